@@ -1,0 +1,6 @@
+find_package(benchmark REQUIRED)
+file(GLOB benchmark_sources CONFIGURE_DEPENDS bench/*.cpp)
+if(benchmark_sources)
+  add_executable(htvm_bench ${benchmark_sources})
+  target_link_libraries(htvm_bench PRIVATE htvm_encoder htvm_decoder htvm_draco htvm_synth benchmark::benchmark_main)
+endif()

@@ -1,0 +1,33 @@
+// The skeleton tracked with a mesh sequence: its bones once, its pose every frame.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace htvm {
+
+using Vector3d = std::array<double, 3>;
+using Rotation = std::array<double, 9>;  // 3x3 rotation matrix, row-major
+
+// A bone b^i runs from joint j^(i,0) to joint j^(i,1) (paper, section IV-A).
+struct Bone {
+    std::uint16_t first = 0;   // index of j^(i,0), the joint that the bone turns about
+    std::uint16_t second = 0;  // index of j^(i,1)
+};
+
+// What stays the same over a sequence.
+struct Skeleton {
+    std::vector<std::string> joint_names;
+    std::vector<Bone> bones;
+};
+
+// S_t: the skeleton in one frame.
+struct Pose {
+    std::vector<Vector3d> joints;        // mm, one per joint of the skeleton
+    std::vector<bool> tracked;           // one per joint, false where the tracker lost it; empty: all tracked
+    std::vector<Rotation> orientations;  // T^i, one per bone; empty: derived from the joints
+};
+
+}  // namespace htvm

@@ -1,0 +1,40 @@
+// The integer lattice on which every decoded position lives (design, section 5): exact on every machine.
+#pragma once
+
+#include <cmath>
+#include <compare>
+#include <cstdint>
+#include <vector>
+
+namespace htvm {
+
+// Lattice coordinates. The lattice step is 2^-lattice_bits mm. |x|, |y|, |z| <= lattice_limit for every decoded
+// vertex, so that a difference fits 26 bits and a squared distance is an exact int64 (and an exact double).
+struct LatticePoint {
+    std::int32_t x = 0, y = 0, z = 0;
+    auto operator<=>(const LatticePoint&) const = default;
+};
+
+inline constexpr std::int32_t lattice_limit = 1 << 24;
+
+inline LatticePoint operator+(LatticePoint a, LatticePoint b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline LatticePoint operator-(LatticePoint a, LatticePoint b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+
+inline bool on_lattice(LatticePoint p) {
+    auto inside = [](std::int32_t c) { return c >= -lattice_limit && c <= lattice_limit; };
+    return inside(p.x) && inside(p.y) && inside(p.z);
+}
+
+// Squared Euclidean distance in lattice units, exact.
+inline std::int64_t squared_distance(LatticePoint a, LatticePoint b) {
+    const std::int64_t dx = std::int64_t{a.x} - b.x, dy = std::int64_t{a.y} - b.y, dz = std::int64_t{a.z} - b.z;
+    return dx * dx + dy * dy + dz * dz;
+}
+
+// Quotient rounded to the nearest integer, halves away from zero; denominator > 0.
+inline std::int64_t divide_rounded(std::int64_t numerator, std::int64_t denominator) {
+    const std::int64_t half = denominator / 2;
+    return numerator >= 0 ? (numerator + half) / denominator : -((-numerator + half) / denominator);
+}
+
+}  // namespace htvm

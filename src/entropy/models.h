@@ -1,0 +1,111 @@
+// Adaptive models of the symbol streams, and how a symbol is cut into binary decisions.
+//
+// Every symbol is coded as binary decisions, each with its own adaptive probability: a small, fast and exact adaptive
+// arithmetic coder. The functions that code a symbol are templates over a Writer with
+//     void bit(BinaryModel&, bool)          one decision under a model, which adapts
+//     void raw(std::uint32_t value, int n)  the n low bits of value, equally likely, n <= 32
+// of which there are two: RangeEncoder (bytes) and CostCounter (bits that the bytes would take, nothing written).
+// Decoding has the same shape with RangeDecoder, in range_decoder.h.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace htvm {
+
+// The probability that the next decision is 1, in 1/65536, adapted by 1/(n + 1.5) for the n-th decision down to
+// 1/128: it learns a stationary source as fast as counting does and follows one that drifts.
+struct BinaryModel {
+    std::uint16_t one = 32768;
+    std::uint8_t seen = 0;
+
+    void update(bool bit);
+};
+
+inline constexpr std::uint8_t model_seen_limit = 127;
+
+// 65536 / (n + 1.5) for n = 0 .. model_seen_limit.
+inline constexpr auto model_rates = [] {
+    std::array<std::uint16_t, model_seen_limit + 1> rates{};
+    for (std::uint32_t n = 0; n <= model_seen_limit; ++n) rates[n] = static_cast<std::uint16_t>(131072u / (2 * n + 3));
+    return rates;
+}();
+
+inline void BinaryModel::update(bool bit) {
+    const std::int32_t target = bit ? 65535 : 0;
+    const std::int32_t step = static_cast<std::int32_t>((std::int64_t{target - one} * model_rates[seen]) >> 16);
+    std::int32_t next = one + step;
+    if (next < 48) next = 48;
+    if (next > 65535 - 48) next = 65535 - 48;
+    one = static_cast<std::uint16_t>(next);
+    if (seen < model_seen_limit) ++seen;
+}
+
+// Symbols 0 .. 2^bits - 1 as a binary tree, most significant bit first.
+class SymbolModel {
+public:
+    explicit SymbolModel(int bits) : bits_(bits), nodes_(std::size_t{1} << bits) {}
+    // For an alphabet of `size` symbols (at least 1).
+    static SymbolModel for_alphabet(std::uint32_t size) {
+        return SymbolModel(static_cast<int>(std::bit_width(size > 1 ? size - 1 : 0u)));
+    }
+    int bits() const { return bits_; }
+    BinaryModel& node(std::uint32_t index) { return nodes_[index]; }
+
+private:
+    int bits_;
+    std::vector<BinaryModel> nodes_;  // node 1 is the root; node n has the children 2n and 2n + 1
+};
+
+template <class Writer>
+void encode_symbol(Writer& writer, SymbolModel& model, std::uint32_t symbol) {
+    std::uint32_t node = 1;
+    for (int i = model.bits() - 1; i >= 0; --i) {
+        const bool bit = (symbol >> i) & 1;
+        writer.bit(model.node(node), bit);
+        node = node * 2 + bit;
+    }
+}
+
+// Whole numbers of any size up to 2^32 - 2: an adaptive exponential Golomb code. u + 1 = 2^k + m: k in unary, then the
+// k bits of m, the top three of them adaptive. Values up to 14 have a fully adaptive distribution.
+struct UnsignedModel {
+    std::array<BinaryModel, 33> prefix;
+    std::array<std::array<BinaryModel, 8>, 33> mantissa;
+};
+
+template <class Writer>
+void encode_unsigned(Writer& writer, UnsignedModel& model, std::uint32_t value) {
+    const std::uint64_t shifted = std::uint64_t{value} + 1;
+    const int k = static_cast<int>(std::bit_width(shifted)) - 1;
+    for (int i = 0; i < k; ++i) writer.bit(model.prefix[static_cast<std::size_t>(i)], true);
+    if (k < 32) writer.bit(model.prefix[static_cast<std::size_t>(k)], false);
+    std::uint32_t node = 1;
+    int left = k;
+    for (; left > 0 && left > k - 3; --left) {
+        const bool bit = (shifted >> (left - 1)) & 1;
+        writer.bit(model.mantissa[static_cast<std::size_t>(k)][node], bit);
+        node = node * 2 + bit;
+    }
+    if (left > 0) writer.raw(static_cast<std::uint32_t>(shifted & ((std::uint64_t{1} << left) - 1)), left);
+}
+
+// Whole numbers of either sign, |v| <= 2^31 - 1: whether zero, the sign, then |v| - 1.
+struct SignedModel {
+    BinaryModel zero;
+    BinaryModel negative;
+    UnsignedModel magnitude;
+};
+
+template <class Writer>
+void encode_signed(Writer& writer, SignedModel& model, std::int32_t value) {
+    writer.bit(model.zero, value == 0);
+    if (value == 0) return;
+    writer.bit(model.negative, value < 0);
+    encode_unsigned(writer, model.magnitude, static_cast<std::uint32_t>(value < 0 ? -value : value) - 1);
+}
+
+}  // namespace htvm
