@@ -1,0 +1,52 @@
+// htvm: the command line. Exit codes: 0 done, 1 bad input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit.
+#include <fmt/core.h>
+
+#include <exception>
+
+#include "commands.h"
+
+namespace {
+
+int exit_code(htvm::ErrorKind kind) {
+    switch (kind) {
+        case htvm::ErrorKind::bad_input:
+            return 1;
+        case htvm::ErrorKind::corrupt_stream:
+            return 3;
+        case htvm::ErrorKind::unsupported:
+            return 4;
+        case htvm::ErrorKind::limit:
+            return 5;
+    }
+    return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app{"htvm compresses human time-varying meshes: captured 3D people, one triangle mesh a frame."};
+    app.footer(
+        "Exit codes: 0 done, 1 bad input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit exceeded.\n"
+        "'htvm COMMAND --help' explains a command.");
+    app.set_version_flag("--version", "htvm " HTVM_VERSION);
+    app.require_subcommand(1);
+    htvm::app::Run run;
+    htvm::app::add_synth(app, run);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
+    try {
+        const auto done = run();
+        if (done) return 0;
+        fmt::print(stderr, "htvm: error: {}\n", done.error().message);
+        return exit_code(done.error().kind);
+    } catch (const std::bad_alloc&) {
+        fmt::print(stderr, "htvm: error: out of memory\n");
+        return 5;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "htvm: error: {}\n", error.what());
+        return 1;
+    }
+}
