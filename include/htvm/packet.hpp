@@ -1,0 +1,58 @@
+// The stream: self-delimiting packets, one a frame, behind a sequence header. docs/bitstream.md is normative.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace htvm {
+
+enum class PacketKind : std::uint8_t {
+    sequence = 1,  // sequence header: needed before any frame; may be repeated
+    intra = 2,     // I-frame
+    enhanced = 3,  // EP-frame: refers to an I-frame
+    codebook = 4,  // a codebook that later EP-frames name
+    index = 5,     // where the I-frames are, at the end of a file; optional
+};
+
+struct Packet {
+    PacketKind kind = PacketKind::sequence;
+    std::uint32_t frame = 0;        // number of the frame that it is, or came with
+    std::uint32_t reference = 0;    // number of the I-frame that it refers to; its own for an I-frame
+    std::int64_t timestamp_us = 0;  // of the frame, microseconds
+    std::vector<std::uint8_t> payload;
+};
+
+inline constexpr std::size_t packet_overhead = 36;  // bytes around the payload: a header of 32 and a CRC of 4
+
+// The packet's bytes, ready to store or send.
+std::vector<std::uint8_t> write_packet(const Packet& packet);
+
+// Cuts a stream of bytes into packets. Push bytes as they come, in pieces of any size, and pull packets until there is
+// none. Damage costs the packets it touches: the reader goes on at the next packet that is whole.
+class PacketReader {
+public:
+    // Packets whose payload is larger count as damage.
+    explicit PacketReader(std::size_t max_payload = std::size_t{1} << 28) : max_payload_(max_payload) {}
+    void push(std::span<const std::uint8_t> bytes);
+    // The next whole packet, or nothing until more bytes are pushed.
+    std::optional<Packet> pull();
+    // Bytes that had to be skipped so far because they are no packet, or one with a wrong CRC.
+    std::uint64_t damaged_bytes() const { return damaged_; }
+    // Bytes pushed that are not part of a packet yet. At the end of a stream they are a packet cut short.
+    std::size_t pending_bytes() const { return buffer_.size() - position_; }
+
+private:
+    void skip(std::size_t bytes);
+    std::size_t max_payload_;
+    std::vector<std::uint8_t> buffer_;
+    std::size_t position_ = 0;
+    std::uint64_t damaged_ = 0;
+};
+
+}  // namespace htvm

@@ -1,0 +1,40 @@
+// Geometry prediction: the reference mesh moved to another frame, bone by bone (paper, section IV-B, eq. 4-5).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "codec/lattice_mesh.h"
+#include "codec/rigid_transform.h"
+#include "codec/skinning.h"
+
+namespace htvm {
+
+// What every EP-frame refers to: the decoded mesh of the last I-frame, skinned, with what both sides derive from it.
+struct ReferenceMesh {
+    LatticeMesh mesh;
+    std::vector<BoneIndex> bone_of_vertex;
+    SubMeshes sub_meshes;
+    std::vector<LatticePoint> pivots;             // one a bone: the mean of its sub-mesh's vertices, or its first joint
+    std::vector<LatticePoint> joints;             // of the I-frame's pose
+    std::vector<QuantisedRotation> orientations;  // T_I^i of each bone
+    std::uint32_t frame = 0;
+};
+
+// Skins the decoded I-mesh and derives the pivots. bones must not be empty.
+ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
+                             std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
+                             std::uint32_t frame, unsigned threads);
+
+// One point moved by a bone's transform; the result is kept within the lattice.
+LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift);
+
+// M_P: the reference vertices moved by their bones' transforms, one transform a bone.
+std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
+                                            std::span<const QuantisedTransform> transforms, unsigned threads);
+
+// The reference's normals turned by their bones' transforms.
+std::vector<QuantisedNormal> predict_normals(const ReferenceMesh& reference,
+                                             std::span<const QuantisedTransform> transforms);
+
+}  // namespace htvm
