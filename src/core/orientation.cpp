@@ -1,0 +1,203 @@
+#include "core/orientation.h"
+
+#include <cmath>
+#include <cstddef>
+
+namespace htvm {
+namespace {
+
+Vector3d operator+(const Vector3d& a, const Vector3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
+Vector3d operator-(const Vector3d& a, const Vector3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+Vector3d operator*(const Vector3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+double dot(const Vector3d& a, const Vector3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vector3d cross(const Vector3d& a, const Vector3d& b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+double length(const Vector3d& a) { return std::sqrt(dot(a, a)); }
+
+// Makes v a unit vector; false where it has no direction: shorter than a millionth of a millimetre, or not finite.
+bool normalise(Vector3d& v) {
+    const double size = length(v);
+    if (!(size > 1e-6) || !std::isfinite(size)) return false;
+    v = v * (1 / size);
+    return true;
+}
+
+Vector3d column(const Rotation& r, std::size_t c) { return {r[c], r[3 + c], r[6 + c]}; }
+
+// The unit vector nearest to the hint among those perpendicular to the unit vector v.
+Vector3d perpendicular(const Vector3d& v, const Vector3d& hint) {
+    Vector3d p = hint - v * dot(hint, v);
+    if (std::isfinite(dot(p, p)) && dot(p, p) > 1e-6 && normalise(p)) return p;
+    std::size_t smallest = 0;
+    for (std::size_t i = 1; i < 3; ++i)
+        if (std::abs(v[i]) < std::abs(v[smallest])) smallest = i;
+    Vector3d axis = {0, 0, 0};
+    axis[smallest] = 1;
+    p = axis - v * dot(axis, v);
+    normalise(p);
+    return p;
+}
+
+// The rotation about a unit axis by the angle of which the cosine and sine are given.
+Rotation axis_rotation(const Vector3d& axis, double cosine, double sine) {
+    Rotation r;
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j) r[3 * i + j] = axis[i] * axis[j] * (1 - cosine) + (i == j ? cosine : 0.0);
+    const Vector3d s = axis * sine;
+    r[1] -= s[2], r[2] += s[1];
+    r[3] += s[2], r[5] -= s[0];
+    r[6] -= s[1], r[7] += s[0];
+    return r;
+}
+
+bool has_joints(const Bone& bone, const Pose& pose) {
+    return bone.first < pose.joints.size() && bone.second < pose.joints.size();
+}
+
+Vector3d direction(const Bone& bone, const Pose& pose) { return pose.joints[bone.second] - pose.joints[bone.first]; }
+
+Rotation reference_orientation(const Skeleton& skeleton, std::size_t b, const Pose& reference) {
+    if (reference.orientations.size() == skeleton.bones.size()) return reference.orientations[b];
+    const Bone& bone = skeleton.bones[b];
+    return bone_orientation(reference.joints[bone.first], reference.joints[bone.second], nullptr);
+}
+
+// The minimal rotation from the reference's bone to this pose's.
+Rotation swing(const Bone& bone, const Pose& pose, const Pose& reference, const Rotation& orientation) {
+    Vector3d from = direction(bone, reference);
+    if (!normalise(from)) from = column(orientation, 0);
+    return minimal_rotation(from, direction(bone, pose), column(orientation, 1));
+}
+
+// For each joint the number of bones between it and the nearer end of bone b; a large number where none lead there.
+std::vector<int> bones_away(const Skeleton& skeleton, const std::vector<std::vector<std::size_t>>& neighbours,
+                            std::size_t b, std::size_t joint_count) {
+    constexpr int unreachable = 1000;
+    std::vector<int> away(joint_count, unreachable);
+    std::vector<std::size_t> queue = {skeleton.bones[b].first, skeleton.bones[b].second};
+    for (const std::size_t joint : queue) away[joint] = 0;
+    for (std::size_t next = 0; next < queue.size(); ++next) {
+        const std::size_t from = queue[next];
+        for (const std::size_t to : neighbours[from]) {
+            if (away[to] <= away[from] + 1) continue;
+            away[to] = away[from] + 1;
+            queue.push_back(to);
+        }
+    }
+    return away;
+}
+
+// The rotation about the bone that brings the joints around it, already swung with it, closest to this pose's
+// (least squares, weight 1/4 for each bone further away). Closed form: only the parts across the bone matter.
+Rotation twist(const Bone& bone, const Pose& pose, const Pose& reference, const Rotation& swung,
+               const std::vector<int>& away) {
+    Vector3d axis = direction(bone, pose);
+    if (!normalise(axis)) return identity_rotation;
+    constexpr int furthest = 8;
+    double cosine = 0, sine = 0, size = 0;
+    for (std::size_t j = 0; j < away.size(); ++j) {
+        if (away[j] == 0 || away[j] > furthest) continue;
+        double weight = 1;
+        for (int hop = 0; hop < away[j]; ++hop) weight *= 0.25;
+        const Vector3d a = rotate(swung, reference.joints[j] - reference.joints[bone.first]);
+        const Vector3d b = pose.joints[j] - pose.joints[bone.first];
+        cosine += weight * (dot(a, b) - dot(a, axis) * dot(b, axis));
+        sine += weight * dot(cross(a, b), axis);
+        size += weight * length(a) * length(b);
+    }
+    // Too little lies across the bone to trust: lean towards no twist, all the more the less there is.
+    const double enough = 0.02 * size;
+    double known = std::sqrt(cosine * cosine + sine * sine);
+    if (known < enough) cosine += enough - known;
+    known = std::sqrt(cosine * cosine + sine * sine);
+    if (!(known > 0) || !std::isfinite(known)) return identity_rotation;
+    return axis_rotation(axis, cosine / known, sine / known);
+}
+
+}  // namespace
+
+Rotation multiply(const Rotation& a, const Rotation& b) {
+    Rotation product;
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j)
+            product[3 * i + j] = a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j];
+    return product;
+}
+
+Vector3d rotate(const Rotation& r, const Vector3d& v) {
+    return {r[0] * v[0] + r[1] * v[1] + r[2] * v[2], r[3] * v[0] + r[4] * v[1] + r[5] * v[2],
+            r[6] * v[0] + r[7] * v[1] + r[8] * v[2]};
+}
+
+Rotation orthonormalised(const Rotation& r) {
+    Vector3d x = {r[0], r[1], r[2]}, y = {r[3], r[4], r[5]};
+    if (!normalise(x)) return identity_rotation;
+    y = y - x * dot(x, y);
+    if (!normalise(y)) return identity_rotation;
+    const Vector3d z = cross(x, y);
+    return {x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]};
+}
+
+Rotation minimal_rotation(const Vector3d& from, const Vector3d& to, const Vector3d& hint) {
+    Vector3d a = from, b = to;
+    if (!normalise(a) || !normalise(b)) return identity_rotation;
+    const Vector3d sum = a + b;
+    const double one_plus_cosine = dot(sum, sum) / 2;  // not 1 + a.b, which cancels where a is nearly -b
+    if (one_plus_cosine < 1e-14) return axis_rotation(perpendicular(a, hint), -1, 0);
+    const Vector3d v = cross(a, b);
+    const double cosine = one_plus_cosine - 1;
+    Rotation r;
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j) r[3 * i + j] = v[i] * v[j] / one_plus_cosine + (i == j ? cosine : 0.0);
+    r[1] -= v[2], r[2] += v[1];
+    r[3] += v[2], r[5] -= v[0];
+    r[6] -= v[1], r[7] += v[0];
+    return orthonormalised(r);
+}
+
+Rotation bone_orientation(const Vector3d& first, const Vector3d& second, const Rotation* previous) {
+    const Rotation& rest = previous ? *previous : identity_rotation;
+    Vector3d along = second - first;
+    if (!normalise(along)) return rest;
+    return orthonormalised(multiply(minimal_rotation(column(rest, 0), along, column(rest, 1)), rest));
+}
+
+std::vector<Rotation> derive_orientations(const Skeleton& skeleton, const Pose& pose, const Pose* reference) {
+    std::vector<Rotation> result(skeleton.bones.size(), identity_rotation);
+    for (std::size_t b = 0; b < skeleton.bones.size(); ++b) {
+        const Bone& bone = skeleton.bones[b];
+        if (!has_joints(bone, pose)) continue;
+        if (reference && has_joints(bone, *reference)) {
+            const Rotation orientation = reference_orientation(skeleton, b, *reference);
+            result[b] = multiply(swing(bone, pose, *reference, orientation), orientation);
+        } else {
+            result[b] = bone_orientation(pose.joints[bone.first], pose.joints[bone.second], nullptr);
+        }
+    }
+    return result;
+}
+
+std::vector<Rotation> derive_turning_orientations(const Skeleton& skeleton, const Pose& pose, const Pose& reference) {
+    const std::size_t joint_count = pose.joints.size();
+    for (const Bone& bone : skeleton.bones)
+        if (!has_joints(bone, pose) || reference.joints.size() != joint_count)
+            return derive_orientations(skeleton, pose, &reference);
+    std::vector<std::vector<std::size_t>> neighbours(joint_count);
+    for (const Bone& bone : skeleton.bones) {
+        neighbours[bone.first].push_back(bone.second);
+        neighbours[bone.second].push_back(bone.first);
+    }
+    std::vector<Rotation> result(skeleton.bones.size());
+    for (std::size_t b = 0; b < skeleton.bones.size(); ++b) {
+        const Bone& bone = skeleton.bones[b];
+        const Rotation orientation = reference_orientation(skeleton, b, reference);
+        const Rotation swung = swing(bone, pose, reference, orientation);
+        const std::vector<int> away = bones_away(skeleton, neighbours, b, joint_count);
+        const Rotation twisted = twist(bone, pose, reference, swung, away);
+        result[b] = orthonormalised(multiply(twisted, multiply(swung, orientation)));
+    }
+    return result;
+}
+
+}  // namespace htvm
