@@ -1,0 +1,45 @@
+// Closest points on a mesh's surface: a bounding volume hierarchy (Embree's) finds the candidates, the distances are
+// computed in double. The hierarchy works in float and is searched a little wider than needed for its rounding, so that
+// the answer is exactly the smallest double distance, whatever the hierarchy looks like.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "htvm/mesh.hpp"
+#include "htvm/result.hpp"
+#include "metrics/mesh_measures.h"
+
+namespace htvm {
+
+// The nearest point of triangle abc to p; a triangle without area counts as its three sides.
+Point3 closest_point_on_triangle(const Point3& p, const Point3& a, const Point3& b, const Point3& c);
+
+struct ClosestTriangle {
+    double squared_distance = 0;  // mm^2
+    std::uint32_t triangle = 0;   // of equally near ones, the lowest index
+};
+
+class SurfaceIndex {
+public:
+    // Indexes the triangles of `mesh`, which must have at least one and must outlive the index. A limit error if
+    // Embree cannot start or runs out of memory.
+    static Result<SurfaceIndex> build(const Mesh& mesh, unsigned threads = 0);
+
+    // The triangle nearest to p, which lies within +-2 * largest_coordinate. `hint` is any triangle, best one that is
+    // expected near: the search starts with its distance; the answer does not depend on it. Threads may call it at
+    // once.
+    ClosestTriangle closest(const Point3& p, std::uint32_t hint = 0) const;
+
+    // Calls visit(triangle) for every triangle that may come nearer to p than `radius` mm (a superset of those that
+    // do), in no particular order, until visit returns false.
+    void visit_near(const Point3& p, double radius, const std::function<bool(std::uint32_t)>& visit) const;
+
+private:
+    struct Impl;
+    SurfaceIndex() = default;
+    std::shared_ptr<const Impl> impl_;
+};
+
+}  // namespace htvm
