@@ -13,7 +13,7 @@ Point3 normalised(const Point3& a) {
     return norm > 0 ? a * (1 / norm) : Point3{};
 }
 
-Result<void> check_mesh(const Mesh& mesh, const std::string& name) {
+Result<void> check_measurable(const Mesh& mesh, const std::string& name) {
     constexpr std::size_t most = std::size_t{1} << 31;
     const std::size_t vertices = mesh.positions.size();
     if (vertices > most || mesh.triangles.size() > most)
@@ -70,7 +70,7 @@ std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh) {
     return first;
 }
 
-std::vector<Vector3f> vertex_normals(const Mesh& mesh) {
+std::vector<Vector3f> welded_normals(const Mesh& mesh) {
     const auto first = first_coincident_vertex(mesh);
     std::vector<Point3> sums(mesh.positions.size());
     for (const auto& t : mesh.triangles) {

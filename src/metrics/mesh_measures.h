@@ -36,7 +36,7 @@ inline constexpr float largest_coordinate = 1e9f;  // mm
 // bad_input unless the mesh is one that the metrics can measure: finite coordinates within +-largest_coordinate,
 // triangle indices < vertex count, at most 2^31 vertices and triangles, attribute arrays empty or one entry a vertex.
 // `name` says in the message which mesh it is. Every other function of src/metrics expects a mesh that passed.
-Result<void> check_mesh(const Mesh& mesh, const std::string& name);
+Result<void> check_measurable(const Mesh& mesh, const std::string& name);
 
 // Axis-aligned box in mm; empty until something was put in.
 struct Box {
@@ -53,7 +53,7 @@ std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh);
 // Unit normals, one per vertex: the sum of the area-weighted normals of the triangles round it. Vertices at the same
 // position share one normal, so that a surface cut along texture seams stays smooth. Zero where no triangle with an
 // area touches the position. The mesh's own normals are not looked at.
-std::vector<Vector3f> vertex_normals(const Mesh& mesh);
+std::vector<Vector3f> welded_normals(const Mesh& mesh);
 
 // Mean length of the three sides over all triangles, mm; 0 without triangles.
 double mean_edge_length(const Mesh& mesh);

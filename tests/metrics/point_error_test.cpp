@@ -154,20 +154,20 @@ TEST(PointError, ColourIsLeftOutWhereOneMeshHasNone) {
     EXPECT_EQ(point_error(a, b).forward.colour_vertices, 0u);
 }
 
-TEST(CheckMesh, RefusesNotANumberAndIndicesOutOfRange) {
+TEST(CheckMeasurable, RefusesNotANumberAndIndicesOutOfRange) {
     Mesh mesh;
     mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     mesh.triangles = {{0, 1, 2}};
-    EXPECT_TRUE(check_mesh(mesh, "original").has_value());
+    EXPECT_TRUE(check_measurable(mesh, "original").has_value());
     Mesh bad = mesh;
     bad.positions[1][2] = std::numeric_limits<float>::quiet_NaN();
-    EXPECT_FALSE(check_mesh(bad, "original").has_value());
+    EXPECT_FALSE(check_measurable(bad, "original").has_value());
     bad = mesh;
     bad.triangles[0][2] = 3;
-    EXPECT_FALSE(check_mesh(bad, "original").has_value());
+    EXPECT_FALSE(check_measurable(bad, "original").has_value());
     bad = mesh;
     bad.colours.resize(2);
-    EXPECT_FALSE(check_mesh(bad, "original").has_value());
+    EXPECT_FALSE(check_measurable(bad, "original").has_value());
 }
 
 }  // namespace

@@ -1,0 +1,52 @@
+// D1 and D2: point-to-point and point-to-plane PSNR of the vertices, in the manner of MPEG's point cloud metric
+// (pc_error; Tian, Ochimizu, Feng, Cohen, Vetro: Geometric distortion metrics for point cloud compression, 2017).
+//
+// Each vertex v of one mesh is compared with the nearest vertex h of the other: D1 takes |v - h|^2, D2 the square of
+// (v - h) . n with n the unit normal at h. The mean over the vertices is the direction's error, the larger of both
+// directions counts (pc_error's symmetric value), and
+//     PSNR = 10 log10(peak^2 / error).
+// The peak is the diagonal of the original sequence's bounding box unless given. pc_error puts 3 p^2 in the numerator
+// for a cube of side p: give peak = p * sqrt(3) for the same numbers. Of vertices at the same distance the lowest index
+// is taken, where pc_error averages them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "htvm/mesh.hpp"
+
+namespace htvm {
+
+// Sums of one direction; the sums of several frames add up.
+struct CloudErrorSums {
+    std::uint64_t vertices = 0;
+    double squared_point = 0;  // mm^2, D1
+    double squared_plane = 0;  // mm^2, D2
+};
+CloudErrorSums& operator+=(CloudErrorSums& sums, const CloudErrorSums& frame);
+
+struct CloudError {
+    CloudErrorSums forward, backward;  // forward: from the original's vertices
+};
+CloudError& operator+=(CloudError& sums, const CloudError& frame);
+
+// One direction, where nearest = nearest_vertices(from.positions, to.positions). The normals are to.normals, or where
+// the mesh has none those of its triangles, weighted by area. A vertex without a normal (no triangle with an area, a
+// zero vector) counts the whole distance. Nothing to compare with: infinite.
+CloudErrorSums sum_cloud_errors(const Mesh& from, const Mesh& to, std::span<const std::uint32_t> nearest);
+
+// One frame, both directions.
+CloudError cloud_error(const Mesh& original, const Mesh& decoded, unsigned threads = 0);
+
+// 10 log10(peak^2 / error) in dB. Infinity where the error is 0, minus infinity where it is infinite or the peak 0.
+double psnr(double peak, double mean_squared_error);
+
+// The larger mean squared error of both directions, mm^2; 0 where nothing was compared.
+double d1_error(const CloudError& sums);
+double d2_error(const CloudError& sums);
+
+// dB; peak in mm.
+double d1_psnr(const CloudError& sums, double peak);
+double d2_psnr(const CloudError& sums, double peak);
+
+}  // namespace htvm
