@@ -1,0 +1,31 @@
+// The JSON that Azure Kinect body tracking's offline processor writes: 32 joints in mm, in the depth camera's
+// coordinates (x right, y down, z away), quaternions per joint, any number of bodies per frame.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string_view>
+
+#include "htvm/result.hpp"
+#include "io/skeleton_track.h"
+
+namespace htvm {
+
+// Reads
+//   {"joint_names": [32 names], "bone_list": [[name, name], ...],
+//    "frames": [{"timestamp_usec": n, "frame_id": n, "num_bodies": n,
+//                "bodies": [{"body_id": n, "joint_positions": [[x, y, z] x 32],
+//                            "joint_orientations": [[w, x, y, z] x 32]}]}]}
+// The body seen in most frames is taken (the first seen among equals; a note says how many there were); a frame
+// without it is a missing frame. Absent joint_names or bone_list: the sensor's own 32 joints and 31 bones. Bones are
+// turned to run away from the pelvis, where the names are the sensor's (its list runs from the chest down), and each
+// is oriented as its first joint. Time starts at the first frame; fps is that of the median interval; without
+// timestamps: 30 fps. Errors (bad_input, limit) name the frame and the joint.
+Result<SkeletonTrack> parse_skeleton_azure(std::string_view text);
+
+// The same from parsed JSON.
+Result<SkeletonTrack> skeleton_from_azure(const nlohmann::json& document);
+
+// Whether parsed JSON looks like the above: frames of bodies.
+bool looks_like_azure(const nlohmann::json& document);
+
+}  // namespace htvm

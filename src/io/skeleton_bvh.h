@@ -1,0 +1,24 @@
+// BVH motion capture files: a joint hierarchy with its rest offsets, and Euler angles per frame.
+#pragma once
+
+#include <string_view>
+
+#include "htvm/result.hpp"
+#include "io/skeleton_track.h"
+
+namespace htvm {
+
+struct BvhOptions {
+    double mm_per_unit = 0;  // mm for one unit of the file; 0: guessed from the skeleton's height, and said in a note
+};
+
+// Reads a BVH text: joint positions by forward kinematics (rotations in the order of the channels, degrees), in mm;
+// bones from each joint to its children, end sites included (named "PARENT end"), oriented as their first joint.
+// BVH has no units: a skeleton lower than 10 is taken as metres, lower than 600 as centimetres, else as mm.
+// Position channels count from the parent: in place of the joint's OFFSET where the first frame's lie nearer to the
+// OFFSET than to zero (they repeat it), else on top of it; said in a note where the two differ.
+// Errors: bad_input with the line, or the frame; unsupported for several roots or scale channels; limit for too many
+// joints, or motion that would take far more memory than the file.
+Result<SkeletonTrack> parse_skeleton_bvh(std::string_view text, const BvhOptions& options = {});
+
+}  // namespace htvm
