@@ -1,0 +1,220 @@
+#include "synth/appearance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "synth/random.h"
+
+namespace htvm::synth {
+namespace {
+
+using Eigen::Vector3d;
+
+// Where one material ends and the next begins, rest mm.
+constexpr double collar_height = 1458, hem_height = 925, cuff_height = 112, sleeve_end = 368, arm_begin = 215;
+
+double smooth_step(double u) {
+    u = std::clamp(u, 0.0, 1.0);
+    return u * u * (3.0 - 2.0 * u);
+}
+
+double lattice_value(std::int64_t x, std::int64_t y, std::int64_t z) {
+    const std::uint64_t key = static_cast<std::uint64_t>(x) * 0x8da6b343u ^
+                              static_cast<std::uint64_t>(y) * 0xd8163841u ^ static_cast<std::uint64_t>(z) * 0xcb1ab31fu;
+    return static_cast<double>(mix_bits(key) >> 11) * 0x1p-52 - 1.0;
+}
+
+// Smooth noise in [-1, 1] with features about one unit wide.
+double value_noise(double x, double y, double z) {
+    const double fx = std::floor(x), fy = std::floor(y), fz = std::floor(z);
+    const auto ix = static_cast<std::int64_t>(fx), iy = static_cast<std::int64_t>(fy),
+               iz = static_cast<std::int64_t>(fz);
+    const double u = smooth_step(x - fx), v = smooth_step(y - fy), w = smooth_step(z - fz);
+    const auto along_x = [&](std::int64_t dy, std::int64_t dz) {
+        const double a = lattice_value(ix, iy + dy, iz + dz), b = lattice_value(ix + 1, iy + dy, iz + dz);
+        return a + u * (b - a);
+    };
+    const auto along_y = [&](std::int64_t dz) {
+        const double a = along_x(0, dz), b = along_x(1, dz);
+        return a + v * (b - a);
+    };
+    const double a = along_y(0), b = along_y(1);
+    return a + w * (b - a);
+}
+
+// Ridges where the noise crosses zero, as cloth folds: in [-1, 1].
+double ridges(double x, double y, double z) {
+    const double n = 1.0 - std::min(1.0, 2.2 * std::abs(value_noise(x, y, z)));
+    return 2.0 * n * n - 1.0;
+}
+
+// 1 at the centre of an ellipse in the frontal plane, 0 outside it.
+double spot(const Vector3d& q, double x, double y, double radius_x, double radius_y) {
+    const double u = (std::abs(q.x()) - x) / radius_x, v = (q.y() - y) / radius_y;
+    return smooth_step(1.5 * (1.0 - std::sqrt(u * u + v * v)));
+}
+
+bool on_arm(const Vector3d& q) { return std::abs(q.x()) > arm_begin && q.y() > 1200; }
+
+// Positive where hair grows, mm from the hairline: high on the brow, low at the nape.
+double hair_depth(const Vector3d& q) { return q.y() - 1592 - 100 * smooth_step((q.z() + 40) / 110); }
+
+double head_relief(const Vector3d& q) {
+    double relief = 0;
+    const double hair = hair_depth(q);
+    if (hair > -5) {
+        const double strands = value_noise(q.x() / 11, q.y() / 38, q.z() / 15);
+        relief +=
+            smooth_step((hair + 5) / 12) * (10 + 2.2 * strands + 2 * value_noise(q.x() / 34, q.y() / 34, q.z() / 34));
+    }
+    if (q.z() > 45) {
+        relief -= 4.5 * spot(q, 30, 1655, 21, 12);  // eye sockets
+        relief += 2.2 * spot(q, 30, 1654, 12, 8);   // eyeballs
+        relief += 3.0 * spot(q, 30, 1673, 24, 8);   // brows
+        relief += 2.6 * spot(q, 0, 1596, 24, 5.5);  // upper lip
+        relief += 3.0 * spot(q, 0, 1586, 19, 5.5);  // lower lip
+        relief -= 2.0 * spot(q, 0, 1575, 16, 5);    // under the lip
+        relief += 1.5 * spot(q, 42, 1622, 18, 16);  // cheeks
+    }
+    return relief;
+}
+
+double arm_relief(const Vector3d& q) {
+    const double along = std::abs(q.x());
+    const double sleeve = smooth_step((sleeve_end - along) / 7);
+    const double flare = 5.5 * smooth_step((along - 290) / 70);
+    const double folds = 2.4 * ridges(q.x() / 42, q.y() / 90, q.z() / 90 + 7);
+    const double skin = 0.35 * value_noise(q.x() / 26, q.y() / 26, q.z() / 26);
+    return sleeve * (2.5 + flare + folds) + (1 - sleeve) * skin;
+}
+
+double torso_relief(const Vector3d& q) {
+    const double collar = 3.5 * smooth_step((q.y() - 1432) / 12) * smooth_step((collar_height - q.y()) / 6);
+    const double lower = smooth_step((1250 - q.y()) / 250);
+    const double side = q.x() >= 0 ? 1.0 : -1.0;
+    const double folds = ridges((q.y() + 0.55 * side * q.x()) / 62, (q.x() - 0.4 * side * q.y()) / 150, q.z() / 130);
+    const double hang = ridges(q.x() / 55, q.y() / 260, q.z() / 55 + 3);
+    const double hem = 6.0 * (1 - smooth_step((q.y() - hem_height) / 130));
+    return 2 + collar + hem + (1.6 + 1.8 * lower) * folds + 1.6 * (1 - lower) * hang +
+           0.8 * value_noise(q.x() / 24, q.y() / 24, q.z() / 24);
+}
+
+double leg_relief(const Vector3d& q) {
+    const double knee = std::exp(-std::pow((q.y() - 495) / 95, 2)), bottom = smooth_step((330 - q.y()) / 180);
+    const double folds = ridges(q.x() / 95, q.y() / (38 + 20 * (1 - knee)), q.z() / 95 + 11);
+    const double cuff = 5.0 * smooth_step((190 - q.y()) / 70);
+    const double seam = 1.2 * std::exp(-std::pow((q.z() + 6) / 5, 2)) * (std::abs(q.x()) > 100 ? 1 : 0);
+    const double pocket = q.y() > 790 && q.y() < 870 && q.z() < -60 ? 1.5 : 0.0;
+    return 1.5 + (1.2 + 2.2 * knee + 2.2 * bottom) * folds + cuff + seam + pocket +
+           0.7 * value_noise(q.x() / 22, q.y() / 22, q.z() / 22);
+}
+
+double shoe_relief(const Vector3d& q) {
+    const double sole = 3.5 * smooth_step((26 - q.y()) / 5);
+    const double tongue = q.y() > 55 && std::abs(std::abs(q.x()) - 103) < 20 ? 2.0 : 0.0;
+    const double laces = tongue > 0 && q.z() > 5 ? 1.2 * std::sin(q.z() * 0.42) : 0.0;
+    return sole + tongue + laces;
+}
+
+// Colours are worked out in 0..255 and rounded once.
+Vector3d mix(const Vector3d& a, const Vector3d& b, double weight) { return a + std::clamp(weight, 0.0, 1.0) * (b - a); }
+
+Vector3d skin_colour(const Vector3d& q) {
+    const double blotches = value_noise(q.x() / 45, q.y() / 45, q.z() / 45 + 5);
+    const double pores = value_noise(q.x() / 13, q.y() / 13, q.z() / 13);
+    return Vector3d(211, 160, 131) + blotches * Vector3d(7, 9, 8) + pores * Vector3d(4, 4, 4);
+}
+
+Vector3d head_colour(const Vector3d& q) {
+    Vector3d colour = skin_colour(q);
+    if (q.z() > 45) {
+        colour = mix(colour, {214, 120, 104}, 0.5 * spot(q, 45, 1618, 24, 18));
+        colour = mix(colour, {178, 88, 84}, 1.4 * spot(q, 0, 1591, 26, 11));
+        colour = mix(colour, {96, 46, 46}, 1.2 * spot(q, 0, 1591, 24, 2.6));
+        colour = mix(colour, {74, 50, 36}, 1.5 * spot(q, 31, 1676, 24, 6.5));
+        colour = mix(colour, {236, 232, 226}, 2.0 * spot(q, 30, 1655, 16, 8));
+        colour = mix(colour, {62, 84, 102}, 2.0 * spot(q, 30, 1655, 8, 8));
+        colour = mix(colour, {24, 22, 24}, 1.5 * spot(q, 30, 1655, 4, 4));
+        colour = mix(colour, {120, 70, 60}, 1.0 * spot(q, 8, 1612, 6, 5));  // nostrils
+    }
+    const double edge = hair_depth(q) + 5 * value_noise(q.x() / 14, q.y() / 14, q.z() / 14);
+    const double strands = value_noise(q.x() / 9, q.y() / 45, q.z() / 12);
+    const Vector3d hair = Vector3d(70, 46, 30) + strands * Vector3d(24, 18, 12);
+    return mix(colour, hair, smooth_step(edge / 6));
+}
+
+// A shirt of blue and white bands that a thin red line crosses, with a round badge on the chest.
+Vector3d shirt_colour(const Vector3d& q) {
+    const bool arm = on_arm(q);
+    const double along = arm ? std::abs(q.x()) : q.y();
+    const double band = std::sin(along * 0.105), line = std::sin((arm ? q.z() : q.x()) * 0.14);
+    Vector3d colour = mix({42, 82, 146}, {205, 212, 218}, smooth_step(2.2 * band + 0.5));
+    colour = mix(colour, {178, 50, 52}, smooth_step((line - 0.9) * 14));
+    if (!arm && q.z() > 40) {
+        const double radius = std::hypot(q.x(), q.y() - 1290);
+        const double angle = std::atan2(q.x(), q.y() - 1290);
+        const double star = 30 + 15 * std::cos(5 * angle);
+        colour = mix(colour, {238, 186, 56}, smooth_step((72 - radius) / 5));
+        colour = mix(colour, {40, 44, 62}, smooth_step((star - radius) / 5));
+    }
+    const double edge = arm ? sleeve_end - along : q.y() - hem_height;
+    colour = mix(colour, {30, 52, 92}, smooth_step((18 - edge) / 5));
+    if (q.y() > 1440) colour = mix(colour, {30, 52, 92}, smooth_step((q.y() - 1440) / 4));
+    const double weave = value_noise(q.x() / 11, q.y() / 11, q.z() / 11);
+    return colour * (1.0 + 0.06 * weave);
+}
+
+Vector3d trouser_colour(const Vector3d& q) {
+    const double wash = value_noise(q.x() / 120, q.y() / 160, q.z() / 120),
+                 grain = value_noise(q.x() / 10, q.y() / 26, q.z() / 10);
+    Vector3d colour = Vector3d(66, 70, 84) + wash * Vector3d(12, 12, 13) + grain * Vector3d(11, 11, 12);
+    if (q.y() > 885) colour = mix(colour, {52, 36, 26}, smooth_step((q.y() - 885) / 4));  // belt
+    const bool pocket_edge = q.z() < -60 && q.y() > 782 && q.y() < 792;
+    return pocket_edge ? mix(colour, {140, 110, 70}, 0.6) : colour;
+}
+
+Vector3d shoe_colour(const Vector3d& q) {
+    const double scuff = value_noise(q.x() / 16, q.y() / 16, q.z() / 16);
+    Vector3d colour = Vector3d(128, 44, 40) + scuff * Vector3d(10, 6, 6);
+    if (q.y() > 55 && std::abs(std::abs(q.x()) - 103) < 20 && q.z() > 5)
+        colour = mix(colour, {235, 232, 224}, smooth_step(2 * std::sin(q.z() * 0.42)));  // laces
+    return mix(colour, {226, 224, 216}, smooth_step((27 - q.y()) / 4));
+}
+
+std::uint8_t to_byte(double value) { return static_cast<std::uint8_t>(std::clamp(std::lround(value), 0l, 255l)); }
+
+}  // namespace
+
+double surface_relief(const Vector3d& q) {
+    if (on_arm(q)) return arm_relief(q);
+    // The regions' reliefs fade into each other over a few millimetres, steep as a hem is but without a jump.
+    if (q.y() > collar_height) return mix({head_relief(q), 0, 0}, {2, 0, 0}, (collar_height + 4 - q.y()) / 4).x();
+    if (q.y() > hem_height) return torso_relief(q);
+    if (q.y() > hem_height - 6) {
+        const double w = smooth_step((q.y() - (hem_height - 6)) / 6);
+        return (1 - w) * leg_relief(q) + w * torso_relief(q);
+    }
+    if (q.y() > cuff_height) return leg_relief(q);
+    const double w = smooth_step((q.y() - (cuff_height - 7)) / 7);
+    return w > 0 ? w * leg_relief(q) + (1 - w) * shoe_relief(q) : shoe_relief(q);
+}
+
+Colour surface_colour(const Vector3d& q) {
+    Vector3d colour;
+    if (on_arm(q)) {
+        colour = std::abs(q.x()) < sleeve_end ? shirt_colour(q) : skin_colour(q);
+    } else if (q.y() > collar_height) {
+        colour = head_colour(q);
+    } else if (q.y() > hem_height - 3) {
+        colour = shirt_colour(q);
+    } else {
+        colour = q.y() > cuff_height - 3 ? trouser_colour(q) : shoe_colour(q);
+    }
+    // Hollows are darker, as in a capture's texture.
+    const bool cloth = on_arm(q) ? std::abs(q.x()) < sleeve_end : q.y() < collar_height && q.y() > cuff_height;
+    if (cloth) colour *= std::clamp(0.94 + 0.025 * (surface_relief(q) - 3.0), 0.82, 1.06);
+    return {to_byte(colour.x()), to_byte(colour.y()), to_byte(colour.z())};
+}
+
+}  // namespace htvm::synth

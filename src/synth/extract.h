@@ -1,0 +1,47 @@
+// From the body's function to a triangle mesh: marching tetrahedra over a regular grid, of which only the bricks that
+// the surface enters are visited.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "htvm/mesh.hpp"
+#include "synth/body.h"
+
+namespace htvm::synth {
+
+// Grid corner (i, j, k) lies at origin + rotation * (cell * (i, j, k)).
+struct Grid {
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+    double cell = 10;  // mm
+};
+
+// Which parts of the body matter in each brick of the grid that the surface enters.
+struct BrickMap {
+    Grid grid;
+    std::unordered_map<std::uint64_t, PartSet> candidates;  // by brick_key
+
+    PartSet at(const Eigen::Vector3d& world) const;  // all parts where no brick is
+};
+
+// Where on a grid edge a vertex lies: at share * edge from the edge's lower corner.
+struct EdgePlace {
+    Eigen::Vector3d edge;  // the whole edge, world mm
+    double share = 0;      // in (0, 1)
+};
+
+struct Extraction {
+    std::vector<Eigen::Vector3d> positions;  // on the grid's edges and diagonals
+    std::vector<EdgePlace> places;           // one per position
+    std::vector<Triangle> triangles;         // counter-clockwise seen from outside; closed and manifold
+    BrickMap bricks;
+};
+
+// The surface of the posed body over a grid; the same for any number of threads. About 4.5 vertices per squared cell of
+// surface. Details thinner than a cell are lost.
+Extraction extract_surface(const PosedBody& body, const Grid& grid, unsigned threads);
+
+}  // namespace htvm::synth

@@ -1,0 +1,245 @@
+#include "synth/synth.h"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "core/parallel.h"
+#include "synth/appearance.h"
+#include "synth/body.h"
+#include "synth/extract.h"
+#include "synth/motion.h"
+#include "synth/random.h"
+#include "synth/remesh.h"
+
+namespace htvm {
+namespace {
+
+using namespace synth;
+using Eigen::Vector3d;
+
+constexpr int fewest_vertices = 100, most_vertices = 2000000;
+
+// The streams of random numbers that a frame uses.
+enum Stream : std::uint64_t { grid_stream, count_stream, jitter_stream, surface_stream, joint_stream };
+
+RandomKey frame_key(const SynthOptions& options, int frame) {
+    return derive_key(RandomKey{mix_bits(options.seed)}, static_cast<std::uint64_t>(static_cast<std::uint32_t>(frame)));
+}
+
+// An extraction has about this many vertices times squared cell size, mm^2: 4.5 a cell times the body's surface.
+constexpr double vertices_times_cell2 = 8.6e6;
+
+// The cells are small enough for half as many vertices again as are kept: the shortest edges are then collapsed, which
+// leaves no trace of the grid. Coarser cells than 26 mm would lose the limbs.
+Grid free_grid(RandomKey key, double vertices) {
+    Grid grid;
+    grid.cell = std::min(26.0, std::sqrt(vertices_times_cell2 / (1.6 * vertices)));
+    const Eigen::Quaterniond turn(random_gaussian(key, 0), random_gaussian(key, 1), random_gaussian(key, 2),
+                                  random_gaussian(key, 3));
+    grid.rotation = turn.normalized().toRotationMatrix();
+    for (int axis = 0; axis < 3; ++axis) grid.origin[axis] = grid.cell * random_uniform(key, 100 + axis);
+    return grid;
+}
+
+Grid lattice_grid(double vertices) {
+    Grid grid;
+    grid.cell = std::min(90.0, std::sqrt(vertices_times_cell2 / vertices));
+    return grid;
+}
+
+// Moves every vertex along its normal onto the surface.
+void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, int rounds, unsigned threads) {
+    const auto normals = vertex_normals(mesh, threads);
+    const double longest_step = bricks.grid.cell;
+    parallel_for(normals.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) {
+            if (mesh.outgoing[v] == dead_half_edge) continue;
+            Vector3d& position = mesh.positions[v];
+            for (int round = 0; round < rounds; ++round) {
+                const double distance = evaluate_body(body, bricks.at(position), position).distance;
+                position -= std::clamp(distance, -longest_step, longest_step) * normals[v];
+            }
+        }
+    });
+}
+
+double mean_edge_length(const HalfEdgeMesh& mesh) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t e = 0; e < mesh.origin.size(); ++e) {
+        if (mesh.origin[e] == dead_half_edge) continue;
+        sum += (mesh.positions[mesh.origin[e]] - mesh.positions[mesh.origin[mesh.twin[e]]]).norm();
+        ++count;
+    }
+    return count > 0 ? sum / static_cast<double>(count) : 0.0;
+}
+
+// Moves every vertex by a random tenth or so of the spacing along the surface.
+void jitter(HalfEdgeMesh& mesh, RandomKey key) {
+    const auto normals = vertex_normals(mesh, 1);
+    const double size = 0.1 * mean_edge_length(mesh);
+    for (std::size_t v = 0; v < normals.size(); ++v) {
+        const Vector3d step(random_gaussian(key, 3 * v), random_gaussian(key, 3 * v + 1),
+                            random_gaussian(key, 3 * v + 2));
+        const double length = std::min(step.norm(), 2.5);
+        const Vector3d bounded = step.normalized() * length;
+        mesh.positions[v] += size * (bounded - bounded.dot(normals[v]) * normals[v]);
+    }
+}
+
+// As many vertices as wanted, evenly but randomly spread over the surface.
+void remesh(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, std::size_t vertices, RandomKey key,
+            unsigned threads) {
+    collapse_to(mesh, vertices);
+    compact(mesh);
+    flip_to_delaunay(mesh);
+    relax(mesh, 0.7, threads);
+    project(mesh, body, bricks, 1, threads);
+    flip_to_delaunay(mesh);
+    relax(mesh, 0.5, threads);
+    jitter(mesh, key);
+    project(mesh, body, bricks, 2, threads);
+    flip_to_delaunay(mesh);
+    project(mesh, body, bricks, 1, threads);
+}
+
+void scale_to_power(std::vector<double>& values, double power) {
+    double sum = 0;
+    for (const double value : values) sum += value * value;
+    const double factor = sum > 0 ? std::sqrt(power * static_cast<double>(values.size()) / sum) : 0.0;
+    for (double& value : values) value *= factor;
+}
+
+// Every value half-way towards the mean of its neighbours.
+std::vector<double> smoothed(const HalfEdgeMesh& mesh, const std::vector<double>& values) {
+    std::vector<double> sums(values.size(), 0.0);
+    for (std::size_t e = 0; e < mesh.origin.size(); ++e) sums[mesh.origin[e]] += values[mesh.origin[mesh.twin[e]]];
+    for (std::size_t v = 0; v < values.size(); ++v)
+        sums[v] = 0.5 * values[v] + 0.5 * sums[v] / std::max(mesh.valence[v], 1u);
+    return sums;
+}
+
+// Noise of a mean square of `power` with the spectrum of a reconstruction's: two thirds is correlated with the next
+// vertex, a third over several. One value per vertex, mm.
+std::vector<double> reconstruction_noise(const HalfEdgeMesh& mesh, double power, RandomKey key) {
+    std::vector<double> fine(mesh.positions.size()), coarse(mesh.positions.size());
+    for (std::size_t v = 0; v < fine.size(); ++v) {
+        fine[v] = random_gaussian(key, 2 * v);
+        coarse[v] = random_gaussian(key, 2 * v + 1);
+    }
+    fine = smoothed(mesh, fine);
+    for (int round = 0; round < 8; ++round) coarse = smoothed(mesh, coarse);
+    scale_to_power(fine, 2.0 / 3.0);
+    scale_to_power(coarse, 1.0 / 3.0);
+    for (std::size_t v = 0; v < fine.size(); ++v) fine[v] += coarse[v];
+    scale_to_power(fine, power);
+    return fine;
+}
+
+void add_noise_along_normals(HalfEdgeMesh& mesh, const std::vector<double>& noise, unsigned threads) {
+    const auto normals = vertex_normals(mesh, threads);
+    for (std::size_t v = 0; v < normals.size(); ++v) mesh.positions[v] += noise[v] * normals[v];
+}
+
+// Moves lattice vertices along their edges by as much as changes their distance to the surface by the noise, and never
+// past the edge's ends.
+void add_noise_along_edges(HalfEdgeMesh& mesh, const std::vector<EdgePlace>& places, const std::vector<double>& noise,
+                           unsigned threads) {
+    const auto normals = vertex_normals(mesh, threads);
+    for (std::size_t v = 0; v < normals.size(); ++v) {
+        const double rise = places[v].edge.dot(normals[v]);  // of the distance, over the whole edge
+        const double steep = std::max(std::abs(rise), 0.2 * places[v].edge.norm());
+        const double share = places[v].share + std::copysign(noise[v] / steep, noise[v] * rise);
+        mesh.positions[v] += (std::clamp(share, 0.02, 0.98) - places[v].share) * places[v].edge;
+    }
+}
+
+Vector3f to_float(const Vector3d& p) {
+    return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
+}
+
+std::vector<Colour> sample_colours(const HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks,
+                                   unsigned threads) {
+    std::vector<Colour> colours(mesh.positions.size());
+    parallel_for(colours.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v) {
+            const Vector3d& position = mesh.positions[v];
+            colours[v] = surface_colour(evaluate_body(body, bricks.at(position), position).rest);
+        }
+    });
+    return colours;
+}
+
+Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey key, unsigned threads) {
+    const double vertices = std::clamp(options.vertices, fewest_vertices, most_vertices);
+    const double wanted = vertices * (0.97 + 0.06 * random_uniform(derive_key(key, count_stream), 0));
+    const Grid grid = options.lattice ? lattice_grid(vertices) : free_grid(derive_key(key, grid_stream), wanted);
+    const Extraction extraction = extract_surface(body, grid, threads);
+    // A reconstruction drops specks; on the lattice every vertex stays where its edge is.
+    const std::size_t fewest = options.lattice ? 0 : extraction.triangles.size() / 100;
+    HalfEdgeMesh surface = build_half_edges(extraction.positions, extraction.triangles, fewest);
+    if (!options.lattice)
+        remesh(surface, body, extraction.bricks, static_cast<std::size_t>(wanted), derive_key(key, jitter_stream),
+               threads);
+
+    Mesh mesh;
+    mesh.triangles = triangles_of(surface);
+    if (options.colours) mesh.colours = sample_colours(surface, body, extraction.bricks, threads);
+    const auto noise =
+        reconstruction_noise(surface, std::max(0.0, options.surface_noise_power), derive_key(key, surface_stream));
+    if (options.lattice)
+        add_noise_along_edges(surface, extraction.places, noise, threads);
+    else
+        add_noise_along_normals(surface, noise, threads);
+    for (const auto& position : surface.positions) mesh.positions.push_back(to_float(position));
+    if (options.normals)
+        for (const auto& normal : vertex_normals(surface, threads)) mesh.normals.push_back(to_float(normal));
+    return mesh;
+}
+
+}  // namespace
+
+Skeleton synth_skeleton() {
+    Skeleton skeleton;
+    skeleton.joint_names = {"head",  "neck", "torso", "lshoulder", "lelbow", "lhand", "rshoulder", "relbow",
+                            "rhand", "lhip", "lknee", "lfoot",     "rhip",   "rknee", "rfoot"};
+    skeleton.bones = {{1, 0}, {1, 3}, {3, 4},  {4, 5},   {1, 6},  {6, 7},   {7, 8},
+                      {2, 1}, {2, 9}, {9, 10}, {10, 11}, {2, 12}, {12, 13}, {13, 14}};
+    return skeleton;
+}
+
+Result<void> check_synth_options(const SynthOptions& options) {
+    if (options.vertices < fewest_vertices || options.vertices > most_vertices)
+        return fail(ErrorKind::bad_input, "a synthetic frame can have " + std::to_string(fewest_vertices) + " to " +
+                                              std::to_string(most_vertices) + " vertices, not " +
+                                              std::to_string(options.vertices));
+    if (!(options.fps >= 0.1 && options.fps <= 10000))
+        return fail(ErrorKind::bad_input, "the frame rate must be between 0.1 and 10000 frames a second");
+    if (!(options.surface_noise_power >= 0 && options.surface_noise_power <= 100))
+        return fail(ErrorKind::bad_input, "the surface noise power must be between 0 and 100 mm^2");
+    if (!(options.joint_noise_power >= 0 && options.joint_noise_power <= 1e6))
+        return fail(ErrorKind::bad_input, "the joint noise power must be between 0 and 1000000 mm^2");
+    return {};
+}
+
+SynthFrame synth_frame(const SynthOptions& options, int frame, unsigned threads) {
+    const double fps = options.fps >= 0.1 ? std::min(options.fps, 10000.0) : 0.1;
+    const PosedBody body = pose_body(std::max(0, frame) / fps);
+    const RandomKey key = frame_key(options, frame);
+    SynthFrame result;
+    for (const auto& joint : body.joints) result.true_pose.joints.push_back({joint.x(), joint.y(), joint.z()});
+    result.pose = result.true_pose;
+    const RandomKey joint_key = derive_key(key, joint_stream);
+    const double deviation = std::sqrt(std::max(0.0, options.joint_noise_power));
+    for (std::size_t j = 0; j < result.pose.joints.size(); ++j)
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            result.pose.joints[j][axis] += deviation * random_gaussian(joint_key, 3 * j + axis);
+    result.mesh = frame_mesh(options, body, key, threads);
+    return result;
+}
+
+}  // namespace htvm

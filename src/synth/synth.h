@@ -1,0 +1,42 @@
+// The synthetic capture: a dressed person who moves, re-meshed in every frame as a reconstruction would be, with the
+// skeleton that a tracker would give. Any frame can be made on its own, and is the same for any number of threads.
+#pragma once
+
+#include <cstdint>
+
+#include "htvm/mesh.hpp"
+#include "htvm/result.hpp"
+#include "htvm/skeleton.hpp"
+
+namespace htvm {
+
+struct SynthOptions {
+    std::uint64_t seed = 1;  // of everything random: sampling and noise; the motion does not depend on it
+    int vertices = 35000;    // about how many a frame has, 100 to 2,000,000; each frame's own within 3 %
+    double fps = 30;         // frames a second, > 0
+    double surface_noise_power =
+        2.25;                       // mm^2, mean square of the reconstruction noise along the normal; new every frame
+    double joint_noise_power = 25;  // mm^2, variance of each joint coordinate's Gaussian noise (paper, Fig. 20)
+    bool lattice = false;           // leave the vertices on the edges and diagonals of one fixed, axis-aligned grid;
+                                    // then the number of vertices varies with the pose, and is at least about 1,000
+    bool colours = true;            // give vertices colours
+    bool normals = false;           // give vertices normals
+};
+
+struct SynthFrame {
+    Mesh mesh;       // closed and manifold; mm, y up, the ground at y = 0
+    Pose pose;       // what a tracker would say: true_pose with noise
+    Pose true_pose;  // without noise
+};
+
+// 15 joints and 14 bones, as in the paper's Fig. 3; bones in the same order as the joints' chains.
+Skeleton synth_skeleton();
+
+// Says what is wrong with options (bad_input), if anything.
+Result<void> check_synth_options(const SynthOptions& options);
+
+// The frame at frame / fps seconds. Frame 0 is a T-pose that faces +z; negative frames are frame 0's pose. Options out
+// of their ranges are clamped to them.
+SynthFrame synth_frame(const SynthOptions& options, int frame, unsigned threads = 1);
+
+}  // namespace htvm
