@@ -1,0 +1,27 @@
+// Draco files (.drc), meshes and point clouds, through libdraco.
+//
+// Positions are floats or integers (taken as they are); colours have 3 or 4 components (alpha is dropped), of 8 bits,
+// of 16 bits, or floats 0..1; normals have 3 components, texture coordinates 2. Of several attributes of one kind the
+// first counts. Each of Draco's points becomes a vertex, in Draco's order, with the attributes mapped to it, so that a
+// vertex on a seam of an attribute stands once for each side. Faces keep their order and orientation.
+//
+// Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
+//
+// Bytes that nobody checked: the counts in the header are compared with the size of the file before libdraco sees it,
+// its exceptions become errors and what it gives is checked; how it reads in between is its own affair.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "htvm/mesh.hpp"
+#include "htvm/result.hpp"
+#include "io/mesh_check.h"
+
+namespace htvm {
+
+// Errors: bad_input where the bytes are no Draco file, are cut off or damaged, hold no positions, or a position is not
+// finite; unsupported for bitstreams before 2.2 (Draco 1.2, 2017) and for other attribute layouts; limit.
+Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
+
+}  // namespace htvm

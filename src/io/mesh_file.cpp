@@ -1,0 +1,169 @@
+#include "io/mesh_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "io/drc.h"
+#include "io/obj.h"
+#include "io/ply.h"
+
+namespace htvm {
+
+namespace {
+
+enum class MeshFormat { ply, obj, drc };
+
+std::optional<MeshFormat> format_of(const std::filesystem::path& path) {
+    std::string extension = path.extension().string();
+    std::transform(extension.begin(), extension.end(), extension.begin(),
+                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    if (extension == ".ply") return MeshFormat::ply;
+    if (extension == ".obj") return MeshFormat::obj;
+    if (extension == ".drc") return MeshFormat::drc;
+    return std::nullopt;
+}
+
+tl::unexpected<Error> fail_at(const std::filesystem::path& path, ErrorKind kind, const std::string& message) {
+    return fail(kind, path.string() + ": " + message);
+}
+
+tl::unexpected<Error> fail_at(const std::filesystem::path& path, const Error& error) {
+    return fail_at(path, error.kind, error.message);
+}
+
+Result<Mesh> parse(MeshFormat format, const std::vector<std::uint8_t>& bytes, const MeshLimits& limits) {
+    switch (format) {
+        case MeshFormat::ply:
+            return read_ply(bytes, limits);
+        case MeshFormat::obj:
+            return read_obj(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), limits);
+        case MeshFormat::drc:
+            break;
+    }
+    return read_drc(bytes, limits);
+}
+
+Result<void> write_file(const std::filesystem::path& path, const char* data, std::size_t size) {
+    std::ofstream file(path, std::ios::binary | std::ios::trunc);
+    if (!file) return fail_at(path, ErrorKind::bad_input, "cannot be opened for writing; see that its folder exists");
+    file.write(data, static_cast<std::streamsize>(size));
+    file.close();
+    if (!file) return fail_at(path, ErrorKind::bad_input, "could not be written in full; is the disk full?");
+    return {};
+}
+
+}  // namespace
+
+bool is_mesh_file_name(const std::filesystem::path& path) { return format_of(path).has_value(); }
+
+Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::uint64_t most_bytes) {
+    std::error_code error;
+    const auto status = std::filesystem::status(path, error);
+    if (!std::filesystem::exists(status)) return fail_at(path, ErrorKind::bad_input, "there is no such file");
+    if (std::filesystem::is_directory(status))
+        return fail_at(path, ErrorKind::bad_input, "this is a folder, not a file");
+    std::ifstream file(path, std::ios::binary);
+    if (!file) return fail_at(path, ErrorKind::bad_input, "cannot be opened for reading; see its permissions");
+    std::vector<std::uint8_t> bytes;
+    const std::uintmax_t expected = std::filesystem::file_size(path, error);
+    if (!error && expected <= most_bytes) bytes.reserve(static_cast<std::size_t>(expected));
+    std::array<char, 1 << 16> piece;  // a file's size is a hint only: a pipe has none
+    while (file.read(piece.data(), piece.size()) || file.gcount() > 0) {
+        bytes.insert(bytes.end(), piece.begin(), piece.begin() + file.gcount());
+        if (bytes.size() > most_bytes) {
+            return fail_at(path, ErrorKind::limit, "is larger than " + std::to_string(most_bytes) + " bytes");
+        }
+    }
+    if (file.bad()) return fail_at(path, ErrorKind::bad_input, "could not be read to its end");
+    return bytes;
+}
+
+Result<void> scale_positions(Mesh& mesh, double factor) {
+    if (!(factor > 0) || !std::isfinite(factor)) {
+        return fail(ErrorKind::bad_input, "the scale of the positions must be a finite number above 0");
+    }
+    if (factor == 1) return {};
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+        for (float& c : mesh.positions[v]) {
+            const double scaled = static_cast<double>(c) * factor;
+            if (!fits_float(scaled)) {
+                return fail(ErrorKind::bad_input, "the position of vertex " + std::to_string(v) +
+                                                      " is too large once scaled; check the unit");
+            }
+            c = static_cast<float>(scaled);
+        }
+    }
+    return {};
+}
+
+Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options) {
+    const auto format = format_of(path);
+    if (!format) {
+        return fail_at(path, ErrorKind::unsupported,
+                       "the name ends in none of .ply, .obj, .drc, the formats that are read");
+    }
+    const auto bytes = read_file(path);
+    if (!bytes) return tl::unexpected(bytes.error());
+    auto mesh = parse(*format, *bytes, options.limits);
+    if (!mesh) return fail_at(path, mesh.error());
+    if (auto ok = scale_positions(*mesh, options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
+    return mesh;
+}
+
+Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, const MeshFileOptions& options) {
+    const auto format = format_of(path);
+    if (!format || *format == MeshFormat::drc) {
+        return fail_at(path, ErrorKind::unsupported, "the name must end in .ply or .obj, the formats that are written");
+    }
+    if (!(options.millimetres_per_unit > 0)) {
+        return fail_at(path, ErrorKind::bad_input, "the millimetres per unit must be above 0");
+    }
+    Mesh scaled;
+    const Mesh* written = &mesh;
+    if (options.millimetres_per_unit != 1) {
+        scaled = mesh;
+        if (auto ok = scale_positions(scaled, 1 / options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
+        written = &scaled;
+    }
+    if (*format == MeshFormat::ply) {
+        const auto bytes = write_ply(*written);
+        if (!bytes) return fail_at(path, bytes.error());
+        return write_file(path, reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    }
+    const auto text = write_obj(*written);
+    if (!text) return fail_at(path, text.error());
+    return write_file(path, text->data(), text->size());
+}
+
+double millimetres_per(LengthUnit unit) {
+    switch (unit) {
+        case LengthUnit::metre:
+            return 1000;
+        case LengthUnit::centimetre:
+            return 10;
+        case LengthUnit::millimetre:
+            break;
+    }
+    return 1;
+}
+
+LengthUnit guess_unit(const Mesh& mesh) {
+    double squared = 0;
+    for (std::size_t axis = 0; axis < 3 && !mesh.positions.empty(); ++axis) {
+        const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
+                                                     [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+        const double extent = static_cast<double>((*high)[axis]) - static_cast<double>((*low)[axis]);
+        squared += extent * extent;
+    }
+    const double diagonal = std::sqrt(squared);
+    if (!(diagonal > 0) || diagonal >= 600) return LengthUnit::millimetre;
+    return diagonal < 10 ? LengthUnit::metre : LengthUnit::centimetre;
+}
+
+}  // namespace htvm

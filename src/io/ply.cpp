@@ -1,0 +1,417 @@
+#include "io/ply.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <istream>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "io/number_text.h"
+#include "io/ply_header.h"
+#include "io/ply_source.h"
+
+namespace htvm {
+
+namespace {
+
+// What a vertex property means to us, and the place of its value in VertexValues.
+enum Field { x, y, z, nx, ny, nz, s, t, red, green, blue, field_count, ignored };
+using VertexValues = std::array<double, field_count>;
+
+struct Body {
+    PlySource& source;
+    PlyFormat format;
+    MeshLimits limits;
+    std::uint64_t vertex_count = 0;  // as the header claims
+    bool took_words = false;         // the text body has begun, so the line its last word stands on is to be finished
+};
+
+double decode_value(const std::uint8_t* bytes, PlyType type, bool big_endian) {
+    const std::size_t size = ply_type_size(type);
+    std::uint64_t bits = 0;
+    for (std::size_t i = 0; i < size; ++i) {
+        bits |= static_cast<std::uint64_t>(bytes[big_endian ? size - 1 - i : i]) << (8 * i);
+    }
+    switch (type) {
+        case PlyType::i8:
+            return static_cast<std::int8_t>(bits);
+        case PlyType::u8:
+            return static_cast<std::uint8_t>(bits);
+        case PlyType::i16:
+            return static_cast<std::int16_t>(bits);
+        case PlyType::u16:
+            return static_cast<std::uint16_t>(bits);
+        case PlyType::i32:
+            return static_cast<std::int32_t>(bits);
+        case PlyType::u32:
+            return static_cast<std::uint32_t>(bits);
+        case PlyType::f32:
+            return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
+        case PlyType::f64:
+            break;
+    }
+    return std::bit_cast<double>(bits);
+}
+
+// The next value; nothing where the bytes end or, in text, where the next word is no number.
+std::optional<double> take_value(Body& body, PlyType type) {
+    if (body.format == PlyFormat::ascii) {
+        std::array<char, 256> word;
+        body.took_words = true;
+        return parse_number(take_word(body.source, word));
+    }
+    const std::size_t size = ply_type_size(type);
+    if (!body.source.ensure(size)) return std::nullopt;
+    const double value = decode_value(body.source.cursor(), type, body.format == PlyFormat::binary_big_endian);
+    body.source.advance(size);
+    return value;
+}
+
+// The length of a list; nothing where it is missing, negative or broken.
+std::optional<std::uint64_t> take_list_length(Body& body, const PlyProperty& list) {
+    const auto length = take_value(body, list.count_type);
+    if (!length || !(*length >= 0) || *length > 4294967295.0 || *length != std::floor(*length)) return std::nullopt;
+    return static_cast<std::uint64_t>(*length);
+}
+
+bool skip_property(Body& body, const PlyProperty& property) {
+    std::uint64_t count = 1;
+    if (property.is_list) {
+        const auto length = take_list_length(body, property);
+        if (!length) return false;
+        count = *length;
+    }
+    if (body.format != PlyFormat::ascii) return body.source.skip(count * ply_type_size(property.type));
+    for (std::uint64_t i = 0; i < count; ++i) {
+        if (!take_value(body, property.type)) return false;
+    }
+    return true;
+}
+
+// Has a stream fetched in pieces rather than value by value: of the elements still to come, what they take at least.
+void fetch_ahead(Body& body, std::uint64_t element_bytes, std::uint64_t elements_left) {
+    constexpr std::uint64_t piece = 1 << 16;
+    if (body.source.buffered() >= element_bytes) return;
+    // In text the last value of all may lack the separator that is counted in.
+    const std::uint64_t wanted = element_bytes * std::min(elements_left, piece / (element_bytes + 1) + 1);
+    (void)body.source.ensure(static_cast<std::size_t>(std::min(wanted - (wanted > 0 ? 1 : 0), piece)));
+}
+
+std::string text_of(const char* element, std::uint64_t i, std::uint64_t count) {
+    return std::string(element) + " " + std::to_string(i) + " of " + std::to_string(count);
+}
+
+tl::unexpected<Error> ends_within(const std::string& where) {
+    return fail(ErrorKind::bad_input,
+                "the PLY ends or cannot be read at " + where + "; the file is cut off or damaged");
+}
+
+// Fails where the element claims more than the bytes at hand can hold.
+Result<void> check_element_count(const Body& body, const PlyElement& element) {
+    const std::uint64_t fewest = fewest_element_bytes(element, body.format);
+    const auto left = body.source.remaining();
+    if (!left || fewest == 0) return {};
+    const std::uint64_t slack = body.format == PlyFormat::ascii ? 1 : 0;
+    if (element.count <= (*left + slack) / fewest) return {};
+    return fail(ErrorKind::bad_input, "the PLY header claims " + std::to_string(element.count) + " of the element \"" +
+                                          element.name.substr(0, 80) + "\", more than the " + std::to_string(*left) +
+                                          " bytes that follow can hold; the file is cut off or damaged");
+}
+
+// What to reserve for a count that was checked against the bytes at hand, or (a stream) was not.
+std::size_t reservation(const Body& body, std::uint64_t count, std::uint64_t bytes_each) {
+    const std::uint64_t most = body.source.remaining().value_or(1 << 18) / bytes_each;
+    return static_cast<std::size_t>(std::min(count, most));
+}
+
+// How a vertex element's properties make a vertex.
+struct VertexLayout {
+    std::vector<Field> fields;  // of each property
+    std::array<PlyType, field_count> type{};
+    bool normals = false;
+    bool texcoords = false;
+    bool colours = false;
+};
+
+Field field_named(std::string_view name) {
+    static constexpr std::array<std::pair<std::string_view, Field>, 21> names{{
+        {"x", x},
+        {"y", y},
+        {"z", z},
+        {"nx", nx},
+        {"ny", ny},
+        {"nz", nz},
+        {"s", s},
+        {"t", t},
+        {"u", s},
+        {"v", t},
+        {"texture_u", s},
+        {"texture_v", t},
+        {"red", red},
+        {"green", green},
+        {"blue", blue},
+        {"diffuse_red", red},
+        {"diffuse_green", green},
+        {"diffuse_blue", blue},
+        {"r", red},
+        {"g", green},
+        {"b", blue},
+    }};
+    for (const auto& [known, field] : names) {
+        if (known == name) return field;
+    }
+    return ignored;
+}
+
+Result<VertexLayout> layout_of(const PlyElement& vertex) {
+    VertexLayout layout;
+    std::array<bool, field_count> seen{};
+    for (const PlyProperty& property : vertex.properties) {
+        Field field = property.is_list ? ignored : field_named(property.name);
+        if (field != ignored && seen[field]) {
+            if (field <= z) {
+                return fail(ErrorKind::bad_input, "the PLY header declares the vertex's " + property.name + " twice");
+            }
+            field = ignored;  // such as s t and u v both: the first counts
+        }
+        if (field != ignored) {
+            seen[field] = true;
+            layout.type[field] = property.type;
+        }
+        layout.fields.push_back(field);
+    }
+    if (vertex.count > 0 && !(seen[x] && seen[y] && seen[z])) {
+        return fail(ErrorKind::bad_input, "the PLY header declares no x, y, z for the element \"vertex\"");
+    }
+    layout.normals = seen[nx] && seen[ny] && seen[nz];
+    layout.texcoords = seen[s] && seen[t];
+    layout.colours = seen[red] && seen[green] && seen[blue];
+    return layout;
+}
+
+// A colour component, as the property's type has it, to 0..255.
+std::uint8_t colour_component(double value, PlyType type) {
+    if (type == PlyType::f32 || type == PlyType::f64) value *= 255;
+    if (type == PlyType::u16) value /= 257;
+    if (!(value > 0)) return 0;  // NaN too
+    return static_cast<std::uint8_t>(std::lround(std::min(value, 255.0)));
+}
+
+// False where the bytes end or cannot be read.
+bool take_vertex(Body& body, const PlyElement& element, const VertexLayout& layout, VertexValues& value) {
+    for (std::size_t p = 0; p < element.properties.size(); ++p) {
+        const PlyProperty& property = element.properties[p];
+        if (layout.fields[p] == ignored) {
+            if (!skip_property(body, property)) return false;
+            continue;
+        }
+        const auto taken = take_value(body, property.type);
+        if (!taken) return false;
+        value[layout.fields[p]] = *taken;
+    }
+    return true;
+}
+
+void append_vertex(Mesh& mesh, const VertexLayout& layout, const VertexValues& value) {
+    mesh.positions.push_back(
+        {static_cast<float>(value[x]), static_cast<float>(value[y]), static_cast<float>(value[z])});
+    if (layout.normals) {
+        mesh.normals.push_back({finite_or_zero(value[nx]), finite_or_zero(value[ny]), finite_or_zero(value[nz])});
+    }
+    if (layout.texcoords) mesh.texcoords.push_back({finite_or_zero(value[s]), finite_or_zero(value[t])});
+    if (layout.colours) {
+        mesh.colours.push_back({colour_component(value[red], layout.type[red]),
+                                colour_component(value[green], layout.type[green]),
+                                colour_component(value[blue], layout.type[blue])});
+    }
+}
+
+Result<void> read_vertices(Body& body, const PlyElement& element, Mesh& mesh) {
+    const auto layout = layout_of(element);
+    if (!layout) return tl::unexpected(layout.error());
+    const std::uint64_t fewest = fewest_element_bytes(element, body.format);
+    const std::size_t reserved = reservation(body, element.count, std::max<std::uint64_t>(fewest, 1));
+    mesh.positions.reserve(reserved);
+    if (layout->normals) mesh.normals.reserve(reserved);
+    if (layout->texcoords) mesh.texcoords.reserve(reserved);
+    if (layout->colours) mesh.colours.reserve(reserved);
+    VertexValues value{};
+    for (std::uint64_t v = 0; v < element.count; ++v) {
+        fetch_ahead(body, fewest, element.count - v);
+        if (!take_vertex(body, element, *layout, value)) return ends_within(text_of("vertex", v, element.count));
+        if (!fits_float(value[x]) || !fits_float(value[y]) || !fits_float(value[z])) {
+            return fail(ErrorKind::bad_input, "the position of vertex " + std::to_string(v) + " is not finite");
+        }
+        append_vertex(mesh, *layout, value);
+    }
+    return {};
+}
+
+Result<void> read_polygon(Body& body, const PlyProperty& list, std::uint64_t face, std::uint64_t faces, Mesh& mesh) {
+    const auto corners = take_list_length(body, list);
+    if (!corners) return ends_within(text_of("face", face, faces));
+    Triangle triangle{};
+    for (std::uint64_t c = 0; c < *corners; ++c) {
+        const auto index = take_value(body, list.type);
+        if (!index) return ends_within(text_of("face", face, faces));
+        if (!(*index >= 0 && *index < static_cast<double>(body.vertex_count)) || *index != std::floor(*index)) {
+            return fail(ErrorKind::bad_input, "face " + std::to_string(face) +
+                                                  " uses a vertex index that is not one of 0 to " +
+                                                  std::to_string(body.vertex_count) + " - 1");
+        }
+        const auto vertex = static_cast<std::uint32_t>(*index);
+        if (c == 0) triangle[0] = vertex;
+        if (c > 0) triangle[1] = std::exchange(triangle[2], vertex);
+        if (c < 2) continue;
+        if (mesh.triangles.size() >= body.limits.most_triangles) {
+            return check_count(body.limits.most_triangles + 1, body.limits.most_triangles, "triangles or more");
+        }
+        mesh.triangles.push_back(triangle);
+    }
+    return {};
+}
+
+Result<void> read_faces(Body& body, const PlyElement& element, Mesh& mesh) {
+    std::size_t indices = element.properties.size();
+    for (std::size_t p = 0; p < element.properties.size(); ++p) {
+        const PlyProperty& property = element.properties[p];
+        if (property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index")) indices = p;
+    }
+    if (indices == element.properties.size() && element.count > 0) {
+        return fail(ErrorKind::bad_input, "the PLY header declares no list vertex_indices for the element \"face\"");
+    }
+    const std::uint64_t fewest = fewest_element_bytes(element, body.format);
+    mesh.triangles.reserve(reservation(body, element.count, fewest + 3));
+    for (std::uint64_t f = 0; f < element.count; ++f) {
+        fetch_ahead(body, fewest, element.count - f);
+        for (std::size_t p = 0; p < element.properties.size(); ++p) {
+            if (p == indices) {
+                if (auto ok = read_polygon(body, element.properties[p], f, element.count, mesh); !ok) return ok;
+            } else if (!skip_property(body, element.properties[p])) {
+                return ends_within(text_of("face", f, element.count));
+            }
+        }
+    }
+    return {};
+}
+
+Result<void> skip_element(Body& body, const PlyElement& element) {
+    if (element.properties.empty()) return {};
+    const std::uint64_t fewest = fewest_element_bytes(element, body.format);
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+        fetch_ahead(body, fewest, element.count - i);
+        for (const PlyProperty& property : element.properties) {
+            if (!skip_property(body, property)) return ends_within(text_of(element.name.c_str(), i, element.count));
+        }
+    }
+    return {};
+}
+
+Result<PlyHeader> read_header(PlySource& source) {
+    std::vector<char> line;
+    const std::uint64_t begin = source.consumed();
+    const auto magic = take_line(source, line, 16);
+    if (!magic || (*magic != "ply" && *magic != "PLY")) {
+        return fail(ErrorKind::bad_input, "this is no PLY: it does not begin with a line \"ply\"");
+    }
+    PlyHeader header;
+    bool has_format = false;
+    for (;;) {
+        const std::uint64_t used = source.consumed() - begin;
+        const auto next = used < most_ply_header_bytes
+                              ? take_line(source, line, most_ply_header_bytes - static_cast<std::size_t>(used))
+                              : std::nullopt;
+        if (!next)
+            return fail(ErrorKind::bad_input, "the PLY header has no end_header; the file is cut off or damaged");
+        has_format = has_format || next->starts_with("format");
+        const auto ended = read_ply_header_line(header, *next);
+        if (!ended) return tl::unexpected(ended.error());
+        if (*ended) break;
+    }
+    if (!has_format) return fail(ErrorKind::bad_input, "the PLY header has no format line");
+    return header;
+}
+
+Result<Mesh> read_one(PlySource& source, const MeshLimits& limits) {
+    const auto header = read_header(source);
+    if (!header) return tl::unexpected(header.error());
+    Body body{source, header->format, limits};
+    bool has_vertices = false;
+    for (const PlyElement& element : header->elements) {
+        if (element.name == "tristrips") {
+            return fail(ErrorKind::unsupported,
+                        "the PLY holds triangle strips, which are not read; write it with faces");
+        }
+        if (element.name != "vertex") continue;
+        has_vertices = true;
+        body.vertex_count = element.count;
+        const std::uint64_t most =
+            std::min<std::uint64_t>(limits.most_vertices, std::numeric_limits<std::uint32_t>::max());
+        if (auto ok = check_count(element.count, most, "vertices"); !ok) return tl::unexpected(ok.error());
+    }
+    if (!has_vertices) return fail(ErrorKind::bad_input, "the PLY header declares no element \"vertex\"");
+    Mesh mesh;
+    for (const PlyElement& element : header->elements) {
+        Result<void> read = check_element_count(body, element);
+        if (!read) return tl::unexpected(read.error());
+        if (element.name == "vertex") {
+            read = read_vertices(body, element, mesh);
+        } else if (element.name == "face") {
+            read = read_faces(body, element, mesh);
+        } else {
+            read = skip_element(body, element);
+        }
+        if (!read) return tl::unexpected(read.error());
+    }
+    if (body.took_words) {  // the rest of the last line, so that what follows begins on its own
+        while (source.ensure(1)) {
+            const std::uint8_t c = *source.cursor();
+            source.advance(1);
+            if (c == '\n') break;
+        }
+    }
+    return mesh;
+}
+
+}  // namespace
+
+Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
+    PlySource source(bytes);
+    take_white_space(source);
+    auto mesh = read_one(source, limits);
+    if (!mesh) return tl::unexpected(mesh.error());
+    return PlyAtStart{std::move(*mesh), static_cast<std::size_t>(source.consumed())};
+}
+
+Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
+    auto read = read_ply_at_start(bytes, limits);
+    if (!read) return tl::unexpected(read.error());
+    PlySource rest(bytes.subspan(read->bytes_consumed));
+    take_white_space(rest);
+    std::vector<char> line;
+    if (const auto next = take_line(rest, line, 16); next && *next == "ply") {
+        return fail(ErrorKind::bad_input, "the file holds more than one PLY; give such a file on standard input");
+    }
+    return std::move(read->mesh);
+}
+
+PlyStreamReader::PlyStreamReader(std::istream& stream, const MeshLimits& limits) : stream_(stream), limits_(limits) {}
+
+Result<std::optional<Mesh>> PlyStreamReader::next() {
+    if (error_) return tl::unexpected(*error_);
+    PlySource source(*stream_.rdbuf());
+    if (!take_white_space(source)) return std::optional<Mesh>();
+    auto mesh = read_one(source, limits_);
+    if (!mesh) {
+        error_ = Error{mesh.error().kind,
+                       "mesh " + std::to_string(meshes_read_) + " of the stream: " + mesh.error().message};
+        return tl::unexpected(*error_);
+    }
+    ++meshes_read_;
+    return std::optional<Mesh>(std::move(*mesh));
+}
+
+}  // namespace htvm

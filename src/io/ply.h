@@ -1,0 +1,60 @@
+// PLY, the polygon file format: text and binary of either byte order in, binary little-endian out.
+//
+// Read: the element "vertex" (x y z; nx ny nz; s t, u v or texture_u texture_v; red green blue or diffuse_red ...) and
+// the list "vertex_indices" or "vertex_index" of the element "face". Everything else is skipped. Polygons are cut into
+// fans round their first corner, their orientation kept; faces with fewer than three corners are left out. Colours of
+// a floating-point type are 0..1, 16-bit ones 0..65535, others 0..255. Normals, colours and texture coordinates
+// that are not finite become 0; normals are not made unit length. Triangle strips are refused (unsupported).
+//
+// Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
+//
+// Errors: bad_input with the vertex or face (counted from 0) where the file is truncated, a position is not finite or
+// an index is out of range; limit; unsupported. Nothing is allocated for a count that the bytes at hand cannot hold.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <iosfwd>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "htvm/mesh.hpp"
+#include "htvm/result.hpp"
+#include "io/mesh_check.h"
+
+namespace htvm {
+
+struct PlyAtStart {
+    Mesh mesh;
+    std::size_t bytes_consumed = 0;  // where the next PLY may begin
+};
+
+// Reads the one PLY that the bytes begin with (white space before it is taken too); others may follow.
+Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
+
+// Reads a file's bytes. Trailing bytes are ignored, but a second PLY is an error: nothing is dropped in silence.
+Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
+
+// Binary little-endian: float x y z, then where the mesh has them float nx ny nz, float s t, uchar red green blue;
+// faces as uchar, uint vertex_indices. Fails (bad_input) where check_mesh does.
+Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh);
+
+// Reads PLYs that follow one another in a stream. One mesh is held at a time, and the stream is not read past the end
+// of the mesh it gives, so that a live stream's meshes come out as soon as they are complete.
+class PlyStreamReader {
+public:
+    // The stream must outlive the reader.
+    explicit PlyStreamReader(std::istream& stream, const MeshLimits& limits = {});
+    // The next mesh; nothing at the end of the stream. After an error the place of the next mesh is unknown: the error
+    // (which names the mesh, counted from 0) comes again.
+    Result<std::optional<Mesh>> next();
+
+private:
+    std::istream& stream_;
+    MeshLimits limits_;
+    std::size_t meshes_read_ = 0;
+    std::optional<Error> error_;
+};
+
+}  // namespace htvm

@@ -1,0 +1,53 @@
+// The header of a PLY file: which elements and properties follow, and how they are stored.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace htvm {
+
+enum class PlyFormat { ascii, binary_little_endian, binary_big_endian };
+
+enum class PlyType { i8, u8, i16, u16, i32, u32, f32, f64 };
+
+struct PlyProperty {
+    std::string name;
+    PlyType type = PlyType::f32;       // of the value, or of a list's items
+    bool is_list = false;              //
+    PlyType count_type = PlyType::u8;  // of a list's length; an integer type
+};
+
+struct PlyElement {
+    std::string name;
+    std::uint64_t count = 0;  // as the header claims: not to be trusted
+    std::vector<PlyProperty> properties;
+};
+
+struct PlyHeader {
+    PlyFormat format = PlyFormat::ascii;
+    std::vector<PlyElement> elements;
+};
+
+// Bytes of a header, from "ply" to "end_header", that a reader accepts.
+inline constexpr std::size_t most_ply_header_bytes = std::size_t{1} << 20;
+
+// Elements that a header may declare.
+inline constexpr std::size_t most_ply_elements = 256;
+
+// Bytes of one value in a binary file: 1, 2, 4 or 8.
+std::size_t ply_type_size(PlyType type);
+
+// The fewest bytes one element of this kind takes in the file; 0 for an element without properties. A list may be
+// empty; in text a value takes a digit and a separator (which the file's last value may lack).
+std::uint64_t fewest_element_bytes(const PlyElement& element, PlyFormat format);
+
+// Reads one line of the header, without its end of line, into the header read so far. True when it was "end_header".
+// Fails (bad_input, unsupported) with a sentence that quotes the line. The first line, "ply", is not to be given.
+Result<bool> read_ply_header_line(PlyHeader& header, std::string_view line);
+
+}  // namespace htvm

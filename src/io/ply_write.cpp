@@ -1,0 +1,45 @@
+#include <bit>
+#include <string>
+
+#include "core/bytes.h"
+#include "io/ply.h"
+
+namespace htvm {
+
+namespace {
+
+template <std::size_t N>
+void put_floats(ByteWriter& out, const std::array<float, N>& values) {
+    for (const float value : values) out.u32(std::bit_cast<std::uint32_t>(value));
+}
+
+std::string header_of(const Mesh& mesh) {
+    std::string text = "ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.positions.size());
+    text += "\nproperty float x\nproperty float y\nproperty float z\n";
+    if (!mesh.normals.empty()) text += "property float nx\nproperty float ny\nproperty float nz\n";
+    if (!mesh.texcoords.empty()) text += "property float s\nproperty float t\n";
+    if (!mesh.colours.empty()) text += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    text += "element face " + std::to_string(mesh.triangles.size());
+    return text + "\nproperty list uchar uint vertex_indices\nend_header\n";
+}
+
+}  // namespace
+
+Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh) {
+    if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
+    ByteWriter out;
+    for (const char c : header_of(mesh)) out.u8(static_cast<std::uint8_t>(c));
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+        put_floats(out, mesh.positions[v]);
+        if (!mesh.normals.empty()) put_floats(out, mesh.normals[v]);
+        if (!mesh.texcoords.empty()) put_floats(out, mesh.texcoords[v]);
+        if (!mesh.colours.empty()) out.bytes(mesh.colours[v]);
+    }
+    for (const Triangle& triangle : mesh.triangles) {
+        out.u8(3);
+        for (const std::uint32_t index : triangle) out.u32(index);
+    }
+    return out.take();
+}
+
+}  // namespace htvm

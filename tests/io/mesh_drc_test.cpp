@@ -1,0 +1,156 @@
+#include <draco/compression/encode.h>
+#include <draco/compression/expert_encode.h>
+#include <draco/mesh/triangle_soup_mesh_builder.h>
+#include <draco/point_cloud/point_cloud_builder.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "gmock/gmock.h"
+#include "io/drc.h"
+#include "io/mesh_samples.h"
+
+namespace htvm {
+namespace {
+
+using draco::GeometryAttribute;
+
+// A grid of n by n squares, with colours (of `components`), normals and texture coordinates.
+std::vector<std::uint8_t> encoded_grid(int n, int encoding_method, int speed, std::uint8_t components = 3) {
+    draco::TriangleSoupMeshBuilder builder;
+    builder.Start(2 * n * n);
+    const int position = builder.AddAttribute(GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
+    const int colour =
+        builder.AddAttribute(GeometryAttribute::COLOR, static_cast<std::int8_t>(components), draco::DT_UINT8);
+    const int normal = builder.AddAttribute(GeometryAttribute::NORMAL, 3, draco::DT_FLOAT32);
+    const int texcoord = builder.AddAttribute(GeometryAttribute::TEX_COORD, 2, draco::DT_FLOAT32);
+    const auto set = [&](int face, std::array<std::array<int, 2>, 3> corners) {
+        std::array<std::array<float, 3>, 3> p, m;
+        std::array<std::array<float, 2>, 3> t;
+        std::array<std::array<std::uint8_t, 4>, 3> c;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto x = static_cast<float>(corners[i][0]);
+            const auto y = static_cast<float>(corners[i][1]);
+            p[i] = {x, y, 0};
+            m[i] = {0, 0, 1};
+            t[i] = {x / 64, y / 64};
+            c[i] = {static_cast<std::uint8_t>(corners[i][0]), static_cast<std::uint8_t>(corners[i][1]), 7, 99};
+        }
+        const draco::FaceIndex f(static_cast<std::uint32_t>(face));
+        builder.SetAttributeValuesForFace(position, f, &p[0], &p[1], &p[2]);
+        builder.SetAttributeValuesForFace(colour, f, &c[0], &c[1], &c[2]);
+        builder.SetAttributeValuesForFace(normal, f, &m[0], &m[1], &m[2]);
+        builder.SetAttributeValuesForFace(texcoord, f, &t[0], &t[1], &t[2]);
+    };
+    int face = 0;
+    for (int y = 0; y < n; ++y) {
+        for (int x = 0; x < n; ++x) {
+            set(face++, {{{x, y}, {x + 1, y}, {x + 1, y + 1}}});
+            set(face++, {{{x, y}, {x + 1, y + 1}, {x, y + 1}}});
+        }
+    }
+    const auto mesh = builder.Finalize();
+    draco::Encoder encoder;
+    encoder.SetEncodingMethod(encoding_method);
+    encoder.SetSpeedOptions(speed, speed);
+    encoder.SetAttributeQuantization(GeometryAttribute::TEX_COORD, 12);
+    encoder.SetAttributeQuantization(GeometryAttribute::NORMAL, 8);
+    draco::EncoderBuffer buffer;
+    EXPECT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+    return {buffer.data(), buffer.data() + buffer.size()};
+}
+
+TEST(DrcReading, EveryAttributeFollowsItsPointThroughBothMeshCoders) {
+    for (const int method :
+         {static_cast<int>(draco::MESH_SEQUENTIAL_ENCODING), static_cast<int>(draco::MESH_EDGEBREAKER_ENCODING)}) {
+        for (const std::uint8_t components : {std::uint8_t{3}, std::uint8_t{4}}) {
+            const auto mesh = read_drc(encoded_grid(6, method, 0, components));
+            ASSERT_TRUE(mesh) << mesh.error().message;
+            ASSERT_EQ(mesh->positions.size(), 49u);
+            ASSERT_EQ(mesh->triangles.size(), 72u);
+            ASSERT_TRUE(check_mesh(*mesh));
+            for (std::size_t v = 0; v < 49; ++v) {
+                const Vector3f& p = mesh->positions[v];
+                EXPECT_EQ(mesh->colours[v],
+                          (Colour{static_cast<std::uint8_t>(p[0]), static_cast<std::uint8_t>(p[1]), 7}));
+                EXPECT_NEAR(mesh->texcoords[v][0], p[0] / 64, 1e-4);
+                EXPECT_NEAR(mesh->texcoords[v][1], p[1] / 64, 1e-4);
+                EXPECT_NEAR(mesh->normals[v][2], 1, 1e-4);
+            }
+            for (const Triangle& t : mesh->triangles) {  // counter-clockwise, as they went in
+                const auto& [a, b, c] = t;
+                const auto& p = mesh->positions;
+                EXPECT_EQ((p[b][0] - p[a][0]) * (p[c][1] - p[a][1]) - (p[b][1] - p[a][1]) * (p[c][0] - p[a][0]), 1);
+            }
+        }
+    }
+}
+
+std::vector<std::uint8_t> encoded_points(std::uint32_t n, int method) {
+    draco::PointCloudBuilder builder;
+    builder.Start(n);
+    const int position = builder.AddAttribute(GeometryAttribute::POSITION, 3, draco::DT_INT32);
+    for (std::uint32_t i = 0; i < n; ++i) {
+        const std::array<std::int32_t, 3> p{static_cast<std::int32_t>(i), -100000, 5};
+        builder.SetAttributeValueForPoint(position, draco::PointIndex(i), p.data());
+    }
+    const auto cloud = builder.Finalize(false);
+    draco::Encoder encoder;
+    encoder.SetEncodingMethod(method);
+    draco::EncoderBuffer buffer;
+    EXPECT_TRUE(encoder.EncodePointCloudToBuffer(*cloud, &buffer).ok());
+    return {buffer.data(), buffer.data() + buffer.size()};
+}
+
+TEST(DrcReading, PointCloudsWithIntegerPositionsAreTakenAsTheyAre) {
+    const auto mesh = read_drc(encoded_points(5, draco::POINT_CLOUD_SEQUENTIAL_ENCODING));
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(
+        mesh->positions,
+        (std::vector<Vector3f>{{0, -100000, 5}, {1, -100000, 5}, {2, -100000, 5}, {3, -100000, 5}, {4, -100000, 5}}));
+    EXPECT_TRUE(mesh->triangles.empty());
+}
+
+TEST(DrcReading, PointCloudsOfTheTreeCoderComeInAnyOrder) {
+    auto mesh = read_drc(encoded_points(5, draco::POINT_CLOUD_KD_TREE_ENCODING));
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    std::sort(mesh->positions.begin(), mesh->positions.end());
+    EXPECT_EQ(
+        mesh->positions,
+        (std::vector<Vector3f>{{0, -100000, 5}, {1, -100000, 5}, {2, -100000, 5}, {3, -100000, 5}, {4, -100000, 5}}));
+}
+
+TEST(DrcReading, WhatIsNoDracoFileIsAnError) {
+    EXPECT_FALSE(read_drc({}));
+    EXPECT_FALSE(read_drc(samples::bytes_of("DRACO")));
+    EXPECT_FALSE(read_drc(samples::bytes_of("ply\nformat ascii 1.0\n")));
+    auto old = encoded_points(5, draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
+    old[6] = 1;
+    const auto mesh = read_drc(old);
+    ASSERT_FALSE(mesh);
+    EXPECT_EQ(mesh.error().kind, ErrorKind::unsupported);
+}
+
+TEST(DrcReading, CountsThatTheFileCannotHoldAreRefusedBeforeAllocation) {
+    auto points = encoded_points(5, draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
+    points[11] = points[12] = points[13] = 0xff;  // the count, 24 bits of it
+    ASSERT_FALSE(read_drc(points));
+    EXPECT_THAT(read_drc(points).error().message, testing::HasSubstr("16777215"));
+    points[14] = 0x7f;
+    ASSERT_FALSE(read_drc(points));
+    EXPECT_EQ(read_drc(points).error().kind, ErrorKind::limit);
+}
+
+TEST(DrcReading, EveryTruncationIsAnError) {
+    for (const auto& whole :
+         {encoded_grid(4, draco::MESH_SEQUENTIAL_ENCODING, 5), encoded_grid(4, draco::MESH_EDGEBREAKER_ENCODING, 0),
+          encoded_grid(4, draco::MESH_EDGEBREAKER_ENCODING, 7)}) {
+        for (std::size_t n = 0; n < whole.size(); ++n) {
+            const std::vector<std::uint8_t> cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n));
+            EXPECT_FALSE(read_drc(cut)) << n << " of " << whole.size();
+        }
+    }
+}
+
+}  // namespace
+}  // namespace htvm

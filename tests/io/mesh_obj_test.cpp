@@ -1,0 +1,150 @@
+#include "gmock/gmock.h"
+#include "io/mesh_samples.h"
+#include "io/obj.h"
+
+namespace htvm {
+namespace {
+
+using samples::expect_equal;
+using samples::random_mesh;
+using testing::HasSubstr;
+
+const std::string square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+TEST(ObjReading, PolygonsBecomeFansAndIsolatedVerticesAndDegenerateTrianglesStay) {
+    const auto mesh = read_obj("# a square\nmtllib a.mtl\no x\n" + square +
+                               "v 9 9 9\ng y\nusemtl z\ns 1\nf 2 3 4 1\nf 1 2\nf 1 1 2\nl 1 2\nf 3 2 1\n");
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(mesh->positions, (std::vector<Vector3f>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {9, 9, 9}}));
+    EXPECT_EQ(mesh->triangles, (std::vector<Triangle>{{1, 2, 3}, {1, 3, 0}, {0, 0, 1}, {2, 1, 0}}));
+    EXPECT_TRUE(mesh->colours.empty() && mesh->normals.empty() && mesh->texcoords.empty());
+}
+
+TEST(ObjReading, APolygonMayHaveMoreThan255Corners) {
+    std::string text;
+    std::string face = "f";
+    for (int i = 1; i <= 1000; ++i) {
+        const std::string number = std::to_string(i);
+        text += "v " + number + " 0 0\n";
+        face += ' ';
+        face += number;
+    }
+    const auto mesh = read_obj(text + face);
+    ASSERT_TRUE(mesh);
+    EXPECT_EQ(mesh->triangles.size(), 998u);
+    EXPECT_EQ(mesh->triangles.back(), (Triangle{0, 998, 999}));
+}
+
+TEST(ObjReading, NegativeIndicesCountBackFromTheLastSoFar) {
+    const auto mesh = read_obj("v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\r\nf -4/ -2// \\\r\n-1\n");
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(mesh->triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST(ObjReading, VertexColoursAre0To1OrPlainly0To255) {
+    const auto unit = read_obj("v 0 0 0 0 0.5 1\nv 0 0 0\nv 0 0 0 1 2\n");
+    ASSERT_TRUE(unit);
+    EXPECT_EQ(unit->colours, (std::vector<Colour>{{0, 128, 255}, {255, 255, 255}, {255, 255, 255}}));
+    const auto bytes = read_obj("v 0 0 0 0 1 200\nv 0 0 0 0 17 300\n");
+    ASSERT_TRUE(bytes);
+    EXPECT_EQ(bytes->colours, (std::vector<Colour>{{0, 1, 200}, {0, 17, 255}}));
+}
+
+TEST(ObjReading, AVertexIsSplitOnlyWhereItsCornersDiffer) {
+    const std::string texcoords = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt 0.5 0.5\nvt 1 0\n";
+    // vt 6 equals vt 2, so it splits nothing; vt 5 at position 3 does.
+    const auto mesh = read_obj(square + texcoords + "f 1/1 2/2 3/3\nf 1/1 2/6 3/5\nf 3/5 4/4 1/1\n");
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(mesh->positions, (std::vector<Vector3f>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 1, 0}}));
+    EXPECT_EQ(mesh->texcoords, (std::vector<Vector2f>{{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0.5f, 0.5f}}));
+    EXPECT_EQ(mesh->triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 1, 4}, {4, 3, 0}}));
+}
+
+TEST(ObjReading, SplitVerticesKeepTheirColourAndCornersMayLackAttributes) {
+    const auto mesh = read_obj(
+        "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nvn 0 0 1\nvn 0 1 0\nvt 0.5\n"
+        "f 1//1 2//1 3/1/1\nf 1//2 3 2//1\n");
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(mesh->triangles, (std::vector<Triangle>{{0, 1, 2}, {3, 4, 1}}));
+    EXPECT_EQ(mesh->colours, (std::vector<Colour>{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 0, 0}, {0, 0, 255}}));
+    EXPECT_EQ(mesh->normals, (std::vector<Vector3f>{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 1, 0}, {0, 0, 0}}));
+    EXPECT_EQ(mesh->texcoords, (std::vector<Vector2f>{{0, 0}, {0, 0}, {0.5f, 0}, {0, 0}, {0, 0}}));
+}
+
+TEST(ObjReading, ErrorsNameTheLine) {
+    for (const std::string bad : {"f 1 2 5", "f 1 2 0", "f 1 2 -5", "f 1 2 x", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1",
+                                  "f 1/2/3/4 1 1", "f 1 2 99999999999999999999", "v 1 2", "v 1 2 nan", "v 1 inf 2",
+                                  "v 1 2 1e39", "v a b c", "vn 1 2", "vt", "vt x", "f 1 2 4294967297"}) {
+        const auto mesh = read_obj(square + bad + "\nf 1 2 3\n");
+        ASSERT_FALSE(mesh) << bad;
+        EXPECT_EQ(mesh.error().kind, ErrorKind::bad_input);
+        EXPECT_THAT(mesh.error().message, HasSubstr("line 5 ")) << bad;
+    }
+}
+
+TEST(ObjReading, LimitsAreErrorsOfTheirOwnKind) {
+    const auto mesh = read_obj(square, {3, 100});
+    ASSERT_FALSE(mesh);
+    EXPECT_EQ(mesh.error().kind, ErrorKind::limit);
+}
+
+TEST(ObjReading, NoTextIsNoMesh) {
+    const auto mesh = read_obj("");
+    ASSERT_TRUE(mesh);
+    EXPECT_TRUE(mesh->positions.empty());
+}
+
+TEST(ObjReading, DamagedTextGivesAMeshOrAnError) {
+    const auto whole = write_obj(random_mesh(4, 12, 15));
+    ASSERT_TRUE(whole);
+    std::mt19937 random(5);
+    const std::string alphabet = "0123456789-+./ \nvfnt#\\e\r\t";
+    for (int trial = 0; trial < 5000; ++trial) {
+        std::string damaged = whole->substr(0, random() % whole->size());
+        for (int hit = 0; hit < 3 && !damaged.empty(); ++hit) {
+            damaged[random() % damaged.size()] = alphabet[random() % alphabet.size()];
+        }
+        if (const auto mesh = read_obj(damaged)) {
+            EXPECT_TRUE(check_mesh(*mesh));
+        }
+    }
+}
+
+TEST(ObjWriting, ReadsBackExactlyWithAnySetOfAttributes) {
+    for (unsigned seed = 0; seed < 8; ++seed) {
+        for (const std::size_t vertices : {0, 1, 2, 100}) {
+            const Mesh mesh =
+                random_mesh(seed, vertices, vertices * 2 / 3, {(seed & 1) != 0, (seed & 2) != 0, (seed & 4) != 0});
+            const auto text = write_obj(mesh);
+            ASSERT_TRUE(text);
+            const auto again = read_obj(*text);
+            ASSERT_TRUE(again) << again.error().message;
+            expect_equal(*again, mesh);
+        }
+    }
+}
+
+TEST(ObjWriting, EveryColourLevelReadsBack) {
+    Mesh mesh;
+    for (int c = 0; c < 256; ++c) {
+        mesh.positions.push_back({0, 0, 0});
+        mesh.colours.push_back({static_cast<std::uint8_t>(c), 255, 0});
+    }
+    const auto again = read_obj(*write_obj(mesh));
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->colours, mesh.colours);
+}
+
+TEST(ObjWriting, TheTextOfASmallMeshIsThis) {
+    Mesh mesh;
+    mesh.positions = {{1, 0.5f, -2}};
+    mesh.colours = {{0, 51, 255}};
+    mesh.normals = {{0, 0, 1}};
+    mesh.triangles = {{0, 0, 0}};
+    EXPECT_EQ(*write_obj(mesh), "v 1 0.5 -2 0 0.2 1\nvn 0 0 1\nf 1//1 1//1 1//1\n");
+    mesh.texcoords = {{0.25f, 1}};
+    EXPECT_EQ(*write_obj(mesh), "v 1 0.5 -2 0 0.2 1\nvt 0.25 1\nvn 0 0 1\nf 1/1/1 1/1/1 1/1/1\n");
+}
+
+}  // namespace
+}  // namespace htvm
