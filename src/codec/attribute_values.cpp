@@ -6,17 +6,19 @@ namespace htvm {
 
 namespace {
 
-template <std::size_t components>
-Result<AttributeValues<components>> decode_from(std::span<const std::uint8_t> bytes,
-                                                const AttributeSource<components>& source) {
-    AttributeValues<components> values(source.vertex_count());
+using Values2 = std::array<std::int32_t, 2>;
+using Values3 = std::array<std::int32_t, 3>;
+
+template <class Value>
+Result<std::vector<Value>> decode_from(std::span<const std::uint8_t> bytes, const AttributeSource<Value>& source) {
+    std::vector<Value> values(source.vertex_count());
     if (values.empty()) return values;
     if (bytes.empty()) return fail(ErrorKind::corrupt_stream, "attribute values: the layer is empty");
     const auto predictor = static_cast<AttributePredictor>(bytes[0]);
     if (!source.offers(predictor))
         return fail(ErrorKind::corrupt_stream, "attribute values: the layer names a predictor that this frame has not");
     RangeDecoder decoder(bytes.subspan(1));
-    std::vector<AttributeContexts> contexts(components);
+    std::vector<AttributeContexts> contexts(std::tuple_size_v<Value>);
     auto code = [&](ResidualContext& a, ResidualContext& b, ResidualMantissa& mantissa, std::int32_t) {
         return decode_residual(decoder, a, b, mantissa);
     };
@@ -28,23 +30,24 @@ Result<AttributeValues<components>> decode_from(std::span<const std::uint8_t> by
 
 }  // namespace
 
-template <std::size_t components>
-Result<AttributeValues<components>> decode_attribute_values(std::span<const std::uint8_t> bytes,
-                                                            const Neighbours& neighbours) {
-    return decode_from<components>(bytes, {.neighbours = &neighbours});
+template <class Value>
+Result<std::vector<Value>> decode_attribute_values(std::span<const std::uint8_t> bytes, const Neighbours& neighbours) {
+    return decode_from<Value>(bytes, {.neighbours = &neighbours});
 }
 
-template <std::size_t components>
-Result<AttributeValues<components>> decode_attribute_values(std::span<const std::uint8_t> bytes,
-                                                            const AttributeValues<components>& predictions) {
-    return decode_from<components>(bytes, {.given = &predictions});
+template <class Value>
+Result<std::vector<Value>> decode_attribute_values(std::span<const std::uint8_t> bytes,
+                                                   const std::vector<Value>& predictions) {
+    return decode_from<Value>(bytes, {.given = &predictions});
 }
 
-template Result<AttributeValues<2>> decode_attribute_values<2>(std::span<const std::uint8_t>, const Neighbours&);
-template Result<AttributeValues<3>> decode_attribute_values<3>(std::span<const std::uint8_t>, const Neighbours&);
-template Result<AttributeValues<2>> decode_attribute_values<2>(std::span<const std::uint8_t>,
-                                                               const AttributeValues<2>&);
-template Result<AttributeValues<3>> decode_attribute_values<3>(std::span<const std::uint8_t>,
-                                                               const AttributeValues<3>&);
+template Result<std::vector<Values2>> decode_attribute_values<Values2>(std::span<const std::uint8_t>,
+                                                                       const Neighbours&);
+template Result<std::vector<Values3>> decode_attribute_values<Values3>(std::span<const std::uint8_t>,
+                                                                       const Neighbours&);
+template Result<std::vector<Values2>> decode_attribute_values<Values2>(std::span<const std::uint8_t>,
+                                                                       const std::vector<Values2>&);
+template Result<std::vector<Values3>> decode_attribute_values<Values3>(std::span<const std::uint8_t>,
+                                                                       const std::vector<Values3>&);
 
 }  // namespace htvm

@@ -7,11 +7,14 @@ namespace htvm {
 
 namespace {
 
+using Values2 = std::array<std::int32_t, 2>;
+using Values3 = std::array<std::int32_t, 3>;
+
 // The values are not changed by walking over them: what is coded is what they are.
-template <std::size_t components, class Writer>
-void write_values(AttributeValues<components>& values, const AttributeSource<components>& source,
-                  AttributePredictor predictor, std::size_t end, Writer& writer) {
-    std::vector<AttributeContexts> contexts(components);
+template <class Value, class Writer>
+void write_values(std::vector<Value>& values, const AttributeSource<Value>& source, AttributePredictor predictor,
+                  std::size_t end, Writer& writer) {
+    std::vector<AttributeContexts> contexts(std::tuple_size_v<Value>);
     auto code = [&](ResidualContext& a, ResidualContext& b, ResidualMantissa& mantissa, std::int32_t residual) {
         encode_residual(writer, a, b, mantissa, residual);
         return residual;
@@ -19,8 +22,8 @@ void write_values(AttributeValues<components>& values, const AttributeSource<com
     walk_attribute_values(values, source, predictor, end, contexts, code);
 }
 
-template <std::size_t components>
-std::vector<std::uint8_t> encode_from(AttributeValues<components> values, const AttributeSource<components>& source) {
+template <class Value>
+std::vector<std::uint8_t> encode_from(std::vector<Value> values, const AttributeSource<Value>& source) {
     if (values.empty()) return {};
     constexpr std::size_t trial_size = 8192;  // enough vertices to tell the predictors apart
     AttributePredictor best = AttributePredictor::previous;
@@ -44,21 +47,22 @@ std::vector<std::uint8_t> encode_from(AttributeValues<components> values, const 
 
 }  // namespace
 
-template <std::size_t components>
-std::vector<std::uint8_t> encode_attribute_values(const AttributeValues<components>& values,
-                                                  const Neighbours& neighbours) {
-    return encode_from<components>(values, {.neighbours = &neighbours});
+template <class Value>
+std::vector<std::uint8_t> encode_attribute_values(const std::vector<Value>& values, const Neighbours& neighbours) {
+    return encode_from<Value>(values, {.neighbours = &neighbours});
 }
 
-template <std::size_t components>
-std::vector<std::uint8_t> encode_attribute_values(const AttributeValues<components>& values,
-                                                  const AttributeValues<components>& predictions) {
-    return encode_from<components>(values, {.given = &predictions});
+template <class Value>
+std::vector<std::uint8_t> encode_attribute_values(const std::vector<Value>& values,
+                                                  const std::vector<Value>& predictions) {
+    return encode_from<Value>(values, {.given = &predictions});
 }
 
-template std::vector<std::uint8_t> encode_attribute_values<2>(const AttributeValues<2>&, const Neighbours&);
-template std::vector<std::uint8_t> encode_attribute_values<3>(const AttributeValues<3>&, const Neighbours&);
-template std::vector<std::uint8_t> encode_attribute_values<2>(const AttributeValues<2>&, const AttributeValues<2>&);
-template std::vector<std::uint8_t> encode_attribute_values<3>(const AttributeValues<3>&, const AttributeValues<3>&);
+template std::vector<std::uint8_t> encode_attribute_values<Values2>(const std::vector<Values2>&, const Neighbours&);
+template std::vector<std::uint8_t> encode_attribute_values<Values3>(const std::vector<Values3>&, const Neighbours&);
+template std::vector<std::uint8_t> encode_attribute_values<Values2>(const std::vector<Values2>&,
+                                                                    const std::vector<Values2>&);
+template std::vector<std::uint8_t> encode_attribute_values<Values3>(const std::vector<Values3>&,
+                                                                    const std::vector<Values3>&);
 
 }  // namespace htvm

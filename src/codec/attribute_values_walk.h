@@ -26,10 +26,10 @@ enum class AttributePredictor : std::uint8_t {
 };
 
 // Where predictions come from: one of the two is null.
-template <std::size_t components>
+template <class Value>
 struct AttributeSource {
     const Neighbours* neighbours = nullptr;
-    const AttributeValues<components>* given = nullptr;
+    const std::vector<Value>* given = nullptr;
 
     std::size_t vertex_count() const { return neighbours ? neighbours->vertex_count() : given->size(); }
     bool offers(AttributePredictor predictor) const {
@@ -40,14 +40,15 @@ struct AttributeSource {
     std::size_t vertex_at(std::size_t rank) const { return neighbours ? neighbours->order[rank] : rank; }
 };
 
-template <std::size_t components>
-std::array<std::int64_t, components> predict_from_mesh(const AttributeValues<components>& values,
-                                                       const Neighbours& neighbours, std::size_t rank,
-                                                       AttributePredictor predictor) {
+template <class Value>
+std::array<std::int64_t, std::tuple_size_v<Value>> predict_from_mesh(const std::vector<Value>& values,
+                                                                     const Neighbours& neighbours, std::size_t rank,
+                                                                     AttributePredictor predictor) {
     const auto around = neighbours.neighbours_of(rank);
     const auto parallelograms = neighbours.parallelograms_of(rank);
     const bool use_parallelograms = predictor != AttributePredictor::neighbours && !parallelograms.empty();
     const bool use_neighbours = predictor != AttributePredictor::parallelograms || !use_parallelograms;
+    constexpr std::size_t components = std::tuple_size_v<Value>;
     std::array<std::int64_t, components> out{};
     for (std::size_t c = 0; c < components; ++c) {
         std::int64_t near = 0, far = 0;
@@ -83,11 +84,12 @@ struct AttributeContexts {
 
 // Codes all vertices up to `end`. code(context, context, mantissa, residual) puts the residual into the stream and
 // returns it, or, decoding, returns what the stream says. False where a value leaves the limit.
-template <std::size_t components, class Code>
-bool walk_attribute_values(AttributeValues<components>& values, const AttributeSource<components>& source,
+template <class Value, class Code>
+bool walk_attribute_values(std::vector<Value>& values, const AttributeSource<Value>& source,
                            AttributePredictor predictor, std::size_t end, std::vector<AttributeContexts>& contexts,
                            Code&& code) {
-    std::vector<std::array<std::int32_t, components>> residuals(source.neighbours ? values.size() : 0);
+    constexpr std::size_t components = std::tuple_size_v<Value>;
+    std::vector<Value> residuals(source.neighbours ? values.size() : 0);
     std::array<std::int64_t, components> recent{};  // running mean of the magnitudes, in sixteenths
     for (std::size_t rank = 0; rank < end; ++rank) {
         const std::size_t v = source.vertex_at(rank);
