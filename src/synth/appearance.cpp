@@ -12,41 +12,47 @@ namespace {
 using Eigen::Vector3d;
 
 // Where one material ends and the next begins, rest mm.
-constexpr double collar_height = 1458, hem_height = 925, cuff_height = 112, sleeve_end = 368, arm_begin = 215;
+constexpr double collar_height = 1472, hem_height = 925, cuff_height = 112, sleeve_end = 368, arm_begin = 215;
 
 double smooth_step(double u) {
     u = std::clamp(u, 0.0, 1.0);
     return u * u * (3.0 - 2.0 * u);
 }
 
-double lattice_value(std::int64_t x, std::int64_t y, std::int64_t z) {
-    const std::uint64_t key = static_cast<std::uint64_t>(x) * 0x8da6b343u ^
-                              static_cast<std::uint64_t>(y) * 0xd8163841u ^ static_cast<std::uint64_t>(z) * 0xcb1ab31fu;
-    return static_cast<double>(mix_bits(key) >> 11) * 0x1p-52 - 1.0;
+// The slope of a random gradient at a lattice point, along an offset from it.
+double lattice_slope(std::int64_t x, std::int64_t y, std::int64_t z, double dx, double dy, double dz) {
+    const std::uint64_t bits =
+        mix_bits(static_cast<std::uint64_t>(x) * 0x8da6b343u ^ static_cast<std::uint64_t>(y) * 0xd8163841u ^
+                 static_cast<std::uint64_t>(z) * 0xcb1ab31fu);
+    const auto component = [&](int shift) { return static_cast<double>(bits >> shift & 0xffff) * 0x1p-15 - 1.0; };
+    return component(0) * dx + component(16) * dy + component(32) * dz;
 }
 
-// Smooth noise in [-1, 1] with features about one unit wide.
-double value_noise(double x, double y, double z) {
+// Smooth noise, mostly in [-1, 1], with features about one unit wide.
+double smooth_noise(double x, double y, double z) {
     const double fx = std::floor(x), fy = std::floor(y), fz = std::floor(z);
     const auto ix = static_cast<std::int64_t>(fx), iy = static_cast<std::int64_t>(fy),
                iz = static_cast<std::int64_t>(fz);
-    const double u = smooth_step(x - fx), v = smooth_step(y - fy), w = smooth_step(z - fz);
-    const auto along_x = [&](std::int64_t dy, std::int64_t dz) {
-        const double a = lattice_value(ix, iy + dy, iz + dz), b = lattice_value(ix + 1, iy + dy, iz + dz);
+    const double dx = x - fx, dy = y - fy, dz = z - fz;
+    const double u = smooth_step(dx), v = smooth_step(dy), w = smooth_step(dz);
+    const auto along_x = [&](int j, int k) {
+        const double a = lattice_slope(ix, iy + j, iz + k, dx, dy - j, dz - k);
+        const double b = lattice_slope(ix + 1, iy + j, iz + k, dx - 1, dy - j, dz - k);
         return a + u * (b - a);
     };
-    const auto along_y = [&](std::int64_t dz) {
-        const double a = along_x(0, dz), b = along_x(1, dz);
+    const auto along_y = [&](int k) {
+        const double a = along_x(0, k), b = along_x(1, k);
         return a + v * (b - a);
     };
     const double a = along_y(0), b = along_y(1);
-    return a + w * (b - a);
+    return std::clamp(1.9 * (a + w * (b - a)), -1.2, 1.2);
 }
 
-// Ridges where the noise crosses zero, as cloth folds: in [-1, 1].
+// Rounded ridges where the noise crosses zero, as cloth folds: in [-1, 1].
 double ridges(double x, double y, double z) {
-    const double n = 1.0 - std::min(1.0, 2.2 * std::abs(value_noise(x, y, z)));
-    return 2.0 * n * n - 1.0;
+    const double n = 1.8 * smooth_noise(x, y, z);
+    const double crest = std::max(0.0, 1.0 - n * n);
+    return 2.0 * crest * crest - 1.0;
 }
 
 // 1 at the centre of an ellipse in the frontal plane, 0 outside it.
@@ -60,21 +66,27 @@ bool on_arm(const Vector3d& q) { return std::abs(q.x()) > arm_begin && q.y() > 1
 // Positive where hair grows, mm from the hairline: high on the brow, low at the nape.
 double hair_depth(const Vector3d& q) { return q.y() - 1592 - 100 * smooth_step((q.z() + 40) / 110); }
 
+// 1 on the ears, which hair leaves free.
+double ear_cover(const Vector3d& q) {
+    const double u = (q.z() + 2) / 40, v = (q.y() - 1634) / 48;
+    return smooth_step(1.6 * (1.0 - std::sqrt(u * u + v * v))) * smooth_step((std::abs(q.x()) - 40) / 20);
+}
+
 double head_relief(const Vector3d& q) {
     double relief = 0;
     const double hair = hair_depth(q);
     if (hair > -5) {
-        const double strands = value_noise(q.x() / 11, q.y() / 38, q.z() / 15);
-        relief +=
-            smooth_step((hair + 5) / 12) * (10 + 2.2 * strands + 2 * value_noise(q.x() / 34, q.y() / 34, q.z() / 34));
+        const double strands = smooth_noise(q.x() / 11, q.y() / 38, q.z() / 15);
+        relief += (1 - ear_cover(q)) * smooth_step((hair + 5) / 12) *
+                  (10 + 2.2 * strands + 2 * smooth_noise(q.x() / 34, q.y() / 34, q.z() / 34));
     }
     if (q.z() > 45) {
         relief -= 4.5 * spot(q, 30, 1655, 21, 12);  // eye sockets
         relief += 2.2 * spot(q, 30, 1654, 12, 8);   // eyeballs
         relief += 3.0 * spot(q, 30, 1673, 24, 8);   // brows
-        relief += 2.6 * spot(q, 0, 1596, 24, 5.5);  // upper lip
-        relief += 3.0 * spot(q, 0, 1586, 19, 5.5);  // lower lip
-        relief -= 2.0 * spot(q, 0, 1575, 16, 5);    // under the lip
+        relief += 2.6 * spot(q, 0, 1588, 24, 5.5);  // upper lip
+        relief += 3.0 * spot(q, 0, 1577, 19, 5.5);  // lower lip
+        relief -= 2.0 * spot(q, 0, 1566, 16, 5);    // under the lip
         relief += 1.5 * spot(q, 42, 1622, 18, 16);  // cheeks
     }
     return relief;
@@ -85,19 +97,24 @@ double arm_relief(const Vector3d& q) {
     const double sleeve = smooth_step((sleeve_end - along) / 7);
     const double flare = 5.5 * smooth_step((along - 290) / 70);
     const double folds = 2.4 * ridges(q.x() / 42, q.y() / 90, q.z() / 90 + 7);
-    const double skin = 0.35 * value_noise(q.x() / 26, q.y() / 26, q.z() / 26);
+    const double skin = 0.35 * smooth_noise(q.x() / 26, q.y() / 26, q.z() / 26);
     return sleeve * (2.5 + flare + folds) + (1 - sleeve) * skin;
 }
 
 double torso_relief(const Vector3d& q) {
-    const double collar = 3.5 * smooth_step((q.y() - 1432) / 12) * smooth_step((collar_height - q.y()) / 6);
+    const double collar = 3.5 * smooth_step((q.y() - 1446) / 12) * smooth_step((collar_height - q.y()) / 6);
     const double lower = smooth_step((1250 - q.y()) / 250);
-    const double side = q.x() >= 0 ? 1.0 : -1.0;
-    const double folds = ridges((q.y() + 0.55 * side * q.x()) / 62, (q.x() - 0.4 * side * q.y()) / 150, q.z() / 130);
+    // Drawn from the shoulders to the waist, on each side its own way.
+    const double slant = 0.5 * std::abs(q.x());
+    const double folds = ridges((q.y() + slant) / 75, q.x() / 150, q.z() / 140);
     const double hang = ridges(q.x() / 55, q.y() / 260, q.z() / 55 + 3);
     const double hem = 6.0 * (1 - smooth_step((q.y() - hem_height) / 130));
     return 2 + collar + hem + (1.6 + 1.8 * lower) * folds + 1.6 * (1 - lower) * hang +
-           0.8 * value_noise(q.x() / 24, q.y() / 24, q.z() / 24);
+           0.8 * smooth_noise(q.x() / 24, q.y() / 24, q.z() / 24);
+}
+
+bool on_back_pocket(const Vector3d& q) {
+    return q.z() < -60 && q.y() > 790 && q.y() < 870 && std::abs(std::abs(q.x()) - 82) < 38;
 }
 
 double leg_relief(const Vector3d& q) {
@@ -105,9 +122,9 @@ double leg_relief(const Vector3d& q) {
     const double folds = ridges(q.x() / 95, q.y() / (38 + 20 * (1 - knee)), q.z() / 95 + 11);
     const double cuff = 5.0 * smooth_step((190 - q.y()) / 70);
     const double seam = 1.2 * std::exp(-std::pow((q.z() + 6) / 5, 2)) * (std::abs(q.x()) > 100 ? 1 : 0);
-    const double pocket = q.y() > 790 && q.y() < 870 && q.z() < -60 ? 1.5 : 0.0;
+    const double pocket = on_back_pocket(q) ? 1.5 : 0.0;
     return 1.5 + (1.2 + 2.2 * knee + 2.2 * bottom) * folds + cuff + seam + pocket +
-           0.7 * value_noise(q.x() / 22, q.y() / 22, q.z() / 22);
+           0.7 * smooth_noise(q.x() / 22, q.y() / 22, q.z() / 22);
 }
 
 double shoe_relief(const Vector3d& q) {
@@ -121,8 +138,8 @@ double shoe_relief(const Vector3d& q) {
 Vector3d mix(const Vector3d& a, const Vector3d& b, double weight) { return a + std::clamp(weight, 0.0, 1.0) * (b - a); }
 
 Vector3d skin_colour(const Vector3d& q) {
-    const double blotches = value_noise(q.x() / 45, q.y() / 45, q.z() / 45 + 5);
-    const double pores = value_noise(q.x() / 13, q.y() / 13, q.z() / 13);
+    const double blotches = smooth_noise(q.x() / 45, q.y() / 45, q.z() / 45 + 5);
+    const double pores = smooth_noise(q.x() / 13, q.y() / 13, q.z() / 13);
     return Vector3d(211, 160, 131) + blotches * Vector3d(7, 9, 8) + pores * Vector3d(4, 4, 4);
 }
 
@@ -130,16 +147,16 @@ Vector3d head_colour(const Vector3d& q) {
     Vector3d colour = skin_colour(q);
     if (q.z() > 45) {
         colour = mix(colour, {214, 120, 104}, 0.5 * spot(q, 45, 1618, 24, 18));
-        colour = mix(colour, {178, 88, 84}, 1.4 * spot(q, 0, 1591, 26, 11));
-        colour = mix(colour, {96, 46, 46}, 1.2 * spot(q, 0, 1591, 24, 2.6));
+        colour = mix(colour, {178, 88, 84}, 1.4 * spot(q, 0, 1582, 26, 11));
+        colour = mix(colour, {96, 46, 46}, 1.2 * spot(q, 0, 1582, 24, 2.6));
         colour = mix(colour, {74, 50, 36}, 1.5 * spot(q, 31, 1676, 24, 6.5));
         colour = mix(colour, {236, 232, 226}, 2.0 * spot(q, 30, 1655, 16, 8));
         colour = mix(colour, {62, 84, 102}, 2.0 * spot(q, 30, 1655, 8, 8));
         colour = mix(colour, {24, 22, 24}, 1.5 * spot(q, 30, 1655, 4, 4));
         colour = mix(colour, {120, 70, 60}, 1.0 * spot(q, 8, 1612, 6, 5));  // nostrils
     }
-    const double edge = hair_depth(q) + 5 * value_noise(q.x() / 14, q.y() / 14, q.z() / 14);
-    const double strands = value_noise(q.x() / 9, q.y() / 45, q.z() / 12);
+    const double edge = hair_depth(q) - 90 * ear_cover(q) + 5 * smooth_noise(q.x() / 14, q.y() / 14, q.z() / 14);
+    const double strands = smooth_noise(q.x() / 9, q.y() / 45, q.z() / 12);
     const Vector3d hair = Vector3d(70, 46, 30) + strands * Vector3d(24, 18, 12);
     return mix(colour, hair, smooth_step(edge / 6));
 }
@@ -148,7 +165,8 @@ Vector3d head_colour(const Vector3d& q) {
 Vector3d shirt_colour(const Vector3d& q) {
     const bool arm = on_arm(q);
     const double along = arm ? std::abs(q.x()) : q.y();
-    const double band = std::sin(along * 0.105), line = std::sin((arm ? q.z() : q.x()) * 0.14);
+    const double around = arm ? std::atan2(q.y() - 1395, q.z()) : std::atan2(q.x(), q.z());
+    const double band = std::sin(along * 0.105), line = std::sin(around * (arm ? 6 : 16));
     Vector3d colour = mix({42, 82, 146}, {205, 212, 218}, smooth_step(2.2 * band + 0.5));
     colour = mix(colour, {178, 50, 52}, smooth_step((line - 0.9) * 14));
     if (!arm && q.z() > 40) {
@@ -160,22 +178,21 @@ Vector3d shirt_colour(const Vector3d& q) {
     }
     const double edge = arm ? sleeve_end - along : q.y() - hem_height;
     colour = mix(colour, {30, 52, 92}, smooth_step((18 - edge) / 5));
-    if (q.y() > 1440) colour = mix(colour, {30, 52, 92}, smooth_step((q.y() - 1440) / 4));
-    const double weave = value_noise(q.x() / 11, q.y() / 11, q.z() / 11);
+    if (q.y() > 1454) colour = mix(colour, {30, 52, 92}, smooth_step((q.y() - 1454) / 4));
+    const double weave = smooth_noise(q.x() / 11, q.y() / 11, q.z() / 11);
     return colour * (1.0 + 0.06 * weave);
 }
 
 Vector3d trouser_colour(const Vector3d& q) {
-    const double wash = value_noise(q.x() / 120, q.y() / 160, q.z() / 120),
-                 grain = value_noise(q.x() / 10, q.y() / 26, q.z() / 10);
+    const double wash = smooth_noise(q.x() / 120, q.y() / 160, q.z() / 120),
+                 grain = smooth_noise(q.x() / 10, q.y() / 26, q.z() / 10);
     Vector3d colour = Vector3d(66, 70, 84) + wash * Vector3d(12, 12, 13) + grain * Vector3d(11, 11, 12);
     if (q.y() > 885) colour = mix(colour, {52, 36, 26}, smooth_step((q.y() - 885) / 4));  // belt
-    const bool pocket_edge = q.z() < -60 && q.y() > 782 && q.y() < 792;
-    return pocket_edge ? mix(colour, {140, 110, 70}, 0.6) : colour;
+    return on_back_pocket(q) && (q.y() > 862 || q.y() < 798) ? mix(colour, {140, 110, 70}, 0.6) : colour;
 }
 
 Vector3d shoe_colour(const Vector3d& q) {
-    const double scuff = value_noise(q.x() / 16, q.y() / 16, q.z() / 16);
+    const double scuff = smooth_noise(q.x() / 16, q.y() / 16, q.z() / 16);
     Vector3d colour = Vector3d(128, 44, 40) + scuff * Vector3d(10, 6, 6);
     if (q.y() > 55 && std::abs(std::abs(q.x()) - 103) < 20 && q.z() > 5)
         colour = mix(colour, {235, 232, 224}, smooth_step(2 * std::sin(q.z() * 0.42)));  // laces

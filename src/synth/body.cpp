@@ -75,19 +75,19 @@ void build_trunk(Body& body) {
                         tapered({-92, 1385, -12}, {92, 1385, -12}, 62, 62)};
     add_pair(chest, {64, 1312, 44}, {70, 1325, 42}, 58, 54);    // pectorals
     add_pair(chest, {158, 1392, -6}, {182, 1392, -4}, 55, 54);  // shoulders
-    add_pair(chest, {24, 1452, -18}, {130, 1412, -14}, 38, 40);
+    add_pair(chest, {26, 1466, -20}, {135, 1414, -14}, 40, 42);
     Shape& neck = body[static_cast<std::size_t>(Part::neck)];
     neck.blend = 10;
-    neck.primitives = {tapered({0, 1440, -14}, {0, 1570, 2}, 56, 52)};
+    neck.primitives = {tapered({0, 1440, -16}, {0, 1570, 0}, 60, 55)};
 }
 
 void build_head(Body& body) {
     Shape& head = body[static_cast<std::size_t>(Part::head)];
     head.blend = 7;
-    head.primitives = {ellipsoid({0, 1652, 2}, {72, 86, 92}), tapered({0, 1610, 28}, {0, 1572, 56}, 56, 27),
-                       tapered({0, 1600, 0}, {0, 1575, 12}, 55, 46), tapered({0, 1652, 88}, {0, 1617, 104}, 7, 12),
-                       tapered({-9, 1613, 96}, {9, 1613, 96}, 8, 8)};
-    add_pair(head, {74, 1655, -6}, {72, 1625, -2}, 20, 13, {0.45, 1, 1});  // ears
+    head.primitives = {ellipsoid({0, 1650, 0}, {75, 90, 95}), tapered({0, 1606, 26}, {0, 1560, 56}, 60, 29),
+                       tapered({0, 1598, -2}, {0, 1568, 14}, 60, 50), tapered({0, 1650, 88}, {0, 1619, 101}, 7, 10),
+                       tapered({-8, 1614, 95}, {8, 1614, 95}, 7.5, 7.5)};
+    add_pair(head, {77, 1652, -6}, {74, 1622, -2}, 20, 13, {0.45, 1, 1});  // ears
 }
 
 void build_limbs(Body& body) {

@@ -68,6 +68,7 @@ Angles stand(double t) {
         a.hip_spread[side] = 3;
         a.hip_flex[side] = 3;
         a.knee[side] = 5;
+        a.ankle[side] = 2;
     }
     return a;
 }
@@ -86,7 +87,7 @@ Angles walk(double t, double distance) {
         const double swing_knee = 0.5 + 0.5 * std::cos(p - 4.7);
         a.hip_flex[side] = 7 + 24 * std::cos(p);
         a.knee[side] = 9 + 52 * swing_knee * swing_knee + 4 * std::cos(2 * p);
-        a.ankle[side] = 0.55 * (a.hip_flex[side] - a.knee[side]) + 4;
+        a.ankle[side] = 0.6 * (a.knee[side] - a.hip_flex[side]) - 3;  // keeps the foot nearly level
         a.arm_swing[side] = 3 - 24 * std::cos(p);
         a.elbow[side] = 26 - 14 * std::cos(p);
     }
@@ -117,7 +118,7 @@ Angles turn(double t, double local) {
         const double raise = step * step * (3 - 2 * step);
         a.hip_flex[side] = 3 + 30 * raise;
         a.knee[side] = 5 + 48 * raise;
-        a.ankle[side] = -8 * raise;
+        a.ankle[side] = 2 + 6 * raise;
         a.arm_lower[side] = 52;
         a.arm_swing[side] = side == 0 ? 22 : -14;
         a.elbow[side] = 34;
@@ -138,7 +139,7 @@ Angles jump(double t, double local) {
     for (int side = 0; side < 2; ++side) {
         a.hip_flex[side] += 58 * crouch + 16 * air;
         a.knee[side] += 84 * crouch + 26 * air;
-        a.ankle[side] = -30 * crouch + 26 * air;
+        a.ankle[side] += 26 * crouch - 24 * air;
         a.hip_spread[side] += 7 * air;
         a.arm_swing[side] += -38 * crouch + 74 * air;
         a.arm_lower[side] -= 28 * air;
@@ -231,6 +232,22 @@ void place_joints(PosedBody& body) {
     for (std::size_t j = 0; j < joint_count; ++j) body.joints[j] = carry(body.parts[index_of(carrier[j])], rest[j]);
 }
 
+// The height of the lowest point of the shoes: a soft minimum, so that a change of foot makes no jolt.
+double lowest_sole(const PosedBody& body) {
+    constexpr double softness = 6.0;
+    std::array<double, 4> heights;
+    for (std::size_t side = 0; side < 2; ++side) {
+        const PartFrame& foot = body.parts[index_of(Part::left_foot) + side];
+        const double x = side == 0 ? 102.0 : -102.0;
+        heights[2 * side] = carry(foot, {x, 0, -72}).y();
+        heights[2 * side + 1] = carry(foot, {x, 0, 140}).y();
+    }
+    const double lowest = *std::ranges::min_element(heights);
+    double sum = 0;
+    for (const double height : heights) sum += std::exp((lowest - height) / softness);
+    return lowest - softness * std::log(sum / static_cast<double>(heights.size()));
+}
+
 }  // namespace
 
 const std::array<Vector3d, joint_count>& rest_joints() {
@@ -263,13 +280,9 @@ PosedBody pose_body(double seconds) {
     place_limbs(body, a);
     place_joints(body);
 
-    // The lower foot stands on the ground; a soft minimum, so that the change of foot makes no jolt.
-    const double left = body.joints[11].y(), right = body.joints[14].y(), softness = 12.0;
-    const double lowest = std::min(left, right) - softness * std::log1p(std::exp(-std::abs(left - right) / softness)) +
-                          softness * std::log(2.0);
+    const double lowest = lowest_sole(body);
     // The circle starts at the origin with the person facing +z, and turns to the person's left.
-    const Vector3d shift(walk_radius * (1 - std::cos(heading)), rest[11].y() - lowest + a.lift,
-                         walk_radius * std::sin(heading));
+    const Vector3d shift(walk_radius * (1 - std::cos(heading)), a.lift - lowest, walk_radius * std::sin(heading));
     for (auto& frame : parts) frame.pivot += shift;
     for (auto& joint : body.joints) joint += shift;
     return body;
