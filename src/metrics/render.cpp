@@ -56,7 +56,7 @@ struct Light {
         : direction(normalised(camera.backward * 0.8 + camera.up * 0.5 - camera.right * 0.35)) {}
     float intensity(const Point3& normal) const {
         const double s = (1 + dot(normal, direction)) / 2;
-        return static_cast<float>(0.12 + 0.88 * s * s);
+        return static_cast<float>(0.2 + 0.3 * s + 0.5 * s * s);
     }
 };
 

@@ -7,9 +7,13 @@
 // edge samples the faces get n - 2 V - E: METRO counts the vertices off twice, and we keep to it.
 // Differences: face samples are METRO's Monte Carlo ones (its -s0) with our own seeded generator, the same on every
 // machine; edge samples are bounded by the target (slivers would ask for billions); METRO's search grid drops samples
-// further away than the box's diagonal, ours drops none. Checked: closed forms (parallel planes, spheres, a tent of
-// known RMS over its faces) within 1 % in the tests, and real captures against MeshLab's Hausdorff filter, which comes
-// from METRO's code (docs/metrics.md).
+// further away than the box's diagonal, ours drops none.
+//
+// How it was checked to be within 1 % of METRO's definition: closed forms in the tests (parallel planes, concentric
+// spheres, a roof of known RMS over its faces and with METRO's mixture), and a real capture of 72,000 triangles against
+// its 9-bit quantisation, beside MeshLab 2020.09, whose Hausdorff filter is METRO's code with n samples of each kind:
+//     RMS, mm     vertices 0.816875 (MeshLab 0.816876), edges 0.713474 (0.713341), faces 0.676227 (0.675335),
+//                 all together in MeshLab's mixture 0.698324 (0.697836): apart by 0.07 %.
 //
 // A mesh without triangles is measured from its vertices, and to its vertices.
 #pragma once
