@@ -1,0 +1,81 @@
+// All metrics of a pair of meshes at once, and of a sequence frame by frame with bounded memory: what the commands that
+// measure share.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "htvm/mesh.hpp"
+#include "htvm/result.hpp"
+#include "metrics/cloud_psnr.h"
+#include "metrics/mesh_measures.h"
+#include "metrics/picture_error.h"
+#include "metrics/point_error.h"
+#include "metrics/surface_error.h"
+#include "metrics/topology.h"
+
+namespace htvm {
+
+struct CompareOptions {
+    bool points = true;    // M1, geometry and colour
+    bool surface = true;   // M2
+    bool cloud = true;     // D1 and D2
+    bool pictures = true;  // M3
+    bool topology = true;  // counts
+    SurfaceErrorOptions surface_options;
+    TopologyOptions topology_options;
+    ViewOptions views;
+    RenderOptions render;         // colours are drawn only where both meshes have some
+    std::optional<Box> view_box;  // what the cameras look at in every frame; empty: each original's own bounding box
+    unsigned threads = 0;         // 0: one per core; any number gives the same numbers (overrides surface_options')
+};
+
+// One frame. What was not asked for is left zero.
+struct FrameComparison {
+    std::uint64_t original_vertices = 0, decoded_vertices = 0;
+    std::uint64_t original_triangles = 0, decoded_triangles = 0;
+    Box original_box;
+    PointError points;
+    SurfaceError surface;
+    CloudError cloud;
+    PictureErrorSums pictures;
+    Topology original_topology, decoded_topology;
+};
+
+// Fails (bad_input) where a mesh cannot be measured (check_measurable) or an option is out of range, (limit) where
+// memory runs out.
+Result<FrameComparison> compare_frame(const Mesh& original, const Mesh& decoded, const CompareOptions& options = {});
+
+// Frames added up so far.
+struct SequenceComparison {
+    std::uint64_t frames = 0;
+    std::uint64_t original_vertices = 0, decoded_vertices = 0;
+    std::uint64_t original_triangles = 0, decoded_triangles = 0;
+    Box original_box;  // round all frames
+    PointError points;
+    SurfaceErrorSums surface;
+    CloudError cloud;
+    PictureErrorSums pictures;
+    Topology original_topology, decoded_topology;  // sums over the frames
+};
+SequenceComparison& operator+=(SequenceComparison& sums, const FrameComparison& frame);
+SequenceComparison as_sequence(const FrameComparison& frame);  // of one frame
+
+// The numbers that stand in tables and curves. PSNR is infinite where there is no difference.
+struct ComparisonSummary {
+    double m1_mm = 0, m1_forward_mm = 0, m1_backward_mm = 0, m1_largest_mm = 0;
+    bool has_colour = false;                                              // both sequences have colours somewhere
+    double m1_colour = 0, m1_colour_forward = 0, m1_colour_backward = 0;  // levels
+    double m2_mm = 0, m2_worst_frame_mm = 0;
+    SurfaceDistances m2_forward, m2_backward;
+    double hausdorff_mm = 0;  // largest distance of both directions and all frames
+    double peak_mm = 0;       // of D1 and D2
+    double d1_db = 0, d2_db = 0;
+    double m3_foreground_db = 0, m3_full_db = 0;
+    double foreground_share = 0;  // of the pixels
+};
+
+// peak_mm: of D1 and D2; 0: the diagonal of the box round all originals so far.
+ComparisonSummary summarise(const SequenceComparison& sums, double peak_mm = 0);
+
+}  // namespace htvm
