@@ -1,5 +1,6 @@
 #include "core/orientation.h"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -70,6 +71,79 @@ Rotation swing(const Bone& bone, const Pose& pose, const Pose& reference, const 
     return minimal_rotation(from, direction(bone, pose), column(orientation, 1));
 }
 
+// The body's rotation, then the minimal rotation from the bone so turned to this pose's.
+Rotation swing_after(const Rotation& body, const Bone& bone, const Pose& pose, const Pose& reference,
+                     const Rotation& orientation) {
+    Vector3d from = direction(bone, reference);
+    if (!normalise(from)) from = column(orientation, 0);
+    const Vector3d hint = rotate(body, column(orientation, 1));
+    return multiply(minimal_rotation(rotate(body, from), direction(bone, pose), hint), body);
+}
+
+// The eigenvector of the largest eigenvalue of a symmetric 4x4 matrix, by Jacobi rotations.
+std::array<double, 4> largest_eigenvector(std::array<std::array<double, 4>, 4> m) {
+    std::array<std::array<double, 4>, 4> vectors{};  // columns
+    for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = 1;
+    for (int sweep = 0; sweep < 20; ++sweep)
+        for (std::size_t p = 0; p < 3; ++p)
+            for (std::size_t q = p + 1; q < 4; ++q) {
+                if (m[p][q] == 0) continue;
+                const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+                const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+                const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+                for (std::size_t k = 0; k < 4; ++k) {
+                    const double a = m[k][p], b = m[k][q];
+                    m[k][p] = c * a - s * b, m[k][q] = s * a + c * b;
+                }
+                for (std::size_t k = 0; k < 4; ++k) {
+                    const double a = m[p][k], b = m[q][k];
+                    m[p][k] = c * a - s * b, m[q][k] = s * a + c * b;
+                }
+                for (auto& row : vectors) {
+                    const double a = row[p], b = row[q];
+                    row[p] = c * a - s * b, row[q] = s * a + c * b;
+                }
+            }
+    std::size_t largest = 0;
+    for (std::size_t i = 1; i < 4; ++i)
+        if (m[i][i] > m[largest][largest]) largest = i;
+    return {vectors[0][largest], vectors[1][largest], vectors[2][largest], vectors[3][largest]};
+}
+
+Vector3d centre(const Pose& pose) {
+    Vector3d sum{};
+    for (const Vector3d& joint : pose.joints) sum = sum + joint;
+    return sum * (1 / static_cast<double>(pose.joints.size()));
+}
+
+// The rotation that brings the reference's joints closest to this pose's, as one rigid body (least squares; Horn 1987,
+// "Closed-form solution of absolute orientation using unit quaternions").
+Rotation body_rotation(const Pose& pose, const Pose& reference) {
+    const Vector3d from = centre(reference), to = centre(pose);
+    double h[3][3] = {};
+    double size = 0;
+    for (std::size_t j = 0; j < pose.joints.size(); ++j) {
+        const Vector3d a = reference.joints[j] - from, b = pose.joints[j] - to;
+        size += length(a) * length(b);
+        for (std::size_t r = 0; r < 3; ++r)
+            for (std::size_t c = 0; c < 3; ++c) h[r][c] += a[r] * b[c];
+    }
+    if (!(size > 1e-6) || !std::isfinite(size)) return identity_rotation;
+    for (auto& row : h)
+        for (double& element : row) element /= size;
+    for (std::size_t i = 0; i < 3; ++i) h[i][i] += 1e-6;  // joints all in a line: turn no more than needed
+    const auto q = largest_eigenvector({{
+        {h[0][0] + h[1][1] + h[2][2], h[1][2] - h[2][1], h[2][0] - h[0][2], h[0][1] - h[1][0]},
+        {h[1][2] - h[2][1], h[0][0] - h[1][1] - h[2][2], h[0][1] + h[1][0], h[2][0] + h[0][2]},
+        {h[2][0] - h[0][2], h[0][1] + h[1][0], h[1][1] - h[0][0] - h[2][2], h[1][2] + h[2][1]},
+        {h[0][1] - h[1][0], h[2][0] + h[0][2], h[1][2] + h[2][1], h[2][2] - h[0][0] - h[1][1]},
+    }});
+    const double w = q[0], x = q[1], y = q[2], z = q[3];
+    return orthonormalised({1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
+                            1 - 2 * (x * x + z * z), 2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x),
+                            1 - 2 * (x * x + y * y)});
+}
+
 // For each joint the number of bones between it and the nearer end of bone b; a large number where none lead there.
 std::vector<int> bones_away(const Skeleton& skeleton, const std::vector<std::vector<std::size_t>>& neighbours,
                             std::size_t b, std::size_t joint_count) {
@@ -106,8 +180,9 @@ Rotation twist(const Bone& bone, const Pose& pose, const Pose& reference, const 
         sine += weight * dot(cross(a, b), axis);
         size += weight * length(a) * length(b);
     }
-    // Too little lies across the bone to trust: lean towards no twist, all the more the less there is.
-    const double enough = 0.02 * size;
+    // Where little lies across the bone, or the joints around disagree, lean towards no twist; with less than this the
+    // legs of a real dancer twisted by half turns from frame to frame.
+    const double enough = 0.4 * size;
     double known = std::sqrt(cosine * cosine + sine * sine);
     if (known < enough) cosine += enough - known;
     known = std::sqrt(cosine * cosine + sine * sine);
@@ -188,11 +263,12 @@ std::vector<Rotation> derive_turning_orientations(const Skeleton& skeleton, cons
         neighbours[bone.first].push_back(bone.second);
         neighbours[bone.second].push_back(bone.first);
     }
+    const Rotation body = body_rotation(pose, reference);
     std::vector<Rotation> result(skeleton.bones.size());
     for (std::size_t b = 0; b < skeleton.bones.size(); ++b) {
         const Bone& bone = skeleton.bones[b];
         const Rotation orientation = reference_orientation(skeleton, b, reference);
-        const Rotation swung = swing(bone, pose, reference, orientation);
+        const Rotation swung = swing_after(body, bone, pose, reference, orientation);
         const std::vector<int> away = bones_away(skeleton, neighbours, b, joint_count);
         const Rotation twisted = twist(bone, pose, reference, swung, away);
         result[b] = orthonormalised(multiply(twisted, multiply(swung, orientation)));

@@ -38,10 +38,11 @@ Rotation bone_orientation(const Vector3d& first, const Vector3d& second, const R
 // pose keeps the reference's orientation. Bones whose joints the pose lacks get the identity.
 std::vector<Rotation> derive_orientations(const Skeleton& skeleton, const Pose& pose, const Pose* reference);
 
-// As derive_orientations with a reference, and the bone is then twisted about itself so that the joints around it
-// (nearer along the skeleton: more weight) come as close as they can to where they are in this pose. A body that
-// turns as a whole turns all its bones, also the upright ones, which minimal rotations alone leave where they were.
-// Where the joints around do not tell (all in line with the bone), the twist is zero.
+// As derive_orientations with a reference, but a body that turns as a whole turns all its bones, also the upright
+// ones, which minimal rotations alone leave where they were: the reference is first turned as one rigid body onto this
+// pose (least squares over all joints), then each bone by the minimal rotation onto its direction, then about itself
+// so that the joints around it (nearer along the skeleton: more weight) come as close as they can, as far as they tell.
+// Joints all in one line give the minimal rotation alone. Falls back to derive_orientations where joints are missing.
 std::vector<Rotation> derive_turning_orientations(const Skeleton& skeleton, const Pose& pose, const Pose& reference);
 
 }  // namespace htvm
