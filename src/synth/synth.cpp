@@ -45,12 +45,6 @@ Grid free_grid(RandomKey key, double vertices) {
     return grid;
 }
 
-Grid lattice_grid(double vertices) {
-    Grid grid;
-    grid.cell = std::min(90.0, std::sqrt(vertices_times_cell2 / vertices));
-    return grid;
-}
-
 // Moves every vertex along its normal onto the surface.
 void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, int rounds, unsigned threads) {
     const auto normals = vertex_normals(mesh, threads);
@@ -177,7 +171,11 @@ std::vector<Colour> sample_colours(const HalfEdgeMesh& mesh, const PosedBody& bo
 Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey key, unsigned threads) {
     const double vertices = std::clamp(options.vertices, fewest_vertices, most_vertices);
     const double wanted = vertices * (0.97 + 0.06 * random_uniform(derive_key(key, count_stream), 0));
-    const Grid grid = options.lattice ? lattice_grid(vertices) : free_grid(derive_key(key, grid_stream), wanted);
+    Grid grid;
+    if (options.lattice)
+        grid.cell = synth_lattice_cell(options);
+    else
+        grid = free_grid(derive_key(key, grid_stream), wanted);
     const Extraction extraction = extract_surface(body, grid, threads);
     // A reconstruction drops specks; on the lattice every vertex stays where its edge is.
     const std::size_t fewest = options.lattice ? 0 : extraction.triangles.size() / 100;
@@ -210,6 +208,11 @@ Skeleton synth_skeleton() {
     skeleton.bones = {{1, 0}, {1, 3}, {3, 4},  {4, 5},   {1, 6},  {6, 7},   {7, 8},
                       {2, 1}, {2, 9}, {9, 10}, {10, 11}, {2, 12}, {12, 13}, {13, 14}};
     return skeleton;
+}
+
+double synth_lattice_cell(const SynthOptions& options) {
+    return std::min(90.0,
+                    std::sqrt(vertices_times_cell2 / std::clamp(options.vertices, fewest_vertices, most_vertices)));
 }
 
 Result<void> check_synth_options(const SynthOptions& options) {

@@ -32,6 +32,10 @@ struct SynthFrame {
 // 15 joints and 14 bones, as in the paper's Fig. 3; bones in the same order as the joints' chains.
 Skeleton synth_skeleton();
 
+// The side of the lattice's cells, mm: a lattice vertex is at cell * (i, j, k) + share * cell * d, with integers i, j,
+// k, d one of the seven offsets {0, 1}^3 other than zero and share in (0, 1).
+double synth_lattice_cell(const SynthOptions& options);
+
 // Says what is wrong with options (bad_input), if anything.
 Result<void> check_synth_options(const SynthOptions& options);
 

@@ -1,0 +1,184 @@
+// htvm synth: a synthetic capture of a person, as mesh files and a skeleton.
+#include "synth/synth.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "core/parallel.h"
+#include "io/mesh_file.h"
+#include "io/skeleton_file.h"
+#include "terminal.h"
+
+namespace htvm::app {
+namespace {
+
+constexpr int most_frames = 1000000;
+
+struct Options {
+    std::string folder;
+    int frames = 60, first_frame = 0;
+    SynthOptions synth;
+    unsigned threads = 0;
+    bool json = false;
+};
+
+struct Written {
+    std::set<std::string> names;
+    std::size_t vertices = 0, triangles = 0;
+    double seconds = 0;
+};
+
+std::filesystem::path frame_path(const Options& options, int frame) {
+    return std::filesystem::path(options.folder) / fmt::format("frame_{:05}.ply", frame);
+}
+
+SkeletonTrack empty_track(double fps) {
+    SkeletonTrack track;
+    track.skeleton = synth_skeleton();
+    track.fps = fps;
+    return track;
+}
+
+void add_pose(SkeletonTrack& track, Pose pose) {
+    track.timestamps.push_back(static_cast<double>(track.poses.size()) / track.fps);
+    track.poses.push_back(std::move(pose));
+}
+
+// Makes as many frames at once as there are threads, so that memory does not grow with the number of frames.
+Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, SkeletonTrack& exact) {
+    const unsigned threads = std::min(thread_count(options.threads), 64u);
+    Written written;
+    Progress progress("synth", static_cast<std::size_t>(options.frames));
+    for (int done = 0; done < options.frames;) {
+        const int count = std::min(static_cast<int>(threads), options.frames - done);
+        std::vector<SynthFrame> made(static_cast<std::size_t>(count));
+        const unsigned inner = std::max(1u, threads / static_cast<unsigned>(count));
+        parallel_for(made.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i)
+                made[i] = synth_frame(options.synth, options.first_frame + done + static_cast<int>(i), inner);
+        });
+        for (auto& frame : made) {
+            const auto path = frame_path(options, options.first_frame + done++);
+            if (auto ok = write_mesh(path, frame.mesh); !ok) return tl::unexpected(ok.error());
+            written.names.insert(path.filename().string());
+            written.vertices += frame.mesh.positions.size();
+            written.triangles += frame.mesh.triangles.size();
+            add_pose(noisy, std::move(frame.pose));
+            add_pose(exact, std::move(frame.true_pose));
+            progress.step();
+        }
+    }
+    return written;
+}
+
+// Frames of an earlier run beside the new ones would be read as one sequence with them.
+void warn_of_other_meshes(const Options& options, const std::set<std::string>& written) {
+    std::size_t others = 0;
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(options.folder, error))
+        if (is_mesh_file_name(entry.path()) && !written.contains(entry.path().filename().string())) ++others;
+    if (others > 0)
+        warn(
+            fmt::format("{} holds {} other mesh files, which will be read along with these frames; remove them if that "
+                        "is not wanted",
+                        options.folder, others));
+}
+
+void report(const Options& options, const Written& written) {
+    const auto frames = static_cast<double>(options.frames);
+    note(
+        fmt::format("{} frames ({:.0f} vertices each on average), skeleton.json and skeleton_true.json to {}, made at "
+                    "{:.1f} frames/s",
+                    options.frames, static_cast<double>(written.vertices) / frames, options.folder,
+                    frames / std::max(written.seconds, 1e-9)));
+    if (!options.json) return;
+    const std::filesystem::path folder(options.folder);
+    const nlohmann::json summary = {{"folder", options.folder},
+                                    {"frames", options.frames},
+                                    {"first_frame", options.first_frame},
+                                    {"fps", options.synth.fps},
+                                    {"seed", options.synth.seed},
+                                    {"vertices", written.vertices},
+                                    {"triangles", written.triangles},
+                                    {"first_mesh", frame_path(options, options.first_frame).string()},
+                                    {"skeleton", (folder / "skeleton.json").string()},
+                                    {"true_skeleton", (folder / "skeleton_true.json").string()},
+                                    {"seconds", written.seconds}};
+    fmt::print("{}\n", summary.dump(2));
+}
+
+Result<void> synthesise(const Options& options) {
+    if (auto ok = check_synth_options(options.synth); !ok) return ok;
+    const auto start = std::chrono::steady_clock::now();
+    std::error_code error;
+    std::filesystem::create_directories(options.folder, error);
+    if (error) return fail(ErrorKind::bad_input, options.folder + " cannot be made: " + error.message());
+    SkeletonTrack noisy = empty_track(options.synth.fps), exact = noisy;
+    auto written = write_frames(options, noisy, exact);
+    if (!written) return tl::unexpected(written.error());
+    const std::filesystem::path folder(options.folder);
+    if (auto ok = write_skeleton((folder / "skeleton.json").string(), noisy); !ok) return ok;
+    if (auto ok = write_skeleton((folder / "skeleton_true.json").string(), exact); !ok) return ok;
+    written->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    warn_of_other_meshes(options, written->names);
+    report(options, *written);
+    return {};
+}
+
+}  // namespace
+
+void add_synth(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto& o = *options;
+    CLI::App* command = app.add_subcommand("synth", "Make a synthetic capture of a person: meshes and skeleton");
+    command->description(
+        "Makes a capture of a person who does not exist, to try the codec on: a dressed, coloured body, 1.75 m tall,\n"
+        "that starts in a T-pose, then walks, waves, turns and jumps in a cycle of 8 seconds. The surface is meshed "
+        "anew\n"
+        "in every frame, as reconstructions are: the number of vertices, their places and the triangles all change.\n"
+        "The same options give the same bytes, and every frame can be made on its own (--first-frame).");
+    command
+        ->add_option("OUT_DIR", o.folder, "Folder to write frame_00000.ply ..., skeleton.json, skeleton_true.json to")
+        ->required();
+    command->add_option("--frames", o.frames, "How many frames")
+        ->check(CLI::Range(1, most_frames))
+        ->capture_default_str();
+    command->add_option("--first-frame", o.first_frame, "The first frame's number; the motion starts at frame 0")
+        ->check(CLI::Range(0, most_frames))
+        ->capture_default_str();
+    command->add_option("--fps", o.synth.fps, "Frames per second")->capture_default_str();
+    command->add_option("--vertices", o.synth.vertices, "Vertices per frame, within 3 %")->capture_default_str();
+    command->add_option("--seed", o.synth.seed, "Of the noise and the sampling; the motion stays the same")
+        ->capture_default_str();
+    command
+        ->add_option("--surface-noise", o.synth.surface_noise_power,
+                     "Power of the noise on the surface, mm^2; new in every frame (2.25 is 1.5 mm RMS)")
+        ->capture_default_str();
+    command
+        ->add_option("--joint-noise", o.synth.joint_noise_power,
+                     "Power of the noise on each joint coordinate in skeleton.json, mm^2 (25 is 5 mm RMS);\n"
+                     "skeleton_true.json has none")
+        ->capture_default_str();
+    command->add_flag("--lattice", o.synth.lattice,
+                      "Leave the vertices on the edges of one regular grid (by default no grid can be told from them)");
+    command->add_flag("--normals", o.synth.normals, "Write vertex normals too");
+    command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
+    command->add_flag("--json", o.json, "Print what was written as JSON on standard output");
+    command->footer(
+        "Example: a capture of 2 seconds, then its first frame coded and shown\n"
+        "  htvm synth capture --frames 60\n"
+        "  htvm encode capture --skeleton capture/skeleton.json -o capture.htvm\n"
+        "  htvm info capture.htvm");
+    command->callback([options, &run] { run = [options] { return synthesise(*options); }; });
+}
+
+}  // namespace htvm::app
