@@ -1,5 +1,8 @@
 #include "metrics/picture_error.h"
 
+#include <algorithm>
+#include <cstdlib>
+
 #include "core/parallel.h"
 #include "metrics/cloud_psnr.h"
 
@@ -28,6 +31,19 @@ PictureErrorSums picture_error(const Picture& original, const Picture& decoded) 
         sums.squared += squared;
     }
     return sums;
+}
+
+Picture difference_picture(const Picture& original, const Picture& decoded, int gain) {
+    Picture out = original;
+    for (std::size_t i = 0; i < original.covered.size(); ++i) {
+        int largest = 0;
+        for (std::size_t c = 3 * i; c < 3 * i + 3; ++c)
+            largest = std::max(largest, std::abs(int{original.rgb[c]} - int{decoded.rgb[c]}));
+        const auto grey = static_cast<std::uint8_t>(255 - std::min(255, gain * largest));
+        for (std::size_t c = 3 * i; c < 3 * i + 3; ++c) out.rgb[c] = grey;
+        out.covered[i] = original.covered[i] | decoded.covered[i];
+    }
+    return out;
 }
 
 PictureErrorSums compare_views(const DrawableMesh& original, const DrawableMesh& decoded,

@@ -24,6 +24,10 @@ PictureErrorSums& operator+=(PictureErrorSums& sums, const PictureErrorSums& mor
 // Of two pictures of the same size.
 PictureErrorSums picture_error(const Picture& original, const Picture& decoded);
 
+// Where two pictures of the same size differ: white where they do not, darker by `gain` times the largest difference of
+// a pixel's three channels.
+Picture difference_picture(const Picture& original, const Picture& decoded, int gain = 4);
+
 // Draws both meshes from every camera and sums up. The same for any number of threads (0: one per core).
 PictureErrorSums compare_views(const DrawableMesh& original, const DrawableMesh& decoded,
                                const std::vector<Camera>& cameras, unsigned threads = 0);

@@ -231,6 +231,17 @@ TEST(PictureError, OfAShiftedMeshCountsTheOutline) {
     EXPECT_EQ(error.squared, 40u * 3 * 55 * 55);  // material 200 against background 255
 }
 
+TEST(PictureError, ItsPictureIsWhiteWhereNothingDiffers) {
+    Picture a;
+    a.width = 2;
+    a.height = 1;
+    a.rgb = {10, 20, 30, 40, 50, 60};
+    a.covered = {1, 0};
+    Picture b = a;
+    b.rgb[4] = 53;
+    EXPECT_EQ(difference_picture(a, b, 10).rgb, (std::vector<std::uint8_t>{255, 255, 255, 225, 225, 225}));
+}
+
 TEST(Png, IsWrittenAndAFolderThatDoesNotExistIsAnError) {
     const auto path = std::filesystem::temp_directory_path() / "htvm_render_test.png";
     const Picture picture = render(shapes::plane(10, 1, 0), pixel_camera(12, 8));

@@ -1,0 +1,275 @@
+#include "compare.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "compare_report.h"
+#include "mesh_source.h"
+#include "metrics/compare.h"
+#include "terminal.h"
+
+namespace htvm::app {
+namespace {
+
+struct Options {
+    std::string original, decoded, unit = "auto";
+    std::size_t frames = 0;  // 0: all
+    std::vector<std::string> only;
+    CompareOptions compare;
+    bool grey = false, follow_sequence = false, json = false;
+    double peak_mm = 0;
+    std::string csv, pictures;
+    int picture_views = 1;
+};
+
+const std::map<std::string, Shading> shadings{
+    {"flat", Shading::flat}, {"smooth", Shading::smooth}, {"unlit", Shading::unlit}};
+const std::map<std::string, UpAxis> axes{{"x", UpAxis::plus_x},   {"-x", UpAxis::minus_x}, {"y", UpAxis::plus_y},
+                                         {"-y", UpAxis::minus_y}, {"z", UpAxis::plus_z},   {"-z", UpAxis::minus_z}};
+
+void choose_metrics(Options& options) {
+    CompareOptions& c = options.compare;
+    if (c.views.views == 0) {
+        c.pictures = false;
+        c.views.views = 1;
+    }
+    c.render.colours = !options.grey;
+    if (options.only.empty()) return;
+    const std::set<std::string> only(options.only.begin(), options.only.end());
+    c.points = only.contains("m1");
+    c.surface = only.contains("m2");
+    c.cloud = only.contains("d1") || only.contains("d2");
+    c.pictures = c.pictures && only.contains("m3");
+    c.topology = only.contains("topology");
+}
+
+// Both names may carry frame numbers: their gaps must then be the same, or frames would be compared with others.
+Result<void> check_numbers(const MeshSource& original, const MeshSource& decoded) {
+    if (original.numbers.empty() || decoded.numbers.empty()) return {};
+    for (std::size_t i = 0; i < std::min(original.numbers.size(), decoded.numbers.size()); ++i)
+        if (original.numbers[i] - original.numbers[0] != decoded.numbers[i] - decoded.numbers[0])
+            return fail(ErrorKind::bad_input,
+                        fmt::format("The frames' numbers do not go together: {} has {} where {} has {}; give the same "
+                                    "frames on both sides.",
+                                    original.name, original.numbers[i], decoded.name, decoded.numbers[i]));
+    return {};
+}
+
+// The box round all originals, for cameras that stand still.
+Result<Box> sequence_box(const Options& options) {
+    auto source = open_mesh_files(options.original, options.unit);
+    if (!source) return tl::unexpected(source.error());
+    Box box;
+    Progress progress("bounding box", options.frames > 0 ? std::min(options.frames, source->frames) : source->frames);
+    for (std::size_t frame = 0; options.frames == 0 || frame < options.frames; ++frame) {
+        auto mesh = source->next(*source);
+        if (!mesh) return tl::unexpected(mesh.error());
+        if (!*mesh) break;
+        if (const auto ok = check_measurable(**mesh, "original"); !ok) return tl::unexpected(ok.error());
+        extend(box, bounding_box(**mesh));
+        progress.step();
+    }
+    return box;
+}
+
+Result<void> write_pictures(const Options& options, const Mesh& original, const Mesh& decoded, std::size_t frame) {
+    const CompareOptions& c = options.compare;
+    const auto cameras = cameras_round(c.view_box.value_or(bounding_box(original)), c.views);
+    if (!cameras) return tl::unexpected(cameras.error());
+    RenderOptions render_options = c.render;
+    render_options.colours = render_options.colours && !original.colours.empty() && !decoded.colours.empty();
+    const DrawableMesh first = make_drawable(original, render_options), second = make_drawable(decoded, render_options);
+    const int count = std::min(options.picture_views, static_cast<int>(cameras->size()));
+    Canvas left, right;
+    for (int i = 0; i < count; ++i) {
+        const std::size_t view = cameras->size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(count);
+        draw(first, (*cameras)[view], left, c.threads);
+        draw(second, (*cameras)[view], right, c.threads);
+        const auto path = std::filesystem::path(options.pictures) / fmt::format("frame_{:05}_view_{}.png", frame, view);
+        const Picture together =
+            side_by_side({left.picture, right.picture, difference_picture(left.picture, right.picture)});
+        if (auto ok = write_png(together, path.string()); !ok) return ok;
+    }
+    return {};
+}
+
+struct Measured {
+    SequenceComparison sums;
+    std::vector<FrameComparison> frames;
+};
+
+void warn_of_length(const MeshSource& original, const MeshSource& decoded, const Options& options) {
+    auto wanted = [&](std::size_t n) { return options.frames > 0 ? std::min(n, options.frames) : n; };
+    if (original.frames == 0 || decoded.frames == 0 || wanted(original.frames) == wanted(decoded.frames)) return;
+    warn(fmt::format("{} has {} frames and {} has {}: only the first {} are compared", original.name, original.frames,
+                     decoded.name, decoded.frames, std::min(wanted(original.frames), wanted(decoded.frames))));
+}
+
+Result<Measured> measure(const Options& options) {
+    auto original = open_mesh_files(options.original, options.unit);
+    if (!original) return tl::unexpected(original.error());
+    auto decoded = open_mesh_files(options.decoded, options.unit);
+    if (!decoded) return tl::unexpected(decoded.error());
+    if (const auto ok = check_numbers(*original, *decoded); !ok) return tl::unexpected(ok.error());
+    warn_of_length(*original, *decoded, options);
+    std::size_t total = std::min(original->frames, decoded->frames);
+    if (options.frames > 0) total = std::min(total, options.frames);
+    Measured out;
+    Progress progress("compare", total);
+    for (std::size_t frame = 0; options.frames == 0 || frame < options.frames; ++frame) {
+        auto first = original->next(*original);
+        if (!first) return tl::unexpected(first.error());
+        auto second = decoded->next(*decoded);
+        if (!second) return tl::unexpected(second.error());
+        if (!*first || !*second) break;
+        auto comparison = compare_frame(**first, **second, options.compare);
+        if (!comparison)
+            return fail(comparison.error().kind, fmt::format("Frame {}: {}", frame, comparison.error().message));
+        out.sums += *comparison;
+        out.frames.push_back(*comparison);
+        if (!options.pictures.empty())
+            if (const auto ok = write_pictures(options, **first, **second, frame); !ok)
+                return tl::unexpected(ok.error());
+        progress.step();
+    }
+    if (original->millimetres_per_unit != decoded->millimetres_per_unit)
+        note(fmt::format("took the original's unit for {:g} mm and the decoded's for {:g} mm; --unit says otherwise",
+                         original->millimetres_per_unit, decoded->millimetres_per_unit));
+    if (out.frames.empty()) return fail(ErrorKind::bad_input, "There was no frame to compare.");
+    return out;
+}
+
+Result<void> write_csv(const Options& options, const Measured& measured, double peak_mm) {
+    std::string text = csv_header(options.compare);
+    for (std::size_t i = 0; i < measured.frames.size(); ++i)
+        text += csv_line(i, measured.frames[i], options.compare, peak_mm);
+    if (options.csv == "-") {
+        fmt::print("{}", text);
+        return {};
+    }
+    std::ofstream file(options.csv, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) return fail(ErrorKind::bad_input, options.csv + " cannot be written.");
+    return {};
+}
+
+nlohmann::json as_json(const Options& options, const Measured& measured, double peak_mm) {
+    nlohmann::json frames = nlohmann::json::array();
+    for (const auto& frame : measured.frames) {
+        auto line = summary_json(summarise(as_sequence(frame), peak_mm), options.compare);
+        line["original_vertices"] = frame.original_vertices;
+        line["decoded_vertices"] = frame.decoded_vertices;
+        if (options.compare.topology) {
+            line["original_topology"] = topology_json(frame.original_topology);
+            line["decoded_topology"] = topology_json(frame.decoded_topology);
+        }
+        frames.push_back(std::move(line));
+    }
+    nlohmann::json out = {{"original", options.original}, {"decoded", options.decoded}, {"frames", std::move(frames)}};
+    out["sequence"] = summary_json(summarise(measured.sums, peak_mm), options.compare);
+    return out;
+}
+
+Result<void> compare(Options options) {
+    choose_metrics(options);
+    if (!options.pictures.empty()) {
+        std::error_code error;
+        std::filesystem::create_directories(options.pictures, error);
+        if (error) return fail(ErrorKind::bad_input, options.pictures + " cannot be made: " + error.message());
+    }
+    if (options.follow_sequence) {
+        const auto box = sequence_box(options);
+        if (!box) return tl::unexpected(box.error());
+        options.compare.view_box = *box;
+    }
+    const auto measured = measure(options);
+    if (!measured) return tl::unexpected(measured.error());
+    // The frames' PSNR takes the sequence's peak, so that they can be compared with each other.
+    const double peak_mm = summarise(measured->sums, options.peak_mm).peak_mm;
+    if (!options.csv.empty())
+        if (auto ok = write_csv(options, *measured, peak_mm); !ok) return ok;
+    if (options.json) {
+        fmt::print("{}\n", as_json(options, *measured, peak_mm).dump(2));
+    } else if (options.csv != "-") {
+        fmt::print("{}", comparison_table(measured->sums, options.compare, options.peak_mm));
+    }
+    return {};
+}
+
+void add_picture_options(CLI::App& command, Options& o) {
+    ViewOptions& v = o.compare.views;
+    command.add_option("--views", v.views, "Views round the body for M3; 0 leaves M3 out")
+        ->check(CLI::Range(0, 1000))
+        ->capture_default_str();
+    command.add_option("--width", v.width, "Of the pictures, pixels")->capture_default_str();
+    command.add_option("--height", v.height, "Of the pictures, pixels")->capture_default_str();
+    command.add_option("--shading", o.compare.render.shading, "flat, smooth, or unlit (the colours alone)")
+        ->transform(CLI::CheckedTransformer(shadings))
+        ->default_str("smooth");
+    command.add_flag("--grey", o.grey, "Draw without the colours (also done where one side has none)");
+    command.add_option("--up", v.up, "Where the head is: x, -x, y, -y, z or -z")
+        ->transform(CLI::CheckedTransformer(axes))
+        ->default_str("y");
+    command.add_option("--azimuth", v.first_azimuth, "Of the first view, degrees round the body")
+        ->capture_default_str();
+    command.add_option("--elevation", v.elevation, "That the views look down, degrees")->capture_default_str();
+    command.add_flag("--orthographic", v.orthographic, "Parallel projection instead of perspective");
+    command.add_flag("--still-camera", o.follow_sequence,
+                     "The cameras look at the box round the whole sequence instead of each frame's own\n"
+                     "(reads the originals twice)");
+    command.add_option("--pictures", o.pictures, "Folder for PNG files: original, decoded, difference (4-fold)");
+    command.add_option("--picture-views", o.picture_views, "How many of the views are written")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto& o = *options;
+    CLI::App* command = app.add_subcommand("compare", "Measure decoded meshes against their originals");
+    command->description(
+        "Measures decoded meshes against their originals, frame by frame in the order of their names:\n"
+        "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
+        "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
+        "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
+        "  M3  PSNR of pictures from all round\n"
+        "  topology  components, boundaries, cracks, flaps");
+    command->add_option("ORIGINAL", o.original, "A mesh file, folder, glob or %05d pattern")->required();
+    command->add_option("DECODED", o.decoded, "The same for the decoded meshes")->required();
+    command->add_option("--frames", o.frames, "Compare at most so many");
+    command->add_option("--only", o.only, "Measure only some of m1, m2, d1, d2, m3, topology (comma between)")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"m1", "m2", "d1", "d2", "m3", "topology"}));
+    command->add_option("--unit", o.unit, "Of the files: mm, cm, m, or auto (by the first frame's size)")
+        ->capture_default_str();
+    command->add_option("--samples", o.compare.surface_options.samples,
+                        "For M2, in each direction (default: 10 times the triangles, as METRO)");
+    command->add_option("--seed", o.compare.surface_options.seed, "Of M2's samples")->capture_default_str();
+    command->add_option("--peak", o.peak_mm, "Of D1 and D2, mm (default: the originals' bounding box diagonal)")
+        ->check(CLI::PositiveNumber);
+    command->add_option("--crack-width", o.compare.topology_options.crack_width,
+                        "Widest crack, mm (default: half of the mean edge length)");
+    command->add_option("--flap-distance", o.compare.topology_options.flap_distance,
+                        "Farthest apart that a flap's layers are, mm (default: the same)");
+    add_picture_options(*command, o);
+    command->add_option("--threads", o.compare.threads,
+                        "Threads to use (default: one per core); the result is the same");
+    command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
+    command->add_option("--csv", o.csv,
+                        "A line a frame to this file, or - for standard output; an infinite PSNR is inf");
+    command->callback([options, &run] { run = [options] { return compare(*options); }; });
+}
+
+}  // namespace htvm::app

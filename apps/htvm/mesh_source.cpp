@@ -1,0 +1,44 @@
+#include "mesh_source.h"
+
+#include <memory>
+
+#include "io/mesh_file.h"
+#include "io/sequence.h"
+
+namespace htvm::app {
+namespace {
+
+Result<std::optional<LengthUnit>> unit_named(const std::string& name) {
+    if (name == "auto") return std::optional<LengthUnit>{};
+    if (name == "mm") return std::optional(LengthUnit::millimetre);
+    if (name == "cm") return std::optional(LengthUnit::centimetre);
+    if (name == "m") return std::optional(LengthUnit::metre);
+    return fail(ErrorKind::bad_input, "There is no unit '" + name + "': give mm, cm, m or auto.");
+}
+
+}  // namespace
+
+Result<MeshSource> open_mesh_files(const std::string& name, const std::string& unit) {
+    const auto chosen = unit_named(unit);
+    if (!chosen) return tl::unexpected(chosen.error());
+    const auto files = find_sequence(name);
+    if (!files) return tl::unexpected(files.error());
+    MeshSource source;
+    source.name = name;
+    source.frames = files->paths.size();
+    source.numbers = files->numbers;
+    if (*chosen) source.millimetres_per_unit = millimetres_per(**chosen);
+    source.next = [paths = files->paths, guess = !*chosen,
+                   given = std::size_t{0}](MeshSource& self) mutable -> Result<std::optional<Mesh>> {
+        if (given == paths.size()) return std::optional<Mesh>{};
+        auto mesh = read_mesh(paths[given]);
+        if (!mesh) return tl::unexpected(mesh.error());
+        if (given == 0 && guess) self.millimetres_per_unit = millimetres_per(guess_unit(*mesh));
+        if (const auto ok = scale_positions(*mesh, self.millimetres_per_unit); !ok) return tl::unexpected(ok.error());
+        ++given;
+        return std::optional(std::move(*mesh));
+    };
+    return source;
+}
+
+}  // namespace htvm::app
