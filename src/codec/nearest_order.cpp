@@ -7,7 +7,7 @@
 namespace htvm {
 namespace {
 
-constexpr std::size_t leaf_size = 8;
+constexpr std::size_t leaf_size = 16;
 constexpr std::size_t most_nearest = 64;
 
 std::int32_t coordinate(const LatticePoint& p, int axis) { return axis == 0 ? p.x : axis == 1 ? p.y : p.z; }

@@ -10,6 +10,7 @@ struct NextNumber {
     static constexpr bool visits_isolated = false;
     std::uint32_t vertices_left;
     bool seed() { return vertices_left-- > 0; }
+    FanHints hints(const FanState&) const { return {}; }
     bool discover(const FanState&) { return vertices_left-- > 0; }
 };
 

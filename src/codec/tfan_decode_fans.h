@@ -14,6 +14,7 @@ namespace htvm {
 // coded besides the fans:
 //     static constexpr bool visits_isolated   whether vertices without triangles are visited as seeds
 //     bool seed()                             a seed takes the next visiting number; false where no vertex is left
+//     FanHints hints(const FanState&)         contexts for the fan's next step
 //     bool discover(const FanState&)          a vertex met by the fan takes it; false where it cannot
 template <class Discovery>
 bool decode_fans(RangeDecoder& decoder, std::uint32_t triangle_count, Discovery& discovery,
@@ -37,7 +38,7 @@ bool decode_fans(RangeDecoder& decoder, std::uint32_t triangle_count, Discovery&
         find_ends(edges, fan);
         while (triangles.size() < triangle_count) {
             look_around(edges, fan);
-            CodedStep step = code_step(coder, models, edges, fan, {});
+            CodedStep step = code_step(coder, models, edges, fan, discovery.hints(fan), {});
             if (step.step == Step::stop) return true;
             if (step.step == Step::new_vertex) {
                 step.vertex = edges.vertex_count();

@@ -9,6 +9,7 @@ namespace {
 struct NextNumber {
     static constexpr bool visits_isolated = false;
     void seed(std::uint32_t) {}
+    FanHints hints(const FanState&) const { return {}; }
     void discover(const FanState&, std::uint32_t) {}
 };
 

@@ -49,6 +49,7 @@ struct FanOrder {
 // Codes all triangles. The Discovery says what is coded besides the fans:
 //     static constexpr bool visits_isolated   whether vertices without triangles are visited as seeds
 //     void seed(vertex)                       a seed (input index) takes the next visiting number
+//     FanHints hints(const FanState&)         contexts for the fan's next step
 //     void discover(const FanState&, vertex)  a vertex met by the fan takes it
 template <class Coder, class Discovery>
 FanOrder encode_fans(Coder& coder, FanModels& models, std::uint32_t vertex_count, std::span<const Triangle> triangles,
@@ -83,11 +84,12 @@ FanOrder encode_fans(Coder& coder, FanModels& models, std::uint32_t vertex_count
         while (result.triangles.size() < triangles.size()) {
             look_around(edges, fan);
             if (!links.leads_on(vertex)) {
-                code_step(coder, models, edges, fan, {Step::stop, OpenEdges::none});
+                code_step(coder, models, edges, fan, discovery.hints(fan), {Step::stop, OpenEdges::none});
                 return;
             }
             vertex = links.follow(vertex);
-            CodedStep step = code_step(coder, models, edges, fan, classify_step(fan, number_of[vertex]));
+            CodedStep step =
+                code_step(coder, models, edges, fan, discovery.hints(fan), classify_step(fan, number_of[vertex]));
             if (step.step == Step::new_vertex) {
                 discovery.discover(fan, vertex);
                 step.vertex = visit(vertex);

@@ -14,6 +14,7 @@ public:
 
     struct HalfEdge {
         std::uint32_t from = none, to = none;
+        std::uint32_t apex = none;  // the third vertex of its triangle
         // Doubly linked lists of the half-edges that leave `from` and of those that enter `to`, latest first.
         std::uint32_t next_out = none, previous_out = none, next_in = none, previous_in = none;
     };
@@ -34,9 +35,9 @@ public:
         ++vertices_[a].triangles;
         ++vertices_[b].triangles;
         ++vertices_[c].triangles;
-        add(a, b);
-        add(b, c);
-        add(c, a);
+        add(a, b, c);
+        add(b, c, a);
+        add(c, a, b);
     }
 
 private:
@@ -47,13 +48,13 @@ private:
     // sides alike: that costs bits where two vertices both have many open edges, and bounds the work.
     static constexpr int search_limit = 32;
 
-    void add(std::uint32_t from, std::uint32_t to) {
+    void add(std::uint32_t from, std::uint32_t to, std::uint32_t apex) {
         if (from == to) return;
         const std::uint32_t opposite = find(to, from);
         if (opposite != none) {
             unlink(opposite);
         } else {
-            link(from, to);
+            link(from, to, apex);
         }
     }
     // Both ends' lists side by side, so that the shorter one decides how long it takes.
@@ -67,7 +68,7 @@ private:
         }
         return none;
     }
-    void link(std::uint32_t from, std::uint32_t to) {
+    void link(std::uint32_t from, std::uint32_t to, std::uint32_t apex) {
         std::uint32_t id = free_;
         if (id == none) {
             id = static_cast<std::uint32_t>(half_edges_.size());
@@ -75,7 +76,7 @@ private:
         } else {
             free_ = half_edges_[id].next_out;
         }
-        half_edges_[id] = {from, to, vertices_[from].first_out, none, vertices_[to].first_in, none};
+        half_edges_[id] = {from, to, apex, vertices_[from].first_out, none, vertices_[to].first_in, none};
         if (vertices_[from].first_out != none) half_edges_[vertices_[from].first_out].previous_out = id;
         if (vertices_[to].first_in != none) half_edges_[vertices_[to].first_in].previous_in = id;
         vertices_[from].first_out = id;

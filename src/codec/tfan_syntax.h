@@ -13,6 +13,7 @@
 #include <array>
 #include <cstdint>
 
+#include "codec/tfan_mixing.h"
 #include "codec/tfan_open_edges.h"
 #include "entropy/models.h"
 #include "entropy/range_decoder.h"
@@ -64,8 +65,18 @@ struct FanState {
     // From the open edges, by look_around():
     std::array<std::uint32_t, most_candidates> ends{};
     std::uint32_t end_count = 0;
+    std::uint32_t behind = OpenEdges::none;      // the third vertex of the coded triangle before the current vertex
+    std::uint32_t beyond_end = OpenEdges::none;  // the third vertex of the coded triangle after the first end candidate
     std::uint32_t left = OpenEdges::none, right = OpenEdges::none;
     bool fills_hole = false;  // one triangle would complete the open edges on both sides
+};
+
+// Contexts for the next step that come from elsewhere than connectivity: none (all 0) in TFAN, from the decoded
+// positions in M-TFAN.
+struct FanHints {
+    std::uint32_t gap = 0;    // 0 .. 15: the angle at the focus from the current vertex to the end candidate
+    std::uint32_t left = 0;   // 0 .. 7: the angle at the current vertex that the left triangle would fill
+    std::uint32_t right = 0;  // 0 .. 7: the angle at the end candidate that the right triangle would fill
 };
 
 struct FanModels {
@@ -73,7 +84,10 @@ struct FanModels {
     std::array<BinaryModel, 4> starts_at_candidate;
     std::array<BinaryModel, most_candidates> start_index, end_index;
     BinaryModel starts_at_known;
-    std::array<std::array<BinaryModel, 8>, 128> is_new;
+    std::array<std::array<BinaryModel, 32768>, 6> is_new;
+    std::array<Mixer<6>, 64> new_mixer;
+    std::array<std::array<BinaryModel, 32768>, 6> closing;
+    std::array<Mixer<6>, 64> close_mixer;
     std::array<std::array<BinaryModel, 8>, 128> closes;
     std::array<std::array<BinaryModel, 16>, 2> goes_left;
     std::array<BinaryModel, 16> goes_right;
@@ -122,6 +136,10 @@ inline void find_ends(const OpenEdges& edges, FanState& fan) {
          ++i, edge = edges[edge].next_out)
         if (edges[edge].to != fan.start) fan.ends[fan.end_count++] = edges[edge].to;
     if (fan.end_count > 1 && fan.from_candidate) put_own_gap_first(edges, fan);
+    if (fan.end_count > 0)
+        for (edge = edges.first_out(fan.focus); edge != OpenEdges::none && fan.beyond_end == OpenEdges::none;
+             edge = edges[edge].next_out)
+            if (edges[edge].to == fan.ends[0]) fan.beyond_end = edges[edge].apex;
     if (!fan.from_candidate) fan.ends[fan.end_count++] = fan.start;
 }
 
@@ -197,7 +215,8 @@ struct CodedStep {
 // The next step of the fan; wanted.vertex counts for close and known_vertex. In a corrupt stream the vertex may be out
 // of range.
 template <class Coder>
-CodedStep code_step(Coder& coder, FanModels& models, const OpenEdges& edges, const FanState& fan, CodedStep wanted) {
+CodedStep code_step(Coder& coder, FanModels& models, const OpenEdges& edges, const FanState& fan, const FanHints& hints,
+                    CodedStep wanted) {
     const std::uint32_t around = std::min(edges.triangle_count(fan.focus), 15u);
     const std::uint32_t end = fan.end_count > 0 ? fan.ends[0] : OpenEdges::none;
     const std::uint32_t at_current = std::min(edges.triangle_count(fan.current), 7u);
@@ -207,12 +226,38 @@ CodedStep code_step(Coder& coder, FanModels& models, const OpenEdges& edges, con
                                     : fan.last == Step::new_vertex ? 2
                                     : fan.last == Step::stop       ? 3
                                                                    : 4;
-    if (coder.bit(models.is_new[around * 8 + at_end][situation], wanted.step == Step::new_vertex))
-        return {Step::new_vertex, OpenEdges::none};
+    const auto count = [&](std::uint32_t vertex, std::uint32_t most) {
+        return vertex < edges.vertex_count() ? std::min(edges.triangle_count(vertex), most) : 0u;
+    };
+    const std::uint32_t at_right = count(fan.right, 7), at_left = count(fan.left, 7);
+    const std::uint32_t before = count(fan.focus - 1, 15);
+    const std::uint32_t length = std::min(fan.length, 7u);
+    const std::uint32_t gap = hints.gap;
+    {
+        auto& m = models.is_new;
+        if (code_mixed(coder, models.new_mixer[situation * 8 + length],
+                       std::array<BinaryModel*, 6>{&m[0][((around * 8 + at_end) * 8 + situation) * 16 + gap],
+                                                   &m[1][((around * 8 + at_current) * 8 + situation) * 16 + gap],
+                                                   &m[2][((gap * 8 + hints.left) * 8 + hints.right) * 8 + situation],
+                                                   &m[3][(around * 8 + at_end) * 8 + at_right],
+                                                   &m[4][(around * 8 + length) * 8 + at_left],
+                                                   &m[5][((around * 16 + before) * 8 + situation) * 16 + gap]},
+                       wanted.step == Step::new_vertex))
+            return {Step::new_vertex, OpenEdges::none};
+    }
     const std::uint32_t way = (fan.left != OpenEdges::none ? 1 : 0) + (fan.right != OpenEdges::none ? 2 : 0);
-    if (fan.end_count > 0 &&
-        coder.bit(models.closes[around * 8 + situation][way + 4 * (fan.last == Step::right || fan.last == Step::left)],
-                  wanted.step == Step::close)) {
+    const auto code_close = [&] {
+        auto& m = models.closing;
+        return code_mixed(
+            coder, models.close_mixer[situation * 4 + way],
+            std::array<BinaryModel*, 6>{
+                &m[0][(around * 8 + situation) * 8 + way + 4 * (fan.last == Step::right || fan.last == Step::left)],
+                &m[1][(around * 8 + at_current) * 8 + at_end], &m[2][(around * 8 + at_end) * 8 + situation],
+                &m[3][(at_left * 8 + at_current) * 8 + length], &m[4][(at_end * 8 + at_right) * 8 + length],
+                &m[5][((gap * 8 + hints.left) * 8 + hints.right) * 8 + situation]},
+            wanted.step == Step::close);
+    };
+    if (fan.end_count > 0 && code_close()) {
         std::uint32_t index = 0;
         while (index < fan.end_count && fan.ends[index] != wanted.vertex) ++index;
         return {Step::close, fan.ends[code_index(coder, models.end_index, fan.end_count, index)]};
@@ -239,7 +284,7 @@ inline CodedStep classify_step(const FanState& fan, std::uint32_t number) {
 }
 
 inline void advance(FanState& fan, const CodedStep& step) {
-    fan.previous = fan.current;
+    fan.previous = fan.behind = fan.current;
     fan.current = step.vertex;
     fan.last = step.step;
     ++fan.length;
@@ -250,13 +295,18 @@ template <class Coder>
 void code_start(Coder& coder, FanModels& models, const OpenEdges& edges, FanState& fan, std::uint32_t wanted) {
     std::array<std::uint32_t, most_candidates> starts{};
     std::uint32_t count = 0, index = 0;
+    std::array<std::uint32_t, most_candidates> behind{};
     std::uint32_t edge = edges.first_in(fan.focus);
-    for (; count < most_candidates && edge != OpenEdges::none; edge = edges[edge].next_in)
+    for (; count < most_candidates && edge != OpenEdges::none; edge = edges[edge].next_in) {
+        behind[count] = edges[edge].apex;
         starts[count++] = edges[edge].from;
+    }
     while (index < count && starts[index] != wanted) ++index;
     fan.from_candidate = count > 0 && coder.bit(models.starts_at_candidate[count - 1], index < count);
     if (fan.from_candidate) {
-        fan.start = starts[code_index(coder, models.start_index, count, index)];
+        index = code_index(coder, models.start_index, count, index);
+        fan.start = starts[index];
+        fan.behind = behind[index];
     } else if (coder.bit(models.starts_at_known, wanted != OpenEdges::none)) {
         fan.start = coder.number(models.far, wanted - fan.focus) + fan.focus;
     } else {

@@ -1,0 +1,74 @@
+// One decision predicted from several contexts at once: each context's adaptive probability votes with its log odds,
+// weighted by how well it has been doing (logistic mixing; Mahoney 2005). Integers only, so that every machine agrees.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "entropy/models.h"
+
+namespace htvm {
+
+// Log odds are natural, in 1/256, from -2047 to 2047; probabilities in 1/65536.
+// 65536 / (1 + exp(-x / 256)) for x = -2048, -1920, ..., 2048.
+inline constexpr std::array<std::int32_t, 33> logistic_knots = {
+    22,    36,    60,    98,    162,   267,   439,   720,   1179,  1921,  3108,
+    4971,  7812,  11955, 17625, 24743, 32768, 40793, 47911, 53581, 57724, 60565,
+    62428, 63615, 64357, 64816, 65097, 65269, 65374, 65438, 65476, 65500, 65514};
+
+constexpr std::int32_t probability_of_log_odds(std::int32_t log_odds) {
+    const std::int32_t x = std::clamp(log_odds, -2047, 2047) + 2048;
+    const std::size_t knot = static_cast<std::size_t>(x >> 7);
+    const std::int32_t part = x & 127;
+    return (logistic_knots[knot] * (128 - part) + logistic_knots[knot + 1] * part) >> 7;
+}
+
+// By probability / 16: the inverse of the above.
+inline constexpr auto log_odds_table = [] {
+    std::array<std::int16_t, 4096> table{};
+    std::int32_t log_odds = -2047;
+    for (std::int32_t p = 0; p < 4096; ++p) {
+        while (log_odds < 2047 && probability_of_log_odds(log_odds) < p * 16 + 8) ++log_odds;
+        table[static_cast<std::size_t>(p)] = static_cast<std::int16_t>(log_odds);
+    }
+    return table;
+}();
+
+// Weights of N votes, in 1/65536.
+template <std::size_t N>
+struct Mixer {
+    std::array<std::int32_t, N> weights = [] {
+        std::array<std::int32_t, N> equal{};
+        equal.fill(static_cast<std::int32_t>(65536 * 5 / (4 * N)));
+        return equal;
+    }();
+    BinaryModel mixed;  // only carries the mixed probability to the coder
+};
+
+inline constexpr std::int32_t mixing_rate = 5;
+
+// Codes one decision; each of the models and the mixer adapt.
+template <class Coder, std::size_t N>
+bool code_mixed(Coder& coder, Mixer<N>& mixer, const std::array<BinaryModel*, N>& models, bool wanted) {
+    std::array<std::int32_t, N> votes;
+    std::int64_t sum = 0;
+    for (std::size_t i = 0; i < N; ++i) {
+        votes[i] = log_odds_table[models[i]->one >> 4];
+        sum += std::int64_t{votes[i]} * mixer.weights[i];
+    }
+    const std::int32_t probability =
+        probability_of_log_odds(static_cast<std::int32_t>(std::clamp<std::int64_t>(sum >> 16, -2047, 2047)));
+    mixer.mixed = {static_cast<std::uint16_t>(std::clamp(probability, 48, 65535 - 48)), model_seen_limit};
+    const bool bit = coder.bit(mixer.mixed, wanted);
+    const std::int32_t error = (bit ? 65536 : 0) - probability;
+    for (std::size_t i = 0; i < N; ++i) {
+        const std::int32_t change = static_cast<std::int32_t>((std::int64_t{votes[i]} * error * mixing_rate) >> 18);
+        mixer.weights[i] = std::clamp(mixer.weights[i] + change, -(1 << 20), 1 << 20);
+        models[i]->update(bit);
+    }
+    return bit;
+}
+
+}  // namespace htvm
