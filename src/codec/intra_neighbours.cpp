@@ -69,22 +69,28 @@ Corners make_corners(std::span<const Triangle> triangles, std::size_t vertex_cou
     return corners;
 }
 
-// A vertex waits in the queue of its score: the number of parallelograms it completes, at most score_limit. It may wait
-// in several queues; the entries that are out of date are passed over.
+// A vertex waits in the queue of its score: the number of parallelograms it completes, at most score_limit. The queues
+// are last in, first out. It may wait in several; the entries that are out of date are passed over.
 constexpr std::size_t score_limit = 4;
 
 struct Traversal {
     std::vector<std::uint8_t> coded;
     std::vector<std::uint8_t> queued;  // has been put in a queue
     std::vector<std::uint8_t> score;   // by vertex
-    std::vector<std::uint8_t>
-        known;  // by the lower of an edge's two facing corners: corners of the pair that are coded
     std::array<std::vector<std::uint32_t>, score_limit + 1> queues;
     std::uint32_t seed = 0;
 
     void push(std::uint32_t v) {
         queued[v] = 1;
         queues[score[v]].push_back(v);
+    }
+    void meet(std::uint32_t v) {
+        if (!queued[v]) push(v);
+    }
+    void gain(std::uint32_t v) {
+        if (score[v] == score_limit) return;
+        ++score[v];
+        push(v);
     }
     std::uint32_t pop() {
         for (std::size_t s = score_limit + 1; s-- > 0;) {
@@ -100,17 +106,6 @@ struct Traversal {
     }
 };
 
-// The pair of triangles on either side of the edge that faces corner c; its key is the lower of the two facing corners.
-struct Pair {
-    std::uint32_t key, tip, other_tip, left, right;  // the vertices at the tips and at the ends of the edge
-};
-
-Pair pair_of(const Corners& corners, std::uint32_t c) {
-    const std::uint32_t o = corners.opposite[c];
-    return {std::min(c, o), corners.vertex[c], corners.vertex[o], corners.vertex[next_corner(c)],
-            corners.vertex[previous_corner(c)]};
-}
-
 void add_neighbour(Neighbours& out, std::size_t row, std::uint32_t v) {
     if (out.neighbours.size() - row >= row_limit) return;
     for (std::size_t i = row; i < out.neighbours.size(); ++i)
@@ -118,50 +113,49 @@ void add_neighbour(Neighbours& out, std::size_t row, std::uint32_t v) {
     out.neighbours.push_back(v);
 }
 
-// One more corner of the pair is coded; where it was the third, the fourth gains a parallelogram.
-void advance(Traversal& state, const Pair& pair) {
-    if (++state.known[pair.key] != 3) return;
-    for (const std::uint32_t v : {pair.tip, pair.other_tip, pair.left, pair.right}) {
-        if (state.coded[v] || state.score[v] >= score_limit) continue;
-        ++state.score[v];
-        state.push(v);
-    }
-}
-
-// Codes vertex v: its candidates are written out, and its neighbours learn that it is known.
+// Codes vertex v: its candidates are written out, and the vertices that it completes a parallelogram for gain one.
+// Only parallelograms across an edge count for the order; the others come with them.
 void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint32_t v) {
     const std::size_t neighbour_row = out.neighbours.size(), parallelogram_row = out.parallelograms.size();
     auto add_parallelogram = [&](std::uint32_t a, std::uint32_t b, std::uint32_t opposite, bool across) {
         if (out.parallelograms.size() - parallelogram_row < row_limit)
             out.parallelograms.push_back({a, b, opposite, across});
     };
-    auto see = [&](const Pair& pair) {
-        if (pair.tip == pair.other_tip) return;
-        if (state.known[pair.key] == 3) {
-            if (pair.tip == v)
-                add_parallelogram(pair.left, pair.right, pair.other_tip, true);
-            else if (pair.other_tip == v)
-                add_parallelogram(pair.right, pair.left, pair.tip, true);
-            else if (pair.left == v)
-                add_parallelogram(pair.other_tip, pair.tip, pair.right, false);
-            else
-                add_parallelogram(pair.tip, pair.other_tip, pair.left, false);
-        }
-        advance(state, pair);
+    // The vertex across the edge that this corner faces, or none.
+    auto beyond = [&](std::uint32_t corner) {
+        const std::uint32_t o = corners.opposite[corner];
+        return o == none ? none : corners.vertex[o];
     };
+    auto is_known = [&](std::uint32_t vertex) { return vertex != none && state.coded[vertex]; };
     state.coded[v] = 1;
     for (std::uint32_t i = corners.first_at[v]; i < corners.first_at[v + 1]; ++i) {
         const std::uint32_t c = corners.at[i], after = next_corner(c), before = previous_corner(c);
-        for (const std::uint32_t other : {corners.vertex[after], corners.vertex[before]}) {
-            if (state.coded[other])
-                add_neighbour(out, neighbour_row, other);
-            else if (!state.queued[other])
-                state.push(other);
+        const std::uint32_t p = corners.vertex[after], q = corners.vertex[before];
+        const bool knows_p = state.coded[p], knows_q = state.coded[q];
+        if (knows_p) add_neighbour(out, neighbour_row, p);
+        if (knows_q) add_neighbour(out, neighbour_row, q);
+        if (knows_p && knows_q) {
+            const std::uint32_t y = beyond(c);
+            if (is_known(y) && y != v)
+                add_parallelogram(p, q, y, true);
+            else if (y != none && y != v)
+                state.gain(y);
+            // An edge at v is seen from both of its triangles, and counted from the one with the lower facing corner.
+            const std::uint32_t past_q = beyond(after), past_p = beyond(before);
+            if (is_known(past_p) && past_p != q && before < corners.opposite[before])
+                add_parallelogram(past_p, q, p, false);
+            if (is_known(past_q) && past_q != p && after < corners.opposite[after])
+                add_parallelogram(p, past_q, q, false);
+        } else if (knows_p != knows_q) {
+            const std::uint32_t unknown = knows_p ? q : p;
+            if (is_known(beyond(knows_p ? before : after)))
+                state.gain(unknown);
+            else
+                state.meet(unknown);
+        } else {
+            state.meet(p);
+            state.meet(q);
         }
-        if (corners.opposite[c] != none) see(pair_of(corners, c));
-        // An edge at v is seen from both of its triangles, and counted from the one with the lower facing corner.
-        for (const std::uint32_t facing : {after, before})
-            if (corners.opposite[facing] != none && facing < corners.opposite[facing]) see(pair_of(corners, facing));
     }
 }
 
@@ -178,7 +172,6 @@ Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::siz
     state.coded.assign(vertex_count, 0);
     state.queued.assign(vertex_count, 0);
     state.score.assign(vertex_count, 0);
-    state.known.assign(corners.vertex.size(), 0);
     Neighbours out;
     out.order.reserve(vertex_count);
     out.first_parallelogram.reserve(vertex_count + 1);
