@@ -16,6 +16,6 @@ void add_decode(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
 void add_synth(CLI::App& app, Run& run);
 void add_calibrate(CLI::App& app, Run& run);
-void add_layers(CLI::App& app, Run& run);
+void add_rd(CLI::App& app, Run& run);
 
 }  // namespace htvm::app

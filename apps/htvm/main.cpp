@@ -4,6 +4,7 @@
 #include <exception>
 
 #include "commands.h"
+#include "compare.h"
 
 namespace {
 
@@ -32,6 +33,11 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     htvm::app::Run run;
     htvm::app::add_synth(app, run);
+    htvm::app::add_encode(app, run);
+    htvm::app::add_decode(app, run);
+    htvm::app::add_info(app, run);
+    htvm::app::add_calibrate(app, run);
+    htvm::app::add_compare(app, run);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -1,6 +1,8 @@
 #include <numeric>
 
 #include "codec/codebook.h"
+#include "codec/sequence_index.h"
+#include "core/bytes.h"
 #include "entropy/range_encoder.h"
 
 namespace htvm {
@@ -26,6 +28,14 @@ std::vector<std::uint8_t> encode_codebook(const Codebook& codebook) {
     }
     encoder.raw(codebook.lengths.back(), 8);
     return encoder.finish();
+}
+
+std::vector<std::uint8_t> write_codebook_payload(std::uint8_t purpose, std::uint32_t number, const Codebook& codebook) {
+    ByteWriter out;
+    out.u8(purpose);
+    out.varint(number);
+    out.bytes(encode_codebook(codebook));
+    return out.take();
 }
 
 }  // namespace htvm

@@ -1,0 +1,108 @@
+#include "encoder_options.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "io/mesh_file.h"
+#include "terminal.h"
+
+namespace htvm::app {
+namespace {
+
+Result<std::vector<double>> read_radii(const std::string& path, std::size_t bones) {
+    const auto bytes = read_file(path);
+    if (!bytes) return tl::unexpected(bytes.error());
+    const auto json = nlohmann::json::parse(bytes->begin(), bytes->end(), nullptr, false);
+    if (!json.is_object() || !json.contains("radii") || !json["radii"].is_array())
+        return fail(ErrorKind::bad_input,
+                    path + " is not a calibration: it has no list \"radii\" (see htvm calibrate)");
+    std::vector<double> radii;
+    for (const auto& value : json["radii"]) {
+        if (!value.is_number()) return fail(ErrorKind::bad_input, path + ": a radius is not a number");
+        radii.push_back(value.get<double>());
+    }
+    if (radii.size() != bones)
+        return fail(ErrorKind::bad_input,
+                    fmt::format("{} has {} radii, but the skeleton has {} bones", path, radii.size(), bones));
+    return radii;
+}
+
+}  // namespace
+
+void add_encoding_options(CLI::App& command, EncodingOptions& options) {
+    command
+        .add_option(
+            "-q,--quality", options.quality,
+            "Quality, 0 to 100 (default 50): positions in steps of 16 mm at 0, 4 mm at 33, 2 mm at 50, 1 mm at\n"
+            "67, 0.25 mm at 100; colours in steps of 32, 10, 5.7, 3.2 and 1 of 255 levels. Errors are about\n"
+            "half a step")
+        ->check(CLI::Range(0.0, 100.0));
+    command.add_option("--geometry-step", options.geometry_step, "Step of the positions in mm, instead of by quality")
+        ->check(CLI::Range(1.0 / 65536, 1000.0));
+    command.add_option("--colour-step", options.colour_step, "Step of the colours in levels of 255, likewise")
+        ->check(CLI::Range(1.0, 255.0));
+    command
+        .add_option("--lambda", options.lambda,
+                    "EP-frames: squared error that is worth one bit, in steps squared (default 0.12); more saves\n"
+                    "bits, 0 takes the nearest codeword")
+        ->check(CLI::Range(0.0, 1000.0));
+    command
+        .add_option("--keyint", options.key_interval,
+                    "Frames from one I-frame to the next (default 30); 1: I-frames only")
+        ->check(CLI::Range(1, 1000000));
+    command
+        .add_option("--intra", options.intra,
+                    "Coder of the I-frames: tfan (default; keeps every triangle) or draco (drops isolated\n"
+                    "vertices, splits non-manifold ones)")
+        ->check(CLI::IsMember({"tfan", "draco"}));
+    command
+        .add_option("--reference", options.reference,
+                    "Reference vertex of a residual: any, the nearest of the predicted mesh (default), or bone, the\n"
+                    "nearest of the same bone, as in the paper")
+        ->check(CLI::IsMember({"any", "bone"}));
+    command.add_flag("--keep-duplicates", options.keep_duplicates,
+                     "Keep vertices that decode to the same point and attributes, and triangles that collapse: the\n"
+                     "decoded triangle set is then exactly the input's");
+    command
+        .add_option("--nearest", options.nearest_vertices,
+                    "Nearest vertices that the distance order counts (default 16)")
+        ->check(CLI::Range(1, 64));
+    command.add_flag("--point-to-plane", options.point_to_plane,
+                     "Register bones by distances to planes instead of points");
+    command.add_option("--radii", options.radii_file,
+                       "Bone radii from htvm calibrate (default: the skeleton file's,\n"
+                       "else calibrated on the first frame)");
+    command.add_option("--threads", options.threads, "Threads (default: one a core); the bytes do not depend on it");
+}
+
+Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture) {
+    EncoderOptions out;
+    const auto steps = quality_steps(options.quality);
+    out.geometry_step = options.geometry_step > 0 ? options.geometry_step : steps.geometry_step;
+    out.colour_step = options.colour_step > 0 ? options.colour_step : steps.colour_step;
+    if (options.lambda >= 0) out.lambda = options.lambda;
+    out.key_interval = options.key_interval;
+    out.merge_duplicates = !options.keep_duplicates;
+    out.nearest_vertices = options.nearest_vertices;
+    out.reference_vertices = options.reference == "bone" ? ReferenceVertices::bone : ReferenceVertices::any;
+    out.point_to_plane = options.point_to_plane;
+    out.threads = options.threads;
+    out.fps_numerator = static_cast<std::uint32_t>(std::lround(capture.fps() * 1000));
+    out.fps_denominator = 1000;
+    out.skeleton = capture.skeleton();
+    out.radii = capture.radii();
+    if (!options.radii_file.empty()) {
+        if (capture.skeleton().bones.empty())
+            return fail(ErrorKind::bad_input, "--radii needs a skeleton (see --skeleton)");
+        auto radii = read_radii(options.radii_file, capture.skeleton().bones.size());
+        if (!radii) return tl::unexpected(radii.error());
+        out.radii = std::move(*radii);
+    }
+    if (options.intra == "draco") out.intra_coder = draco_intra_coder();
+    return out;
+}
+
+}  // namespace htvm::app

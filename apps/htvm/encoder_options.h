@@ -1,0 +1,32 @@
+// The encoder's options on the command line, shared by every command that encodes.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "capture.h"
+#include "htvm/encoder.hpp"
+
+namespace htvm::app {
+
+struct EncodingOptions {
+    double quality = 50;
+    double geometry_step = 0;  // mm; 0: by quality
+    double colour_step = 0;    // levels; 0: by quality
+    double lambda = -1;        // below 0: the library's default
+    int key_interval = 30;
+    std::string intra = "tfan";
+    std::string reference = "any";
+    std::string radii_file;
+    bool keep_duplicates = false;
+    bool point_to_plane = false;
+    int nearest_vertices = 16;
+    unsigned threads = 0;
+};
+
+void add_encoding_options(CLI::App& command, EncodingOptions& options);
+
+// The library's options for a capture; reads the radii's file where one is named.
+Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture);
+
+}  // namespace htvm::app

@@ -1,0 +1,143 @@
+// htvm info: what is in a stream.
+#include <fmt/core.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "htvm/decoder.hpp"
+#include "layer_table.h"
+#include "stream_file.h"
+#include "terminal.h"
+
+namespace htvm::app {
+namespace {
+
+struct Options {
+    std::string input;
+    bool json = false, summary = false;
+};
+
+// A frame's bytes, with those of the codebooks that came with it.
+void add_codebook(LayerBytes& bytes, const Packet& packet) {
+    bytes.overhead += packet_overhead;
+    if (!packet.payload.empty()) (packet.payload[0] == 0 ? bytes.geometry : bytes.colour) += packet.payload.size();
+}
+
+void print_frame(const FrameInfo& f) {
+    auto bpv = [&](std::size_t bytes) { return bits_per_vertex(bytes, f.source_vertices); };
+    const auto& b = f.bytes;
+    fmt::print(
+        "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>8} {:>9} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} "
+        "{:>8.3f}\n",
+        f.frame, type_name(f.type), f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices, f.triangles,
+        b.total(), bpv(b.pose + b.transforms), bpv(b.geometry + b.external_intra), bpv(b.colour),
+        bpv(b.normals + b.texcoords), bpv(b.mapping), bpv(b.fans), bpv(b.distance_orders), bpv(b.total()));
+}
+
+void print_sequence(const SequenceInfo& s, const std::string& input) {
+    fmt::print("{}: {:g} frames/s, positions in steps of {:g} mm, captured in units of {:g} mm\n", input,
+               static_cast<double>(s.fps_numerator) / s.fps_denominator, s.lattice_step, s.unit_micrometres / 1000.0);
+    if (!s.skeleton_tracked) {
+        fmt::print("no skeleton: one bone stands in, radius {:.0f} mm\n", s.radii[0]);
+        return;
+    }
+    fmt::print("skeleton: {} joints, {} bones, radii in mm:", s.skeleton.joint_names.size(), s.skeleton.bones.size());
+    for (const auto r : s.radii) fmt::print(" {:.0f}", r);
+    fmt::print("\n");
+}
+
+nlohmann::json sequence_json(const SequenceInfo& s) {
+    nlohmann::json bones = nlohmann::json::array();
+    for (const auto& bone : s.skeleton.bones) bones.push_back({bone.first, bone.second});
+    return {{"fps", static_cast<double>(s.fps_numerator) / s.fps_denominator},
+            {"lattice_step_mm", s.lattice_step},
+            {"unit_mm", s.unit_micrometres / 1000.0},
+            {"skeleton_tracked", s.skeleton_tracked},
+            {"joints", s.skeleton.joint_names},
+            {"bones", bones},
+            {"radii_mm", s.radii},
+            {"nearest_vertices", s.nearest_vertices}};
+}
+
+Result<void> info(const Options& options) {
+    auto input = StreamInput::open(options.input);
+    if (!input) return tl::unexpected(input.error());
+    Decoder headers;  // for the sequence header alone: frames are inspected, not decoded
+    LayerTotals intra, enhanced;
+    LayerBytes codebooks;
+    nlohmann::json frames = nlohmann::json::array();
+    std::uint64_t bytes = 0;
+    bool index = false;
+    std::int64_t first_us = 0, last_us = 0;
+    while (auto packet = input->next()) {
+        bytes += packet->payload.size() + packet_overhead;
+        if (packet->kind == PacketKind::sequence) {
+            const bool first = !headers.sequence();
+            if (auto ok = headers.push(*packet); !ok) return tl::unexpected(ok.error());
+            if (!options.json && first) print_sequence(*headers.sequence(), options.input);
+            if (!options.json && first && !options.summary)
+                fmt::print(
+                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>8} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+                    "frame", "type", "ref", "time s", "vertices", "triangs", "bytes", "motion", "geometry", "colour",
+                    "attribs", "mapping", "fans", "d.order", "bpv");
+        }
+        if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
+        if (packet->kind == PacketKind::index) index = true;
+        if (packet->kind != PacketKind::intra && packet->kind != PacketKind::enhanced) continue;
+        auto frame = inspect(*packet);
+        if (!frame) return tl::unexpected(frame.error());
+        frame->bytes.overhead += codebooks.overhead;
+        frame->bytes.geometry += codebooks.geometry;
+        frame->bytes.colour += codebooks.colour;
+        codebooks = {};
+        auto& totals = frame->type == FrameType::intra ? intra : enhanced;
+        if (intra.frames + enhanced.frames == 0) first_us = frame->timestamp_us;
+        last_us = frame->timestamp_us;
+        add(totals, *frame);
+        if (options.json) frames.push_back(frame_json(*frame));
+        if (!options.json && !options.summary) print_frame(*frame);
+    }
+    if (!headers.sequence())
+        return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
+    const auto count = intra.frames + enhanced.frames;
+    const auto& s = *headers.sequence();
+    const double seconds = count > 1 ? static_cast<double>(last_us - first_us) / 1e6 * static_cast<double>(count) /
+                                           static_cast<double>(count - 1)
+                                     : static_cast<double>(s.fps_denominator) / s.fps_numerator;
+    const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
+    if (options.json) {
+        fmt::print("{}\n", nlohmann::json{{"sequence", sequence_json(s)},
+                                          {"frames", frames},
+                                          {"bytes", bytes},
+                                          {"index", index},
+                                          {"damaged_bytes", input->damaged_bytes()},
+                                          {"megabits_per_second", megabits}}
+                               .dump(2));
+    } else {
+        fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(intra, enhanced), count, seconds,
+                   bytes, megabits, index ? ", with an index for seeking" : "");
+    }
+    if (input->damaged_bytes() > 0)
+        return fail(ErrorKind::corrupt_stream,
+                    fmt::format("{}: {} bytes are no sound packet", options.input, input->damaged_bytes()));
+    if (input->cut_short_bytes() > 0)
+        return fail(ErrorKind::corrupt_stream, options.input + " ends in the middle of a packet");
+    return {};
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto* command = app.add_subcommand("info", "Show what is in an .htvm stream: frames, sizes by layer, skeleton");
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
+    command->add_flag("--summary", options->summary, "The totals only, no line a frame");
+    command->add_flag("--json", options->json, "Everything as JSON");
+    command->footer(
+        "Columns: motion is the skeleton (I) or the bones' transforms (EP); fans and d.order are the connectivity's\n"
+        "two parts, TFAN's and the distance order's. All in bits per vertex of the captured mesh.");
+    command->callback([options, &run] { run = [options] { return info(*options); }; });
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,30 @@
+// Where a sequence's bytes went, added up over frames, as text and as JSON.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "htvm/frame.hpp"
+
+namespace htvm::app {
+
+struct LayerTotals {
+    std::size_t frames = 0;
+    std::uint64_t source_vertices = 0;  // the "v" of bits per vertex: the captured meshes' vertices
+    LayerBytes bytes;
+};
+
+void add(LayerTotals& totals, const FrameInfo& info);
+
+// Bits per captured vertex; 0 where there is no vertex.
+double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);
+
+// A table of bits per vertex by layer, one line a kind of frame and one for all.
+std::string layer_table(const LayerTotals& intra, const LayerTotals& enhanced);
+
+nlohmann::json layers_json(const LayerBytes& bytes);
+nlohmann::json frame_json(const FrameInfo& info);
+const char* type_name(FrameType type);  // I, EP
+
+}  // namespace htvm::app

@@ -1,0 +1,60 @@
+#include "stream_file.h"
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+
+namespace htvm::app {
+
+Result<StreamInput> StreamInput::open(const std::string& path) {
+    StreamInput input;
+    input.standard_ = path == "-";
+    if (input.standard_) return input;
+    if (std::filesystem::is_directory(path))
+        return fail(ErrorKind::bad_input, path + " is a folder; give an .htvm file");
+    input.file_.open(path, std::ios::binary);
+    if (!input.file_) return fail(ErrorKind::bad_input, path + " cannot be read: " + std::strerror(errno));
+    return input;
+}
+
+std::optional<Packet> StreamInput::next() {
+    std::istream& in = standard_ ? std::cin : file_;
+    std::array<char, 65536> buffer;
+    for (;;) {
+        if (auto packet = reader_.pull()) return packet;
+        if (at_end_) return std::nullopt;
+        // What a live stream has is taken as it comes, not only when the buffer is full.
+        in.read(buffer.data(), 1);
+        std::streamsize got = in.gcount();
+        if (got > 0) got += in.readsome(buffer.data() + 1, static_cast<std::streamsize>(buffer.size()) - 1);
+        if (got == 0) {
+            at_end_ = true;
+            continue;
+        }
+        reader_.push({reinterpret_cast<const std::uint8_t*>(buffer.data()), static_cast<std::size_t>(got)});
+    }
+}
+
+Result<StreamOutput> StreamOutput::open(const std::string& path) {
+    StreamOutput output;
+    output.path_ = path;
+    output.standard_ = path == "-";
+    if (output.standard_) return output;
+    output.file_.open(path, std::ios::binary | std::ios::trunc);
+    if (!output.file_) return fail(ErrorKind::bad_input, path + " cannot be written: " + std::strerror(errno));
+    return output;
+}
+
+Result<void> StreamOutput::write(const Packet& packet) {
+    const auto bytes = write_packet(packet);
+    std::ostream& out = standard_ ? std::cout : file_;
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    if (standard_) out.flush();
+    if (!out) return fail(ErrorKind::bad_input, path_ + " cannot be written: " + std::strerror(errno));
+    bytes_ += bytes.size();
+    return {};
+}
+
+}  // namespace htvm::app

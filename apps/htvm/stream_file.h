@@ -1,0 +1,41 @@
+// Streams as the commands read and write them: packets in a file, or on standard input and output.
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <string>
+
+#include "htvm/packet.hpp"
+#include "htvm/result.hpp"
+
+namespace htvm::app {
+
+class StreamInput {
+public:
+    static Result<StreamInput> open(const std::string& path);  // - is standard input
+    // The next packet, or nothing at the end.
+    std::optional<Packet> next();
+    std::uint64_t damaged_bytes() const { return reader_.damaged_bytes(); }
+    std::size_t cut_short_bytes() const { return reader_.pending_bytes(); }  // at the end: of a packet without its end
+
+private:
+    std::ifstream file_;
+    bool standard_ = false, at_end_ = false;
+    PacketReader reader_;
+};
+
+class StreamOutput {
+public:
+    static Result<StreamOutput> open(const std::string& path);  // - is standard output
+    Result<void> write(const Packet& packet);
+    std::uint64_t bytes() const { return bytes_; }
+
+private:
+    std::string path_;
+    std::ofstream file_;
+    bool standard_ = false;
+    std::uint64_t bytes_ = 0;
+};
+
+}  // namespace htvm::app

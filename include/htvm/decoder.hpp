@@ -1,0 +1,71 @@
+// The decoder: push packets, pull meshes. It depends on the standard library alone and never throws.
+//
+//   htvm::Decoder decoder;
+//   for each packet:  auto frame = decoder.push(packet);   // Result<std::optional<DecodedFrame>>
+//                     if (frame && *frame) show((*frame)->mesh);
+//
+// Frames refer to I-frames alone: any EP-frame may be left out. A decoder may start at any I-frame once it has seen the
+// sequence header.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "htvm/frame.hpp"
+#include "htvm/intra_coder.hpp"
+#include "htvm/mesh.hpp"
+#include "htvm/packet.hpp"
+#include "htvm/result.hpp"
+#include "htvm/skeleton.hpp"
+
+namespace htvm {
+
+struct DecoderOptions {
+    std::uint32_t max_vertices = 1u << 22;          // of a frame; larger frames are refused (ErrorKind::limit)
+    std::uint32_t max_triangles = 1u << 23;         // likewise
+    unsigned threads = 0;                           // 0: one a core; the meshes are the same for any number
+    std::optional<ExternalIntraCoder> intra_coder;  // for I-frames of another coder; none: they are unsupported
+};
+
+// What the sequence header says.
+struct SequenceInfo {
+    double lattice_step = 0;  // mm: decoded positions are multiples of it from the origin
+    std::uint32_t fps_numerator = 30, fps_denominator = 1;
+    std::uint32_t unit_micrometres = 1000;  // the unit that the capture came in
+    bool skeleton_tracked = true;           // false: one bone stands in for a skeleton that the capture has not
+    Skeleton skeleton;
+    std::vector<double> radii;  // mm, one a bone
+    int nearest_vertices = 16;  // m of the distance order
+};
+
+struct DecodedFrame {
+    FrameInfo info;
+    Mesh mesh;  // mm
+    // Of an I-frame, the skeleton as sent; of an EP-frame, the I-frame's moved by the transforms.
+    Pose pose;
+};
+
+class Decoder {
+public:
+    struct State;  // opaque
+    explicit Decoder(const DecoderOptions& options = {});
+    Decoder(Decoder&&) noexcept;
+    Decoder& operator=(Decoder&&) noexcept;
+    ~Decoder();
+
+    // Takes one packet; gives a frame where the packet is one. Errors cost that packet only: corrupt_stream where its
+    // bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported, limit.
+    Result<std::optional<DecodedFrame>> push(const Packet& packet);
+    // Known once a sequence header was pushed.
+    const std::optional<SequenceInfo>& sequence() const;
+
+private:
+    std::unique_ptr<State> state_;
+};
+
+// The layer sizes of a frame packet without decoding it, for inspection.
+Result<FrameInfo> inspect(const Packet& packet);
+
+}  // namespace htvm

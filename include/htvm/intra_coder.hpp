@@ -1,0 +1,28 @@
+// The place where another static mesh coder plugs in for I-frames (paper, section III-C).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace htvm {
+
+struct LatticeMesh;
+
+// A static coder that packs a mesh of integers without loss. It may change the order of vertices and triangles, and
+// what else its own design changes (see docs/bitstream.md); decode(encode(x)) must be the same on every machine.
+// encode is needed by an encoder only, decode by both.
+struct ExternalIntraCoder {
+    std::uint8_t number = 0;  // its number in the stream
+    const char* name = "";
+    std::function<Result<std::vector<std::uint8_t>>(const LatticeMesh&)> encode;
+    std::function<Result<LatticeMesh>(std::span<const std::uint8_t>)> decode;
+};
+
+// Draco (in the target htvm_draco, which links libdraco).
+ExternalIntraCoder draco_intra_coder();
+
+}  // namespace htvm

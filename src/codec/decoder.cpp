@@ -1,0 +1,219 @@
+// The decoder, top to bottom: a packet's payload becomes a mesh, an I-frame by itself, an EP-frame against its I-frame.
+#include "htvm/decoder.hpp"
+
+#include <new>
+
+#include "codec/enhanced_frame.h"
+#include "codec/intra_frame.h"
+#include "codec/sequence_header.h"
+#include "codec/sequence_index.h"
+#include "codec/transforms.h"
+#include "core/parallel.h"
+
+namespace htvm {
+
+struct Decoder::State {
+    DecoderOptions options;
+    unsigned threads = 1;
+    std::optional<SequenceHeader> header;
+    std::optional<SequenceInfo> info;
+    std::optional<ReferenceMesh> reference;
+    std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
+};
+
+namespace {
+
+using State = Decoder::State;
+using Frame = std::optional<DecodedFrame>;
+
+std::array<double, 9> matrix_of(const RotationMatrix& m) {
+    std::array<double, 9> out{};
+    for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<double>(m[i]) / static_cast<double>(1 << matrix_bits);
+    return out;
+}
+
+SequenceInfo describe(const SequenceHeader& header) {
+    SequenceInfo info;
+    info.lattice_step = header.lattice.step();
+    info.fps_numerator = header.fps_numerator;
+    info.fps_denominator = header.fps_denominator;
+    info.unit_micrometres = header.unit_micrometres;
+    info.skeleton_tracked = header.skeleton_tracked;
+    info.skeleton = header.skeleton;
+    for (const auto r : header.radii) info.radii.push_back(r * info.lattice_step);
+    info.nearest_vertices = header.nearest_vertices;
+    return info;
+}
+
+Result<Frame> take_header(State& state, const Packet& packet) {
+    auto header = read_sequence_header(packet.payload);
+    if (!header) return tl::unexpected(header.error());
+    // A repeated header changes nothing; another one begins another sequence.
+    if (!state.header || write_sequence_header(*state.header) != packet.payload) {
+        state.reference.reset();
+        state.geometry_codebook.reset();
+        state.colour_codebook.reset();
+    }
+    state.info = describe(*header);
+    state.header = std::move(*header);
+    return Frame{};
+}
+
+Result<Frame> take_codebook(State& state, const Packet& packet) {
+    auto codebook = read_codebook_payload(packet.payload);
+    if (!codebook) return tl::unexpected(codebook.error());
+    if (!state.reference || state.reference->frame != packet.reference) return Frame{};
+    (codebook->purpose == codebook_for_geometry ? state.geometry_codebook : state.colour_codebook) =
+        std::move(*codebook);
+    return Frame{};
+}
+
+Result<FramePayload> read_frame(const State& state, const Packet& packet) {
+    if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
+    auto payload = read_frame_payload(packet.payload);
+    if (!payload) return payload;
+    const auto& h = payload->header;
+    if (h.vertices > state.options.max_vertices || h.triangles > state.options.max_triangles)
+        return fail(ErrorKind::limit, "frame " + std::to_string(packet.frame) + " has " + std::to_string(h.vertices) +
+                                          " vertices and " + std::to_string(h.triangles) +
+                                          " triangles, more than this decoder accepts");
+    return payload;
+}
+
+Result<Frame> decode_intra(State& state, const Packet& packet) {
+    const auto payload = read_frame(state, packet);
+    if (!payload) return tl::unexpected(payload.error());
+    const auto& skeleton = state.header->skeleton;
+    const auto pose = decode_pose(payload->of(Layer::pose), skeleton.joint_names.size(), skeleton.bones.size());
+    if (!pose) return tl::unexpected(pose.error());
+    const auto& external = state.options.intra_coder;
+    auto mesh = decode_intra_frame(*payload, external ? &*external : nullptr);
+    if (!mesh) return tl::unexpected(mesh.error());
+    DecodedFrame out;
+    out.mesh = to_mesh(*mesh, state.header->lattice);
+    for (const auto joint : pose->joints) out.pose.joints.push_back(to_millimetres(joint, state.header->lattice));
+    for (const auto& rotation : pose->orientations)
+        out.pose.orientations.push_back(matrix_of(rotation_matrix(rotation)));
+    state.reference = make_reference(std::move(*mesh), skeleton.bones, pose->joints, pose->orientations,
+                                     state.header->radii, packet.frame, state.threads);
+    state.geometry_codebook.reset();
+    state.colour_codebook.reset();
+    return Frame{std::move(out)};
+}
+
+// The I-frame's joints, each moved by the first bone that it belongs to.
+Pose moved_pose(const State& state, const std::vector<QuantisedTransform>& transforms) {
+    const auto& reference = *state.reference;
+    const auto& bones = state.header->skeleton.bones;
+    Pose pose;
+    std::vector<LatticePoint> joints = reference.joints;
+    std::vector<bool> moved(joints.size(), false);
+    for (std::size_t i = 0; i < bones.size(); ++i) {
+        const auto matrix = rotation_matrix(transforms[i].rotation);
+        for (const auto joint : {bones[i].first, bones[i].second}) {
+            if (moved[joint]) continue;
+            joints[joint] = move(reference.joints[joint], matrix, reference.pivots[i], transforms[i].shift);
+            moved[joint] = true;
+        }
+        const auto turn = matrix_of(matrix), rest = matrix_of(rotation_matrix(reference.orientations[i]));
+        Rotation orientation{};
+        for (std::size_t row = 0; row < 3; ++row)
+            for (std::size_t column = 0; column < 3; ++column)
+                for (std::size_t k = 0; k < 3; ++k)
+                    orientation[3 * row + column] += turn[3 * row + k] * rest[3 * k + column];
+        pose.orientations.push_back(orientation);
+    }
+    for (const auto joint : joints) pose.joints.push_back(to_millimetres(joint, state.header->lattice));
+    return pose;
+}
+
+const Codebook* named(const std::optional<NumberedCodebook>& codebook, std::uint32_t number) {
+    return codebook && codebook->number == number ? &codebook->codebook : nullptr;
+}
+
+Result<Frame> decode_enhanced(State& state, const Packet& packet) {
+    const auto payload = read_frame(state, packet);
+    if (!payload) return tl::unexpected(payload.error());
+    if (!state.reference || state.reference->frame != packet.reference)
+        return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " refers to I-frame " +
+                                                   std::to_string(packet.reference) + ", which is not there");
+    const EnhancedFrameContext context{
+        *state.reference, named(state.geometry_codebook, payload->header.geometry_codebook),
+        named(state.colour_codebook, payload->header.colour_codebook), state.header->nearest_vertices, state.threads};
+    auto decoded = decode_enhanced_frame(*payload, context);
+    if (!decoded) return tl::unexpected(decoded.error());
+    DecodedFrame out;
+    out.mesh = to_mesh(decoded->mesh, state.header->lattice);
+    out.pose = moved_pose(state, decoded->transforms);
+    return Frame{std::move(out)};
+}
+
+Result<Frame> take(State& state, const Packet& packet) {
+    switch (packet.kind) {
+        case PacketKind::sequence:
+            return take_header(state, packet);
+        case PacketKind::codebook:
+            return take_codebook(state, packet);
+        case PacketKind::intra:
+            return decode_intra(state, packet);
+        case PacketKind::enhanced:
+            return decode_enhanced(state, packet);
+        case PacketKind::index:
+            break;
+    }
+    return Frame{};  // what this version does not know is skipped
+}
+
+}  // namespace
+
+Decoder::Decoder(const DecoderOptions& options) : state_(std::make_unique<State>()) {
+    state_->options = options;
+    state_->threads = thread_count(options.threads);
+}
+Decoder::Decoder(Decoder&&) noexcept = default;
+Decoder& Decoder::operator=(Decoder&&) noexcept = default;
+Decoder::~Decoder() = default;
+
+Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
+    try {
+        auto frame = take(*state_, packet);
+        if (frame && *frame) (*frame)->info = *inspect(packet);
+        return frame;
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorKind::limit, "there is not enough memory for frame " + std::to_string(packet.frame));
+    }
+}
+
+const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->info; }
+
+Result<FrameInfo> inspect(const Packet& packet) {
+    if (packet.kind != PacketKind::intra && packet.kind != PacketKind::enhanced)
+        return fail(ErrorKind::bad_input, "the packet is not a frame");
+    const auto payload = read_frame_payload(packet.payload);
+    if (!payload) return tl::unexpected(payload.error());
+    FrameInfo out;
+    out.type = packet.kind == PacketKind::intra ? FrameType::intra : FrameType::enhanced;
+    out.frame = packet.frame;
+    out.reference = packet.reference;
+    out.timestamp_us = packet.timestamp_us;
+    out.source_vertices = payload->header.source_vertices;
+    out.source_triangles = payload->header.source_triangles;
+    out.vertices = payload->header.vertices;
+    out.triangles = payload->header.triangles;
+    auto size = [&](Layer layer) { return payload->of(layer).size(); };
+    auto& b = out.bytes;
+    b.pose = size(Layer::pose);
+    b.transforms = size(Layer::transforms);
+    b.geometry = size(Layer::geometry);
+    b.colour = size(Layer::colour);
+    b.normals = size(Layer::normals);
+    b.texcoords = size(Layer::texcoords);
+    b.mapping = size(Layer::mapping);
+    b.fans = size(Layer::fans);
+    b.distance_orders = size(Layer::distance_orders);
+    b.external_intra = size(Layer::external_intra);
+    b.overhead = packet.payload.size() + packet_overhead - b.total();
+    return out;
+}
+
+}  // namespace htvm

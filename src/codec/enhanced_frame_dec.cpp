@@ -1,0 +1,129 @@
+#include <algorithm>
+
+#include "codec/attribute_values.h"
+#include "codec/enhanced_frame.h"
+#include "codec/mapping.h"
+#include "codec/mtfan.h"
+#include "codec/residual_layer.h"
+#include "codec/transforms.h"
+#include "core/parallel.h"
+
+namespace htvm {
+namespace {
+
+Result<std::vector<LatticePoint>> decode_positions(const FramePayload& payload, const EnhancedFrameContext& context,
+                                                   std::span<const LatticePoint> predicted,
+                                                   std::span<const std::uint32_t> reference_of) {
+    const auto residuals =
+        decode_residuals(payload.of(Layer::geometry), reference_of.size(), *context.geometry_codebook);
+    if (!residuals) return tl::unexpected(residuals.error());
+    std::vector<LatticePoint> out;
+    for (std::size_t k = 0; k < residuals->size(); ++k) {
+        const auto& e = (*residuals)[k];
+        const LatticePoint p = predicted[reference_of[k]] + LatticePoint{e[0], e[1], e[2]};
+        if (!on_lattice(p)) return fail(ErrorKind::corrupt_stream, "EP-frame: a vertex lies off the lattice");
+        out.push_back(p);
+    }
+    return out;
+}
+
+Result<std::vector<Colour>> decode_colours(const FramePayload& payload, const EnhancedFrameContext& context,
+                                           std::span<const std::uint32_t> reference_of) {
+    const auto residuals = decode_residuals(payload.of(Layer::colour), reference_of.size(), *context.colour_codebook);
+    if (!residuals) return tl::unexpected(residuals.error());
+    std::vector<Colour> out;
+    for (std::size_t k = 0; k < residuals->size(); ++k)
+        out.push_back(add_colour(context.reference.mesh.colours[reference_of[k]], (*residuals)[k]));
+    return out;
+}
+
+template <class Value>
+std::vector<Value> of_references(const std::vector<Value>& values, std::span<const std::uint32_t> reference_of) {
+    std::vector<Value> out;
+    out.reserve(reference_of.size());
+    for (const auto r : reference_of) out.push_back(values[r]);
+    return out;
+}
+
+// Colours, normals and texture coordinates, where the reference has them.
+Result<void> decode_attributes(const FramePayload& payload, const EnhancedFrameContext& context,
+                               std::span<const QuantisedTransform> transforms,
+                               std::span<const std::uint32_t> reference_of, LatticeMesh& mesh) {
+    const auto& reference = context.reference;
+    if (!reference.mesh.colours.empty()) {
+        auto colours = decode_colours(payload, context, reference_of);
+        if (!colours) return tl::unexpected(colours.error());
+        mesh.colours = std::move(*colours);
+    }
+    if (!reference.mesh.normals.empty()) {
+        auto normals = decode_attribute_values(payload.of(Layer::normals),
+                                               of_references(predict_normals(reference, transforms), reference_of));
+        if (!normals) return tl::unexpected(normals.error());
+        mesh.normals = std::move(*normals);
+    }
+    if (!reference.mesh.texcoords.empty()) {
+        auto texcoords = decode_attribute_values(payload.of(Layer::texcoords),
+                                                 of_references(reference.mesh.texcoords, reference_of));
+        if (!texcoords) return tl::unexpected(texcoords.error());
+        mesh.texcoords = std::move(*texcoords);
+    }
+    return {};
+}
+
+Result<void> check(const EnhancedFrameContext& context) {
+    if (context.reference.mesh.positions.empty())
+        return fail(ErrorKind::corrupt_stream, "EP-frame: its I-frame has no vertices to refer to");
+    if (!context.geometry_codebook || (!context.colour_codebook && !context.reference.mesh.colours.empty()))
+        return fail(ErrorKind::corrupt_stream, "EP-frame: the codebook that it names did not arrive");
+    return {};
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> references_of_residuals(std::span<const std::uint32_t> residuals_of, std::size_t residuals) {
+    std::vector<std::uint32_t> out;
+    out.reserve(residuals);
+    for (std::size_t k = 0; k < residuals_of.size(); ++k)
+        out.insert(out.end(), residuals_of[k], static_cast<std::uint32_t>(k));
+    return out;
+}
+
+Colour add_colour(Colour reference, const std::array<std::int32_t, 3>& residual) {
+    Colour out{};
+    for (std::size_t c = 0; c < 3; ++c)
+        out[c] = static_cast<std::uint8_t>(std::clamp(reference[c] + residual[c], 0, 255));
+    return out;
+}
+
+Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, const EnhancedFrameContext& context) {
+    if (auto ok = check(context); !ok) return tl::unexpected(ok.error());
+    const auto& reference = context.reference;
+    DecodedEnhancedFrame out;
+    auto transforms = decode_transforms(payload.of(Layer::transforms), reference.pivots.size());
+    if (!transforms) return tl::unexpected(transforms.error());
+    out.transforms = std::move(*transforms);
+    const auto residuals_of =
+        decode_mapping(payload.of(Layer::mapping), reference.mesh.positions.size(), payload.header.vertices);
+    if (!residuals_of) return tl::unexpected(residuals_of.error());
+    const auto reference_of = references_of_residuals(*residuals_of, payload.header.vertices);
+    const auto predicted = predict_positions(reference, out.transforms, context.threads);
+    auto positions = decode_positions(payload, context, predicted, reference_of);
+    if (!positions) return tl::unexpected(positions.error());
+    out.mesh.positions = std::move(*positions);
+
+    Result<std::vector<Triangle>> triangles;
+    Result<void> attributes;
+    parallel_invoke(
+        context.threads,
+        [&] { attributes = decode_attributes(payload, context, out.transforms, reference_of, out.mesh); },
+        [&] {
+            triangles = decode_mtfan(payload.of(Layer::fans), payload.of(Layer::distance_orders), out.mesh.positions,
+                                     payload.header.triangles, context.nearest_vertices, context.threads);
+        });
+    if (!attributes) return tl::unexpected(attributes.error());
+    if (!triangles) return tl::unexpected(triangles.error());
+    out.mesh.triangles = std::move(*triangles);
+    return out;
+}
+
+}  // namespace htvm
