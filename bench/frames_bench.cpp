@@ -1,0 +1,111 @@
+// Speed of a frame, by kind and by stage, on the default synthetic person: about 35,000 vertices with colour.
+//
+// Real time, on all cores; frames per second beside it. HTVM_BENCH_VERTICES changes the size.
+#include <benchmark/benchmark.h>
+
+#include <cstdlib>
+#include <map>
+#include <string>
+
+#include "htvm/decoder.hpp"
+#include "htvm/encoder.hpp"
+#include "synth/synth.h"
+
+namespace {
+
+constexpr int first_frame = 40, frames = 6;
+
+struct Sequence {
+    std::vector<htvm::SynthFrame> frames;
+    std::vector<htvm::Packet> packets;
+};
+
+htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
+    htvm::EncoderOptions options;
+    const auto steps = htvm::quality_steps(quality);
+    options.geometry_step = steps.geometry_step;
+    options.colour_step = steps.colour_step;
+    options.threads = threads;
+    options.skeleton = htvm::synth_skeleton();
+    options.key_interval = 1000;
+    return options;
+}
+
+const std::vector<htvm::SynthFrame>& capture() {
+    static const auto made = [] {
+        htvm::SynthOptions options;
+        if (const char* vertices = std::getenv("HTVM_BENCH_VERTICES")) options.vertices = std::atoi(vertices);
+        std::vector<htvm::SynthFrame> out;
+        for (int i = 0; i < frames; ++i) out.push_back(htvm::synth_frame(options, first_frame + i));
+        return out;
+    }();
+    return made;
+}
+
+// An encoder behind its first frame, so that the next ones are EP-frames.
+htvm::Encoder primed(double quality, unsigned threads) {
+    auto encoder = htvm::Encoder::create(encoder_options(quality, threads));
+    if (!encoder->push(capture()[0].mesh, &capture()[0].pose, 0)) std::abort();
+    return std::move(*encoder);
+}
+
+void report(benchmark::State& state, const std::map<std::string, double>& stages) {
+    const auto iterations = static_cast<double>(state.iterations());
+    state.counters["fps"] = benchmark::Counter(iterations, benchmark::Counter::kIsRate);
+    for (const auto& [stage, milliseconds] : stages) state.counters[stage + ", ms"] = milliseconds / iterations;
+}
+
+void encode(benchmark::State& state, bool intra) {
+    const auto threads = static_cast<unsigned>(state.range(1));
+    auto encoder = primed(static_cast<double>(state.range(0)), threads);
+    std::map<std::string, double> stages;
+    std::int64_t frame = 0;
+    for (auto _ : state) {
+        ++frame;
+        const auto& input = capture()[static_cast<std::size_t>(1 + frame % (frames - 1))];
+        if (!encoder.push(input.mesh, &input.pose, frame, intra)) std::abort();
+        while (auto packet = encoder.pull()) benchmark::DoNotOptimize(packet->payload.data());
+        for (const auto& stage : encoder.stage_times()) stages[stage.stage] += stage.milliseconds;
+    }
+    report(state, stages);
+}
+
+void encode_intra(benchmark::State& state) { encode(state, true); }
+void encode_enhanced(benchmark::State& state) { encode(state, false); }
+
+void decode(benchmark::State& state, htvm::PacketKind kind) {
+    auto encoder = primed(static_cast<double>(state.range(0)), 0);
+    const auto& input = capture()[2];
+    if (!encoder.push(input.mesh, &input.pose, 1)) std::abort();
+    htvm::DecoderOptions options;
+    options.threads = static_cast<unsigned>(state.range(1));
+    htvm::Decoder decoder(options);
+    htvm::Packet measured;
+    while (auto packet = encoder.pull()) {
+        if (!decoder.push(*packet)) std::abort();
+        if (packet->kind == kind) measured = *packet;
+    }
+    for (auto _ : state) {
+        auto frame = decoder.push(measured);
+        if (!frame || !*frame) std::abort();
+        benchmark::DoNotOptimize((*frame)->mesh.positions.data());
+    }
+    report(state, {});
+}
+
+void decode_intra(benchmark::State& state) { decode(state, htvm::PacketKind::intra); }
+void decode_enhanced(benchmark::State& state) { decode(state, htvm::PacketKind::enhanced); }
+
+void arguments(benchmark::internal::Benchmark* benchmark) {
+    benchmark->ArgNames({"quality", "threads"});
+    for (const int quality : {25, 50, 75})
+        for (const int threads : {1, 2}) benchmark->Args({quality, threads});
+    benchmark->Unit(benchmark::kMillisecond)->UseRealTime();
+}
+
+BENCHMARK(encode_intra)->Apply(arguments);
+BENCHMARK(encode_enhanced)->Apply(arguments);
+BENCHMARK(decode_intra)->Apply(arguments);
+BENCHMARK(decode_enhanced)->Apply(arguments);
+
+}  // namespace
