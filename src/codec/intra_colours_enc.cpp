@@ -2,7 +2,6 @@
 
 #include "codec/intra_colour_walk.h"
 #include "codec/intra_colours.h"
-#include "core/bytes.h"
 #include "entropy/cost.h"
 #include "entropy/range_encoder.h"
 
@@ -58,16 +57,16 @@ EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<c
                                     const Neighbours& neighbours, std::int32_t step) {
     if (colours.empty()) return {};
     const ColourPredictor predictor = choose_predictor(colours, positions, neighbours, step);
-    ByteWriter writer;
-    for (const std::int8_t share : {predictor.red_from_green, predictor.blue_from_green, predictor.blue_from_red})
-        writer.u8(static_cast<std::uint8_t>(share));
-    writer.u8(predictor.decoded_weight);
     EncodedColours out;
     out.decoded.assign(colours.begin(), colours.end());
     RangeEncoder encoder;
     write_colours(out.decoded, positions, neighbours, step, predictor, colours.size(), encoder);
-    writer.bytes(encoder.finish());
-    out.bytes = writer.take();
+    const auto coded = encoder.finish();
+    out.bytes.reserve(coded.size() + 4);
+    for (const std::int8_t share : {predictor.red_from_green, predictor.blue_from_green, predictor.blue_from_red})
+        out.bytes.push_back(static_cast<std::uint8_t>(share));
+    out.bytes.push_back(predictor.decoded_weight);
+    out.bytes.insert(out.bytes.end(), coded.begin(), coded.end());
     return out;
 }
 

@@ -18,12 +18,14 @@ std::int64_t mean_of(std::int64_t sum, std::size_t count) { return (sum * recipr
 
 Triple triple(LatticePoint p) { return {p.x, p.y, p.z}; }
 
-// How many of the ascending thresholds lie below the value.
+// How many of the ascending thresholds lie below the value. Without an early way out: it is faster than a branch that
+// is hard to predict.
 template <std::size_t size>
 std::size_t class_of(std::int64_t value, const std::array<std::int32_t, size>& thresholds) {
-    std::size_t k = 0;
-    while (k < size && value > thresholds[k]) ++k;
-    return k;
+    const auto bounded = static_cast<std::int32_t>(std::min<std::int64_t>(value, 1 << 30));
+    std::int32_t k = 0;
+    for (const std::int32_t threshold : thresholds) k += bounded > threshold;
+    return static_cast<std::size_t>(k);
 }
 
 // The features that come from the parallelograms; `base` is the point from which differences are taken.
