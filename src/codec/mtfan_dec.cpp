@@ -49,7 +49,7 @@ struct DistanceOrders {
 Result<std::vector<Triangle>> decode_mtfan(std::span<const std::uint8_t> fans,
                                            std::span<const std::uint8_t> distance_orders,
                                            std::span<const LatticePoint> positions, std::uint32_t triangle_count, int m,
-                                           unsigned) {
+                                           unsigned threads) {
     if (m < 1 || m > mtfan_max_nearest)
         return fail(ErrorKind::corrupt_stream,
                     "M-TFAN's number of nearest vertices must be 1 to 64, but the stream "
@@ -58,8 +58,8 @@ Result<std::vector<Triangle>> decode_mtfan(std::span<const std::uint8_t> fans,
     std::vector<Triangle> triangles;
     if (triangle_count == 0) return triangles;
     RangeDecoder decoder(fans);
-    const auto discovery = std::unique_ptr<DistanceOrders>(
-        new DistanceOrders{positions, UnvisitedNear(positions, m), RangeDecoder(distance_orders), {}, {}, 0, {}});
+    const auto discovery = std::unique_ptr<DistanceOrders>(new DistanceOrders{
+        positions, UnvisitedNear(positions, m, threads), RangeDecoder(distance_orders), {}, {}, 0, {}});
     if (!decode_fans(decoder, triangle_count, *discovery, triangles))
         return fail(ErrorKind::corrupt_stream,
                     "The M-TFAN connectivity names vertices that do not exist or ends early: the stream is damaged.");

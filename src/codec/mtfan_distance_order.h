@@ -38,18 +38,28 @@ private:
 // Most vertices are found among so many; only where one is not are the other m nearest searched for.
 inline constexpr std::size_t first_look = 8;
 
-// An unvisited vertex as the next boundary vertex of a fan.
+// An unvisited vertex as the next boundary vertex of a fan. Its misfit grows with the cotangent of the new triangle's
+// angle at it (smallest where the triangle would be the Delaunay one), and is huge where the triangle folds back.
 struct Candidate {
     std::uint32_t vertex = 0;
-    double misfit = 0;           // the cotangent of the triangle's angle at the candidate; much where it folds back
-    std::uint32_t turn = 0;      // 0 .. 15: class of the angle at the focus from the current vertex to the candidate
+    double misfit = 0;
+};
+
+// The contexts in which it is coded whether a candidate is the one.
+struct CandidateClasses {
+    std::uint32_t stage = 0;  // 0: the fan's start, 1: no triangle behind, 2: no end to reach, 3: within a gap
+    std::uint32_t place = 0, left = 0;                  // 0 .. 7: candidates before and after it
+    std::uint32_t better_before = 0, better_after = 0;  // 0 .. 3: of these, the ones with less misfit
+    std::uint32_t fit = 0;                              // 0 .. 7: class of the misfit
+    std::uint32_t turn = 0;      // 0 .. 15: class of the angle at the focus from the current vertex to it
     std::uint32_t distance = 0;  // 0 .. 7: class of its distance from the current vertex, by that to the focus
 };
 
 // The not yet visited vertices among the m nearest to a focus, nearest first.
 class UnvisitedNear {
 public:
-    UnvisitedNear(std::span<const LatticePoint> positions, int m);
+    // With more than one thread, the nearest ones of all vertices are searched for at once, beforehand.
+    UnvisitedNear(std::span<const LatticePoint> positions, int m, unsigned threads);
 
     bool visited(std::uint32_t vertex) const { return visited_[vertex]; }
     void visit(std::uint32_t vertex) { visited_[vertex] = true; }
@@ -58,6 +68,7 @@ public:
     void look(const VisitedPositions& known, const FanState& fan, std::uint32_t focus);
     void look_farther(const VisitedPositions& known, const FanState& fan);
     std::span<const Candidate> candidates() const { return {candidates_.data(), count_}; }
+    CandidateClasses classes(const VisitedPositions& known, const FanState& fan, std::size_t place) const;
 
 private:
     void add_candidate(const VisitedPositions& known, const FanState& fan, std::uint32_t vertex);
@@ -65,6 +76,7 @@ private:
     std::span<const LatticePoint> positions_;
     NearestOrder order_;
     std::size_t m_;
+    std::vector<std::uint32_t> first_nearest_;  // by vertex, first_look each; empty: searched for when needed
     std::vector<bool> visited_;
     std::uint32_t focus_;  // whose nearest vertices `nearest_` holds
     std::size_t found_ = 0, looked_ = 0, count_ = 0;
@@ -72,39 +84,17 @@ private:
     std::array<Candidate, mtfan_max_nearest> candidates_;
 };
 
-// Codes whether the next boundary vertex is the candidate at this place, knowing that it is none before.
+// Codes whether a candidate is the next boundary vertex, knowing that none before it is.
 template <class Coder>
-bool code_is_it(Coder& coder, DistanceOrderModels& models, std::span<const Candidate> candidates, std::size_t place,
-                const FanState& fan, bool wanted) {
-    const std::uint32_t stage = fan.current == OpenEdges::none                   ? 0
-                                : fan.behind == OpenEdges::none                  ? 1
-                                : fan.end_count == 0 || fan.ends[0] == fan.start ? 2
-                                                                                 : 3;
-    const Candidate& candidate = candidates[place];
-    std::uint32_t better_before = 0, better_after = 0;
-    for (std::size_t i = 0; i < candidates.size(); ++i)
-        if (i != place && candidates[i].misfit < candidate.misfit) ++(i < place ? better_before : better_after);
-    const std::uint32_t at = static_cast<std::uint32_t>(std::min<std::size_t>(place, 7));
-    const std::uint32_t left = static_cast<std::uint32_t>(std::min<std::size_t>(candidates.size() - place, 8)) - 1;
-    better_after = std::min(better_after, 3u);
-    better_before = std::min(better_before, 3u);
-    const double m = candidate.misfit;
-    const std::uint32_t fit = m < -0.3  ? 0
-                              : m < 0   ? 1
-                              : m < 0.3 ? 2
-                              : m < 0.6 ? 3
-                              : m < 1   ? 4
-                              : m < 1.5 ? 5
-                              : m < 3   ? 6
-                                        : 7;
-    const std::uint32_t rank = better_after * 4 + stage;
+bool code_is_it(Coder& coder, DistanceOrderModels& models, const CandidateClasses& c, bool wanted) {
+    const std::uint32_t rank = c.better_after * 4 + c.stage;
     auto& is_it = models.is_it;
     return code_mixed(
-        coder, models.mixer[rank * 4 + better_before],
-        std::array<BinaryModel*, 4>{&is_it[0][(rank * 8 + at) * 8 + left],
-                                    &is_it[1][(rank * 16 + candidate.turn) * 8 + candidate.distance],
-                                    &is_it[2][((rank * 8 + fit) * 4 + better_before) * 4 + std::min(left, 3u)],
-                                    &is_it[3][(rank * 16 + candidate.turn) * 8 + fit]},
+        coder, models.mixer[rank * 4 + c.better_before],
+        std::array<BinaryModel*, 4>{&is_it[0][(rank * 8 + c.place) * 8 + c.left],
+                                    &is_it[1][(rank * 16 + c.turn) * 8 + c.distance],
+                                    &is_it[2][((rank * 8 + c.fit) * 4 + c.better_before) * 4 + std::min(c.left, 3u)],
+                                    &is_it[3][(rank * 16 + c.turn) * 8 + c.fit]},
         wanted);
 }
 
@@ -119,7 +109,8 @@ std::size_t code_distance_order(Coder& coder, DistanceOrderModels& models, Unvis
     for (int round = 0; round < 2; ++round) {
         const auto candidates = unvisited.candidates();
         for (; place < candidates.size(); ++place)
-            if (code_is_it(coder, models, candidates, place, fan, candidates[place].vertex == wanted)) return place;
+            if (code_is_it(coder, models, unvisited.classes(known, fan, place), candidates[place].vertex == wanted))
+                return place;
         if (round == 0) unvisited.look_farther(known, fan);
     }
     return place;

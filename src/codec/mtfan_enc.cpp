@@ -41,20 +41,21 @@ struct DistanceOrders {
 }  // namespace
 
 EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::span<const Triangle> triangles, int m,
-                          unsigned) {
+                          unsigned threads) {
     EncodedMtfan result;
     result.distance_order_counts.resize(static_cast<std::size_t>(m) + 1);
     if (triangles.empty()) return result;
     RangeEncoder encoder;
     FanWriter coder{encoder};
     const auto models = std::make_unique<FanModels>();
-    const auto discovery = std::unique_ptr<DistanceOrders>(new DistanceOrders{decoded_positions,
-                                                                              UnvisitedNear(decoded_positions, m),
-                                                                              {},
-                                                                              {},
-                                                                              {},
-                                                                              {},
-                                                                              std::move(result.distance_order_counts)});
+    const auto discovery =
+        std::unique_ptr<DistanceOrders>(new DistanceOrders{decoded_positions,
+                                                           UnvisitedNear(decoded_positions, m, threads),
+                                                           {},
+                                                           {},
+                                                           {},
+                                                           {},
+                                                           std::move(result.distance_order_counts)});
     FanOrder fans =
         encode_fans(coder, *models, static_cast<std::uint32_t>(decoded_positions.size()), triangles, *discovery);
     result.fans = encoder.finish();

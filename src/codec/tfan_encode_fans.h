@@ -46,6 +46,15 @@ struct FanOrder {
     std::vector<Triangle> triangles;   // in visiting numbers, as decoded
 };
 
+// Where the next fan at the focus starts: at a start candidate if a link leads on from one. An input index.
+inline std::uint32_t choose_start(FocusLinks& links, const OpenEdges& edges, std::uint32_t focus,
+                                  const std::vector<std::uint32_t>& order) {
+    std::uint32_t edge = edges.first_in(focus);
+    for (std::uint32_t i = 0; edge != OpenEdges::none && i < most_candidates; edge = edges[edge].next_in, ++i)
+        if (links.leads_on(order[edges[edge].from])) return order[edges[edge].from];
+    return links.any_start();
+}
+
 // Codes all triangles. The Discovery says what is coded besides the fans:
 //     static constexpr bool visits_isolated   whether vertices without triangles are visited as seeds
 //     void seed(vertex)                       a seed (input index) takes the next visiting number
@@ -68,12 +77,7 @@ FanOrder encode_fans(Coder& coder, FanModels& models, std::uint32_t vertex_count
     };
     // One fan at the focus: its start, then its steps.
     const auto code_fan = [&](FanState& fan) {
-        std::uint32_t vertex = OpenEdges::none;
-        for (std::uint32_t e = edges.first_in(fan.focus), i = 0; e != OpenEdges::none && i < most_candidates;
-             e = edges[e].next_in, ++i)
-            if (vertex == OpenEdges::none && links.leads_on(result.order[edges[e].from]))
-                vertex = result.order[edges[e].from];
-        if (vertex == OpenEdges::none) vertex = links.any_start();
+        std::uint32_t vertex = choose_start(links, edges, fan.focus, result.order);
         code_start(coder, models, edges, fan, number_of[vertex]);
         if (fan.start == OpenEdges::none) {
             discovery.discover(fan, vertex);
@@ -112,7 +116,7 @@ FanOrder encode_fans(Coder& coder, FanModels& models, std::uint32_t vertex_count
             implied = !Discovery::visits_isolated;
         }
         links.gather(result.order[focus]);
-        for (std::uint32_t fans = 0; result.triangles.size() < triangles.size(); ++fans, implied = false) {
+        for (; result.triangles.size() < triangles.size(); implied = false) {
             const bool more = links.remaining() > 0;
             if (!implied) code_more_fans(coder, models, edges, focus, more);
             if (!more) break;

@@ -84,13 +84,12 @@ struct FanModels {
     std::array<BinaryModel, 4> starts_at_candidate;
     std::array<BinaryModel, most_candidates> start_index, end_index;
     BinaryModel starts_at_known;
-    std::array<std::array<BinaryModel, 32768>, 6> is_new;
-    std::array<Mixer<6>, 64> new_mixer;
-    std::array<std::array<BinaryModel, 32768>, 6> closing;
-    std::array<Mixer<6>, 64> close_mixer;
-    std::array<std::array<BinaryModel, 8>, 128> closes;
-    std::array<std::array<BinaryModel, 16>, 2> goes_left;
-    std::array<BinaryModel, 16> goes_right;
+    std::array<std::array<BinaryModel, 16384>, 5> is_new;  // by five sets of contexts each, see code_is_new()
+    std::array<Mixer<5>, 64> new_mixer;
+    std::array<std::array<BinaryModel, 16384>, 5> closing;
+    std::array<Mixer<5>, 64> close_mixer;
+    std::array<std::array<std::array<BinaryModel, 8>, 8>, 4> goes_left;
+    std::array<std::array<BinaryModel, 8>, 8> goes_right;
     std::array<BinaryModel, 8> stops;
     std::array<BinaryModel, 2> walks, walks_left;
     UnsignedModel walk_steps;
@@ -212,61 +211,89 @@ struct CodedStep {
     std::uint32_t vertex;  // the visiting number; none for a new vertex and for stop
 };
 
+// The contexts of a step, each clipped to a class.
+struct StepContexts {
+    std::uint32_t situation = 0;  // 0: no end candidate, 1: one triangle fills the gap, 2 .. 4: by the last step
+    std::uint32_t length = 0;     // triangles in the fan, up to 7
+    std::uint32_t ways = 0;       // 0 .. 3: left and right exist
+    bool turned = false;          // the last step went left or right
+    // Coded triangles at the focus (up to 15) and (up to 7) at the vertices around the gap.
+    std::uint32_t focus = 0, current = 0, end = 0, left = 0, right = 0, behind = 0, beyond = 0;
+    FanHints hints;
+};
+
+inline StepContexts step_contexts(const OpenEdges& edges, const FanState& fan, const FanHints& hints) {
+    const auto count = [&](std::uint32_t vertex, std::uint32_t most) {
+        return vertex == OpenEdges::none ? 0u : std::min(edges.triangle_count(vertex), most);
+    };
+    StepContexts c;
+    c.situation = fan.end_count == 0             ? 0
+                  : fan.fills_hole               ? 1
+                  : fan.last == Step::new_vertex ? 2
+                  : fan.last == Step::stop       ? 3
+                                                 : 4;
+    c.length = std::min(fan.length, 7u);
+    c.ways = (fan.left != OpenEdges::none ? 1u : 0u) + (fan.right != OpenEdges::none ? 2u : 0u);
+    c.turned = fan.last == Step::right || fan.last == Step::left;
+    c.focus = count(fan.focus, 15);
+    c.current = count(fan.current, 7);
+    c.end = count(fan.end_count > 0 ? fan.ends[0] : OpenEdges::none, 7);
+    c.left = count(fan.left, 7);
+    c.right = count(fan.right, 7);
+    c.behind = count(fan.behind, 7);
+    c.beyond = count(fan.beyond_end, 7);
+    c.hints = hints;
+    return c;
+}
+
+template <class Coder>
+bool code_is_new(Coder& coder, FanModels& models, const StepContexts& c, bool wanted) {
+    auto& m = models.is_new;
+    const std::uint32_t gap = c.hints.gap;
+    return code_mixed(
+        coder, models.new_mixer[c.situation * 8 + c.length],
+        std::array<BinaryModel*, 5>{&m[0][((c.focus * 8 + c.end) * 8 + c.situation) * 16 + gap],
+                                    &m[1][((c.focus * 8 + c.current) * 8 + c.situation) * 16 + gap],
+                                    &m[2][((gap * 8 + c.hints.left) * 8 + c.hints.right) * 8 + c.situation],
+                                    &m[3][(c.focus * 8 + c.end) * 8 + c.right],
+
+                                    &m[4][((c.focus * 8 + c.behind) * 8 + c.beyond) * 8 + c.situation]},
+        wanted);
+}
+
+template <class Coder>
+bool code_closes(Coder& coder, FanModels& models, const StepContexts& c, bool wanted) {
+    auto& m = models.closing;
+    const std::uint32_t gap = c.hints.gap;
+    return code_mixed(
+        coder, models.close_mixer[c.situation * 4 + c.ways],
+        std::array<BinaryModel*, 5>{&m[0][((c.focus * 8 + c.situation) * 4 + c.ways) * 2 + c.turned],
+                                    &m[1][(c.focus * 8 + c.current) * 8 + c.end],
+                                    &m[2][((c.focus * 8 + c.end) * 8 + c.situation) * 16 + gap],
+                                    &m[3][((c.left * 8 + c.current) * 8 + c.end) * 8 + c.right],
+
+                                    &m[4][((gap * 8 + c.hints.left) * 8 + c.hints.right) * 8 + c.situation]},
+        wanted);
+}
+
 // The next step of the fan; wanted.vertex counts for close and known_vertex. In a corrupt stream the vertex may be out
 // of range.
 template <class Coder>
 CodedStep code_step(Coder& coder, FanModels& models, const OpenEdges& edges, const FanState& fan, const FanHints& hints,
                     CodedStep wanted) {
-    const std::uint32_t around = std::min(edges.triangle_count(fan.focus), 15u);
-    const std::uint32_t end = fan.end_count > 0 ? fan.ends[0] : OpenEdges::none;
-    const std::uint32_t at_current = std::min(edges.triangle_count(fan.current), 7u);
-    const std::uint32_t at_end = end == OpenEdges::none ? 0 : std::min(edges.triangle_count(end), 7u);
-    const std::uint32_t situation = fan.end_count == 0             ? 0
-                                    : fan.fills_hole               ? 1
-                                    : fan.last == Step::new_vertex ? 2
-                                    : fan.last == Step::stop       ? 3
-                                                                   : 4;
-    const auto count = [&](std::uint32_t vertex, std::uint32_t most) {
-        return vertex < edges.vertex_count() ? std::min(edges.triangle_count(vertex), most) : 0u;
-    };
-    const std::uint32_t at_right = count(fan.right, 7), at_left = count(fan.left, 7);
-    const std::uint32_t before = count(fan.focus - 1, 15);
-    const std::uint32_t length = std::min(fan.length, 7u);
-    const std::uint32_t gap = hints.gap;
-    {
-        auto& m = models.is_new;
-        if (code_mixed(coder, models.new_mixer[situation * 8 + length],
-                       std::array<BinaryModel*, 6>{&m[0][((around * 8 + at_end) * 8 + situation) * 16 + gap],
-                                                   &m[1][((around * 8 + at_current) * 8 + situation) * 16 + gap],
-                                                   &m[2][((gap * 8 + hints.left) * 8 + hints.right) * 8 + situation],
-                                                   &m[3][(around * 8 + at_end) * 8 + at_right],
-                                                   &m[4][(around * 8 + length) * 8 + at_left],
-                                                   &m[5][((around * 16 + before) * 8 + situation) * 16 + gap]},
-                       wanted.step == Step::new_vertex))
-            return {Step::new_vertex, OpenEdges::none};
-    }
-    const std::uint32_t way = (fan.left != OpenEdges::none ? 1 : 0) + (fan.right != OpenEdges::none ? 2 : 0);
-    const auto code_close = [&] {
-        auto& m = models.closing;
-        return code_mixed(
-            coder, models.close_mixer[situation * 4 + way],
-            std::array<BinaryModel*, 6>{
-                &m[0][(around * 8 + situation) * 8 + way + 4 * (fan.last == Step::right || fan.last == Step::left)],
-                &m[1][(around * 8 + at_current) * 8 + at_end], &m[2][(around * 8 + at_end) * 8 + situation],
-                &m[3][(at_left * 8 + at_current) * 8 + length], &m[4][(at_end * 8 + at_right) * 8 + length],
-                &m[5][((gap * 8 + hints.left) * 8 + hints.right) * 8 + situation]},
-            wanted.step == Step::close);
-    };
-    if (fan.end_count > 0 && code_close()) {
+    const StepContexts contexts = step_contexts(edges, fan, hints);
+    if (code_is_new(coder, models, contexts, wanted.step == Step::new_vertex))
+        return {Step::new_vertex, OpenEdges::none};
+    if (fan.end_count > 0 && code_closes(coder, models, contexts, wanted.step == Step::close)) {
         std::uint32_t index = 0;
         while (index < fan.end_count && fan.ends[index] != wanted.vertex) ++index;
         return {Step::close, fan.ends[code_index(coder, models.end_index, fan.end_count, index)]};
     }
     if (fan.left != OpenEdges::none &&
-        coder.bit(models.goes_left[fan.right != OpenEdges::none][at_current + 8 * (fan.end_count > 0)],
-                  wanted.step == Step::left))
+        coder.bit(models.goes_left[contexts.ways][contexts.current][contexts.hints.left], wanted.step == Step::left))
         return {Step::left, fan.left};
-    if (fan.right != OpenEdges::none && coder.bit(models.goes_right[at_end], wanted.step == Step::right))
+    if (fan.right != OpenEdges::none &&
+        coder.bit(models.goes_right[contexts.end][contexts.hints.right], wanted.step == Step::right))
         return {Step::right, fan.right};
     if (fan.length > 0 && coder.bit(models.stops[std::min(fan.end_count, 3u)], wanted.step == Step::stop))
         return {Step::stop, OpenEdges::none};
