@@ -14,13 +14,15 @@ inline unsigned thread_count(unsigned requested) {
     return requested > 0 ? requested : std::max(1u, std::thread::hardware_concurrency());
 }
 
-// Calls body(begin, end) on disjoint pieces that cover [0, count), on up to `threads` threads; pieces are at least
-// `grain` long. Returns when all are done. body must not throw.
+// Calls body(begin, end) on disjoint pieces that cover [0, count), on up to `threads` threads; none is empty, and where
+// there are several, each is at least half a `grain` long. Returns when all are done. body must not throw.
 template <class Body>
 void parallel_for(std::size_t count, unsigned threads, std::size_t grain, const Body& body) {
-    const std::size_t pieces = std::min<std::size_t>(threads, (count + grain - 1) / std::max<std::size_t>(grain, 1));
+    if (count == 0) return;
+    grain = std::max<std::size_t>(grain, 1);
+    const std::size_t pieces = std::min<std::size_t>(threads, (count - 1) / grain + 1);
     if (pieces <= 1) {
-        if (count > 0) body(std::size_t{0}, count);
+        body(std::size_t{0}, count);
         return;
     }
     std::vector<std::thread> workers;
