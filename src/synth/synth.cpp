@@ -72,10 +72,10 @@ double mean_edge_length(const HalfEdgeMesh& mesh) {
     return count > 0 ? sum / static_cast<double>(count) : 0.0;
 }
 
-// Moves every vertex by a random tenth or so of the spacing along the surface.
-void jitter(HalfEdgeMesh& mesh, RandomKey key) {
+// Moves every vertex along the surface at random, by about `share` of the spacing in each direction.
+void jitter(HalfEdgeMesh& mesh, double share, RandomKey key) {
     const auto normals = vertex_normals(mesh, 1);
-    const double size = 0.1 * mean_edge_length(mesh);
+    const double size = share * mean_edge_length(mesh);
     for (std::size_t v = 0; v < normals.size(); ++v) {
         const Vector3d step(random_gaussian(key, 3 * v), random_gaussian(key, 3 * v + 1),
                             random_gaussian(key, 3 * v + 2));
@@ -88,14 +88,18 @@ void jitter(HalfEdgeMesh& mesh, RandomKey key) {
 // As many vertices as wanted, evenly but randomly spread over the surface.
 void remesh(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, std::size_t vertices, RandomKey key,
             unsigned threads) {
+    // What is collapsed depends on the lengths of the edges: once the vertices have moved, no longer on the grid.
+    jitter(mesh, 0.3, derive_key(key, 0));
     collapse_to(mesh, vertices);
     compact(mesh);
+    flip_to_delaunay(mesh);
+    jitter(mesh, 0.2, derive_key(key, 1));
     flip_to_delaunay(mesh);
     relax(mesh, 0.7, threads);
     project(mesh, body, bricks, 1, threads);
     flip_to_delaunay(mesh);
     relax(mesh, 0.5, threads);
-    jitter(mesh, key);
+    jitter(mesh, 0.1, derive_key(key, 2));
     project(mesh, body, bricks, 2, threads);
     flip_to_delaunay(mesh);
     project(mesh, body, bricks, 1, threads);
