@@ -10,6 +10,7 @@ add_library(htvm_libdraco INTERFACE)
 target_include_directories(htvm_libdraco SYSTEM INTERFACE ${DRACO_INCLUDE})
 target_link_libraries(htvm_libdraco INTERFACE ${DRACO_LIBRARY})
 
+htvm_floor(io DIRECTORY src/io LINKS htvm_core htvm_libdraco nlohmann_json::nlohmann_json)
 htvm_floor(synth DIRECTORY src/synth LINKS htvm_core Eigen3::Eigen)
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
 
