@@ -213,13 +213,13 @@ void add_picture_options(CLI::App& command, Options& o) {
         ->capture_default_str();
     command.add_option("--width", v.width, "Of the pictures, pixels")->capture_default_str();
     command.add_option("--height", v.height, "Of the pictures, pixels")->capture_default_str();
-    command.add_option("--shading", o.compare.render.shading, "flat, smooth, or unlit (the colours alone)")
+    command.add_option("--shading", o.compare.render.shading, "The body's shading; unlit is the colours alone")
         ->transform(CLI::CheckedTransformer(shadings))
-        ->default_str("smooth");
+        ->option_text("flat|smooth|unlit=smooth");
     command.add_flag("--grey", o.grey, "Draw without the colours (also done where one side has none)");
-    command.add_option("--up", v.up, "Where the head is: x, -x, y, -y, z or -z")
+    command.add_option("--up", v.up, "Where the head is")
         ->transform(CLI::CheckedTransformer(axes))
-        ->default_str("y");
+        ->option_text("x|-x|y|-y|z|-z=y");
     command.add_option("--azimuth", v.first_azimuth, "Of the first view, degrees round the body")
         ->capture_default_str();
     command.add_option("--elevation", v.elevation, "That the views look down, degrees")->capture_default_str();
@@ -251,7 +251,8 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("--frames", o.frames, "Compare at most so many");
     command->add_option("--only", o.only, "Measure only some of m1, m2, d1, d2, m3, topology (comma between)")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "d1", "d2", "m3", "topology"}));
+        ->check(CLI::IsMember({"m1", "m2", "d1", "d2", "m3", "topology"}))
+        ->option_text("LIST");
     command->add_option("--unit", o.unit, "Of the files: mm, cm, m, or auto (by the first frame's size)")
         ->capture_default_str();
     command->add_option("--samples", o.compare.surface_options.samples,

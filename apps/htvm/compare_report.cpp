@@ -104,11 +104,11 @@ std::string comparison_table(const SequenceComparison& sums, const CompareOption
     const ComparisonSummary s = summarise(sums, peak_mm);
     const double frames = static_cast<double>(sums.frames);
     std::string out = fmt::format(
-        "{} frames; per frame {:.1f} vertices, {:.1f} triangles; decoded {:.1f} and {:.1f}\n\n", sums.frames,
+        "{} frames; per frame {:.1f} vertices, {:.1f} triangles; decoded {:.1f} and {:.1f}\n", sums.frames,
         static_cast<double>(sums.original_vertices) / frames, static_cast<double>(sums.original_triangles) / frames,
         static_cast<double>(sums.decoded_vertices) / frames, static_cast<double>(sums.decoded_triangles) / frames);
     if (options.points || options.surface)
-        out += fmt::format("  {:<34}{:>12}{:>12}{:>12}\n", "", "forward", "backward", "larger");
+        out += fmt::format("\n  {:<34}{:>12}{:>12}{:>12}\n", "", "forward", "backward", "larger");
     if (options.points) {
         out += row("M1 geometry, RMS mm", s.m1_forward_mm, s.m1_backward_mm, s.m1_mm, 4);
         if (s.has_colour)

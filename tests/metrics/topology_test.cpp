@@ -117,14 +117,14 @@ TEST(Topology, GoesThroughAnything) {
         EXPECT_LE(t.crack_edges, t.open_edges);
     }
     EXPECT_EQ(of(Mesh{}).components, 0u);
-    Mesh heap;  // ten thousand layers at one place
-    for (int i = 0; i < 10000; ++i) {
+    Mesh heap;  // two thousand layers at one place
+    for (int i = 0; i < 2000; ++i) {
         const auto v = static_cast<std::uint32_t>(heap.positions.size());
         const float z = 1e-4f * static_cast<float>(i);
         heap.positions.insert(heap.positions.end(), {{0, 0, z}, {10, 0, z}, {0, 10, z}});
         heap.triangles.push_back({v, v + 1, v + 2});
     }
-    EXPECT_EQ(of(heap).flap_triangles, 10000u);
+    EXPECT_EQ(of(heap).flap_triangles, 2000u);
 }
 
 }  // namespace
