@@ -1,4 +1,3 @@
-#include <bit>
 #include <memory>
 
 #include "codec/mtfan.h"
@@ -35,9 +34,11 @@ struct DistanceOrders {
         const std::size_t place =
             code_distance_order(coder, models, unvisited, known, fan, order[fan.focus], OpenEdges::none);
         const auto candidates = unvisited.candidates();
-        const std::uint32_t vertex = place < candidates.size()
-                                         ? candidates[place].vertex
-                                         : decoder.raw(static_cast<int>(std::bit_width(positions.size() - 1)));
+        const std::uint32_t vertex =
+            place < candidates.size()
+                ? candidates[place].vertex
+                : code_index_directly(coder, models, order[fan.current == OpenEdges::none ? fan.focus : fan.current],
+                                      OpenEdges::none);
         if (vertex >= positions.size() || unvisited.visited(vertex) || decoder.exhausted()) return false;
         visit(vertex);
         return true;

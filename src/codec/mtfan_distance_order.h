@@ -20,6 +20,7 @@ namespace htvm {
 struct DistanceOrderModels {
     std::array<std::array<BinaryModel, 2048>, 4> is_it;
     std::array<Mixer<4>, 64> mixer;
+    UnsignedModel far;  // for an index that no distance order names
 };
 
 // The positions by visiting number, and the angles between visited vertices.
@@ -114,6 +115,17 @@ std::size_t code_distance_order(Coder& coder, DistanceOrderModels& models, Unvis
         if (round == 0) unvisited.look_farther(known, fan);
     }
     return place;
+}
+
+// Codes the index z of a vertex that is none of the candidates (the -z - 1 of eq. 8), by how far it is from the current
+// boundary vertex's index: neighbours have indices near each other where the positions come in an order along the
+// surface. In a corrupt stream it may be out of range.
+template <class Coder>
+std::uint32_t code_index_directly(Coder& coder, DistanceOrderModels& models, std::uint32_t current,
+                                  std::uint32_t wanted) {
+    const std::uint32_t forward = wanted - current, backward = current - wanted;
+    const std::uint32_t folded = coder.number(models.far, wanted >= current ? 2 * forward : 2 * backward - 1);
+    return folded % 2 == 0 ? current + folded / 2 : current - folded / 2 - 1;
 }
 
 }  // namespace htvm

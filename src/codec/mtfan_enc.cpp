@@ -1,4 +1,3 @@
-#include <bit>
 #include <memory>
 
 #include "codec/mtfan.h"
@@ -29,7 +28,7 @@ struct DistanceOrders {
         FanWriter coder{encoder};
         const std::size_t place = code_distance_order(coder, models, unvisited, known, fan, order[fan.focus], vertex);
         if (place == unvisited.candidates().size()) {
-            encoder.raw(vertex, static_cast<int>(std::bit_width(positions.size() - 1)));
+            code_index_directly(coder, models, order[fan.current == OpenEdges::none ? fan.focus : fan.current], vertex);
             ++counts.back();
         } else {
             ++counts[place];
