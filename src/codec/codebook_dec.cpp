@@ -40,7 +40,7 @@ Result<Codebook> decode_codebook(std::span<const std::uint8_t> bytes) {
     const std::uint32_t size = decoder.raw(12);
     const std::uint32_t escape_step = decode_unsigned(decoder, step_model);
     const std::uint32_t scale = decode_unsigned(decoder, step_model) + 1;
-    if (size > max_codewords || escape_step >= (1u << 24) || scale > (1u << 24))
+    if (size > max_codewords || escape_step >= (1u << 24) || scale > (1u << 26))
         return fail(ErrorKind::corrupt_stream, "codebook: its size or steps are out of range");
     out.escape_step = static_cast<std::int32_t>(escape_step) + 1;
     std::uint32_t length = 0;
