@@ -1,0 +1,120 @@
+#include "codec/transforms.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "codec/hostile_bytes.h"
+#include "codec/random_numbers.h"
+
+namespace htvm {
+namespace {
+
+QuantisedRotation random_rotation(std::mt19937& random) {
+    QuantisedRotation out;
+    out.largest = static_cast<std::uint8_t>(random() % 4);
+    const auto reach = static_cast<std::int32_t>(1u << (random() % (rotation_bits + 1)));
+    for (auto& c : out.others) c = static_cast<std::int16_t>(test::between(random, -reach, reach));
+    return out;
+}
+
+LatticePoint random_point(std::int32_t reach, std::mt19937& random) {
+    const auto c = [&] { return test::between(random, -reach, reach); };
+    return {c(), c(), c()};
+}
+
+std::vector<QuantisedTransform> random_transforms(std::size_t bones, std::mt19937& random) {
+    std::vector<QuantisedTransform> out(bones);
+    for (auto& t : out)
+        if (random() % 4 > 0) t = {random_rotation(random), random_point(1 << random() % 25, random)};
+    return out;
+}
+
+CodedPose random_pose(std::size_t joints, std::size_t bones, std::mt19937& random) {
+    CodedPose out;
+    for (std::size_t k = 0; k < joints; ++k) out.joints.push_back(random_point(1 << random() % 25, random));
+    for (std::size_t i = 0; i < bones; ++i) out.orientations.push_back(random_rotation(random));
+    return out;
+}
+
+TEST(Transforms, ComeBack) {
+    std::mt19937 random(1);
+    for (const std::size_t bones : {0u, 1u, 14u, 1024u})
+        for (int i = 0; i < 20; ++i) {
+            const auto transforms = random_transforms(bones, random);
+            const auto decoded = decode_transforms(encode_transforms(transforms), bones);
+            ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+            EXPECT_EQ(*decoded, transforms);
+        }
+}
+
+TEST(Transforms, ExtremesComeBack) {
+    constexpr std::int16_t most = 1 << rotation_bits;
+    const std::vector<QuantisedTransform> transforms = {
+        {{3, {most, -most, most}}, {lattice_limit, -lattice_limit, lattice_limit}},
+        {},
+        {{0, {0, 0, 0}}, {0, 0, 1}},
+        {{0, {-most, -most, -most}}, {-lattice_limit, -lattice_limit, -lattice_limit}}};
+    EXPECT_EQ(*decode_transforms(encode_transforms(transforms), transforms.size()), transforms);
+}
+
+TEST(Transforms, AStandingBodyCostsAByteOrTwo) {
+    EXPECT_LE(encode_transforms(std::vector<QuantisedTransform>(14)).size(), 2u);
+}
+
+TEST(Transforms, DamageGivesAnErrorOrTransformsInRange) {
+    std::mt19937 random(2);
+    const auto transforms = random_transforms(14, random);
+    hostile::try_everything(encode_transforms(transforms), [](const std::vector<std::uint8_t>& bytes) {
+        const auto decoded = decode_transforms(bytes, 14);
+        if (!decoded) {
+            EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
+            return;
+        }
+        ASSERT_EQ(decoded->size(), 14u);
+        for (const auto& t : *decoded) {
+            EXPECT_LT(t.rotation.largest, 4);
+            for (const auto c : t.rotation.others) EXPECT_LE(std::abs(c), 1 << rotation_bits);
+            for (const auto c : {t.shift.x, t.shift.y, t.shift.z}) EXPECT_LE(std::abs(c), 2 * lattice_limit);
+        }
+    });
+}
+
+TEST(CodedPose, ComesBack) {
+    std::mt19937 random(3);
+    for (const auto& [joints, bones] :
+         std::vector<std::pair<std::size_t, std::size_t>>{{0, 0}, {2, 1}, {15, 14}, {1, 5}, {1024, 1024}}) {
+        const auto pose = random_pose(joints, bones, random);
+        const auto decoded = decode_pose(encode_pose(pose), joints, bones);
+        ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+        EXPECT_EQ(decoded->joints, pose.joints);
+        EXPECT_EQ(decoded->orientations, pose.orientations);
+    }
+}
+
+TEST(CodedPose, JointsAtOppositeCornersOfTheLatticeComeBack) {
+    CodedPose pose;
+    for (int i = 0; i < 4; ++i) {
+        const std::int32_t c = i % 2 ? lattice_limit : -lattice_limit;
+        pose.joints.push_back({c, -c, c});
+    }
+    EXPECT_EQ(decode_pose(encode_pose(pose), 4, 0)->joints, pose.joints);
+}
+
+TEST(CodedPose, DamageGivesAnErrorOrJointsOnTheLattice) {
+    std::mt19937 random(4);
+    const auto pose = random_pose(15, 14, random);
+    hostile::try_everything(encode_pose(pose), [](const std::vector<std::uint8_t>& bytes) {
+        const auto decoded = decode_pose(bytes, 15, 14);
+        if (!decoded) {
+            EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
+            return;
+        }
+        ASSERT_EQ(decoded->joints.size(), 15u);
+        ASSERT_EQ(decoded->orientations.size(), 14u);
+        for (const auto joint : decoded->joints) EXPECT_TRUE(on_lattice(joint));
+    });
+}
+
+}  // namespace
+}  // namespace htvm
