@@ -21,7 +21,7 @@ namespace {
 using namespace synth;
 using Eigen::Vector3d;
 
-constexpr int fewest_vertices = 100, most_vertices = 2000000;
+constexpr int fewest_vertices = 150, most_vertices = 2000000;
 
 // The streams of random numbers that a frame uses.
 enum Stream : std::uint64_t { grid_stream, count_stream, jitter_stream, surface_stream, joint_stream };
@@ -45,18 +45,43 @@ Grid free_grid(RandomKey key, double vertices) {
     return grid;
 }
 
-// Moves every vertex along its normal onto the surface.
+// Moves a point towards the surface by its distance, in the direction in which the distance falls fastest.
+void descend(Vector3d& position, const PosedBody& body, const BrickMap& bricks, double longest_step) {
+    const PartSet candidates = bricks.at(position);
+    const double distance = evaluate_body(body, candidates, position).distance, width = 0.5;
+    Vector3d gradient;
+    for (int axis = 0; axis < 3; ++axis)
+        gradient[axis] =
+            (evaluate_body(body, candidates, position + width * Vector3d::Unit(axis)).distance - distance) / width;
+    const double steepness2 = std::max(gradient.squaredNorm(), 0.25);
+    const double step = std::clamp(distance / std::sqrt(steepness2), -longest_step, longest_step);
+    position -= step * gradient / std::sqrt(steepness2);
+}
+
+// Moves every vertex onto the surface: along its normal, and where a crumpled neighbourhood's normal does not lead
+// there, by the distance's own slope.
 void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, int rounds, unsigned threads) {
     const auto normals = vertex_normals(mesh, threads);
-    const double longest_step = bricks.grid.cell;
+    const double longest_step = 0.5 * bricks.grid.cell;
+    constexpr double near_enough = 0.5;  // mm
+    constexpr int most_descents = 4;
     parallel_for(normals.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
-            if (mesh.outgoing[v] == dead_half_edge) continue;
-            Vector3d& position = mesh.positions[v];
+            const Vector3d start = mesh.positions[v];
+            Vector3d position = start;
+            const auto distance_here = [&] { return evaluate_body(body, bricks.at(position), position).distance; };
+            double distance = distance_here(), before = distance;
             for (int round = 0; round < rounds; ++round) {
-                const double distance = evaluate_body(body, bricks.at(position), position).distance;
                 position -= std::clamp(distance, -longest_step, longest_step) * normals[v];
+                before = distance;
+                distance = distance_here();
+                if (std::abs(distance) > 0.7 * std::abs(before)) break;
             }
+            if (std::abs(distance) > near_enough && std::abs(distance) > 0.7 * std::abs(before)) {
+                position = start;
+                for (int round = 0; round < most_descents; ++round) descend(position, body, bricks, longest_step);
+            }
+            mesh.positions[v] = position;
         }
     });
 }

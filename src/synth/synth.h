@@ -12,7 +12,7 @@ namespace htvm {
 
 struct SynthOptions {
     std::uint64_t seed = 1;  // of everything random: sampling and noise; the motion does not depend on it
-    int vertices = 35000;    // about how many a frame has, 100 to 2,000,000; each frame's own within 3 %
+    int vertices = 35000;    // about how many a frame has, 150 to 2,000,000; each frame's own within 3 %
     double fps = 30;         // frames a second, > 0
     double surface_noise_power =
         2.25;                       // mm^2, mean square of the reconstruction noise along the normal; new every frame

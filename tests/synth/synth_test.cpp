@@ -84,7 +84,7 @@ TEST(Synth, AnotherSeedChangesMeshAndNoiseButNotTheMotion) {
 }
 
 TEST(Synth, VertexCountsAreWithinThreePercentOfTheCountAskedFor) {
-    for (const int vertices : {100, 500, 4000, 35000})
+    for (const int vertices : {150, 500, 4000, 35000})
         for (const int frame : {0, 45, 150}) {
             const auto found = static_cast<double>(synth_frame(small(vertices), frame).mesh.positions.size());
             EXPECT_NEAR(found, vertices, 0.03 * vertices + 1) << "frame " << frame;
@@ -178,7 +178,7 @@ TEST(Synth, TheSkeletonHasFifteenJointsAndFourteenBonesThatJoinThem) {
 
 TEST(Synth, JointNoiseHasThePowerAskedForInEveryCoordinate) {
     for (const double power : {25.0, 80.0}) {
-        SynthOptions options = small(100);
+        SynthOptions options = small(150);
         options.joint_noise_power = power;
         double sum = 0, squares = 0, count = 0;
         for (int frame = 0; frame < 40; ++frame) {
@@ -232,7 +232,7 @@ TEST(Synth, VerticesKeepToTheGridOnlyIfTheLatticeIsAskedFor) {
 }
 
 TEST(Synth, TheFrameRateChangesTheSpeedOfTheFramesNotOfTheMotion) {
-    SynthOptions slow = small(100), fast = small(100);
+    SynthOptions slow = small(150), fast = small(150);
     fast.fps = 60;
     EXPECT_EQ(synth_frame(slow, 20).true_pose.joints, synth_frame(fast, 40).true_pose.joints);
 }
@@ -254,7 +254,7 @@ TEST(Synth, OptionsOutOfRangeAreNamedAndDoNotCrash) {
     }
     wrong[1].vertices = -5;  // the clamped count, but a small one
     for (auto& options : wrong) {
-        options.vertices = std::min(options.vertices, 100);
+        options.vertices = std::min(options.vertices, 150);
         const Mesh mesh = synth_frame(options, -3).mesh;
         for (const auto& p : mesh.positions)
             ASSERT_TRUE(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]));
