@@ -169,7 +169,7 @@ void add_synth(CLI::App& app, Run& run) {
                      "skeleton_true.json has none")
         ->capture_default_str();
     command->add_flag("--lattice", o.synth.lattice,
-                      "Leave the vertices on the edges of one regular grid (by default no grid can be told from them)");
+                      "Leave the vertices on the edges of one regular grid (by default they keep to none)");
     command->add_flag("--normals", o.synth.normals, "Write vertex normals too");
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Print what was written as JSON on standard output");

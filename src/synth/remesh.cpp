@@ -91,8 +91,8 @@ bool pair_half_edges(HalfEdgeMesh& mesh) {
     return true;
 }
 
-// Whether moving a vertex to a new place would turn any of its triangles over, those with `other` left out.
-bool would_fold(const HalfEdgeMesh& mesh, std::uint32_t vertex, std::uint32_t other, const Vector3d& place) {
+// would_fold, with the triangles that hold `other` left out.
+bool would_fold_without(const HalfEdgeMesh& mesh, std::uint32_t vertex, std::uint32_t other, const Vector3d& place) {
     bool folds = false;
     for_each_outgoing(mesh, vertex, [&](std::uint32_t e) {
         const std::uint32_t a = target(mesh, e), b = mesh.origin[previous(e)];
@@ -120,7 +120,7 @@ bool collapse_edge(HalfEdgeMesh& mesh, std::uint32_t e) {
         return false;
     if (!link_is_clean(mesh, u, v)) return false;
     const Vector3d middle = 0.5 * (mesh.positions[u] + mesh.positions[v]);
-    if (would_fold(mesh, u, v, middle) || would_fold(mesh, v, u, middle)) return false;
+    if (would_fold_without(mesh, u, v, middle) || would_fold_without(mesh, v, u, middle)) return false;
 
     const std::uint32_t a = mesh.twin[next(e)], b = mesh.twin[previous(e)];
     const std::uint32_t c = mesh.twin[next(t)], d = mesh.twin[previous(t)];
@@ -202,6 +202,10 @@ HalfEdgeMesh build_half_edges(const std::vector<Vector3d>& positions, const std:
     for (const auto& t : kept) mesh.origin.insert(mesh.origin.end(), t.begin(), t.end());
     if (!pair_half_edges(mesh)) return {};
     return mesh;
+}
+
+bool would_fold(const HalfEdgeMesh& mesh, std::uint32_t vertex, const Vector3d& place) {
+    return would_fold_without(mesh, vertex, dead_half_edge, place);
 }
 
 void collapse_to(HalfEdgeMesh& mesh, std::size_t vertices) {

@@ -25,6 +25,9 @@ inline constexpr std::uint32_t dead_half_edge = 0xffffffffu;
 HalfEdgeMesh build_half_edges(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& triangles,
                               std::size_t fewest);
 
+// Whether moving a live vertex would turn one of its triangles by more than about 70 degrees.
+bool would_fold(const HalfEdgeMesh& mesh, std::uint32_t vertex, const Eigen::Vector3d& place);
+
 // Collapses the shortest edges first until `vertices` are left, or no edge can be collapsed without folding the surface
 // or making it non-manifold.
 void collapse_to(HalfEdgeMesh& mesh, std::size_t vertices);

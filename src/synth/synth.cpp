@@ -97,16 +97,19 @@ double mean_edge_length(const HalfEdgeMesh& mesh) {
     return count > 0 ? sum / static_cast<double>(count) : 0.0;
 }
 
-// Moves every vertex along the surface at random, by about `share` of the spacing in each direction.
+// Moves every vertex along the surface at random, by about `share` of the spacing in each direction, unless
+// that would fold the surface.
 void jitter(HalfEdgeMesh& mesh, double share, RandomKey key) {
     const auto normals = vertex_normals(mesh, 1);
     const double size = share * mean_edge_length(mesh);
     for (std::size_t v = 0; v < normals.size(); ++v) {
+        if (mesh.outgoing[v] == dead_half_edge) continue;
         const Vector3d step(random_gaussian(key, 3 * v), random_gaussian(key, 3 * v + 1),
                             random_gaussian(key, 3 * v + 2));
         const double length = std::min(step.norm(), 2.5);
         const Vector3d bounded = step.normalized() * length;
-        mesh.positions[v] += size * (bounded - bounded.dot(normals[v]) * normals[v]);
+        const Vector3d place = mesh.positions[v] + size * (bounded - bounded.dot(normals[v]) * normals[v]);
+        if (!would_fold(mesh, static_cast<std::uint32_t>(v), place)) mesh.positions[v] = place;
     }
 }
 

@@ -11,6 +11,9 @@
 #include <set>
 #include <utility>
 
+#include "synth/body.h"
+#include "synth/motion.h"
+
 namespace htvm {
 namespace {
 
@@ -207,6 +210,22 @@ TEST(Synth, SurfaceNoiseHasThePowerAskedForAndIsNewInEveryFrame) {
         for (std::size_t axis = 0; axis < 3; ++axis)
             squares += std::pow(a.positions[v][axis] - b.positions[v][axis], 2);
     EXPECT_NEAR(squares / static_cast<double>(a.positions.size()), 4.0, 0.01);
+}
+
+TEST(Synth, WithoutNoiseEveryVertexIsOnTheSurface) {
+    for (const int vertices : {4000, 35000}) {
+        SynthOptions options = small(vertices);
+        options.surface_noise_power = 0;
+        const Mesh mesh = synth_frame(options, 12).mesh;
+        const synth::PosedBody body = synth::pose_body(12 / options.fps);
+        std::size_t away = 0;
+        for (const auto& p : mesh.positions) {
+            const double distance = synth::evaluate_body(body, synth::all_parts, {p[0], p[1], p[2]}).distance;
+            EXPECT_LT(std::abs(distance), 8.0) << "mm";
+            if (std::abs(distance) > 0.5) ++away;
+        }
+        EXPECT_LT(away, mesh.positions.size() / 50);
+    }
 }
 
 TEST(Synth, WithoutNoisePoseAndTruePoseAgree) {
