@@ -55,8 +55,9 @@ void add_calibrate(CLI::App& app, Run& run) {
         app.add_subcommand("calibrate", "Measure the bones' radii on a frame in T-pose, for encode --radii");
     add_capture_options(*command, options->capture);
     command
-        ->add_option("--percentile", options->calibration.percentile,
-                     "Of each bone's vertices' distances, instead of the maximum (default: 100, the maximum)")
+        ->add_option(
+            "--percentile", options->calibration.percentile,
+            "Of the distances of a bone's vertices (default 70); 100, the paper's maximum, suffers from strays")
         ->check(CLI::Range(0.0, 100.0));
     command->add_option("-o,--output", options->output, "The calibration, JSON (default: - for standard output)");
     command->footer(

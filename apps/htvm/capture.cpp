@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <iostream>
+#include <utility>
 
 #include "io/mesh_file.h"
 #include "io/skeleton_align.h"
@@ -95,41 +96,54 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
     } else {
         note("no skeleton given: one bone that spans the mesh stands in (see --skeleton)");
     }
+    if (auto ok = capture.peek(); !ok) return tl::unexpected(ok.error());
     return capture;
 }
 
-Result<Mesh> Capture::read(std::size_t index) {
-    const auto& path = files_.paths[index];
+// Reads the first mesh, and with it the unit of all.
+Result<void> Capture::peek() {
+    auto mesh = read_next();
+    if (!mesh) return tl::unexpected(mesh.error());
+    if (!*mesh) return fail(ErrorKind::bad_input, "there is no mesh in " + options_.input);
     if (millimetres_per_unit_ == 0) {
-        auto mesh = read_mesh(path);
-        if (!mesh) return mesh;
-        millimetres_per_unit_ = millimetres_per(guess_unit(*mesh));
+        millimetres_per_unit_ = millimetres_per(guess_unit(**mesh));
         if (millimetres_per_unit_ != 1)
             note(fmt::format("the meshes look as if they were in {} (see --unit)", unit_name(millimetres_per_unit_)));
-        if (auto scaled = scale_positions(*mesh, millimetres_per_unit_); !scaled) return tl::unexpected(scaled.error());
+        if (auto ok = scale_positions(**mesh, millimetres_per_unit_); !ok) return ok;
+    }
+    peeked_ = std::move(**mesh);
+    return {};
+}
+
+// In the files' own unit as long as that is not known, then in mm.
+Result<std::optional<Mesh>> Capture::read_next() {
+    if (stream_) {
+        for (; read_ < options_.first; ++read_)
+            if (auto mesh = stream_->next(); !mesh || !*mesh) return mesh;
+        auto mesh = stream_->next();
+        if (!mesh || !*mesh) return mesh;
+        ++read_;
+        if (millimetres_per_unit_ > 0)
+            if (auto ok = scale_positions(**mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
         return mesh;
     }
+    if (read_ >= frames_) return std::optional<Mesh>{};
     MeshFileOptions options;
-    options.millimetres_per_unit = millimetres_per_unit_;
-    return read_mesh(path, options);
+    if (millimetres_per_unit_ > 0) options.millimetres_per_unit = millimetres_per_unit_;
+    auto mesh = read_mesh(files_.paths[options_.first + read_], options);
+    if (!mesh) return tl::unexpected(mesh.error());
+    ++read_;
+    return std::optional<Mesh>{std::move(*mesh)};
 }
 
 Result<std::optional<Mesh>> Capture::next() {
-    if (!stream_) {
-        if (given_ >= frames_) return std::optional<Mesh>{};
-        auto mesh = read(options_.first + given_);
-        if (!mesh) return tl::unexpected(mesh.error());
-        ++given_;
-        return std::optional<Mesh>{std::move(*mesh)};
-    }
     if (options_.frames > 0 && given_ >= options_.frames) return std::optional<Mesh>{};
-    for (std::size_t skipped = given_ == 0 ? 0 : options_.first; skipped < options_.first; ++skipped)
-        if (auto mesh = stream_->next(); !mesh || !*mesh) return mesh;
-    auto mesh = stream_->next();
-    if (!mesh || !*mesh) return mesh;
-    if (millimetres_per_unit_ == 0) millimetres_per_unit_ = millimetres_per(guess_unit(**mesh));
-    if (auto scaled = scale_positions(**mesh, millimetres_per_unit_); !scaled) return tl::unexpected(scaled.error());
-    ++given_;
+    if (peeked_) {
+        ++given_;
+        return std::exchange(peeked_, std::nullopt);
+    }
+    auto mesh = read_next();
+    if (mesh && *mesh) ++given_;
     return mesh;
 }
 

@@ -45,14 +45,15 @@ public:
     const std::vector<double>& radii() const { return radii_; }  // from the skeleton's file; may be empty
     double fps() const { return fps_; }
     double millimetres_per_unit() const { return millimetres_per_unit_; }
-    void rewind() { given_ = 0; }  // not for standard input
 
 private:
-    Result<Mesh> read(std::size_t index);
+    Result<void> peek();
+    Result<std::optional<Mesh>> read_next();
     CaptureOptions options_;
     SequenceFiles files_;
     std::unique_ptr<PlyStreamReader> stream_;
-    std::size_t frames_ = 0, given_ = 0;
+    std::optional<Mesh> peeked_;  // the first mesh, read beforehand to tell its unit
+    std::size_t frames_ = 0, read_ = 0, given_ = 0;
     double fps_ = 30, millimetres_per_unit_ = 0;
     Skeleton skeleton_;
     std::vector<Pose> poses_;

@@ -66,7 +66,7 @@ Result<void> check_numbers(const MeshSource& original, const MeshSource& decoded
 
 // The box round all originals, for cameras that stand still.
 Result<Box> sequence_box(const Options& options) {
-    auto source = open_mesh_files(options.original, options.unit);
+    auto source = open_meshes(options.original, options.unit);
     if (!source) return tl::unexpected(source.error());
     Box box;
     Progress progress("bounding box", options.frames > 0 ? std::min(options.frames, source->frames) : source->frames);
@@ -115,13 +115,13 @@ void warn_of_length(const MeshSource& original, const MeshSource& decoded, const
 }
 
 Result<Measured> measure(const Options& options) {
-    auto original = open_mesh_files(options.original, options.unit);
+    auto original = open_meshes(options.original, options.unit);
     if (!original) return tl::unexpected(original.error());
-    auto decoded = open_mesh_files(options.decoded, options.unit);
+    auto decoded = open_meshes(options.decoded, options.unit);
     if (!decoded) return tl::unexpected(decoded.error());
     if (const auto ok = check_numbers(*original, *decoded); !ok) return tl::unexpected(ok.error());
     warn_of_length(*original, *decoded, options);
-    std::size_t total = std::min(original->frames, decoded->frames);
+    std::size_t total = decoded->frames > 0 ? std::min(original->frames, decoded->frames) : original->frames;
     if (options.frames > 0) total = std::min(total, options.frames);
     Measured out;
     Progress progress("compare", total);
@@ -247,7 +247,7 @@ void add_compare(CLI::App& app, Run& run) {
         "  M3  PSNR of pictures from all round\n"
         "  topology  components, boundaries, cracks, flaps");
     command->add_option("ORIGINAL", o.original, "A mesh file, folder, glob or %05d pattern")->required();
-    command->add_option("DECODED", o.decoded, "The same for the decoded meshes")->required();
+    command->add_option("DECODED", o.decoded, "The same for the decoded meshes, or an .htvm stream")->required();
     command->add_option("--frames", o.frames, "Compare at most so many");
     command->add_option("--only", o.only, "Measure only some of m1, m2, d1, d2, m3, topology (comma between)")
         ->delimiter(',')

@@ -59,10 +59,20 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
                     "vertices, splits non-manifold ones)")
         ->check(CLI::IsMember({"tfan", "draco"}));
     command
+        .add_option(
+            "--profile", options.profile,
+            "topology (default): keeps the capture's connectivity, with the choices that measured best; paper:\n"
+            "the published method's own choices (--reference bone, --registration point)")
+        ->check(CLI::IsMember({"topology", "paper"}));
+    command
         .add_option("--reference", options.reference,
-                    "Reference vertex of a residual: any, the nearest of the predicted mesh (default), or bone, the\n"
-                    "nearest of the same bone, as in the paper")
+                    "Reference vertex of a residual: any, the nearest of the predicted mesh, or bone, the nearest of\n"
+                    "the same bone (default: by profile)")
         ->check(CLI::IsMember({"any", "bone"}));
+    command
+        .add_option("--registration", options.registration,
+                    "Of the bones: by distances from point to plane, or from point to point (default: by profile)")
+        ->check(CLI::IsMember({"plane", "point"}));
     command.add_flag("--keep-duplicates", options.keep_duplicates,
                      "Keep vertices that decode to the same point and attributes, and triangles that collapse: the\n"
                      "decoded triangle set is then exactly the input's");
@@ -70,8 +80,6 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
         .add_option("--nearest", options.nearest_vertices,
                     "Nearest vertices that the distance order counts (default 16)")
         ->check(CLI::Range(1, 64));
-    command.add_flag("--point-to-plane", options.point_to_plane,
-                     "Register bones by distances to planes instead of points");
     command.add_option("--radii", options.radii_file,
                        "Bone radii from htvm calibrate (default: the skeleton file's,\n"
                        "else calibrated on the first frame)");
@@ -87,11 +95,17 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     out.key_interval = options.key_interval;
     out.merge_duplicates = !options.keep_duplicates;
     out.nearest_vertices = options.nearest_vertices;
-    out.reference_vertices = options.reference == "bone" ? ReferenceVertices::bone : ReferenceVertices::any;
-    out.point_to_plane = options.point_to_plane;
+    const bool paper = options.profile == "paper";
+    const auto chosen = [](const std::string& given, const char* by_profile) {
+        return given.empty() ? std::string(by_profile) : given;
+    };
+    out.reference_vertices =
+        chosen(options.reference, paper ? "bone" : "any") == "bone" ? ReferenceVertices::bone : ReferenceVertices::any;
+    out.point_to_plane = chosen(options.registration, paper ? "point" : "plane") == "plane";
     out.threads = options.threads;
     out.fps_numerator = static_cast<std::uint32_t>(std::lround(capture.fps() * 1000));
     out.fps_denominator = 1000;
+    out.unit_micrometres = static_cast<std::uint32_t>(std::lround(capture.millimetres_per_unit() * 1000));
     out.skeleton = capture.skeleton();
     out.radii = capture.radii();
     if (!options.radii_file.empty()) {

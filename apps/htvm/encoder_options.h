@@ -16,10 +16,10 @@ struct EncodingOptions {
     double lambda = -1;        // below 0: the library's default
     int key_interval = 30;
     std::string intra = "tfan";
-    std::string reference = "any";
+    std::string profile = "topology";
+    std::string reference, registration;  // empty: by profile
     std::string radii_file;
     bool keep_duplicates = false;
-    bool point_to_plane = false;
     int nearest_vertices = 16;
     unsigned threads = 0;
 };

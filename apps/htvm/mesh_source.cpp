@@ -2,8 +2,10 @@
 
 #include <memory>
 
+#include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
 #include "io/sequence.h"
+#include "stream_file.h"
 
 namespace htvm::app {
 namespace {
@@ -16,9 +18,32 @@ Result<std::optional<LengthUnit>> unit_named(const std::string& name) {
     return fail(ErrorKind::bad_input, "There is no unit '" + name + "': give mm, cm, m or auto.");
 }
 
+Result<MeshSource> open_stream(const std::string& path) {
+    auto input = StreamInput::open(path);
+    if (!input) return tl::unexpected(input.error());
+    MeshSource source;
+    source.name = path;
+    DecoderOptions options;
+    options.intra_coder = draco_intra_coder();
+    source.next = [input = std::make_shared<StreamInput>(std::move(*input)),
+                   decoder = std::make_shared<Decoder>(options)](MeshSource& self) -> Result<std::optional<Mesh>> {
+        while (const auto packet = input->next()) {
+            auto frame = decoder->push(*packet);
+            if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
+            if (decoder->sequence()) self.millimetres_per_unit = decoder->sequence()->unit_micrometres / 1000.0;
+            if (*frame) return std::optional(std::move((*frame)->mesh));
+        }
+        if (input->damaged_bytes() > 0 || input->cut_short_bytes() > 0 || !decoder->sequence())
+            return fail(ErrorKind::corrupt_stream, self.name + " is damaged, cut short, or not an htvm stream");
+        return std::optional<Mesh>{};
+    };
+    return source;
+}
+
 }  // namespace
 
-Result<MeshSource> open_mesh_files(const std::string& name, const std::string& unit) {
+Result<MeshSource> open_meshes(const std::string& name, const std::string& unit) {
+    if (name.ends_with(".htvm")) return open_stream(name);
     const auto chosen = unit_named(unit);
     if (!chosen) return tl::unexpected(chosen.error());
     const auto files = find_sequence(name);

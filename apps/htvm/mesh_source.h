@@ -21,7 +21,8 @@ struct MeshSource {
     std::function<Result<std::optional<Mesh>>(MeshSource&)> next;
 };
 
-// The files that `name` means (io/sequence.h). unit: mm, cm, m, or auto, which guesses from the first frame's size.
-Result<MeshSource> open_mesh_files(const std::string& name, const std::string& unit);
+// An .htvm stream, decoded frame by frame, or the files that `name` means (io/sequence.h). unit, of files: mm, cm, m,
+// or auto, which guesses from the first frame's size.
+Result<MeshSource> open_meshes(const std::string& name, const std::string& unit);
 
 }  // namespace htvm::app
