@@ -13,11 +13,25 @@ bool same_vertex(const LatticeMesh& mesh, std::uint32_t a, std::uint32_t b) {
            (mesh.texcoords.empty() || mesh.texcoords[a] == mesh.texcoords[b]);
 }
 
-std::uint64_t hash(LatticePoint p) {
-    std::uint64_t h = static_cast<std::uint32_t>(p.x) * 0x9E3779B97F4A7C15ull;
-    h = (h ^ (h >> 29) ^ static_cast<std::uint32_t>(p.y)) * 0xBF58476D1CE4E5B9ull;
-    h = (h ^ (h >> 32) ^ static_cast<std::uint32_t>(p.z)) * 0x94D049BB133111EBull;
-    return h ^ (h >> 31);
+std::uint64_t mixed(std::uint64_t h, std::uint32_t value) {
+    h = (h ^ value) * 0x9E3779B97F4A7C15ull;
+    return h ^ (h >> 29);
+}
+
+// Of position and attributes, so that many different vertices at one point do not fill one neighbourhood of a table.
+std::uint64_t hash(const LatticeMesh& mesh, std::uint32_t k) {
+    const auto& p = mesh.positions[k];
+    std::uint64_t h = 1;
+    for (const auto c : {p.x, p.y, p.z}) h = mixed(h, static_cast<std::uint32_t>(c));
+    if (!mesh.colours.empty()) {
+        const auto& c = mesh.colours[k];
+        h = mixed(h, std::uint32_t{c[0]} | std::uint32_t{c[1]} << 8 | std::uint32_t{c[2]} << 16);
+    }
+    if (!mesh.normals.empty())
+        for (const auto c : mesh.normals[k]) h = mixed(h, static_cast<std::uint32_t>(c));
+    if (!mesh.texcoords.empty())
+        for (const auto c : mesh.texcoords[k]) h = mixed(h, static_cast<std::uint32_t>(c));
+    return h ^ (h >> 32);
 }
 
 }  // namespace
@@ -26,21 +40,15 @@ Merging find_duplicates(const LatticeMesh& mesh) {
     const auto n = static_cast<std::uint32_t>(mesh.positions.size());
     Merging out;
     out.number.resize(n);
-    // Open addressing by position; vertices at one position form a chain, so that many attributes at one point do not
-    // fill the table's neighbourhood.
+    // Open addressing.
     std::vector<std::uint32_t> table(std::bit_ceil(std::size_t{n} * 2 + 1), none);
-    std::vector<std::uint32_t> next(n, none);
     for (std::uint32_t k = 0; k < n; ++k) {
-        auto slot = hash(mesh.positions[k]) & (table.size() - 1);
-        while (table[slot] != none && !(mesh.positions[table[slot]] == mesh.positions[k]))
-            slot = (slot + 1) & (table.size() - 1);
-        std::uint32_t same = table[slot];
-        while (same != none && !same_vertex(mesh, same, k)) same = next[same];
-        if (same != none) {
-            out.number[k] = out.number[same];
+        auto slot = hash(mesh, k) & (table.size() - 1);
+        while (table[slot] != none && !same_vertex(mesh, table[slot], k)) slot = (slot + 1) & (table.size() - 1);
+        if (table[slot] != none) {
+            out.number[k] = out.number[table[slot]];
             continue;
         }
-        next[k] = table[slot];
         table[slot] = k;
         out.number[k] = static_cast<std::uint32_t>(out.kept.size());
         out.kept.push_back(k);
