@@ -10,7 +10,9 @@ std::vector<std::uint8_t> write_sequence_index(std::span<const IndexEntry> entri
     IndexEntry last;
     for (const auto& entry : entries) {
         out.varint(entry.frame - last.frame);
-        out.signed_varint(entry.timestamp_us - last.timestamp_us);
+        // Unsigned: any two timestamps have a difference that wraps, and stays defined.
+        out.signed_varint(static_cast<std::int64_t>(static_cast<std::uint64_t>(entry.timestamp_us) -
+                                                    static_cast<std::uint64_t>(last.timestamp_us)));
         out.varint(entry.offset - last.offset);
         last = entry;
     }
