@@ -49,10 +49,12 @@ public:
 
 private:
     void skip(std::size_t bytes);
+    void skip_damaged(std::size_t payload_size);
     std::size_t max_payload_;
     std::vector<std::uint8_t> buffer_;
     std::size_t position_ = 0;
     std::uint64_t damaged_ = 0;
+    std::uint64_t checked_in_vain_ = 0;  // payload bytes whose CRC was wrong
 };
 
 }  // namespace htvm

@@ -45,6 +45,18 @@ void PacketReader::skip(std::size_t bytes) {
     position_ += bytes;
 }
 
+// Passes over a packet whose header is sound and whose payload is not. What looks like a packet within may be one
+// (where bytes were lost, it is the next), so only the header is passed over. A stream made to claim the same bytes
+// over and over would take quadratic time that way: once much more was checked than skipped, the payload goes with the
+// header.
+void PacketReader::skip_damaged(std::size_t payload_size) {
+    constexpr std::uint64_t always_affordable = std::uint64_t{1} << 26;
+    constexpr std::uint64_t checks_a_byte = 16;
+    checked_in_vain_ += payload_size;
+    const bool affordable = checked_in_vain_ <= always_affordable + checks_a_byte * damaged_;
+    skip(affordable ? header_size : packet_overhead + payload_size);
+}
+
 std::optional<Packet> PacketReader::pull() {
     for (;;) {
         // To the next sync word; what could be its beginning at the very end is kept.
@@ -80,9 +92,7 @@ std::optional<Packet> PacketReader::pull() {
         const auto payload = bytes.subspan(header_size, size);
         ByteReader tail(bytes.subspan(header_size + size, 4));
         if (tail.u32() != crc32(payload)) {
-            // The header is sound: the damage is inside. What looks like a packet within may be one, so only the
-            // header is passed over.
-            skip(header_size);
+            skip_damaged(size);
             continue;
         }
         packet.payload.assign(payload.begin(), payload.end());
