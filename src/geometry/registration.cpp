@@ -121,6 +121,13 @@ RigidMotion register_points(const NearestPoints& reference, std::span<const Eige
         motion = next;
         if (done) break;
     }
+    // Distances to planes say nothing where the normals do not, as in a soup of triangles; the steps may then lead
+    // away.
+    constexpr double astray = 4;
+    if (options.point_to_plane && !normals.empty() &&
+        registration_error(reference, frame, motion, options) >
+            astray * registration_error(reference, frame, start, options) + 1)
+        return start;
     return motion;
 }
 
