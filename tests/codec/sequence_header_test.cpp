@@ -1,0 +1,142 @@
+#include "codec/sequence_header.h"
+
+#include <gtest/gtest.h>
+
+#include "codec/hostile_bytes.h"
+#include "codec/mtfan.h"
+
+namespace htvm {
+namespace {
+
+SequenceHeader full_header() {
+    SequenceHeader header;
+    header.lattice = {.origin = {-2000000000, 7, 2000000000}, .bits = 16};
+    header.fps_numerator = 30000;
+    header.fps_denominator = 1001;
+    header.unit_micrometres = 1000000;
+    header.skeleton_tracked = false;
+    header.skeleton.joint_names = {"hip", "", "a name with blanks, commas and \xc3\xbc", std::string(255, 'x')};
+    header.skeleton.bones = {{0, 1}, {3, 2}, {1, 1}};
+    header.radii = {0, 1234, lattice_limit};
+    header.nearest_vertices = 64;
+    return header;
+}
+
+void expect_equal(const SequenceHeader& a, const SequenceHeader& b) {
+    EXPECT_EQ(a.lattice.origin, b.lattice.origin);
+    EXPECT_EQ(a.lattice.bits, b.lattice.bits);
+    EXPECT_EQ(a.fps_numerator, b.fps_numerator);
+    EXPECT_EQ(a.fps_denominator, b.fps_denominator);
+    EXPECT_EQ(a.unit_micrometres, b.unit_micrometres);
+    EXPECT_EQ(a.skeleton_tracked, b.skeleton_tracked);
+    EXPECT_EQ(a.skeleton.joint_names, b.skeleton.joint_names);
+    EXPECT_EQ(a.radii, b.radii);
+    EXPECT_EQ(a.nearest_vertices, b.nearest_vertices);
+    ASSERT_EQ(a.skeleton.bones.size(), b.skeleton.bones.size());
+    for (std::size_t i = 0; i < a.skeleton.bones.size(); ++i) {
+        EXPECT_EQ(a.skeleton.bones[i].first, b.skeleton.bones[i].first);
+        EXPECT_EQ(a.skeleton.bones[i].second, b.skeleton.bones[i].second);
+    }
+}
+
+void expect_refused(const SequenceHeader& header, const char* why) {
+    const auto read = read_sequence_header(write_sequence_header(header));
+    ASSERT_FALSE(read.has_value()) << why;
+    EXPECT_EQ(read.error().kind, ErrorKind::corrupt_stream) << why;
+}
+
+TEST(SequenceHeader, ComesBack) {
+    const auto header = full_header();
+    const auto read = read_sequence_header(write_sequence_header(header));
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    expect_equal(*read, header);
+}
+
+TEST(SequenceHeader, OfTheLargestSkeletonComesBack) {
+    auto header = full_header();
+    header.skeleton.joint_names.assign(1024, "joint");
+    header.skeleton.bones.assign(1024, {1023, 0});
+    header.radii.assign(1024, 5);
+    const auto read = read_sequence_header(write_sequence_header(header));
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    expect_equal(*read, header);
+}
+
+TEST(SequenceHeader, WrittenAgainIsTheSameBytes) {
+    const auto bytes = write_sequence_header(full_header());
+    EXPECT_EQ(write_sequence_header(*read_sequence_header(bytes)), bytes);
+}
+
+TEST(SequenceHeader, LongNamesAreCut) {
+    auto header = full_header();
+    header.skeleton.joint_names[0] = std::string(300, 'y');
+    EXPECT_EQ(read_sequence_header(write_sequence_header(header))->skeleton.joint_names[0], std::string(255, 'y'));
+}
+
+TEST(SequenceHeader, FieldsOutOfRangeAreRefused) {
+    auto header = full_header();
+    header.lattice.bits = 17;
+    expect_refused(header, "lattice bits");
+    header = full_header();
+    header.fps_numerator = 0;
+    expect_refused(header, "frame rate");
+    header = full_header();
+    header.fps_denominator = 0;
+    expect_refused(header, "frame rate");
+    header = full_header();
+    header.unit_micrometres = 0;
+    expect_refused(header, "unit");
+    header = full_header();
+    header.nearest_vertices = 0;
+    expect_refused(header, "no nearest vertices");
+    header = full_header();
+    header.nearest_vertices = mtfan_max_nearest + 1;
+    expect_refused(header, "too many nearest vertices");
+    header = full_header();
+    header.skeleton.bones.clear();
+    expect_refused(header, "no bones");
+    header = full_header();
+    header.skeleton.bones[1].second = 4;
+    expect_refused(header, "a bone to a joint that is not there");
+    header = full_header();
+    header.radii[0] = lattice_limit + 1;
+    expect_refused(header, "radius");
+    header = full_header();
+    header.radii[0] = -1;
+    expect_refused(header, "negative radius");
+}
+
+TEST(SequenceHeader, AnotherVersionIsUnsupported) {
+    auto bytes = write_sequence_header(full_header());
+    bytes[4] = static_cast<std::uint8_t>(stream_version + 1);
+    const auto read = read_sequence_header(bytes);
+    ASSERT_FALSE(read.has_value());
+    EXPECT_EQ(read.error().kind, ErrorKind::unsupported);
+    bytes[0] = 'x';
+    EXPECT_EQ(read_sequence_header(bytes).error().kind, ErrorKind::corrupt_stream) << "not this format at all";
+}
+
+TEST(SequenceHeader, EveryTruncationIsAnError) {
+    const auto bytes = write_sequence_header(full_header());
+    for (std::size_t size = 0; size < bytes.size(); ++size)
+        EXPECT_FALSE(read_sequence_header(std::span(bytes).first(size)).has_value()) << size;
+}
+
+TEST(SequenceHeader, DamageGivesAnErrorOrAHeaderInRange) {
+    hostile::try_everything(
+        write_sequence_header(full_header()),
+        [](const std::vector<std::uint8_t>& bytes) {
+            const auto read = read_sequence_header(bytes);
+            if (!read) return;
+            EXPECT_LE(read->lattice.bits, 16);
+            EXPECT_GE(read->nearest_vertices, 1);
+            EXPECT_FALSE(read->skeleton.bones.empty());
+            EXPECT_EQ(read->radii.size(), read->skeleton.bones.size());
+            for (const auto& bone : read->skeleton.bones)
+                EXPECT_LT(std::max(bone.first, bone.second), read->skeleton.joint_names.size());
+        },
+        4000);
+}
+
+}  // namespace
+}  // namespace htvm
