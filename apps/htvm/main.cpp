@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
     htvm::app::add_info(app, run);
     htvm::app::add_calibrate(app, run);
     htvm::app::add_compare(app, run);
+    htvm::app::add_rd(app, run);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -1,0 +1,102 @@
+#include "rd_coders.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <memory>
+
+#include "htvm/decoder.hpp"
+#include "rd_stopwatch.h"
+
+namespace htvm::app {
+namespace {
+
+struct Codec {
+    Encoder encoder;
+    Decoder decoder;
+    unsigned threads = 1;
+};
+
+// All packets of the frame just pushed. Bytes that are not the frame's own (the sequence header, with the first one)
+// count as overhead.
+Result<CodedFrame> decode_pending(Codec& codec) {
+    CodedFrame out;
+    out.decode_ms = 0;
+    out.type = codec.encoder.last_frame().type;
+    out.bytes = codec.encoder.last_frame().bytes;
+    std::size_t sent = 0;
+    while (auto packet = codec.encoder.pull()) {
+        sent += packet->payload.size() + packet_overhead;
+        const Stopwatch watch(codec.threads);
+        auto frame = codec.decoder.push(*packet);
+        *out.decode_ms += watch.milliseconds();
+        if (!frame) return tl::unexpected(frame.error());
+        if (*frame) out.decoded = std::move((*frame)->mesh);
+    }
+    out.bytes.overhead += sent - out.bytes.total();
+    return out;
+}
+
+Result<FrameCoder> start_codec(EncoderOptions options, const SequenceFacts& facts, const QualityPoint& quality) {
+    options.geometry_step = quality.geometry_step;
+    options.colour_step = quality.colour_step;
+    options.threads = quality.threads;
+    options.fps_numerator = static_cast<std::uint32_t>(std::lround(facts.fps * 1000));
+    options.fps_denominator = 1000;
+    options.skeleton = facts.skeleton;
+    options.radii = facts.radii;
+    auto encoder = Encoder::create(options);
+    if (!encoder) return tl::unexpected(encoder.error());
+    DecoderOptions decoder_options;
+    decoder_options.threads = quality.threads;
+    auto codec = std::make_shared<Codec>(Codec{std::move(*encoder), Decoder(decoder_options), quality.threads});
+    return FrameCoder([codec](const SourceFrame& frame) -> Result<CodedFrame> {
+        const Stopwatch watch(codec->threads);
+        const auto pushed = codec->encoder.push(frame.mesh, frame.pose ? &*frame.pose : nullptr, frame.timestamp_us);
+        const double encode_ms = watch.milliseconds();
+        if (!pushed) return tl::unexpected(pushed.error());
+        auto coded = decode_pending(*codec);
+        if (coded) coded->encode_ms = encode_ms;
+        return coded;
+    });
+}
+
+}  // namespace
+
+QualityPoint quality_point(double quality) {
+    const auto steps = quality_steps(quality);
+    QualityPoint out;
+    out.quality = quality;
+    out.geometry_step = steps.geometry_step;
+    out.colour_step = std::round(steps.colour_step);  // as the encoder does
+    return out;
+}
+
+CoderUnderTest codec_under_test(const std::string& name, const std::string& description,
+                                const EncoderOptions& options) {
+    CoderUnderTest out;
+    out.name = name;
+    out.description = description;
+    out.settings = fmt::format("keyint {}, reference {}, lambda {}, nearest {}", options.key_interval,
+                               options.reference_vertices == ReferenceVertices::bone ? "bone" : "any", options.lambda,
+                               options.nearest_vertices);
+    out.start = [options](const SequenceFacts& facts, const QualityPoint& quality) {
+        return start_codec(options, facts, quality);
+    };
+    return out;
+}
+
+std::vector<CoderUnderTest> built_in_coders(int key_interval) {
+    EncoderOptions ours;
+    ours.key_interval = key_interval;
+    EncoderOptions paper = ours;
+    paper.reference_vertices = ReferenceVertices::bone;
+    EncoderOptions intra = ours;
+    intra.key_interval = 1;
+    return {codec_under_test("paper", "I- and EP-frames as in the paper: reference vertices by bone", paper),
+            codec_under_test("htvm-ep", "the same with reference vertices from the whole mesh", ours),
+            codec_under_test("tfan", "our TFAN alone: every frame an I-frame", intra), draco_under_test("draco10", 10),
+            draco_under_test("draco7", 7)};
+}
+
+}  // namespace htvm::app
