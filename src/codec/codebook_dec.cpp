@@ -27,7 +27,7 @@ SymbolModel index_model(const Codebook& codebook) {
         if (mass[node] == 0) continue;
         const std::uint64_t one = (mass[2 * node + 1] << 16) / mass[node];
         model.node(node).one = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(one, 48, 65535 - 48));
-        model.node(node).seen = 24;  // as sure as after two dozen decisions: measured best of 8..64
+        model.node(node).seen = 24;  // as sure as after two dozen decisions; 8 to 110 measure alike
     }
     return model;
 }
