@@ -28,6 +28,9 @@ Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, 
 // The reference vertex of each residual in E^ord, from how many residuals each reference vertex has.
 std::vector<std::uint32_t> references_of_residuals(std::span<const std::uint32_t> residuals_of, std::size_t residuals);
 
+// A predicted vertex corrected by a residual, kept within the lattice.
+LatticePoint add_residual(LatticePoint predicted, const std::array<std::int32_t, 3>& residual);
+
 // A reference colour corrected by a residual, kept within 0..255.
 Colour add_colour(Colour reference, const std::array<std::int32_t, 3>& residual);
 

@@ -18,12 +18,9 @@ Result<std::vector<LatticePoint>> decode_positions(const FramePayload& payload, 
         decode_residuals(payload.of(Layer::geometry), reference_of.size(), *context.geometry_codebook);
     if (!residuals) return tl::unexpected(residuals.error());
     std::vector<LatticePoint> out;
-    for (std::size_t k = 0; k < residuals->size(); ++k) {
-        const auto& e = (*residuals)[k];
-        const LatticePoint p = predicted[reference_of[k]] + LatticePoint{e[0], e[1], e[2]};
-        if (!on_lattice(p)) return fail(ErrorKind::corrupt_stream, "EP-frame: a vertex lies off the lattice");
-        out.push_back(p);
-    }
+    out.reserve(residuals->size());
+    for (std::size_t k = 0; k < residuals->size(); ++k)
+        out.push_back(add_residual(predicted[reference_of[k]], (*residuals)[k]));
     return out;
 }
 
@@ -88,6 +85,15 @@ std::vector<std::uint32_t> references_of_residuals(std::span<const std::uint32_t
     return out;
 }
 
+LatticePoint add_residual(LatticePoint predicted, const std::array<std::int32_t, 3>& residual) {
+    auto within = [](std::int64_t c) {
+        return static_cast<std::int32_t>(
+            std::clamp<std::int64_t>(c, -std::int64_t{lattice_limit}, std::int64_t{lattice_limit}));
+    };
+    return {within(std::int64_t{predicted.x} + residual[0]), within(std::int64_t{predicted.y} + residual[1]),
+            within(std::int64_t{predicted.z} + residual[2])};
+}
+
 Colour add_colour(Colour reference, const std::array<std::int32_t, 3>& residual) {
     Colour out{};
     for (std::size_t c = 0; c < 3; ++c)
@@ -103,7 +109,7 @@ Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, 
     if (!transforms) return tl::unexpected(transforms.error());
     out.transforms = std::move(*transforms);
     const auto residuals_of =
-        decode_mapping(payload.of(Layer::mapping), reference.mesh.positions.size(), payload.header.vertices);
+        decode_mapping(payload.of(Layer::mapping), payload.header.vertices, reference.mapping_prior);
     if (!residuals_of) return tl::unexpected(residuals_of.error());
     const auto reference_of = references_of_residuals(*residuals_of, payload.header.vertices);
     const auto predicted = predict_positions(reference, out.transforms, context.threads);

@@ -78,8 +78,7 @@ LatticeMesh decode_vertices(const LatticeMesh& mesh, const ReferenceMesh& refere
     LatticeMesh out;
     const auto& order = residuals.order;
     for (std::size_t k = 0; k < order.vertex.size(); ++k) {
-        const auto& e = residuals.geometry.values[k];
-        out.positions.push_back(predicted[order.reference[k]] + LatticePoint{e[0], e[1], e[2]});
+        out.positions.push_back(add_residual(predicted[order.reference[k]], residuals.geometry.values[k]));
         if (!mesh.colours.empty())
             out.colours.push_back(add_colour(reference.mesh.colours[order.reference[k]], residuals.colour.values[k]));
         if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[order.vertex[k]]);
@@ -125,7 +124,7 @@ void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrame
     std::vector<std::uint32_t> residuals_of(reference.mesh.positions.size(), 0);
     for (const auto r : residuals.order.reference) ++residuals_of[r];
     payload.set(Layer::transforms, encode_transforms(transforms));
-    payload.set(Layer::mapping, encode_mapping(residuals_of));
+    payload.set(Layer::mapping, encode_mapping(residuals_of, reference.mapping_prior));
     payload.set(Layer::geometry, encode_residuals(residuals.geometry, *state.geometry_codebook->codebook));
     if (!reference.mesh.colours.empty())
         payload.set(Layer::colour, encode_residuals(residuals.colour, *state.colour_codebook->codebook));

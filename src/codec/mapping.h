@@ -2,24 +2,34 @@
 //
 // The graph's path visits every reference vertex in order, and after each its residuals. A node's bit c_q says whether
 // the next node is in the other row. The paper run-length codes the bits and entropy codes the runs; here each run's
-// length is cut into binary decisions (does it go on?), adaptive in context of which bit it repeats, in which row it
-// began, how long it is and how long the last two runs were, which costs the same runs less than one common model.
+// length is cut into binary decisions (does it go on?), coded adaptively in contexts that both sides know: the runs
+// before, and, past the paper, how much of the surface a reference vertex stands for (a large patch is hit more often)
+// and how many residuals its neighbours on the reference mesh have got.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "core/lattice.h"
+#include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 
 namespace htvm {
 
-// residuals_of[k]: how many residuals reference vertex k has. The layer needs no counts: both sides know N_I and N_t.
-// Where a residual has no reference vertex (N_I = 0), there is nothing to code.
-std::vector<std::uint8_t> encode_mapping(std::span<const std::uint32_t> residuals_of);
+// What the reference mesh says of its vertices, once an I-frame.
+struct MappingPrior {
+    std::vector<std::uint8_t> area_class;        // 0..9: a third of the area of the triangles around, against the mean
+    std::vector<std::uint32_t> first_neighbour;  // vertices + 1 offsets
+    std::vector<std::uint32_t> neighbours;       // of lower index, from triangles; at most 8 a vertex, may repeat
+};
+MappingPrior make_mapping_prior(std::span<const LatticePoint> positions, std::span<const Triangle> triangles);
 
-// Gives residuals_of, `references` long, with sum `residuals`.
-Result<std::vector<std::uint32_t>> decode_mapping(std::span<const std::uint8_t> bytes, std::size_t references,
-                                                  std::size_t residuals);
+// residuals_of[k]: how many residuals reference vertex k has. The layer needs no counts: both sides know N_I and N_t.
+std::vector<std::uint8_t> encode_mapping(std::span<const std::uint32_t> residuals_of, const MappingPrior& prior);
+
+// Gives residuals_of, one a reference vertex, with sum `residuals`; where there is no reference vertex, nothing.
+Result<std::vector<std::uint32_t>> decode_mapping(std::span<const std::uint8_t> bytes, std::size_t residuals,
+                                                  const MappingPrior& prior);
 
 }  // namespace htvm

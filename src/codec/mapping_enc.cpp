@@ -3,21 +3,34 @@
 #include "entropy/range_encoder.h"
 
 namespace htvm {
+namespace {
 
-std::vector<std::uint8_t> encode_mapping(std::span<const std::uint32_t> residuals_of) {
+struct Writer {
+    RangeEncoder& encoder;
+    bool bit(BinaryModel& model, bool wanted) {
+        encoder.bit(model, wanted);
+        return wanted;
+    }
+};
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_mapping(std::span<const std::uint32_t> residuals_of, const MappingPrior& prior) {
     std::uint64_t left = 0;
     for (const auto n : residuals_of) left += n;
     RangeEncoder encoder;
-    MappingContext context;
+    Writer writer{encoder};
+    MappingContext context(prior);
     // Behind the last residual, and behind the last reference vertex, both sides know what follows.
     for (std::size_t k = 0; k + 1 < residuals_of.size() && left > 0; ++k) {
         const std::uint32_t n = residuals_of[k];
-        encoder.bit(context.at_reference(), n > 0);
+        context.stand_on(k, residuals_of);
+        context.code(writer, 0, n > 0);
         for (std::uint32_t i = 1; i <= n; ++i) {
             --left;
-            if (left > 0) encoder.bit(context.at_residual(i), i == n);
+            if (left > 0) context.code(writer, i, i == n);
         }
-        context.next(n);
+        context.leave(n);
     }
     return encoder.finish();
 }

@@ -53,6 +53,7 @@ ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, s
     out.bone_of_vertex = skin(out.mesh.positions, cylinders(bones, out.joints, radii), threads);
     out.sub_meshes = group_by_bone(out.bone_of_vertex, bones.size());
     out.pivots = sub_mesh_means(out, bones);
+    out.mapping_prior = make_mapping_prior(out.mesh.positions, out.mesh.triangles);
     return out;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "codec/lattice_mesh.h"
+#include "codec/mapping.h"
 #include "codec/rigid_transform.h"
 #include "codec/skinning.h"
 
@@ -18,6 +19,7 @@ struct ReferenceMesh {
     std::vector<LatticePoint> pivots;             // one a bone: the mean of its sub-mesh's vertices, or its first joint
     std::vector<LatticePoint> joints;             // of the I-frame's pose
     std::vector<QuantisedRotation> orientations;  // T_I^i of each bone
+    MappingPrior mapping_prior;
     std::uint32_t frame = 0;
 };
 

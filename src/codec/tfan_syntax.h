@@ -13,7 +13,7 @@
 #include <array>
 #include <cstdint>
 
-#include "codec/tfan_mixing.h"
+#include "entropy/mixing.h"
 #include "codec/tfan_open_edges.h"
 #include "entropy/models.h"
 #include "entropy/range_decoder.h"
