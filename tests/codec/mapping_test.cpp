@@ -17,8 +17,28 @@ std::size_t sum(const std::vector<std::uint32_t>& counts) {
     return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
 }
 
-void expect_comes_back(const std::vector<std::uint32_t>& counts) {
-    const auto decoded = decode_mapping(encode_mapping(counts), counts.size(), sum(counts));
+// Of a reference mesh without triangles, which says nothing of its vertices.
+MappingPrior plain(std::size_t references) { return make_mapping_prior(std::vector<LatticePoint>(references), {}); }
+
+std::vector<std::uint8_t> encode_plain(const std::vector<std::uint32_t>& counts) {
+    return encode_mapping(counts, plain(counts.size()));
+}
+
+// Triangles and positions without any sense: degenerate, duplicate, with many round one vertex.
+MappingPrior random_prior(std::mt19937& random, std::size_t references) {
+    std::vector<LatticePoint> positions(references);
+    for (auto& p : positions) {
+        const auto coordinate = [&] { return static_cast<std::int32_t>(below(random, 2000)) - 1000; };
+        p = {coordinate(), coordinate(), coordinate()};
+    }
+    std::vector<Triangle> triangles(references > 0 ? below(random, 400) : 0);
+    const auto n = static_cast<std::uint32_t>(references);
+    for (auto& t : triangles) t = {below(random, n), below(random, n), below(random, 2) * (n - 1)};
+    return make_mapping_prior(positions, triangles);
+}
+
+void expect_comes_back(const std::vector<std::uint32_t>& counts, const MappingPrior& prior) {
+    const auto decoded = decode_mapping(encode_mapping(counts, prior), sum(counts), prior);
     ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
     EXPECT_EQ(*decoded, counts);
 }
@@ -31,24 +51,27 @@ std::vector<std::uint32_t> random_counts(std::mt19937& random) {
 }
 
 TEST(Mapping, NothingTakesNoBytes) {
-    EXPECT_TRUE(encode_mapping({}).empty());
-    EXPECT_TRUE(encode_mapping(std::vector<std::uint32_t>(50, 0)).empty());
-    EXPECT_TRUE(encode_mapping(std::vector<std::uint32_t>{1234}).empty()) << "all belong to the only reference vertex";
-    EXPECT_EQ(*decode_mapping({}, 0, 0), std::vector<std::uint32_t>{});
-    EXPECT_EQ(*decode_mapping({}, 3, 0), (std::vector<std::uint32_t>{0, 0, 0}));
-    EXPECT_EQ(*decode_mapping({}, 1, 1234), std::vector<std::uint32_t>{1234});
+    EXPECT_TRUE(encode_plain({}).empty());
+    EXPECT_TRUE(encode_plain(std::vector<std::uint32_t>(50, 0)).empty());
+    EXPECT_TRUE(encode_plain(std::vector<std::uint32_t>{1234}).empty()) << "all belong to the only reference vertex";
+    EXPECT_EQ(*decode_mapping({}, 0, plain(0)), std::vector<std::uint32_t>{});
+    EXPECT_EQ(*decode_mapping({}, 0, plain(3)), (std::vector<std::uint32_t>{0, 0, 0}));
+    EXPECT_EQ(*decode_mapping({}, 1234, plain(1)), std::vector<std::uint32_t>{1234});
 }
 
 TEST(Mapping, ComesBack) {
     for (const auto& counts : std::vector<std::vector<std::uint32_t>>{
              {1}, {0, 1}, {1, 0}, {0, 0, 7}, {7, 0, 0}, {1, 1, 1, 1}, {0, 5, 0, 5}, {100000, 0, 3}, {0, 100000}})
-        expect_comes_back(counts);
+        expect_comes_back(counts, plain(counts.size()));
     std::mt19937 random(1);
-    for (int i = 0; i < 300; ++i) expect_comes_back(random_counts(random));
+    for (int i = 0; i < 300; ++i) {
+        const auto counts = random_counts(random);
+        expect_comes_back(counts, random_prior(random, counts.size()));
+    }
 }
 
 TEST(Mapping, OneResidualEachCostsNextToNothing) {
-    EXPECT_LT(encode_mapping(std::vector<std::uint32_t>(10000, 1)).size(), 100u);
+    EXPECT_LT(encode_plain(std::vector<std::uint32_t>(10000, 1)).size(), 100u);
 }
 
 TEST(Mapping, StaysBelowTheBoundOfThePaper) {
@@ -56,7 +79,18 @@ TEST(Mapping, StaysBelowTheBoundOfThePaper) {
     std::mt19937 random(2);
     std::vector<std::uint32_t> counts(10000);
     for (auto& n : counts) n = below(random, 2) + below(random, 2);
-    EXPECT_LT(8 * encode_mapping(counts).size(), (counts.size() + sum(counts)) * 102 / 100);
+    EXPECT_LT(8 * encode_plain(counts).size(), (counts.size() + sum(counts)) * 102 / 100);
+}
+
+TEST(Mapping, AreasAreClassedAgainstTheirMean) {
+    // A small and a large triangle: areas 50 and 5000, so that the corners have 0.02 and 1.98 of the mean.
+    const std::vector<LatticePoint> positions = {{0, 0, 0}, {10, 0, 0},  {0, 10, 0},
+                                                 {0, 0, 5}, {100, 0, 5}, {0, 100, 5}};
+    const auto prior = make_mapping_prior(positions, std::vector<Triangle>{{0, 1, 2}, {3, 4, 5}});
+    EXPECT_EQ(prior.area_class, (std::vector<std::uint8_t>{0, 0, 0, 8, 8, 8}));
+    // Each corner's next corner, where its index is lower.
+    EXPECT_EQ(prior.first_neighbour, (std::vector<std::uint32_t>{0, 0, 0, 1, 1, 1, 2}));
+    EXPECT_EQ(prior.neighbours, (std::vector<std::uint32_t>{0, 3}));
 }
 
 TEST(Mapping, DamageGivesAnErrorOrAsManyResidualsAsAsked) {
@@ -64,10 +98,11 @@ TEST(Mapping, DamageGivesAnErrorOrAsManyResidualsAsAsked) {
     for (int i = 0; i < 10; ++i) {
         const auto counts = random_counts(random);
         const std::size_t references = counts.size(), residuals = sum(counts);
+        const auto prior = random_prior(random, references);
         hostile::try_everything(
-            encode_mapping(counts),
+            encode_mapping(counts, prior),
             [&](const std::vector<std::uint8_t>& bytes) {
-                const auto decoded = decode_mapping(bytes, references, residuals);
+                const auto decoded = decode_mapping(bytes, residuals, prior);
                 if (!decoded) {
                     EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
                     return;
