@@ -76,8 +76,12 @@ Result<CodedPose> PoseTracker::next(const Mesh& mesh, const Pose* pose, const La
         now = rest;
         if (!mesh.positions.empty()) {
             const auto middle = middle_of(mesh);
+            // The mesh may reach the end of the lattice: its stand-in skeleton stays on it.
+            const double reach = (lattice_limit / 2 - 1) * lattice.step();
             for (auto& joint : now.joints)
-                for (std::size_t axis = 0; axis < 3; ++axis) joint[axis] += middle[axis] - rest_middle[axis];
+                for (std::size_t axis = 0; axis < 3; ++axis)
+                    joint[axis] = std::clamp(joint[axis] + middle[axis] - rest_middle[axis],
+                                             lattice.origin[axis] - reach, lattice.origin[axis] + reach);
         }
     } else if (pose) {
         if (auto ok = check_pose(skeleton, *pose); !ok) return tl::unexpected(ok.error());
