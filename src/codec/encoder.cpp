@@ -59,6 +59,9 @@ Result<void> check(const EncoderOptions& o) {
     if (o.unit_micrometres == 0) return bad("the unit must be above 0");
     if (o.skeleton.joint_names.size() > 1024 || o.skeleton.bones.size() > 1024)
         return bad("a skeleton has at most 1024 joints and bones");
+    if (o.intra_coder &&
+        (o.intra_coder->number == intra_coder_tfan || !o.intra_coder->encode || !o.intra_coder->decode))
+        return bad("the intra coder must have a number above 0, encode and decode");
     if (!o.radii.empty() && o.radii.size() != o.skeleton.bones.size()) return bad("the radii are not one a bone");
     for (const auto r : o.radii)
         if (!(r >= 0 && r < 100000)) return bad("a bone radius must be within 0 and 100 m");
