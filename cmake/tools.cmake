@@ -18,10 +18,14 @@ htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PN
 file(GLOB draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
 htvm_floor(draco SOURCES ${draco_sources} LINKS htvm_decoder htvm_libdraco)
 
+# The command line: everything but main.cpp is a library, so that tests reach it.
 file(GLOB app_sources CONFIGURE_DEPENDS apps/htvm/*.cpp)
-if(app_sources)
-  add_executable(htvm ${app_sources})
-  target_link_libraries(htvm PRIVATE htvm_encoder htvm_decoder htvm_draco htvm_io htvm_synth htvm_metrics CLI11::CLI11 fmt::fmt)
-  target_compile_definitions(htvm PRIVATE HTVM_VERSION="${PROJECT_VERSION}")
-  install(TARGETS htvm)
-endif()
+list(FILTER app_sources EXCLUDE REGEX "/main\\.cpp$")
+add_library(htvm_app STATIC ${app_sources})
+target_include_directories(htvm_app PUBLIC apps/htvm)
+target_link_libraries(htvm_app PUBLIC htvm_encoder htvm_decoder htvm_draco htvm_io htvm_synth htvm_metrics
+                                      CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
+target_compile_definitions(htvm_app PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
+add_executable(htvm apps/htvm/main.cpp)
+target_link_libraries(htvm PRIVATE htvm_app)
+install(TARGETS htvm)

@@ -39,6 +39,10 @@ int main(int argc, char** argv) {
     htvm::app::add_calibrate(app, run);
     htvm::app::add_compare(app, run);
     htvm::app::add_rd(app, run);
+    if (argc > 1 && argv[1][0] != '-' && !app.get_subcommand_no_throw(argv[1])) {
+        fmt::print(stderr, "htvm: error: there is no command '{}'; 'htvm --help' lists them\n", argv[1]);
+        return 2;
+    }
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
