@@ -1,0 +1,276 @@
+#include "htvm/encoder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "codec/sequence_index.h"
+#include "codec/test_sequences.h"
+
+namespace htvm {
+namespace {
+
+using namespace test;
+
+void expect_refused(const EncoderOptions& options, const char* what) {
+    const auto encoder = Encoder::create(options);
+    ASSERT_FALSE(encoder.has_value()) << what;
+    EXPECT_EQ(encoder.error().kind, ErrorKind::bad_input) << what;
+    EXPECT_NE(encoder.error().message.find(what), std::string::npos) << encoder.error().message;
+}
+
+TEST(EncoderOptions, DefaultsAreLegal) { EXPECT_TRUE(Encoder::create({}).has_value()); }
+
+TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
+    const auto with = [](const std::function<void(EncoderOptions&)>& change) {
+        EncoderOptions options;
+        change(options);
+        return options;
+    };
+    const double not_a_number = std::nan("");
+    for (const double step : {0.0, -1.0, 1001.0, not_a_number, 1e-9})
+        expect_refused(with([&](auto& o) { o.geometry_step = step; }), "geometry step");
+    for (const double step : {0.0, 0.9, 256.0, not_a_number})
+        expect_refused(with([&](auto& o) { o.colour_step = step; }), "colour step");
+    for (const double lambda : {-0.1, 1001.0, not_a_number})
+        expect_refused(with([&](auto& o) { o.lambda = lambda; }), "lambda");
+    for (const int interval : {0, -1})
+        expect_refused(with([&](auto& o) { o.key_interval = interval; }), "key interval");
+    for (const int m : {0, -1, 65}) expect_refused(with([&](auto& o) { o.nearest_vertices = m; }), "nearest vertices");
+    for (const int bits : {-1, 17}) expect_refused(with([&](auto& o) { o.lattice_bits = bits; }), "lattice bits");
+    expect_refused(with([](auto& o) { o.fps_numerator = 0; }), "frame rate");
+    expect_refused(with([](auto& o) { o.fps_denominator = 0; }), "frame rate");
+    expect_refused(with([](auto& o) { o.unit_micrometres = 0; }), "unit");
+    expect_refused(with([](auto& o) { o.skeleton.joint_names.resize(1025); }), "1024");
+    expect_refused(with([](auto& o) { o.skeleton.bones.resize(1025); }), "1024");
+    expect_refused(with([](auto& o) { o.skeleton.bones = {{0, 0}}; }), "joint");
+    expect_refused(with([](auto& o) { o.radii = {1}; }), "radii");
+    for (const double radius : {-1.0, 1e9, not_a_number})
+        expect_refused(with([&](auto& o) {
+                           o.skeleton = synth_skeleton();
+                           o.radii.assign(o.skeleton.bones.size(), radius);
+                       }),
+                       "radius");
+    expect_refused(with([](auto& o) {
+                       o.intra_coder = draco_intra_coder();
+                       o.intra_coder->number = 0;
+                   }),
+                   "intra coder");
+    expect_refused(with([](auto& o) {
+                       o.intra_coder = draco_intra_coder();
+                       o.intra_coder->encode = nullptr;
+                   }),
+                   "intra coder");
+    expect_refused(with([](auto& o) {
+                       o.intra_coder = draco_intra_coder();
+                       o.intra_coder->decode = nullptr;
+                   }),
+                   "intra coder");
+}
+
+TEST(QualitySteps, HalveAsPromised) {
+    EXPECT_DOUBLE_EQ(quality_steps(0).geometry_step, 16);
+    EXPECT_DOUBLE_EQ(quality_steps(50).geometry_step, 2);
+    EXPECT_DOUBLE_EQ(quality_steps(100).geometry_step, 0.25);
+    EXPECT_DOUBLE_EQ(quality_steps(0).colour_step, 32);
+    EXPECT_NEAR(quality_steps(50).colour_step, 5.657, 1e-3);
+    EXPECT_DOUBLE_EQ(quality_steps(100).colour_step, 1);
+    EXPECT_EQ(quality_steps(-5).geometry_step, 16);
+    EXPECT_EQ(quality_steps(500).geometry_step, 0.25);
+}
+
+// A frame that cannot be coded, among good ones.
+struct Fault {
+    const char* message;
+    std::function<void(SequenceFrame&)> make;
+};
+
+std::vector<Fault> faults() {
+    const float not_a_number = std::nanf("");
+    return {{"vertex 3", [=](auto& f) { f.mesh.positions[3][1] = not_a_number; }},
+            {"vertex 5", [](auto& f) { f.mesh.positions[5][2] = 3e9f; }},
+            {"triangle 2 names vertex", [](auto& f) { f.mesh.triangles[2][1] = 1u << 30; }},
+            {"colours", [](auto& f) { f.mesh.colours.pop_back(); }},
+            {"normals",
+             [](auto& f) {
+                 f.mesh.normals.push_back({0, 0, 1});
+             }},
+            {"texture coordinates",
+             [](auto& f) {
+                 f.mesh.texcoords.assign(1, {0, 0});
+             }},
+            {"normal that is not", [=](auto& f) { f.mesh.normals[0][0] = not_a_number; }},
+            {"joint 4 is not finite", [](auto& f) { f.pose->joints[4][0] = std::nan(""); }},
+            {"joint 4", [](auto& f) { f.pose->joints[4][0] = 1e12; }},
+            {"the pose has", [](auto& f) { f.pose->joints.pop_back(); }},
+            {"the pose has", [](auto& f) { f.pose->orientations.resize(1); }}};
+}
+
+EncoderOptions with_synthetic_skeleton() {
+    EncoderOptions options;
+    options.skeleton = synth_skeleton();
+    options.key_interval = 3;
+    options.threads = 1;
+    return options;
+}
+
+std::vector<std::uint8_t> drained(Encoder& encoder) {
+    std::vector<std::uint8_t> out;
+    while (auto packet = encoder.pull()) {
+        const auto bytes = write_packet(*packet);
+        out.insert(out.end(), bytes.begin(), bytes.end());
+    }
+    return out;
+}
+
+TEST(Encoder, AFrameThatCannotBeCodedIsNamedAndTheStreamGoesOnAsIfItHadNotBeen) {
+    const auto sequence = synthetic(true, 4, 300);
+    std::vector<std::uint8_t> expected;
+    {
+        auto encoder = Encoder::create(with_synthetic_skeleton());
+        for (int t = 0; t < 4; ++t)
+            ASSERT_TRUE(encoder->push(sequence.frames[t].mesh, &*sequence.frames[t].pose, 1000 * (t + 1)).has_value());
+        expected = drained(*encoder);
+    }
+    for (const auto& fault : faults())
+        for (int at = 0; at < 4; ++at) {  // before the first frame, an EP-frame and the second I-frame
+            SCOPED_TRACE(std::string(fault.message) + " at " + std::to_string(at));
+            auto encoder = Encoder::create(with_synthetic_skeleton());
+            for (int t = 0; t < 4; ++t) {
+                if (t == at) {
+                    auto broken = sequence.frames[0];
+                    fault.make(broken);
+                    const auto pushed = encoder->push(broken.mesh, &*broken.pose, 1000 * (t + 1));
+                    ASSERT_FALSE(pushed.has_value());
+                    EXPECT_EQ(pushed.error().kind, ErrorKind::bad_input);
+                    // Of the first frame the joint, or the mesh as a whole, may be what is found first.
+                    EXPECT_TRUE(at == 0 || pushed.error().message.find(fault.message) != std::string::npos)
+                        << pushed.error().message;
+                }
+                ASSERT_TRUE(
+                    encoder->push(sequence.frames[t].mesh, &*sequence.frames[t].pose, 1000 * (t + 1)).has_value());
+            }
+            EXPECT_EQ(drained(*encoder), expected);
+        }
+}
+
+TEST(Encoder, TimestampsMustAscend) {
+    auto encoder = Encoder::create({});
+    const Mesh mesh = sequence_of(tfan_test::grid(3, 3), 1, none).frames[0].mesh;
+    ASSERT_TRUE(encoder->push(mesh, nullptr, 100).has_value());
+    for (const std::int64_t time : {std::int64_t{100}, std::int64_t{99}, std::numeric_limits<std::int64_t>::min()}) {
+        const auto pushed = encoder->push(mesh, nullptr, time);
+        ASSERT_FALSE(pushed.has_value());
+        EXPECT_EQ(pushed.error().kind, ErrorKind::bad_input);
+        EXPECT_NE(pushed.error().message.find("timestamps"), std::string::npos);
+    }
+    EXPECT_TRUE(encoder->push(mesh, nullptr, 101).has_value());
+}
+
+TEST(Encoder, AnyAscendingTimestampsAreLegal) {
+    auto encoder = Encoder::create({});
+    const Mesh mesh = sequence_of(tfan_test::grid(3, 3), 1, none).frames[0].mesh;
+    ASSERT_TRUE(encoder->push(mesh, nullptr, std::numeric_limits<std::int64_t>::min(), true).has_value());
+    ASSERT_TRUE(encoder->push(mesh, nullptr, std::numeric_limits<std::int64_t>::max(), true).has_value());
+    encoder->finish();
+    while (auto packet = encoder->pull()) {
+        if (packet->kind != PacketKind::index) continue;
+        const auto index = read_sequence_index(packet->payload);
+        ASSERT_TRUE(index.has_value());
+        EXPECT_EQ(index->at(1).timestamp_us, std::numeric_limits<std::int64_t>::max());
+    }
+}
+
+TEST(Encoder, AFirstFrameWithoutItsPoseIsRefusedAndTheNextBegins) {
+    const auto sequence = synthetic(true, 2, 300);
+    auto encoder = Encoder::create(with_synthetic_skeleton());
+    const auto pushed = encoder->push(sequence.frames[0].mesh, nullptr, 0);
+    ASSERT_FALSE(pushed.has_value());
+    EXPECT_NE(pushed.error().message.find("pose"), std::string::npos);
+    EXPECT_FALSE(encoder->pull().has_value());
+    EXPECT_TRUE(encoder->push(sequence.frames[1].mesh, &*sequence.frames[1].pose, 0).has_value());
+    EXPECT_EQ(encoder->last_frame().frame, 0u);
+}
+
+TEST(Encoder, AnIntraFrameComesEveryKeyIntervalOrWhenForced) {
+    const auto sequence = synthetic(false, 7, 300);
+    auto options = EncoderOptions{};
+    options.key_interval = 4;
+    auto encoder = Encoder::create(options);
+    std::vector<bool> intra;
+    std::vector<std::uint32_t> references;
+    for (int t = 0; t < 7; ++t) {
+        ASSERT_TRUE(encoder->push(sequence.frames[t].mesh, nullptr, t, t == 2).has_value());
+        intra.push_back(encoder->last_frame().type == FrameType::intra);
+        references.push_back(encoder->last_frame().reference);
+    }
+    EXPECT_EQ(intra, (std::vector<bool>{true, false, true, false, false, false, true}));
+    EXPECT_EQ(references, (std::vector<std::uint32_t>{0, 0, 2, 2, 2, 2, 6}));
+}
+
+TEST(Encoder, TheIndexSaysWhereTheIntraFramesAre) {
+    auto options = EncoderOptions{};
+    options.key_interval = 2;
+    const auto coded = encode(synthetic(false, 5, 300), options);
+    ASSERT_EQ(coded.packets.back().kind, PacketKind::index);
+    const auto index = read_sequence_index(coded.packets.back().payload);
+    ASSERT_TRUE(index.has_value());
+    ASSERT_EQ(index->size(), 3u);
+    for (const auto& entry : *index) {
+        PacketReader reader;
+        reader.push(std::span(coded.bytes).subspan(entry.offset));
+        const auto packet = reader.pull();
+        ASSERT_TRUE(packet.has_value());
+        EXPECT_EQ(reader.damaged_bytes(), 0u);
+        EXPECT_EQ(packet->kind, PacketKind::intra);
+        EXPECT_EQ(packet->frame, entry.frame);
+        EXPECT_EQ(packet->timestamp_us, entry.timestamp_us);
+    }
+}
+
+TEST(Encoder, AfterFinishNothingMayBePushed) {
+    auto encoder = Encoder::create({});
+    const Mesh mesh = sequence_of(tfan_test::grid(3, 3), 1, none).frames[0].mesh;
+    ASSERT_TRUE(encoder->push(mesh, nullptr, 0).has_value());
+    encoder->finish();
+    encoder->finish();
+    const auto pushed = encoder->push(mesh, nullptr, 1);
+    ASSERT_FALSE(pushed.has_value());
+    EXPECT_EQ(pushed.error().kind, ErrorKind::bad_input);
+    int indices = 0;
+    while (auto packet = encoder->pull()) indices += packet->kind == PacketKind::index;
+    EXPECT_EQ(indices, 1);
+}
+
+TEST(Encoder, AnEmptySequenceHasNoPackets) {
+    auto encoder = Encoder::create({});
+    encoder->finish();
+    EXPECT_FALSE(encoder->pull().has_value());
+    EXPECT_TRUE(encoder->reconstruction().positions.empty());
+}
+
+TEST(Encoder, AnIntraCoderThatFailsCostsItsFrameAlone) {
+    auto options = EncoderOptions{};
+    options.key_interval = 1;
+    int calls = 0;
+    auto coder = draco_intra_coder();
+    const auto encode_well = coder.encode;
+    coder.encode = [&, encode_well](const LatticeMesh& mesh) -> Result<std::vector<std::uint8_t>> {
+        if (++calls == 2) return fail(ErrorKind::unsupported, "not today");
+        return encode_well(mesh);
+    };
+    options.intra_coder = coder;
+    const auto coded = encode(synthetic(false, 3, 300), options);
+    EXPECT_EQ(coded.errors, std::vector<std::string>{"not today"});
+    DecoderOptions decoder;
+    decoder.intra_coder = draco_intra_coder();
+    const auto decoded = decode_packets(coded.packets, decoder);
+    EXPECT_TRUE(decoded.errors.empty());
+    ASSERT_EQ(decoded.frames.size(), 2u);
+    for (std::size_t t = 0; t < 2; ++t) expect_same_mesh(decoded.frames[t].mesh, coded.reconstructions[t]);
+}
+
+}  // namespace
+}  // namespace htvm
