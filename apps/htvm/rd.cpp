@@ -245,6 +245,7 @@ Result<void> write_outputs(const Options& options, const std::vector<RdPoint>& p
         fmt::print("{}\n", json);
     else
         print_tables(options, title, points);
+    std::fflush(stdout);
     if (!*drawn) warn("no curves: gnuplot is not installed (Debian: gnuplot-nox); curves.gp holds what it would draw");
     note(fmt::format("{}: rd.json, rd.csv{}", folder.string(), *drawn ? " and the curves" : ""));
     return {};
@@ -339,8 +340,8 @@ void add_rd(CLI::App& app, Run& run) {
     add_sweep_options(*command, *options);
     add_running_options(*command, *options);
     command->footer(
-        "Every coder codes the whole sequence at every quality; all get the same steps. Draco's position bits are the\n"
-        "fewest whose cell over the sequence's bounding box is no larger than the step. Draco codes colours without\n"
+        "Every coder codes the whole sequence at every quality; all get the same steps. Draco's position bits are\n"
+        "those whose cell over the sequence's bounding box is nearest to the step. Draco codes colours without\n"
         "loss only: they are quantised to our colour step before. Normals and texture coordinates are left out.\n"
         "Results are kept in OUTPUT/results; they are made anew where the inputs, the options or the program changed.\n"
         "\n"

@@ -74,7 +74,7 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
 // that both sides pay for the same colours. Duplicate vertices are joined as Draco's own importer does.
 CoderUnderTest draco_under_test(const std::string& name, int compression_level);
 
-// The fewest bits whose cells over the box's longest side are no larger than step mm: 1..30.
+// The bits whose cells over the box's longest side are nearest to step mm, by their ratio: 1..30.
 int draco_position_bits(const Box& box, double step);
 
 // paper, htvm-ep, tfan, draco10, draco7.

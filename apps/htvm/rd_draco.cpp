@@ -139,9 +139,8 @@ Result<CodedFrame> code_frame(const SourceFrame& frame, const DracoSettings& set
 int draco_position_bits(const Box& box, double step) {
     const auto side = box.high - box.low;
     const double longest = std::max({side[0], side[1], side[2], 0.0});
-    int bits = 1;
-    while (bits < 30 && longest / (std::exp2(bits) - 1) > step) ++bits;
-    return bits;
+    if (!(longest > 0 && step > 0)) return 1;
+    return static_cast<int>(std::clamp(std::lround(std::log2(longest / step + 1)), 1L, 30L));
 }
 
 CoderUnderTest draco_under_test(const std::string& name, int compression_level) {

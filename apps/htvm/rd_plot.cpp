@@ -14,25 +14,34 @@
 namespace htvm::app {
 namespace {
 
-// Told apart by people who are colour-blind too (after Okabe and Ito). Known coders keep theirs in every picture.
-struct NamedColour {
-    const char* coder;
+// How a coder's curve looks. Colours told apart by people who are colour-blind too (after Okabe and Ito), and marks,
+// for curves that lie on each other: disc, square, triangle, diamond, triangle upside down.
+struct Look {
     const char* rgb;
+    int mark;
 };
-constexpr std::array<NamedColour, 5> named_colours = {
-    {{"paper", "#0072b2"}, {"htvm-ep", "#009e73"}, {"tfan", "#e69f00"}, {"draco10", "#d55e00"}, {"draco7", "#cc79a7"}}};
-constexpr std::array<const char*, 5> other_colours = {"#56b4e9", "#000000", "#8c564b", "#7f7f7f", "#6a3d9a"};
+struct NamedLook {
+    const char* coder;
+    Look look;
+};
+// Known coders look the same in every picture.
+constexpr std::array<NamedLook, 5> named_looks = {{{"paper", {"#0072b2", 7}},
+                                                   {"htvm-ep", {"#009e73", 5}},
+                                                   {"tfan", {"#e69f00", 9}},
+                                                   {"draco10", {"#d55e00", 13}},
+                                                   {"draco7", {"#cc79a7", 11}}}};
+constexpr std::array<Look, 5> other_looks = {
+    {{"#56b4e9", 7}, {"#000000", 5}, {"#8c564b", 9}, {"#7f7f7f", 13}, {"#6a3d9a", 11}}};
 
-std::string colour_of(const std::vector<std::string>& coders, const std::string& name) {
+Look look_of(const std::vector<std::string>& coders, const std::string& name) {
     std::size_t others = 0;
     for (const auto& coder : coders) {
-        const auto known = std::find_if(named_colours.begin(), named_colours.end(),
-                                        [&](const NamedColour& c) { return coder == c.coder; });
-        if (coder == name)
-            return known != named_colours.end() ? known->rgb : other_colours[others % other_colours.size()];
-        if (known == named_colours.end()) ++others;
+        const auto known = std::find_if(named_looks.begin(), named_looks.end(),
+                                        [&](const NamedLook& named) { return coder == named.coder; });
+        if (coder == name) return known != named_looks.end() ? known->look : other_looks[others % other_looks.size()];
+        if (known == named_looks.end()) ++others;
     }
-    return "#000000";
+    return other_looks[0];
 }
 
 // A step of 1, 2 or 5 times a power of ten that cuts `span` into at most `most` parts.
@@ -64,9 +73,11 @@ Axis logarithmic_axis(double smallest, double largest) {
     axis.low = smallest / 1.12;
     axis.high = largest * 1.12;
     constexpr std::array<double, 3> few = {1, 2, 5};
+    constexpr std::array<double, 5> more = {1, 2, 3, 5, 7};
     constexpr std::array<double, 9> many = {1, 2, 3, 4, 5, 6, 7, 8, 9};
-    axis.tics = logarithmic_tics(axis.low, axis.high, few);
-    if (axis.tics.size() < 4) axis.tics = logarithmic_tics(axis.low, axis.high, many);
+    for (const std::span<const double> digits :
+         {std::span<const double>(few), std::span<const double>(more), std::span<const double>(many)})
+        if (axis.tics.size() < 5) axis.tics = logarithmic_tics(axis.low, axis.high, digits);
     return axis;
 }
 
@@ -118,28 +129,39 @@ std::string axis_lines(char which, const Axis& axis, const std::string& label) {
     return out + ")\n";
 }
 
-std::string picture_lines(std::span<const RdPoint> points, const Measure& measure, bool by_bits_per_vertex,
-                          const Curves& curves) {
-    const auto coders = coders_of(points);
-    std::string blocks, plots;
+// The curves of one picture in gnuplot's language, and the values that its axes must hold.
+struct PictureCurves {
+    std::string data, plots;
     std::vector<double> xs, ys;
-    int drawn_curves = 0;
+};
+
+PictureCurves picture_curves(std::span<const RdPoint> points, const Measure& measure, bool by_bits_per_vertex) {
+    PictureCurves out;
+    const auto coders = coders_of(points);
+    int number = 0;
     for (const auto& coder : coders) {
         const auto curve = curve_of(points, coder, measure, by_bits_per_vertex);
         if (curve.empty()) continue;
-        const std::string block = fmt::format("$curve{}", drawn_curves++);
-        blocks += block + " << END\n";
+        const Look look = look_of(coders, coder);
+        if (number > 0) out.plots += ", \\\n   ";
+        out.plots += fmt::format(
+            " $curve{} with linespoints linewidth 2.2 pointtype {} pointsize 0.9 linecolor rgb '{}' title {}", number,
+            look.mark, look.rgb, quoted(coder));
+        out.data += fmt::format("$curve{} << END\n", number++);
         for (const auto& [x, y] : curve) {
-            blocks += fmt::format("{:.8g} {:.8g}\n", x, y);
-            xs.push_back(x);
-            ys.push_back(y);
+            out.data += fmt::format("{:.8g} {:.8g}\n", x, y);
+            out.xs.push_back(x);
+            out.ys.push_back(y);
         }
-        blocks += "END\n";
-        plots +=
-            fmt::format("{} {} with linespoints linewidth 2.2 pointtype 7 pointsize 0.8 linecolor rgb '{}' title {}",
-                        plots.empty() ? "" : ", \\\n   ", block, colour_of(coders, coder), quoted(coder));
+        out.data += "END\n";
     }
-    std::string out = blocks;
+    return out;
+}
+
+std::string picture_lines(std::span<const RdPoint> points, const Measure& measure, bool by_bits_per_vertex,
+                          const Curves& curves) {
+    const auto [data, plots, xs, ys] = picture_curves(points, measure, by_bits_per_vertex);
+    std::string out = data;
     out += axis_lines('x', rate_axis(xs), by_bits_per_vertex ? "bits per captured vertex (bpvf)" : "Mbit/s");
     out += axis_lines('y', measure.is_error ? error_axis(ys) : psnr_axis(ys),
                       fmt::format("{}, {}{}", measure.title, measure.unit, measure.is_error ? " (log scale)" : ""));

@@ -20,8 +20,8 @@ struct Axis {
 // From 0 to a little above the largest value; logarithmic where the largest is over 8 times the smallest, so that a
 // coder at a tenth of another's rate can still be read off. Values must be > 0.
 Axis rate_axis(std::span<const double> values);
-// Logarithmic, tics at 1, 2 and 5 times powers of ten (at every integer of the first digit where few of those fall into
-// the range): equal factors are equal distances. Values must be > 0.
+// Logarithmic, so that equal factors are equal distances; tics at 1, 2 and 5 times powers of ten, and at more first
+// digits where fewer than five of those fall into the range. Values must be > 0.
 Axis error_axis(std::span<const double> values);
 // From a round number below the smallest to one above the largest value; a PSNR has no zero to start from.
 Axis psnr_axis(std::span<const double> values);

@@ -1,0 +1,111 @@
+#include "rd_coders.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "metrics/point_error.h"
+#include "synth/synth.h"
+
+namespace htvm::app {
+namespace {
+
+Box cube(double side) {
+    Box box;
+    box.empty = false;
+    box.high = {{side, side / 2, side / 4}};
+    return box;
+}
+
+SourceFrame synthetic_frame(int frame) {
+    SynthOptions options;
+    options.vertices = 1500;
+    const auto synthetic = synth_frame(options, frame);
+    SourceFrame out;
+    out.index = static_cast<std::size_t>(frame);
+    out.mesh = synthetic.mesh;
+    out.pose = synthetic.pose;
+    out.timestamp_us = 33333 * frame;
+    return out;
+}
+
+SequenceFacts facts_of(const SourceFrame& frame) {
+    SequenceFacts facts;
+    facts.box = bounding_box(frame.mesh);
+    facts.skeleton = synth_skeleton();
+    return facts;
+}
+
+TEST(DracoPositionBits, cell_is_the_nearest_to_the_step) {
+    EXPECT_EQ(10, draco_position_bits(cube(1023), 1));
+    EXPECT_EQ(10, draco_position_bits(cube(1023), 1.3));
+    EXPECT_EQ(9, draco_position_bits(cube(1023), 1.5));
+    EXPECT_EQ(11, draco_position_bits(cube(1023), 0.6));
+}
+
+TEST(DracoPositionBits, stay_within_1_and_30) {
+    EXPECT_EQ(1, draco_position_bits(cube(1), 1000));
+    EXPECT_EQ(30, draco_position_bits(cube(1e9), 1e-9));
+    EXPECT_EQ(1, draco_position_bits(cube(0), 1));
+    EXPECT_EQ(1, draco_position_bits(Box{}, 1));
+}
+
+TEST(BuiltInCoders, have_different_names) {
+    std::set<std::string> names;
+    for (const auto& coder : built_in_coders(30)) EXPECT_TRUE(names.insert(coder.name).second) << coder.name;
+    for (const char* name : {"paper", "htvm-ep", "tfan", "draco10", "draco7"}) EXPECT_TRUE(names.contains(name));
+}
+
+TEST(BuiltInCoders, decode_every_frame_within_their_steps) {
+    const auto facts = facts_of(synthetic_frame(0));
+    const auto quality = quality_point(50);
+    for (const auto& coder : built_in_coders(30)) {
+        const auto start = coder.start(facts, quality);
+        ASSERT_TRUE(start) << coder.name;
+        for (const int i : {0, 1, 2}) {
+            const auto frame = synthetic_frame(i);
+            const auto coded = (*start)(frame);
+            ASSERT_TRUE(coded) << coder.name << ": " << coded.error().message;
+            const auto error = point_error(frame.mesh, coded->decoded);
+            EXPECT_LT(m1_geometry(error), quality.geometry_step) << coder.name;
+            EXPECT_LT(m1_colour(error), 3 * quality.colour_step) << coder.name;
+            EXPECT_GT(coded->bytes.total(), 100u) << coder.name;
+            EXPECT_GT(coded->bytes.colour, 0u) << coder.name;
+            EXPECT_LT(coded->bytes.total(), 15 * frame.mesh.positions.size()) << coder.name;
+        }
+    }
+}
+
+TEST(BuiltInCoders, only_the_coders_with_references_code_enhanced_frames) {
+    const auto facts = facts_of(synthetic_frame(0));
+    for (const auto& coder : built_in_coders(30)) {
+        const auto start = coder.start(facts, quality_point(40));
+        ASSERT_TRUE(start);
+        EXPECT_EQ(FrameType::intra, (*start)(synthetic_frame(0))->type);
+        const bool refers = coder.name == "paper" || coder.name == "htvm-ep";
+        EXPECT_EQ(refers ? FrameType::enhanced : FrameType::intra, (*start)(synthetic_frame(1))->type) << coder.name;
+    }
+}
+
+TEST(BuiltInCoders, meshes_without_colour_triangles_or_vertices_go_through) {
+    auto points = synthetic_frame(0);
+    points.mesh.triangles.clear();
+    auto grey = synthetic_frame(0);
+    grey.mesh.colours.clear();
+    SourceFrame nothing;
+    nothing.pose = points.pose;
+    for (const auto& coder : built_in_coders(30)) {
+        for (const auto* frame : {&points, &grey, &nothing}) {
+            const auto start = coder.start(facts_of(points), quality_point(50));
+            ASSERT_TRUE(start);
+            const auto coded = (*start)(*frame);
+            ASSERT_TRUE(coded) << coder.name << ": " << coded.error().message;
+            EXPECT_EQ(frame->mesh.colours.empty(), coded->decoded.colours.empty()) << coder.name;
+            EXPECT_EQ(frame->mesh.triangles.empty(), coded->decoded.triangles.empty()) << coder.name;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace htvm::app
