@@ -1,0 +1,50 @@
+#!/bin/sh
+# Holds the second decoder (docs/bitstream.md put into Python) against `htvm decode`, to the bit.
+#   check.sh HTVM     HTVM: the command line, as built
+# Exits with 77, which CTest can take as "skipped", where there is no Python 3.8.
+set -eu
+htvm=$1
+here=$(cd "$(dirname "$0")" && pwd)
+export PYTHONDONTWRITEBYTECODE=1
+python3 -c 'import sys; sys.exit(sys.version_info < (3, 8))' 2>/dev/null || exit 77
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+checked=0
+# same NAME INPUT OPTION...: encodes the input with the options, decodes it with both, compares.
+same() {
+    name=$1
+    input=$2
+    shift 2
+    rm -rf "$work/decoded"
+    "$htvm" encode "$input" --unit mm "$@" -o "$work/stream.htvm" >"$work/log" 2>&1 ||
+        { echo "$name: encode $* failed"; cat "$work/log"; exit 1; }
+    "$htvm" decode "$work/stream.htvm" -o "$work/decoded" --unit mm >"$work/log" 2>&1 ||
+        { echo "$name: decode failed"; cat "$work/log"; exit 1; }
+    python3 "$here/compare.py" "$work/stream.htvm" "$work/decoded" || { echo "$name: $*"; exit 1; }
+    checked=$((checked + 1))
+}
+
+"$htvm" synth "$work/person" --vertices 300 --frames 4 >/dev/null 2>&1
+"$htvm" synth "$work/normals" --vertices 200 --frames 3 --normals >/dev/null 2>&1
+person=$work/person
+same person "$person"
+same person "$person" --skeleton "$person/skeleton.json"
+for quality in 0 20 90 100; do
+    same person "$person" --skeleton "$person/skeleton.json" -q $quality
+    same person "$person" -q $quality --keep-duplicates
+done
+same person "$person" --skeleton "$person/skeleton.json" --profile paper
+same person "$person" --keyint 2 --lambda 0 --geometry-step 0.02 --colour-step 1
+for nearest in 1 5 8 9 64; do
+    same person "$person" --nearest $nearest -q 70
+done
+same normals "$work/normals" --skeleton "$work/normals/skeleton.json" -q 60
+python3 "$here/awkward.py" "$work/awkward"
+for sequence in "$work"/awkward/*; do
+    name=$(basename "$sequence")
+    same "$name" "$sequence" -q 50
+    same "$name" "$sequence" -q 5 --keep-duplicates
+    same "$name" "$sequence" -q 95 --nearest 12
+done
+echo "second decoder: $checked streams decode to the same meshes"
