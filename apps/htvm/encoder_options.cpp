@@ -115,6 +115,8 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
         if (!radii) return tl::unexpected(radii.error());
         out.radii = std::move(*radii);
     }
+    if (out.radii.empty() && !out.skeleton.bones.empty())
+        note("bone radii are calibrated on the first frame; a T-pose suits best (see htvm calibrate)");
     if (options.intra == "draco") out.intra_coder = draco_intra_coder();
     return out;
 }
