@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Real captures through the codec: a folder each below HTVM_DATA, with skeleton.json where there is one. Skipped (77)
+# where HTVM_DATA is not set.
+set -u
+htvm=$1
+[ -n "${HTVM_DATA:-}" ] && [ -d "$HTVM_DATA" ] || { echo "skipped: HTVM_DATA names no folder of real captures"; exit 77; }
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+failures=0
+fail() { echo "FAILED: $*"; failures=$((failures + 1)); }
+
+for folder in "$HTVM_DATA"/*/; do
+    name=$(basename "$folder")
+    skeleton=()
+    [ -f "$folder/skeleton.json" ] && skeleton=(--skeleton "$folder/skeleton.json")
+    # Errors stay near half a step (2 mm in three dimensions: 1 mm RMS, a little more by ECVQ), whatever the capture.
+    "$htvm" encode "$folder" "${skeleton[@]}" --frames 4 --keyint 3 -q 50 -o "$work/a.htvm" >"$work/log" 2>&1 ||
+        { fail "$name: encode: $(tail -1 "$work/log")"; continue; }
+    "$htvm" compare "$folder" "$work/a.htvm" --frames 4 --only m1 --json >"$work/m1.json" 2>"$work/log" ||
+        { fail "$name: compare: $(tail -1 "$work/log")"; continue; }
+    grep -q m1 "$work/m1.json" || fail "$name: compare gave no M1"
+    "$htvm" decode "$work/a.htvm" -o "$work/one" --threads 1 2>/dev/null || fail "$name: decode"
+    "$htvm" decode "$work/a.htvm" -o "$work/two" --threads 4 2>/dev/null || fail "$name: decode with threads"
+    diff -rq "$work/one" "$work/two" >/dev/null || fail "$name: the decoded meshes depend on the threads"
+    # With duplicates kept, no vertex and no triangle is lost.
+    "$htvm" encode "$folder" "${skeleton[@]}" --frames 2 -q 30 --keep-duplicates --json -o "$work/k.htvm" 2>/dev/null |
+        awk -F'[:,]' '/"source_triangles"/ {s=$2} /"source_vertices"/ {v=$2} /"triangles"/ && !/source/ {if ($2 != 0) t=$2}
+                      /"vertices"/ && !/source/ {if (t != s || $2 != v) exit 1}' || fail "$name: counts differ with --keep-duplicates"
+    rm -rf "${work:?}"/*
+    echo "$name passed"
+done
+exit $failures
