@@ -1096,25 +1096,60 @@ def predict_positions(reference, transforms):
     return out
 
 
-def decode_mapping(data, references, vertices):
+def area_classes(mesh):
+    around, total = [0.0] * len(mesh.positions), 0.0
+    for triangle in mesh.triangles:
+        a, b, c = (mesh.positions[v] for v in triangle)
+        (ux, uy, uz), (vx, vy, vz) = (tuple(map(float, sub(p, a))) for p in (b, c))
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        area = math.sqrt(x * x + y * y + z * z)
+        for v in triangle:
+            around[v] += area
+        total += area * 3
+    mean = total / len(around) if around else 0.0
+    limits = [limit * mean for limit in (0.25, 0.45, 0.62, 0.78, 0.92, 1.08, 1.3, 1.65, 2.4)]
+    return [sum(limit <= area for limit in limits) for area in around]
+
+
+def lower_neighbours(mesh):
+    lower = [[] for _ in mesh.positions]
+    for triangle in mesh.triangles:
+        for i in range(3):
+            v, u = triangle[i], triangle[(i + 1) % 3]
+            if u < v and len(lower[v]) < 8:
+                lower[v].append(u)
+    return lower
+
+
+def decode_mapping(data, reference, vertices):
     """ref[k], the reference vertex of each of the frame's vertices."""
     decoder = Decoder(data)
-    at_reference, at_residual = Models(), Models()
+    area_class, lower = area_classes(reference), lower_neighbours(reference)
+    model, mixer = Models(), Models(lambda: Mixer(4))
     last = before = before_that = 1
     left = vertices
-    count = [0] * references
-    for k in range(references - 1):
+    count = [0] * len(reference.positions)
+
+    def decide(k, n, known, surplus):
+        s = min(n, 5)
+        contexts = [("runs", s, last, before, before_that), ("area", s, area_class[k], last),
+                    ("neighbours", s, known, surplus), ("both", s, area_class[k], surplus)]
+        return decoder.mixed(mixer[s], [model[context] for context in contexts])
+
+    for k in range(len(count) - 1):
         if left == 0:
             break
+        known = min(len(lower[k]), 7)
+        surplus = clamp(sum(min(count[u], 3) - 1 for u in lower[k]), -4, 4) + 4
         n = 0
-        if decoder.bit(at_reference[last, before, before_that]):
+        if decide(k, 0, known, surplus):
             n, left = 1, left - 1
-            while left > 0 and not decoder.bit(at_residual[min(n, 6) - 1, last]):
+            while left > 0 and not decide(k, n, known, surplus):
                 n, left = n + 1, left - 1
         count[k] = n
         last, before, before_that = min(n, 3), last, min(before, 2)
         decoder.check_end()
-    count[references - 1] += left
+    count[-1] += left
     return [k for k, n in enumerate(count) for _ in range(n)]
 
 
@@ -1174,22 +1209,14 @@ def index_model(book):
 def decode_residuals(data, count, book):
     decoder = Decoder(data)
     size = len(book.codewords)
-    weights = [weight_of(length) for length in book.lengths]
-    mean_length = sum(w * length for w, length in zip(weights, book.lengths)) // sum(weights)
-    models = [index_model(book) for _ in range(4)]
-    escape = [SignedModel() for _ in range(3)]
-    last, which, out = mean_length, 1, []
+    model, escape, out = index_model(book), [SignedModel() for _ in range(3)], []
     for _ in range(count):
-        i = decoder.symbol(models[which])
+        i = decoder.symbol(model)
         check(i <= size, "an index is outside the codebook")
-        before, last = last, book.lengths[i]
-        x = 2 * last + before
-        low = (3 * mean_length - 18) & 0xFFFFFFFF
-        which = (x >= low) + (x >= 3 * mean_length) + (x >= 3 * mean_length + 24)
         if i < size:
             out.append(book.codewords[i])
         else:
-            value = tuple(decoder.signed(model) * book.escape_step for model in escape)
+            value = tuple(decoder.signed(m) * book.escape_step for m in escape)
             check(max(abs(x) for x in value) <= 1 << 26, "a residual is out of range")
             out.append(value)
         decoder.check_end()
@@ -1364,7 +1391,7 @@ def decode_enhanced_mesh(frame, reference, books, m):
     if base.colours:
         check(colour_book and colour_book.number == frame.colour_codebook, "the colour codebook is not there")
     transforms = decode_transforms(frame.layer(TRANSFORMS), len(reference.pivots))
-    ref = decode_mapping(frame.layer(MAPPING), len(base.positions), frame.vertices)
+    ref = decode_mapping(frame.layer(MAPPING), base, frame.vertices)
     predicted = predict_positions(reference, transforms)
     mesh = Mesh()
     for r, residual in zip(ref, decode_residuals(frame.layer(GEOMETRY), len(ref), geometry_book)):
