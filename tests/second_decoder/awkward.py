@@ -100,6 +100,13 @@ def main(folder):
         frame("soup", number, v, soup(r, 60, 150), colours=colours_of(v))
         v = points(r, 40, 900)
         frame("sparse", number, v, soup(r, 40, 12))
+        v = points(r, 14, 600)
+        frame("dense", number, v, soup(r, 14, 500))
+        # Attributes that are smooth but for some noise.
+        v, t, n, uv = sphere(9, 12, 400, 0.03 * number)
+        n = [tuple(x + r.gauss(0, 0.02) for x in xs) for xs in n]
+        uv = [tuple(x + r.gauss(0, 0.002) for x in xs) for xs in uv]
+        frame("noisy", number, v, t, normals=n, texcoords=uv)
         # All vertices in few places.
         places = points(r, 9, 300)
         v = [r.choice(places) for _ in range(70)]
