@@ -156,7 +156,7 @@ def read_sequence_header(payload):
         check(max(bone) < joints and radius <= L, "a bone is out of range")
         header.bones.append(bone)
         header.radii.append(radius)
-    header.bytes = payload[: read.at]
+    header.bytes = payload
     return header
 
 
@@ -1458,7 +1458,9 @@ def main(arguments):
         return 2
     with open(arguments[0], "rb") as file:
         data = file.read()
-    failed = False
+    failed = not any(packets(data))
+    if failed:
+        print("there is no packet in it")
     for packet, header, mesh in decode_stream(data):
         if header is None:
             print("packet at %d: %s: %s" % (packet.offset, type(mesh).__name__.lower(), mesh))
