@@ -77,9 +77,9 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
     CoderUnderTest out;
     out.name = name;
     out.description = description;
-    out.settings = fmt::format("keyint {}, reference {}, lambda {}, nearest {}", options.key_interval,
-                               options.reference_vertices == ReferenceVertices::bone ? "bone" : "any", options.lambda,
-                               options.nearest_vertices);
+    out.settings = fmt::format("keyint {}, reference {}, registration {}, lambda {}, nearest {}", options.key_interval,
+                               options.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
+                               options.point_to_plane ? "plane" : "point", options.lambda, options.nearest_vertices);
     out.start = [options](const SequenceFacts& facts, const QualityPoint& quality) {
         return start_codec(options, facts, quality);
     };
@@ -91,12 +91,16 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
     ours.key_interval = key_interval;
     EncoderOptions paper = ours;
     paper.reference_vertices = ReferenceVertices::bone;
+    paper.point_to_plane = false;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
-    return {codec_under_test("paper", "I- and EP-frames as in the paper: reference vertices by bone", paper),
-            codec_under_test("htvm-ep", "the same with reference vertices from the whole mesh", ours),
-            codec_under_test("tfan", "our TFAN alone: every frame an I-frame", intra), draco_under_test("draco10", 10),
-            draco_under_test("draco7", 7)};
+    return {
+        codec_under_test(
+            "paper", "I- and EP-frames with the paper's choices: reference vertices by bone, point to point", paper),
+        codec_under_test(
+            "htvm-ep", "I- and EP-frames as htvm encode makes them: reference vertices anywhere, point to plane", ours),
+        codec_under_test("tfan", "our TFAN alone: every frame an I-frame", intra), draco_under_test("draco10", 10),
+        draco_under_test("draco7", 7)};
 }
 
 }  // namespace htvm::app

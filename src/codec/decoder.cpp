@@ -16,6 +16,7 @@ struct Decoder::State {
     DecoderOptions options;
     unsigned threads = 1;
     std::optional<SequenceHeader> header;
+    std::vector<std::uint8_t> header_payload;
     std::optional<SequenceInfo> info;
     std::optional<ReferenceMesh> reference;
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
@@ -49,13 +50,14 @@ Result<Frame> take_header(State& state, const Packet& packet) {
     auto header = read_sequence_header(packet.payload);
     if (!header) return tl::unexpected(header.error());
     // A repeated header changes nothing; another one begins another sequence.
-    if (!state.header || write_sequence_header(*state.header) != packet.payload) {
+    if (state.header_payload != packet.payload) {
         state.reference.reset();
         state.geometry_codebook.reset();
         state.colour_codebook.reset();
     }
     state.info = describe(*header);
     state.header = std::move(*header);
+    state.header_payload = packet.payload;
     return Frame{};
 }
 

@@ -39,8 +39,8 @@ Result<std::vector<QuantisedTransform>> decode_transforms(std::span<const std::u
         if (!decode_rotation(decoder, rotation, transform.rotation))
             return fail(ErrorKind::corrupt_stream, "transforms layer: a rotation is out of range");
         transform.shift = decode_point(decoder, shift);
-        if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "transforms layer: it ends too early");
     }
+    if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "transforms layer: it ends too early");
     return out;
 }
 
