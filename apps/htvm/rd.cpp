@@ -72,6 +72,7 @@ Result<std::vector<CoderUnderTest>> chosen_coders(const Options& options) {
         return {};
     };
     for (const auto& name : options.coders) {
+        if (name == "none") continue;
         const auto found =
             std::find_if(built_in.begin(), built_in.end(), [&](const CoderUnderTest& c) { return c.name == name; });
         if (found == built_in.end()) {
@@ -86,6 +87,7 @@ Result<std::vector<CoderUnderTest>> chosen_coders(const Options& options) {
         if (!coder) return tl::unexpected(coder.error());
         if (auto ok = add(*coder); !ok) return tl::unexpected(ok.error());
     }
+    if (out.empty()) return fail(ErrorKind::bad_input, "there is no coder to measure: see --coders and --peer");
     return out;
 }
 
@@ -341,7 +343,7 @@ void add_rd(CLI::App& app, Run& run) {
     add_running_options(*command, *options);
     command->footer(
         "Every coder codes the whole sequence at every quality; all get the same steps. Draco's position bits are\n"
-        "those whose cell over the sequence's bounding box is nearest to the step. Draco codes colours without\n"
+        "those whose cell over the mean frame's bounding box is nearest to the step. Draco codes colours without\n"
         "loss only: they are quantised to our colour step before. Normals and texture coordinates are left out.\n"
         "Results are kept in OUTPUT/results; they are made anew where the inputs, the options or the program changed.\n"
         "\n"

@@ -28,7 +28,8 @@ struct SourceFrame {
 
 // What a coder may know of the whole sequence beforehand.
 struct SequenceFacts {
-    Box box;  // round all frames, mm
+    Box box;                // round all frames, mm
+    double frame_side = 0;  // longest side of a frame's own bounding box, mean over the frames, mm
     double fps = 30;
     Skeleton skeleton;
     std::vector<double> radii;
@@ -68,14 +69,15 @@ struct CoderUnderTest {
 // bytes are all packets but the index, which a live stream has not.
 CoderUnderTest codec_under_test(const std::string& name, const std::string& description, const EncoderOptions& options);
 
-// libdraco, every frame by itself, at a compression level of 0 to 10 (10 - speed). Positions are quantised by Draco to
-// draco_position_bits() bits over the frame's own bounding box. Draco has no lossy colour below 8 bits: the colours go
-// in as multiples of our colour step, numbered, and come back times the step (one byte a frame is counted for it), so
-// that both sides pay for the same colours. Duplicate vertices are joined as Draco's own importer does.
+// libdraco, every frame by itself, at a compression level of 0 to 10 (10 - speed). Positions are quantised by Draco
+// over the frame's own bounding box, in all frames to the bits whose cell is nearest to our step in the mean frame.
+// Draco has no lossy colour below 8 bits: the colours go in as multiples of our colour step, numbered, and come back
+// times the step (one byte a frame is counted for it), so that both sides pay for the same colours. Duplicate vertices
+// are joined as Draco's own importer does.
 CoderUnderTest draco_under_test(const std::string& name, int compression_level);
 
-// The bits whose cells over the box's longest side are nearest to step mm, by their ratio: 1..30.
-int draco_position_bits(const Box& box, double step);
+// The bits whose cells over a side of `side` mm are nearest to step mm, by their ratio: 1..30.
+int draco_position_bits(double side, double step);
 
 // paper, htvm-ep, tfan, draco10, draco7.
 std::vector<CoderUnderTest> built_in_coders(int key_interval);

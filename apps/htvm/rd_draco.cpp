@@ -136,11 +136,9 @@ Result<CodedFrame> code_frame(const SourceFrame& frame, const DracoSettings& set
 
 }  // namespace
 
-int draco_position_bits(const Box& box, double step) {
-    const auto side = box.high - box.low;
-    const double longest = std::max({side[0], side[1], side[2], 0.0});
-    if (!(longest > 0 && step > 0)) return 1;
-    return static_cast<int>(std::clamp(std::lround(std::log2(longest / step + 1)), 1L, 30L));
+int draco_position_bits(double side, double step) {
+    if (!(side > 0 && step > 0)) return 1;
+    return static_cast<int>(std::clamp(std::lround(std::log2(side / step + 1)), 1L, 30L));
 }
 
 CoderUnderTest draco_under_test(const std::string& name, int compression_level) {
@@ -151,14 +149,13 @@ CoderUnderTest draco_under_test(const std::string& name, int compression_level) 
     out.start = [compression_level](const SequenceFacts& facts, const QualityPoint& quality) -> Result<FrameCoder> {
         DracoSettings settings;
         settings.speed = 10 - compression_level;
-        settings.position_bits = draco_position_bits(facts.box, quality.geometry_step);
+        settings.position_bits = draco_position_bits(facts.frame_side, quality.geometry_step);
         settings.colour_step = std::max(1, static_cast<int>(std::lround(quality.colour_step)));
         return FrameCoder([settings](const SourceFrame& frame) { return code_frame(frame, settings); });
     };
     out.describe_quality = [](const SequenceFacts& facts, const QualityPoint& quality) {
-        const int bits = draco_position_bits(facts.box, quality.geometry_step);
-        const auto side = facts.box.high - facts.box.low;
-        return fmt::format("{} bits ({:.2f} mm)", bits, std::max({side[0], side[1], side[2]}) / (std::exp2(bits) - 1));
+        const int bits = draco_position_bits(facts.frame_side, quality.geometry_step);
+        return fmt::format("{} bits ({:.2f} mm)", bits, facts.frame_side / (std::exp2(bits) - 1));
     };
     return out;
 }

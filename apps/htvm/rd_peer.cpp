@@ -13,10 +13,12 @@ namespace {
 
 using std::filesystem::path;
 
-std::string first_lines(const path& file) {
+// The end of what a command printed.
+std::string last_words(const path& file) {
     const auto bytes = read_file(file, 1 << 20);
     if (!bytes) return {};
     std::string text(bytes->begin(), bytes->end());
+    while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
     if (text.size() > 300) text = "... " + text.substr(text.size() - 300);
     return text;
 }
@@ -38,7 +40,7 @@ Result<CodedFrame> code_frame(const std::string& name, const std::string& comman
     CodedFrame coded;
     coded.encode_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     if (status != 0)
-        return fail(ErrorKind::bad_input, fmt::format("the command of {} failed: {}", name, first_lines(log)));
+        return fail(ErrorKind::bad_input, fmt::format("the command of {} failed: {}", name, last_words(log)));
     std::error_code missing;
     const auto bytes = std::filesystem::file_size(out, missing);
     if (missing) return fail(ErrorKind::bad_input, fmt::format("the command of {} wrote no {{out}}", name));
@@ -100,7 +102,7 @@ Result<CoderUnderTest> peer_under_test(const std::string& name_and_command) {
             {"q", fmt::format("{:g}", quality.quality)},
             {"step", fmt::format("{:g}", quality.geometry_step)},
             {"colour_step", fmt::format("{:g}", quality.colour_step)},
-            {"bits", fmt::format("{}", draco_position_bits(facts.box, quality.geometry_step))}};
+            {"bits", fmt::format("{}", draco_position_bits(facts.frame_side, quality.geometry_step))}};
         return FrameCoder([name, command, values, folder = quality.working_folder](const SourceFrame& frame) {
             return code_frame(name, command, folder, values, frame);
         });

@@ -6,7 +6,7 @@
 //   {decoded}  where it writes the decoded frame, as PLY in mm, from nothing but {out} if it is to be fair
 //   {q}        the sweep's quality, 0..100
 //   {step}     that quality's step of positions, mm; {colour_step}, of colours, levels of 255
-//   {bits}     the position bits whose cells over the sequence's bounding box are nearest to the step
+//   {bits}     the position bits whose cells over a frame's bounding box are nearest to the step
 // Exit status 0 is success. Its time, on the wall clock, counts as encoding and decoding together.
 #pragma once
 

@@ -2,6 +2,8 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "io/mesh_file.h"
 #include "terminal.h"
 
@@ -16,8 +18,10 @@ std::size_t bytes_of(const Mesh& mesh) {
 }  // namespace
 
 Result<void> SourceFrames::keep(SourceFrame frame, const SourceOptions& options) {
-    extend(facts_.box, bounding_box(frame.mesh));
-    mean_vertices_ += static_cast<double>(frame.mesh.positions.size());
+    const Box box = bounding_box(frame.mesh);
+    extend(facts_.box, box);
+    const Point3 side = box.high - box.low;
+    facts_.frame_side += std::max({side[0], side[1], side[2]});
     std::filesystem::path file;
     const std::size_t bytes = bytes_of(frame.mesh);
     if (bytes_ + bytes > options.memory_bytes) {
@@ -51,7 +55,7 @@ Result<SourceFrames> SourceFrames::load(Capture& capture, const SourceOptions& o
         progress.step();
     }
     if (out.frames_.empty()) return fail(ErrorKind::bad_input, "there is no mesh to measure");
-    out.mean_vertices_ /= static_cast<double>(out.frames_.size());
+    out.facts_.frame_side /= static_cast<double>(out.frames_.size());
     out.facts_.fps = capture.fps();
     out.facts_.skeleton = capture.skeleton();
     out.facts_.radii = capture.radii();

@@ -22,14 +22,12 @@ public:
     static Result<SourceFrames> load(Capture& capture, const SourceOptions& options);
     std::size_t size() const { return frames_.size(); }
     const SequenceFacts& facts() const { return facts_; }
-    double mean_vertices() const { return mean_vertices_; }
     // Threads may call it at once.
     Result<std::shared_ptr<const SourceFrame>> frame(std::size_t index) const;
 
 private:
     Result<void> keep(SourceFrame frame, const SourceOptions& options);
     SequenceFacts facts_;
-    double mean_vertices_ = 0;
     std::size_t bytes_ = 0;
     std::vector<std::shared_ptr<const SourceFrame>> frames_;  // without its mesh where that is in a file
     std::vector<std::filesystem::path> files_;                // empty where the mesh is in memory

@@ -11,13 +11,6 @@
 namespace htvm::app {
 namespace {
 
-Box cube(double side) {
-    Box box;
-    box.empty = false;
-    box.high = {{side, side / 2, side / 4}};
-    return box;
-}
-
 SourceFrame synthetic_frame(int frame) {
     SynthOptions options;
     options.vertices = 1500;
@@ -33,22 +26,23 @@ SourceFrame synthetic_frame(int frame) {
 SequenceFacts facts_of(const SourceFrame& frame) {
     SequenceFacts facts;
     facts.box = bounding_box(frame.mesh);
+    facts.frame_side = 1800;
     facts.skeleton = synth_skeleton();
     return facts;
 }
 
 TEST(DracoPositionBits, cell_is_the_nearest_to_the_step) {
-    EXPECT_EQ(10, draco_position_bits(cube(1023), 1));
-    EXPECT_EQ(10, draco_position_bits(cube(1023), 1.3));
-    EXPECT_EQ(9, draco_position_bits(cube(1023), 1.5));
-    EXPECT_EQ(11, draco_position_bits(cube(1023), 0.6));
+    EXPECT_EQ(10, draco_position_bits(1023, 1));
+    EXPECT_EQ(10, draco_position_bits(1023, 1.3));
+    EXPECT_EQ(9, draco_position_bits(1023, 1.5));
+    EXPECT_EQ(11, draco_position_bits(1023, 0.6));
 }
 
 TEST(DracoPositionBits, stay_within_1_and_30) {
-    EXPECT_EQ(1, draco_position_bits(cube(1), 1000));
-    EXPECT_EQ(30, draco_position_bits(cube(1e9), 1e-9));
-    EXPECT_EQ(1, draco_position_bits(cube(0), 1));
-    EXPECT_EQ(1, draco_position_bits(Box{}, 1));
+    EXPECT_EQ(1, draco_position_bits(1, 1000));
+    EXPECT_EQ(30, draco_position_bits(1e9, 1e-9));
+    EXPECT_EQ(1, draco_position_bits(0, 1));
+    EXPECT_EQ(1, draco_position_bits(-1, 1));
 }
 
 TEST(BuiltInCoders, have_different_names) {

@@ -25,7 +25,7 @@ Result<CodedFrame> run(const std::string& command) {
     auto quality = quality_point(50);
     quality.working_folder = folder;
     SequenceFacts facts;
-    facts.box = bounding_box(triangle());
+    facts.frame_side = 10;
     const auto start = coder->start(facts, quality);
     SourceFrame frame;
     frame.mesh = triangle();
