@@ -159,10 +159,10 @@ std::vector<Triangle> by_source_vertex(const Mesh& decoded) {
     return tfan_test::as_multiset(out);
 }
 
-std::vector<TestSequence> coloured_sequences() {
+std::vector<TestSequence> make_coloured_sequences() {
     std::vector<TestSequence> out = awkward_sequences();
-    out.push_back(synthetic(true, 4));
-    out.push_back(synthetic(false, 4));
+    out.push_back(synthetic(true, 2, 800));
+    out.push_back(synthetic(false, 2, 800));
     for (auto& sequence : out)
         for (auto& frame : sequence.frames) {
             const unsigned more =
@@ -170,6 +170,11 @@ std::vector<TestSequence> coloured_sequences() {
             give_attributes(frame.mesh, colours + more, 3);
         }
     return out;
+}
+
+const std::vector<TestSequence>& coloured_sequences() {
+    static const auto sequences = make_coloured_sequences();
+    return sequences;
 }
 
 TEST(ClosedLoop, WithoutMergingEveryVertexAndOrientedTriangleIsThere) {

@@ -94,7 +94,7 @@ inline TestSequence synthetic(bool skeleton, int frames, int vertices = 1500) {
 }
 
 // Captures as they should not be, but are.
-inline std::vector<TestSequence> awkward_sequences() {
+inline std::vector<TestSequence> make_awkward_sequences() {
     std::vector<TestSequence> out;
     unsigned attributes = 0;
     for (const auto& shape : tfan_test::special_meshes()) out.push_back(sequence_of(shape, 4, attributes++ % 8));
@@ -141,6 +141,11 @@ inline std::vector<TestSequence> awkward_sequences() {
     lost.frames[4].pose.reset();
     out.push_back(lost);
     return out;
+}
+
+inline const std::vector<TestSequence>& awkward_sequences() {
+    static const auto sequences = make_awkward_sequences();
+    return sequences;
 }
 
 struct CodedSequence {
