@@ -6,6 +6,7 @@
 
 #include "commands.h"
 #include "compare.h"
+#include "reproduce.h"
 
 namespace {
 
@@ -40,6 +41,7 @@ int main(int argc, char** argv) {
     htvm::app::add_calibrate(app, run);
     htvm::app::add_compare(app, run);
     htvm::app::add_rd(app, run);
+    htvm::app::add_reproduce(app, run);
     const auto commands = app.get_subcommands([](CLI::App*) { return true; });
     const auto is_named = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
     if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), is_named)) {

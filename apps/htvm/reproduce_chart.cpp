@@ -126,7 +126,7 @@ std::string chart_script(const Chart& chart, const std::filesystem::path& output
         add(fmt::format("$rule{} with lines linewidth 2.2 dashtype {} linecolor rgb '{}' title {}", i, rule.dash,
                         rule.colour, quoted(rule.title)));
     }
-    if (plots.empty()) return {};
+    if (plots.empty()) plots = " NaN notitle";
     return out + "plot" + plots + "\nunset output\n";
 }
 

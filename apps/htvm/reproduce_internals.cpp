@@ -26,6 +26,7 @@ EncoderOptions paper_options(const SequenceFacts& facts, double quality, int key
     options.colour_step = point.colour_step;
     options.key_interval = key_interval;
     options.reference_vertices = ReferenceVertices::bone;
+    options.point_to_plane = false;
     options.threads = threads;
     options.skeleton = facts.skeleton;
     options.radii = facts.radii;

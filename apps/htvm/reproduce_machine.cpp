@@ -95,7 +95,7 @@ std::vector<std::pair<std::string, std::string>> machine_facts(unsigned threads)
             {"Compiler", "g++ " __VERSION__},
 #endif
             {"Libraries", fmt::format("Draco {}, Embree {}, nlohmann/json {}.{}.{}, fmt {}.{}.{}, CLI11 {}",
-                                      draco::Version(), RTC_VERSION_STRING, NLOHMANN_JSON_VERSION_MAJOR,
+                                      draco::kDracoVersion, RTC_VERSION_STRING, NLOHMANN_JSON_VERSION_MAJOR,
                                       NLOHMANN_JSON_VERSION_MINOR, NLOHMANN_JSON_VERSION_PATCH, FMT_VERSION / 10000,
                                       FMT_VERSION / 100 % 100, FMT_VERSION % 100, CLI11_VERSION)},
             {"Charts", gnuplot.empty() ? "no gnuplot" : gnuplot}};
