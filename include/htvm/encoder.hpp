@@ -36,9 +36,9 @@ struct EncoderOptions {
     bool merge_duplicates = true;  // merge vertices that decode to the same, drop triangles that collapse
     int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
     ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured better than the paper's, see docs
-    bool point_to_plane = false;                                    // register bones by distances to planes, not points
-    int lattice_bits = 0;  // decoded positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is
-    unsigned threads = 0;  // 0: one a core; the bytes are the same for any number
+    bool point_to_plane = true;  // register bones by distances to planes; false: to points, as in the paper
+    int lattice_bits = 0;        // decoded positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is
+    unsigned threads = 0;        // 0: one a core; the bytes are the same for any number
     std::uint32_t fps_numerator = 30, fps_denominator = 1;  // frames a second, for players
     std::uint32_t unit_micrometres = 1000;  // the capture's own unit, kept so that a decoder can give it back
     Skeleton skeleton;          // no bones: the capture has no skeleton, and one bone that spans the mesh serves
@@ -55,7 +55,7 @@ QualitySteps quality_steps(double quality);
 
 struct CalibrationOptions {
     double percentile = 70;  // of the distances of a bone's vertices; the paper takes their maximum, 100, which one
-                             // stray vertex can triple: 50 to 80 measured best, 8 % fewer bits for geometry
+                             // stray vertex can triple: 50 to 80 measured best, up to a third fewer bits
 };
 // Skinning calibration (paper, section IV-A, eq. 3): the radius r^i of each bone's cylinder, mm, from a mesh in T-pose
 // and its skeleton. Bones to which no vertex projects get 0.

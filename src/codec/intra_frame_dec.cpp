@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cstdlib>
 #include <string>
 
 #include "codec/attribute_values.h"
@@ -42,7 +41,14 @@ Result<LatticeMesh> decode_by_tfan(const FramePayload& payload) {
     return mesh;
 }
 
-// What another coder gives back is not trusted: sizes as announced, indices in range.
+bool within_attribute_limit(const auto& values) {
+    for (const auto& value : values)
+        for (const std::int32_t c : value)
+            if (c < -attribute_limit || c > attribute_limit) return false;
+    return true;
+}
+
+// What another coder gives back is not trusted: sizes as announced, indices and attributes in range.
 Result<LatticeMesh> decode_by(const ExternalIntraCoder& coder, const FramePayload& payload) {
     auto mesh = coder.decode(payload.of(Layer::external_intra));
     if (!mesh) return mesh;
@@ -51,7 +57,8 @@ Result<LatticeMesh> decode_by(const ExternalIntraCoder& coder, const FramePayloa
     const bool in_range = std::all_of(mesh->triangles.begin(), mesh->triangles.end(),
                                       [&](const Triangle& t) { return t[0] < n && t[1] < n && t[2] < n; });
     if (n != payload.header.vertices || mesh->triangles.size() != payload.header.triangles || !in_range ||
-        !fits(mesh->colours.size()) || !fits(mesh->normals.size()) || !fits(mesh->texcoords.size()))
+        !fits(mesh->colours.size()) || !fits(mesh->normals.size()) || !fits(mesh->texcoords.size()) ||
+        !within_attribute_limit(mesh->normals) || !within_attribute_limit(mesh->texcoords))
         return fail(ErrorKind::corrupt_stream, "I-frame: its mesh is not what its header says");
     for (auto& colour : mesh->colours)
         for (auto& c : colour)
@@ -71,8 +78,9 @@ Result<LatticeMesh> decode_intra_frame(const FramePayload& payload, const Extern
     if (!mesh) return mesh;
     const auto step = static_cast<std::int32_t>(payload.header.geometry_step);
     const std::int32_t limit = lattice_limit / step;
+    const auto inside = [&](std::int32_t c) { return c >= -limit && c <= limit; };
     for (auto& p : mesh->positions) {
-        if (std::abs(p.x) > limit || std::abs(p.y) > limit || std::abs(p.z) > limit)
+        if (!inside(p.x) || !inside(p.y) || !inside(p.z))
             return fail(ErrorKind::corrupt_stream, "I-frame: a vertex lies off the lattice");
         p = from_grid(p, step);
     }

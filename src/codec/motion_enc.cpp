@@ -35,6 +35,15 @@ std::vector<Eigen::Vector3f> vertex_normals(const LatticeMesh& mesh) {
 
 }  // namespace
 
+double mean_edge(const LatticeMesh& mesh) {
+    double sum = 0;
+    for (const auto& t : mesh.triangles)
+        for (std::size_t i = 0; i < 3; ++i)
+            sum +=
+                std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i]], mesh.positions[t[(i + 1) % 3]])));
+    return mesh.triangles.empty() ? 0 : sum / (3.0 * static_cast<double>(mesh.triangles.size()));
+}
+
 ReferenceSearch make_reference_search(const ReferenceMesh& reference) {
     ReferenceSearch out;
     const auto normals = vertex_normals(reference.mesh);
