@@ -70,7 +70,7 @@ ExperimentPlan plan_of(const Options& options) {
     ExperimentPlan plan;
     plan.key_interval = options.key_interval;
     if (options.quick) {
-        plan.qualities = {10, 30, 50, 70};
+        plan.qualities = {10, 20, 35, 50, 70};
         plan.surface_samples = 50000;
         plan.most_measured = 5;
     }

@@ -94,12 +94,12 @@ void fit_axes(Chart& chart, bool is_error) {
     chart.y = is_error ? error_axis(ys) : psnr_axis(ys);
     if (is_error) chart.y_label += " (log scale)";
     if (chart.x.logarithmic) chart.x_label += " (log scale)";
-    chart.key = is_error ? "top right" : "bottom right";
+    chart.key = is_error ? "bottom left" : "bottom right";
 }
 
 std::string chart_script(const Chart& chart, const std::filesystem::path& output) {
     std::string out = opening(chart.title, chart.width, chart.height, output);
-    out += fmt::format("set key {} noenhanced\n", chart.key);
+    out += chart.key.empty() ? "unset key\n" : fmt::format("set key {} noenhanced\n", chart.key);
     out += axis_lines('x', chart.x, chart.x_label) + axis_lines('y', chart.y, chart.y_label);
     std::string plots;
     auto add = [&](const std::string& plot) { plots += (plots.empty() ? " " : ", \\\n  ") + plot; };
@@ -111,8 +111,8 @@ std::string chart_script(const Chart& chart, const std::filesystem::path& output
         out += "END\n";
         const std::string title = line.title.empty() ? "notitle" : "title " + quoted(line.title);
         if (chart.bar_width > 0)
-            add(fmt::format("$line{} with boxes fillstyle solid 0.75 border linecolor rgb '{}' {}", i, line.colour,
-                            title));
+            add(fmt::format("$line{} with boxes fillstyle solid 0.8 border linecolor rgb '{}' fillcolor rgb '{}' {}", i,
+                            line.colour, line.colour, title));
         else
             add(fmt::format(
                 "$line{} with linespoints linewidth 2.2 dashtype {} pointtype {} pointsize 0.8 linecolor rgb '{}' {}",

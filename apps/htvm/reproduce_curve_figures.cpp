@@ -334,8 +334,8 @@ std::string crossing_reason(std::span<const RdPoint> points) {
                                                 : found.crossings.front().rate;
     const RdPoint* ours = nullptr;
     for (const auto& point : points)
-        if (point.coder == "paper" &&
-            (!ours || std::abs(bits_per_vertex(point) - rate) < std::abs(bits_per_vertex(*ours) - rate)))
+        if (point.coder == "paper" && (!ours || std::abs(std::log(bits_per_vertex(point) / rate)) <
+                                                    std::abs(std::log(bits_per_vertex(*ours) / rate))))
             ours = &point;
     if (!ours) return {};
     const auto sums = totals(*ours, FrameType::enhanced);

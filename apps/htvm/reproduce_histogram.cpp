@@ -5,7 +5,7 @@
 
 namespace htvm::app {
 
-Histogram histogram(std::span<const double> values, int most_bars) {
+Histogram histogram(std::span<const double> values, int most_bars, double least_width) {
     std::vector<double> finite;
     for (const double value : values)
         if (std::isfinite(value)) finite.push_back(value);
@@ -16,6 +16,7 @@ Histogram histogram(std::span<const double> values, int most_bars) {
     // Values that differ by less than a thousandth of their size are one bar of a hundredth of it.
     double rough = (*high - *low) / std::max(most_bars, 1);
     if (rough <= 1e-3 * largest / std::max(most_bars, 1)) rough = largest > 0 ? 1e-2 * largest : 1;
+    rough = std::max(rough, least_width);
     const double power = std::pow(10, std::floor(std::log10(rough)));
     out.width = 10 * power;
     for (const double factor : {5.0, 2.0, 1.0})

@@ -14,7 +14,7 @@ struct Histogram {
 };
 
 // Bars whose width is 1, 2 or 5 times a power of ten and which start at a multiple of it, at most `most_bars` + 1 of
-// them; values that are not finite are left out. Equal values make one bar.
-Histogram histogram(std::span<const double> values, int most_bars = 12);
+// them, none narrower than `least_width`; values that are not finite are left out. Equal values make one bar.
+Histogram histogram(std::span<const double> values, int most_bars = 12, double least_width = 0);
 
 }  // namespace htvm::app
