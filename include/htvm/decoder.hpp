@@ -4,7 +4,8 @@
 //   for each packet:  auto frame = decoder.push(packet);   // Result<std::optional<DecodedFrame>>
 //                     if (frame && *frame) show((*frame)->mesh);
 //
-// Frames refer to I-frames alone: any EP-frame may be left out. A decoder may start at any I-frame once it has seen the
+// Frames refer to I-frames (and to codebook packets) alone: any EP-frame may be left out, but a lost codebook costs the
+// frames that name it, until the next one. A decoder may start at any I-frame once it has seen the
 // sequence header.
 #pragma once
 

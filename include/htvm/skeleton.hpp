@@ -26,7 +26,9 @@ struct Skeleton {
 // S_t: the skeleton in one frame.
 struct Pose {
     std::vector<Vector3d> joints;        // mm, one per joint of the skeleton
-    std::vector<bool> tracked;           // one per joint, false where the tracker lost it; empty: all tracked
+    // One per joint, false where the tracker lost it and its position is a guess (coded as given all the same);
+    // empty: all tracked.
+    std::vector<bool> tracked;
     std::vector<Rotation> orientations;  // T^i, one per bone; empty: derived from the joints
 };
 
