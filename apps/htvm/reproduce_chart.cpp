@@ -94,7 +94,6 @@ void fit_axes(Chart& chart, bool is_error) {
     chart.y = is_error ? error_axis(ys) : psnr_axis(ys);
     if (is_error) chart.y_label += " (log scale)";
     if (chart.x.logarithmic) chart.x_label += " (log scale)";
-    chart.key = is_error ? "bottom left" : "bottom right";
 }
 
 std::string chart_script(const Chart& chart, const std::filesystem::path& output) {
@@ -135,7 +134,9 @@ std::string chart_script(const SpaceChart& chart, const std::filesystem::path& o
     out += fmt::format("set key top right noenhanced\nset xlabel {} noenhanced\nset ylabel {} noenhanced\n",
                        quoted(chart.x_label), quoted(chart.y_label));
     out += fmt::format("set zlabel {} rotate parallel offset -1,0 noenhanced\n", quoted(chart.z_label));
-    out += "set border 31\nset ticslevel 0\nset view 62,128\nset grid z\nset zrange [0:*]\nset logscale x\n";
+    out +=
+        "set border 31\nset ticslevel 0\nset view 62,128\nset grid z\nset zrange [0:*]\nset logscale x\nset autoscale "
+        "xfix\n";
     out += "set xtics offset 0,-0.3\nset ytics offset 0,-0.3\n";
     std::string plots;
     for (std::size_t i = 0; i < chart.series.size(); ++i) {

@@ -35,8 +35,8 @@ struct Chart {
     Axis x, y;
     std::vector<ChartLine> lines;
     std::vector<ChartRule> rules;
-    double bar_width = 0;           // > 0: the lines are bars of this width instead
-    std::string key = "top right";  // where the legend is, as gnuplot says it; empty: none
+    double bar_width = 0;                                 // > 0: the lines are bars of this width instead
+    std::string key = "tmargin center horizontal nobox";  // where the legend is, in gnuplot's words; empty: none
     int width = 640, height = 440;
 };
 

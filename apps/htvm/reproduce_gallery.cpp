@@ -134,10 +134,11 @@ std::string surface_words(const std::vector<const Match*>& matches, std::size_t 
         out += fmt::format(" {:.2f} and {:.2f} mm at {:.1f} bpvf;", match->m2_mm[0][frame], match->m2_mm[1][frame],
                            match->rate);
     out.back() = '.';
+    const std::string often = matches.size() == 1 ? "." : " each time.";
     std::size_t better = 0;
     for (const auto* match : matches) better += match->m2_mm[0][frame] < match->m2_mm[1][frame] ? 1 : 0;
-    if (better == matches.size()) return out + " The paper's coder is nearer to the original each time.";
-    if (better == 0) return out + " TFAN is nearer to the original each time.";
+    if (better == matches.size()) return out + " The paper's coder is nearer to the original" + often;
+    if (better == 0) return out + " TFAN is nearer to the original" + often;
     return out + fmt::format(" The paper's coder is nearer to the original at {} of {} rates.", better, matches.size());
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "core/parallel.h"
 #include "htvm/decoder.hpp"
@@ -60,7 +61,7 @@ Result<double> quality_near_rate(const SourceFrames& source, double rate, int ke
         auto encoder = Encoder::create(paper_options(source.facts(), quality, key_interval, thread_count(threads)));
         if (!encoder) return tl::unexpected(encoder.error());
         LayerTotals sums;
-        for (std::size_t i = 0; i < std::min<std::size_t>(3, source.size()); ++i) {
+        for (const std::size_t i : std::set<std::size_t>{0, source.size() / 2, source.size() - 1}) {
             const auto frame = source.frame(i);
             if (!frame) return tl::unexpected(frame.error());
             if (auto pushed = push(*encoder, **frame); !pushed) return tl::unexpected(pushed.error());

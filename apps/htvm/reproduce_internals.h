@@ -31,7 +31,7 @@ struct InternalRun {
     double bits_per_vertex = 0;  // of all frames
 };
 
-// The quality of 20, 25 ... 95 whose rate over the first three frames is nearest to `rate`, bpvf.
+// The quality of 20, 25 ... 95 whose rate over EP-frames in the middle and at the end is nearest to `rate`, bpvf.
 Result<double> quality_near_rate(const SourceFrames& source, double rate, int key_interval, unsigned threads);
 
 // The paper's coder over the whole sequence.

@@ -21,9 +21,9 @@ struct ExperimentPlan {
     int key_interval = 30;
     std::vector<int> intervals{1, 2, 3, 5, 10, 30};  // figure 7, with interval_qualities
     std::vector<double> interval_qualities{25, 60};
-    std::vector<double> geometry_steps{8, 4, 2, 1};       // mm; figures 11 to 13 and 16
+    std::vector<double> geometry_steps{4, 2.5, 1.6, 1};   // mm; figures 11 to 13 and 16
     std::vector<double> colour_columns{16, 6};            // colour steps that go with every geometry step
-    std::vector<double> geometry_rows{4, 1};              // geometry steps that go with every colour step
+    std::vector<double> geometry_rows{2.5, 1};            // geometry steps that go with every colour step
     std::vector<double> colour_steps{32, 16, 6, 3};       // levels
     double picture_colour_step = 6;                       // figure 16
     std::vector<double> noise_powers{0, 20, 40, 60, 80};  // mm^2; figure 20
