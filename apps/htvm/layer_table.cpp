@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -20,6 +21,11 @@ constexpr std::array<Column, 11> columns = {{{"pose", &LayerBytes::pose},
                                              {"distance order", &LayerBytes::distance_orders},
                                              {"external intra", &LayerBytes::external_intra},
                                              {"overhead", &LayerBytes::overhead}}};
+
+std::string key_of(std::string name) {
+    std::replace(name.begin(), name.end(), ' ', '_');
+    return name;
+}
 
 }  // namespace
 
@@ -57,13 +63,14 @@ std::string layer_table(const LayerTotals& intra, const LayerTotals& enhanced) {
 
 nlohmann::json layers_json(const LayerBytes& bytes) {
     nlohmann::json out;
-    for (const auto& [name, member] : columns) {
-        std::string key = name;
-        for (auto& c : key)
-            if (c == ' ') c = '_';
-        out[key] = bytes.*member;
-    }
+    for (const auto& [name, member] : columns) out[key_of(name)] = bytes.*member;
     out["total"] = bytes.total();
+    return out;
+}
+
+LayerBytes layers_from_json(const nlohmann::json& json) {
+    LayerBytes out;
+    for (const auto& [name, member] : columns) out.*member = json.at(key_of(name)).get<std::size_t>();
     return out;
 }
 

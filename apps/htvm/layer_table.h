@@ -24,6 +24,8 @@ double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);
 std::string layer_table(const LayerTotals& intra, const LayerTotals& enhanced);
 
 nlohmann::json layers_json(const LayerBytes& bytes);
+// The reverse; throws as nlohmann-json does where a layer is missing or no number.
+LayerBytes layers_from_json(const nlohmann::json& json);
 nlohmann::json frame_json(const FrameInfo& info);
 const char* type_name(FrameType type);  // I, EP
 

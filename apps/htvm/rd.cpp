@@ -20,6 +20,7 @@
 #include "rd_source.h"
 #include "rd_sweep.h"
 #include "terminal.h"
+#include "work_folder.h"
 
 namespace htvm::app {
 namespace {
@@ -41,25 +42,6 @@ struct Options {
     bool geometry_only = false, keep_frames = false, again = false, png = false, json = false;
     std::string output;
 };
-
-// Removed with all that is in it, however the command ends.
-struct WorkFolder {
-    path where;
-    explicit WorkFolder(path folder) : where(std::move(folder)) {}
-    WorkFolder(const WorkFolder&) = delete;
-    WorkFolder& operator=(const WorkFolder&) = delete;
-    ~WorkFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(where, ignored);
-    }
-};
-
-Result<void> make_folder(const path& folder) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) return fail(ErrorKind::bad_input, folder.string() + " cannot be made: " + error.message());
-    return {};
-}
 
 Result<std::vector<CoderUnderTest>> chosen_coders(const Options& options) {
     const auto built_in = built_in_coders(options.key_interval);

@@ -109,26 +109,6 @@ std::string file_name(const Measure& measure, bool by_bits_per_vertex) {
     return fmt::format("{}_{}", measure.key, by_bits_per_vertex ? "bpvf" : "mbits");
 }
 
-// As gnuplot's single-quoted string.
-std::string quoted(const std::string& text) {
-    std::string out = "'";
-    for (const char c : text) {
-        if (c == '\'') out += c;
-        out += c == '\n' ? ' ' : c;
-    }
-    return out + "'";
-}
-
-std::string axis_lines(char which, const Axis& axis, const std::string& label) {
-    std::string out =
-        fmt::format("{} logscale {}\nset {}range [{:.6g}:{:.6g}]\nset {}label {} noenhanced\n",
-                    axis.logarithmic ? "set" : "unset", which, which, axis.low, axis.high, which, quoted(label));
-    out += fmt::format("set {}tics (", which);
-    for (std::size_t i = 0; i < axis.tics.size(); ++i)
-        out += fmt::format("{}\"{:.4g}\" {:.6g}", i == 0 ? "" : ", ", axis.tics[i], axis.tics[i]);
-    return out + ")\n";
-}
-
 // The curves of one picture in gnuplot's language, and the values that its axes must hold.
 struct PictureCurves {
     std::string data, plots;
@@ -177,6 +157,26 @@ std::string picture_lines(std::span<const RdPoint> points, const Measure& measur
 }
 
 }  // namespace
+
+std::string quoted(const std::string& text) {
+    std::string out = "'";
+    for (const char c : text) {
+        if (c == '\'') out += c;
+        out += c == '\n' ? ' ' : c;
+    }
+    return out + "'";
+}
+
+std::string axis_lines(char which, const Axis& axis, const std::string& label) {
+    std::string out =
+        fmt::format("{} logscale {}\nset {}range [{:.6g}:{:.6g}]\nset {}label {} noenhanced\n",
+                    axis.logarithmic ? "set" : "unset", which, which, axis.low, axis.high, which, quoted(label));
+    if (axis.tics.empty()) return out + fmt::format("set {}tics auto\n", which);
+    out += fmt::format("set {}tics (", which);
+    for (std::size_t i = 0; i < axis.tics.size(); ++i)
+        out += fmt::format("{}\"{:.4g}\" {:.6g}", i == 0 ? "" : ", ", axis.tics[i], axis.tics[i]);
+    return out + ")\n";
+}
 
 Axis rate_axis(std::span<const double> values) {
     if (values.empty()) return {};

@@ -26,6 +26,11 @@ Axis error_axis(std::span<const double> values);
 // From a round number below the smallest to one above the largest value; a PSNR has no zero to start from.
 Axis psnr_axis(std::span<const double> values);
 
+// As gnuplot's single-quoted string.
+std::string quoted(const std::string& text);
+// gnuplot's lines that set the x or y axis; without tics it chooses them.
+std::string axis_lines(char which, const Axis& axis, const std::string& label);
+
 struct Curves {
     std::string capture;           // names it in every title
     std::filesystem::path folder;  // where the pictures go

@@ -18,19 +18,6 @@ constexpr std::array<Measure, 9> all_measures = {{
     {"d2_db", "D2, point to plane, PSNR", "D2", "dB", "d1", false, true, 2},
 }};
 
-using Layer = std::pair<const char*, std::size_t LayerBytes::*>;
-constexpr std::array<Layer, 11> layers = {{{"pose", &LayerBytes::pose},
-                                           {"transforms", &LayerBytes::transforms},
-                                           {"geometry", &LayerBytes::geometry},
-                                           {"colour", &LayerBytes::colour},
-                                           {"normals", &LayerBytes::normals},
-                                           {"texcoords", &LayerBytes::texcoords},
-                                           {"mapping", &LayerBytes::mapping},
-                                           {"fans", &LayerBytes::fans},
-                                           {"distance_order", &LayerBytes::distance_orders},
-                                           {"external_intra", &LayerBytes::external_intra},
-                                           {"overhead", &LayerBytes::overhead}}};
-
 FrameInfo info_of(const RdFrame& frame) {
     FrameInfo info;
     info.type = frame.type;
@@ -64,7 +51,7 @@ RdFrame frame_from_json(const nlohmann::json& json) {
     frame.type =
         json.at("type").get<std::string>() == type_name(FrameType::enhanced) ? FrameType::enhanced : FrameType::intra;
     frame.vertices = json.at("vertices").get<std::uint32_t>();
-    for (const auto& [name, member] : layers) frame.bytes.*member = json.at("bytes").at(name).get<std::size_t>();
+    frame.bytes = layers_from_json(json.at("bytes"));
     frame.encode_ms = json.at("encode_ms").get<double>();
     frame.decode_ms = optional_number(json, "decode_ms");
     frame.m1_mm = optional_number(json, "m1_mm");

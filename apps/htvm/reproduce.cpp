@@ -18,6 +18,7 @@
 #include "reproduce_summary.h"
 #include "reproduce_sweeps.h"
 #include "terminal.h"
+#include "work_folder.h"
 
 namespace htvm::app {
 namespace {
@@ -34,25 +35,6 @@ struct Options {
     std::size_t memory_megabytes = 1024;
     bool quick = false;
 };
-
-// Removed with all that is in it, however the command ends.
-struct WorkFolder {
-    path where;
-    explicit WorkFolder(path folder) : where(std::move(folder)) {}
-    WorkFolder(const WorkFolder&) = delete;
-    WorkFolder& operator=(const WorkFolder&) = delete;
-    ~WorkFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(where, ignored);
-    }
-};
-
-Result<void> make_folder(const path& folder) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) return fail(ErrorKind::bad_input, folder.string() + " cannot be made: " + error.message());
-    return {};
-}
 
 std::set<int> wanted_figures(const Options& options) {
     if (!options.figures.empty()) return {options.figures.begin(), options.figures.end()};

@@ -12,27 +12,6 @@
 namespace htvm::app {
 namespace {
 
-// As gnuplot's single-quoted string.
-std::string quoted(const std::string& text) {
-    std::string out = "'";
-    for (const char c : text) {
-        if (c == '\'') out += c;
-        out += c == '\n' ? ' ' : c;
-    }
-    return out + "'";
-}
-
-std::string axis_lines(char which, const Axis& axis, const std::string& label) {
-    std::string out =
-        fmt::format("{} logscale {}\nset {}range [{:.6g}:{:.6g}]\nset {}label {} noenhanced\n",
-                    axis.logarithmic ? "set" : "unset", which, which, axis.low, axis.high, which, quoted(label));
-    if (axis.tics.empty()) return out + fmt::format("set {}tics auto\n", which);
-    out += fmt::format("set {}tics (", which);
-    for (std::size_t i = 0; i < axis.tics.size(); ++i)
-        out += fmt::format("{}\"{:.4g}\" {:.6g}", i == 0 ? "" : ", ", axis.tics[i], axis.tics[i]);
-    return out + ")\n";
-}
-
 std::string opening(const std::string& title, int width, int height, const std::filesystem::path& output) {
     std::string out = "reset\n";
     out += fmt::format("set terminal svg size {},{} font 'Helvetica,Arial,sans-serif,15' background 'white'\n", width,
