@@ -54,6 +54,9 @@ void add_calibrate(CLI::App& app, Run& run) {
     auto* command =
         app.add_subcommand("calibrate", "Measure the bones' radii on a frame in T-pose, for encode --radii");
     add_capture_options(*command, options->capture);
+    command->get_option("--skeleton")
+        ->description("The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON")
+        ->required();
     command
         ->add_option(
             "--percentile", options->calibration.percentile,

@@ -114,6 +114,17 @@ void warn_of_length(const MeshSource& original, const MeshSource& decoded, const
                      decoded.name, decoded.frames, std::min(wanted(original.frames), wanted(decoded.frames))));
 }
 
+// A stream's length is known when it has ended only.
+void warn_of_ends(const MeshSource& original, const MeshSource& decoded, bool original_ended, bool decoded_ended,
+                  std::size_t compared) {
+    if (decoded.frames > 0 && original.frames > 0) return;
+    if (original_ended && decoded_ended) return;
+    const auto& longer = original_ended ? decoded : original;
+    const auto& shorter = original_ended ? original : decoded;
+    warn(fmt::format("{} has {} frames and {} has more: only the first {} are compared", shorter.name, compared,
+                     longer.name, compared));
+}
+
 Result<Measured> measure(const Options& options) {
     auto original = open_meshes(options.original, options.unit);
     if (!original) return tl::unexpected(original.error());
@@ -130,7 +141,10 @@ Result<Measured> measure(const Options& options) {
         if (!first) return tl::unexpected(first.error());
         auto second = decoded->next(*decoded);
         if (!second) return tl::unexpected(second.error());
-        if (!*first || !*second) break;
+        if (!*first || !*second) {
+            warn_of_ends(*original, *decoded, !*first, !*second, frame);
+            break;
+        }
         auto comparison = compare_frame(**first, **second, options.compare);
         if (!comparison)
             return fail(comparison.error().kind, fmt::format("Frame {}: {}", frame, comparison.error().message));
@@ -270,6 +284,10 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
     command->add_option("--csv", o.csv,
                         "A line a frame to this file, or - for standard output; an infinite PSNR is inf");
+    command->footer(
+        "Examples:\n"
+        "  htvm compare capture/ person.htvm\n"
+        "  htvm compare 'scan_%05d.obj' meshes/ --only m1,m2 --csv errors.csv");
     command->callback([options, &run] { run = [options] { return compare(*options); }; });
 }
 

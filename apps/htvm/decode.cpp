@@ -2,10 +2,13 @@
 #include <fmt/core.h>
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "capture.h"
 #include "commands.h"
@@ -29,6 +32,7 @@ struct Options {
 
 struct Summary {
     std::size_t frames = 0, failed = 0;
+    std::uint32_t due = 0;  // the number of the frame that should come next
     double decode_seconds = 0;
     nlohmann::json list = nlohmann::json::array();
 };
@@ -44,6 +48,7 @@ public:
         out.names_ = std::move(*names);
         std::error_code error;
         if (!out.names_.folder.empty()) std::filesystem::create_directories(out.names_.folder, error);
+        out.folder_alone_ = !out.names_.one_file && options.output.find('%') == std::string::npos;
         if (error)
             return fail(ErrorKind::bad_input, out.names_.folder.string() + " cannot be made: " + error.message());
         return out;
@@ -55,6 +60,7 @@ public:
             MeshFileOptions file_options;
             file_options.millimetres_per_unit = millimetres_per_unit;
             if (auto ok = write_mesh(path, mesh, file_options); !ok) return tl::unexpected(ok.error());
+            written_.insert(path.filename().string());
             return path.string();
         }
         if (auto ok = scale_positions(mesh, 1 / millimetres_per_unit); !ok) return tl::unexpected(ok.error());
@@ -66,15 +72,33 @@ public:
         return std::string("-");
     }
     bool one_file() const { return !standard_ && names_.one_file; }
+    // Meshes in the folder that this run did not write: they would be read as one sequence with its own.
+    std::size_t other_meshes() const {
+        if (!folder_alone_) return 0;  // a pattern tells its own files from others
+        std::size_t others = 0;
+        std::error_code error;
+        const auto folder = names_.folder.empty() ? std::filesystem::path(".") : names_.folder;
+        for (const auto& entry : std::filesystem::directory_iterator(folder, error))
+            if (is_mesh_file_name(entry.path()) && !written_.contains(entry.path().filename().string())) ++others;
+        return others;
+    }
 
 private:
     OutputNames names_;
-    bool standard_ = false;
+    std::set<std::string> written_;
+    bool standard_ = false, folder_alone_ = false;
 };
 
 Result<double> output_unit(const Options& options, const SequenceInfo& info) {
     if (options.unit == "capture") return info.unit_micrometres / 1000.0;
     return millimetres_of_unit(options.unit);
+}
+
+// Frames that were lost on the way leave no damage behind, only a gap in the numbers.
+void tell_gap(Summary& summary, std::uint32_t frame) {
+    if (frame == summary.due + 1) warn(fmt::format("frame {} is not in the stream", summary.due));
+    if (frame > summary.due + 1) warn(fmt::format("frames {} to {} are not in the stream", summary.due, frame - 1));
+    summary.due = frame + 1;
 }
 
 // True while there is more to decode.
@@ -88,11 +112,13 @@ Result<bool> decode_next(const Options& options, StreamInput& input, Decoder& de
     if (!frame) {
         if (frame.error().kind == ErrorKind::unsupported || frame.error().kind == ErrorKind::limit)
             return tl::unexpected(frame.error());
+        if (packet->kind == PacketKind::intra || packet->kind == PacketKind::enhanced) tell_gap(summary, packet->frame);
         warn(fmt::format("frame {} is lost: {}", packet->frame, frame.error().message));
         ++summary.failed;
         return true;
     }
     if (!*frame) return true;
+    tell_gap(summary, packet->frame);
     summary.decode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     auto unit = output_unit(options, *decoder.sequence());
     if (!unit) return tl::unexpected(unit.error());
@@ -139,8 +165,16 @@ Result<void> decode(const Options& options) {
                                .dump(2));
     if (!decoder.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
-    note(fmt::format("{} frames to {}, decoded at {:.1f} frames/s", summary.frames, options.output,
-                     static_cast<double>(summary.frames) / std::max(summary.decode_seconds, 1e-9)));
+    const double rate = static_cast<double>(summary.frames) / std::max(summary.decode_seconds, 1e-9);
+    const std::string where = options.output == "-" ? "standard output" : options.output;
+    note(fmt::format("{} to {}, decoded at {:.1f} frames/s",
+                     output->one_file() ? "the first frame alone" : fmt::format("{} frames", summary.frames), where,
+                     rate));
+    if (const auto others = output->other_meshes(); others > 0 && summary.frames > 0)
+        warn(
+            fmt::format("the output folder holds {} mesh files besides, of an earlier run perhaps; whoever reads the "
+                        "folder reads them too",
+                        others));
     if (input->damaged_bytes() > 0)
         return fail(ErrorKind::corrupt_stream,
                     fmt::format("{} is damaged: {} bytes were no sound packet; {} frames were decoded, {} lost besides",

@@ -30,6 +30,7 @@ Result<void> drain(Encoder& encoder, StreamOutput& output) {
 struct Summary {
     LayerTotals intra, enhanced;
     double encode_seconds = 0;
+    std::size_t without_triangles = 0;
     nlohmann::json frames = nlohmann::json::array();
 };
 
@@ -39,6 +40,7 @@ Result<void> encode_frames(Capture& capture, Encoder& encoder, StreamOutput& out
         const auto mesh = capture.next();
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) break;
+        if ((*mesh)->triangles.empty()) ++summary.without_triangles;
         const auto start = std::chrono::steady_clock::now();
         if (auto ok = encoder.push(**mesh, capture.pose(), capture.timestamp_us()); !ok) {
             const auto done = summary.intra.frames + summary.enhanced.frames;
@@ -71,6 +73,9 @@ Result<void> encode(const Options& options) {
     if (auto ok = encode_frames(*capture, *encoder, *output, options.json, summary); !ok) return ok;
     const auto frames = summary.intra.frames + summary.enhanced.frames;
     if (frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
+    if (summary.without_triangles > 0)
+        warn(fmt::format("{} of {} frames have no triangles; see that the files hold meshes", summary.without_triangles,
+                         frames));
     const double seconds = static_cast<double>(frames) / capture->fps();
     const double megabits = 8e-6 * static_cast<double>(output->bytes());
     if (options.json) {

@@ -28,7 +28,7 @@ void print_frame(const FrameInfo& f) {
     auto bpv = [&](std::size_t bytes) { return bits_per_vertex(bytes, f.source_vertices); };
     const auto& b = f.bytes;
     fmt::print(
-        "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>8} {:>9} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} "
+        "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>9} {:>9} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} "
         "{:>8.3f}\n",
         f.frame, type_name(f.type), f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices, f.triangles,
         b.total(), bpv(b.pose + b.transforms), bpv(b.geometry + b.external_intra), bpv(b.colour),
@@ -36,7 +36,7 @@ void print_frame(const FrameInfo& f) {
 }
 
 void print_sequence(const SequenceInfo& s, const std::string& input) {
-    fmt::print("{}: {:g} frames/s, positions in steps of {:g} mm, captured in units of {:g} mm\n", input,
+    fmt::print("{}: {:g} frames/s, positions on a lattice of {:g} mm, captured in units of {:g} mm\n", input,
                static_cast<double>(s.fps_numerator) / s.fps_denominator, s.lattice_step, s.unit_micrometres / 1000.0);
     if (!s.skeleton_tracked) {
         fmt::print("no skeleton: one bone stands in, radius {:.0f} mm\n", s.radii[0]);
@@ -78,8 +78,8 @@ Result<void> info(const Options& options) {
             if (!options.json && first) print_sequence(*headers.sequence(), options.input);
             if (!options.json && first && !options.summary)
                 fmt::print(
-                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>8} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
-                    "frame", "type", "ref", "time s", "vertices", "triangs", "bytes", "motion", "geometry", "colour",
+                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+                    "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "motion", "geometry", "colour",
                     "attribs", "mapping", "fans", "d.order", "bpv");
         }
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
@@ -136,7 +136,9 @@ void add_info(CLI::App& app, Run& run) {
     command->add_flag("--json", options->json, "Everything as JSON");
     command->footer(
         "Columns: motion is the skeleton (I) or the bones' transforms (EP); fans and d.order are the connectivity's\n"
-        "two parts, TFAN's and the distance order's. All in bits per vertex of the captured mesh.");
+        "two parts, TFAN's and the distance order's; attribs are normals and texture coordinates; bpv is the frame's\n"
+        "total, with packet and layer headers (overhead, below). All in bits per vertex of the captured mesh.\n"
+        "The lattice is what decoded positions lie on; the quality's step (encode -q) is coarser.");
     command->callback([options, &run] { run = [options] { return info(*options); }; });
 }
 

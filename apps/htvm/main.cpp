@@ -2,7 +2,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <exception>
+#include <string>
 
 #include "commands.h"
 #include "compare.h"
@@ -24,14 +26,25 @@ int exit_code(htvm::ErrorKind kind) {
     return 1;
 }
 
+// What was wrong with the command line, and where to read on.
+std::string usage_message(const CLI::App* app, const CLI::Error& error) {
+    std::string command = "htvm";
+    for (const auto* named : app->get_subcommands()) command += " " + named->get_name();
+    return fmt::format("htvm: error: {}; '{} --help' tells more\n", error.what(), command);
+}
+
+// Output that is still buffered may fail to arrive: a full disk must not look like success.
+bool output_arrived() { return std::fflush(stdout) == 0 && std::ferror(stdout) == 0; }
+
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app{"htvm compresses human time-varying meshes: captured 3D people, one triangle mesh a frame."};
+    CLI::App app{"htvm compresses human time-varying meshes: captured 3D people, one triangle mesh a frame.", "htvm"};
     app.footer(
         "Exit codes: 0 done, 1 bad input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit exceeded.\n"
         "'htvm COMMAND --help' explains a command.");
     app.set_version_flag("--version", "htvm " HTVM_VERSION);
+    app.failure_message(usage_message);
     app.require_subcommand(1);
     htvm::app::Run run;
     htvm::app::add_synth(app, run);
@@ -55,7 +68,11 @@ int main(int argc, char** argv) {
     }
     try {
         const auto done = run();
-        if (done) return 0;
+        if (done && output_arrived()) return 0;
+        if (done) {
+            fmt::print(stderr, "htvm: error: standard output cannot be written\n");
+            return 1;
+        }
         fmt::print(stderr, "htvm: error: {}\n", done.error().message);
         return exit_code(done.error().kind);
     } catch (const std::bad_alloc&) {

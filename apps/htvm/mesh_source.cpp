@@ -1,5 +1,8 @@
 #include "mesh_source.h"
 
+#include <fmt/core.h>
+
+#include <cstdint>
 #include <memory>
 
 #include "htvm/decoder.hpp"
@@ -26,15 +29,25 @@ Result<MeshSource> open_stream(const std::string& path) {
     DecoderOptions options;
     options.intra_coder = draco_intra_coder();
     source.next = [input = std::make_shared<StreamInput>(std::move(*input)),
-                   decoder = std::make_shared<Decoder>(options)](MeshSource& self) -> Result<std::optional<Mesh>> {
+                   decoder = std::make_shared<Decoder>(options),
+                   expected = std::uint32_t{0}](MeshSource& self) mutable -> Result<std::optional<Mesh>> {
         while (const auto packet = input->next()) {
             auto frame = decoder->push(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (decoder->sequence()) self.millimetres_per_unit = decoder->sequence()->unit_micrometres / 1000.0;
-            if (*frame) return std::optional(std::move((*frame)->mesh));
+            if (!*frame) continue;
+            // Without this, every frame after a lost one would be taken for its neighbour.
+            if (packet->frame != expected)
+                return fail(ErrorKind::corrupt_stream,
+                            fmt::format("{} has frame {} where frame {} is due: frames were lost; decode it, and give "
+                                        "the same frames on both sides",
+                                        self.name, packet->frame, expected));
+            ++expected;
+            return std::optional(std::move((*frame)->mesh));
         }
         if (input->damaged_bytes() > 0 || input->cut_short_bytes() > 0 || !decoder->sequence())
-            return fail(ErrorKind::corrupt_stream, self.name + " is damaged, cut short, or not an htvm stream");
+            return fail(ErrorKind::corrupt_stream,
+                        self.name + " is damaged, cut short, or not an htvm stream; 'htvm info' tells more");
         return std::optional<Mesh>{};
     };
     return source;
@@ -43,6 +56,8 @@ Result<MeshSource> open_stream(const std::string& path) {
 }  // namespace
 
 Result<MeshSource> open_meshes(const std::string& name, const std::string& unit) {
+    if (name == "-")
+        return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
     if (name.ends_with(".htvm")) return open_stream(name);
     const auto chosen = unit_named(unit);
     if (!chosen) return tl::unexpected(chosen.error());

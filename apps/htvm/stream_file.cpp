@@ -43,7 +43,15 @@ Result<StreamOutput> StreamOutput::open(const std::string& path) {
     output.standard_ = path == "-";
     if (output.standard_) return output;
     output.file_.open(path, std::ios::binary | std::ios::trunc);
-    if (!output.file_) return fail(ErrorKind::bad_input, path + " cannot be written: " + std::strerror(errno));
+    if (!output.file_) {
+        const std::string reason = std::strerror(errno);
+        const auto folder = std::filesystem::path(path).parent_path();
+        std::error_code error;
+        if (!folder.empty() && !std::filesystem::exists(folder, error))
+            return fail(ErrorKind::bad_input,
+                        path + " cannot be written: there is no folder " + folder.string() + "; make it first");
+        return fail(ErrorKind::bad_input, path + " cannot be written: " + reason);
+    }
     return output;
 }
 
@@ -51,8 +59,10 @@ Result<void> StreamOutput::write(const Packet& packet) {
     const auto bytes = write_packet(packet);
     std::ostream& out = standard_ ? std::cout : file_;
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    if (standard_) out.flush();
-    if (!out) return fail(ErrorKind::bad_input, path_ + " cannot be written: " + std::strerror(errno));
+    out.flush();
+    if (!out)
+        return fail(ErrorKind::bad_input,
+                    (standard_ ? "standard output" : path_) + " cannot be written: " + std::strerror(errno));
     bytes_ += bytes.size();
     return {};
 }

@@ -147,7 +147,8 @@ void add_synth(CLI::App& app, Run& run) {
         "in every frame, as reconstructions are: the number of vertices, their places and the triangles all change.\n"
         "The same options give the same bytes, and every frame can be made on its own (--first-frame).");
     command
-        ->add_option("OUT_DIR", o.folder, "Folder to write frame_00000.ply ..., skeleton.json, skeleton_true.json to")
+        ->add_option("OUT_DIR,-o,--output", o.folder,
+                     "Folder to write frame_00000.ply ..., skeleton.json, skeleton_true.json to")
         ->required();
     command->add_option("--frames", o.frames, "How many frames")
         ->check(CLI::Range(1, most_frames))
@@ -174,7 +175,7 @@ void add_synth(CLI::App& app, Run& run) {
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Print what was written as JSON on standard output");
     command->footer(
-        "Example: a capture of 2 seconds, then its first frame coded and shown\n"
+        "Example: a capture of 2 seconds, then its stream and what is in it\n"
         "  htvm synth capture --frames 60\n"
         "  htvm encode capture --skeleton capture/skeleton.json -o capture.htvm\n"
         "  htvm info capture.htvm");
