@@ -1,0 +1,106 @@
+"""Chapters 2 to 4 of docs/bitstream.md: packets, the sequence header, the frame payload.
+Nothing in here is entropy-coded."""
+import struct
+import zlib
+
+from conventions import Bytes, L, Unsupported, check
+
+
+# ---------------------------------------------------------------------------------------------- 2. packets
+
+SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX = 1, 2, 3, 4, 5
+
+
+class Packet:
+    pass
+
+
+def packets(data, max_payload=1 << 28):
+    """Every whole packet of a stream; damage is passed over."""
+    at = 0
+    while True:
+        at = data.find(b"HTVP", at)
+        if at < 0 or at + 32 > len(data):
+            return
+        packet = Packet()
+        (packet.kind, packet.frame, packet.reference, packet.timestamp, size, crc) = struct.unpack(
+            "<B3xIIqII", data[at + 4 : at + 32]
+        )
+        if zlib.crc32(data[at + 4 : at + 28]) != crc or size > max_payload:
+            at += 1
+            continue
+        packet.payload = data[at + 32 : at + 32 + size]
+        tail = data[at + 32 + size : at + 36 + size]
+        if len(tail) < 4 or struct.unpack("<I", tail)[0] != zlib.crc32(packet.payload):
+            at += 32
+            continue
+        packet.offset = at
+        yield packet
+        at += 36 + size
+
+
+# ---------------------------------------------------------------------------------------------- 3. sequence header
+
+
+class Header:
+    pass
+
+
+def read_sequence_header(payload):
+    read = Bytes(payload)
+    header = Header()
+    check(read.take(4) == b"htvm", "this is no htvm stream")
+    version = read.field("H")
+    if version != 1:
+        raise Unsupported("version %d" % version)
+    header.bits = read.field("B")
+    header.origin = [read.field("i") for _ in range(3)]
+    header.fps = (read.field("I"), read.field("I"))
+    header.unit = read.field("I")
+    header.m = read.field("B")
+    header.tracked = read.field("B") != 0
+    joints = read.field("H")
+    check(header.bits <= 16 and min(header.fps) > 0 and header.unit > 0, "a field is out of range")
+    check(1 <= header.m <= 64 and joints <= 1024, "a field is out of range")
+    header.joints = [read.take(read.field("B")) for _ in range(joints)]
+    bones = read.field("H")
+    check(1 <= bones <= 1024, "a wrong number of bones")
+    header.bones, header.radii = [], []
+    for _ in range(bones):
+        bone = (read.field("H"), read.field("H"))
+        radius = read.field("I")
+        check(max(bone) < joints and radius <= L, "a bone is out of range")
+        header.bones.append(bone)
+        header.radii.append(radius)
+    header.bytes = payload
+    return header
+
+
+# ---------------------------------------------------------------------------------------------- 4. frame payload
+
+POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL = range(1, 11)
+
+
+class Frame:
+    def layer(self, number):
+        return self.layers.get(number, b"")
+
+
+def read_frame_payload(payload):
+    read = Bytes(payload)
+    fields = [read.varint() for _ in range(9)]
+    check(max(fields) < 1 << 31, "a number is out of range")
+    frame = Frame()
+    frame.vertices, frame.triangles, frame.geometry_step, frame.colour_step = fields[2:6]
+    frame.intra_coder, frame.geometry_codebook, frame.colour_codebook = fields[6:9]
+    check(1 <= frame.geometry_step <= 1 << 24 and 1 <= frame.colour_step <= 255, "a step is out of range")
+    table = []
+    for _ in range(read.field("B")):
+        table.append((read.field("B"), read.varint()))
+    frame.layers = {}
+    for number, size in table:
+        layer = read.take(size)
+        if number < 11:
+            check(number not in frame.layers, "a layer comes twice")
+            frame.layers[number] = layer
+    return frame
