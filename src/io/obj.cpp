@@ -39,7 +39,17 @@ struct ObjText {
     std::vector<Vector3f> normals;
     std::vector<Corner> corners;
     std::vector<Polygon> polygons;
+    std::size_t foreign_line = 0;  // the first whose statement is none of OBJ's; 0: none
 };
+
+// Statements that hold no mesh and are passed over.
+bool is_other_statement(std::string_view keyword) {
+    constexpr std::array<std::string_view, 28> others = {
+        "",       "g",      "o",      "s",   "mg",   "l",    "p",     "vp",      "usemtl", "mtllib",
+        "usemap", "maplib", "cstype", "deg", "step", "curv", "curv2", "surf",    "parm",   "trim",
+        "hole",   "scrv",   "sp",     "end", "con",  "lod",  "bevel", "c_interp"};
+    return std::find(others.begin(), others.end(), keyword) != others.end();
+}
 
 tl::unexpected<Error> bad_line(std::size_t line, const std::string& why) {
     return fail(ErrorKind::bad_input, "line " + std::to_string(line) + " of the OBJ: " + why);
@@ -146,7 +156,10 @@ Result<void> read_statement(ObjText& obj, std::string_view line, std::size_t lin
     const std::string_view keyword = take_word(line);
     if (keyword == "v") return read_position(obj, line, line_number, limits);
     if (keyword == "f") return read_face(obj, line, line_number, limits);
-    if (keyword != "vt" && keyword != "vn") return {};
+    if (keyword != "vt" && keyword != "vn") {
+        if (obj.foreign_line == 0 && !is_other_statement(keyword)) obj.foreign_line = line_number;
+        return {};
+    }
     std::array<double, 8> values{};
     const auto count = take_numbers(line, values);
     if (keyword == "vt") {
@@ -327,6 +340,9 @@ Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits) {
         const std::string_view line = take_line(text, line_number, joined);
         if (auto ok = read_statement(obj, line, first_line, limits); !ok) return tl::unexpected(ok.error());
     }
+    if (obj.positions.empty() && obj.foreign_line > 0)
+        return bad_line(obj.foreign_line,
+                        "it is no statement of OBJ, and there is no vertex: this is another kind of file");
     if (auto ok = check_corners(obj); !ok) return tl::unexpected(ok.error());
     return mesh_of(obj);
 }

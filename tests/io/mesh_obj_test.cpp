@@ -146,5 +146,14 @@ TEST(ObjWriting, TheTextOfASmallMeshIsThis) {
     EXPECT_EQ(*write_obj(mesh), "v 1 0.5 -2 0 0.2 1\nvt 0.25 1\nvn 0 0 1\nf 1/1/1 1/1/1 1/1/1\n");
 }
 
+TEST(ObjReading, AnotherKindOfTextIsNoEmptyMesh) {
+    const auto prose = read_obj("Dear diary,\ntoday I captured a dancer.\n");
+    ASSERT_FALSE(prose.has_value());
+    EXPECT_EQ(prose.error().kind, ErrorKind::bad_input);
+    EXPECT_NE(prose.error().message.find("line 1"), std::string::npos) << prose.error().message;
+    EXPECT_TRUE(read_obj("# nothing\no empty\ng none\n").has_value()) << "an OBJ without a vertex is an empty mesh";
+    EXPECT_TRUE(read_obj("").has_value());
+}
+
 }  // namespace
 }  // namespace htvm
