@@ -76,16 +76,28 @@ UnvisitedNear::UnvisitedNear(std::span<const LatticePoint> positions, int m, uns
     constexpr std::size_t worth_threads = 4096;
     if (thread_count(threads) < 2 || positions.size() < worth_threads || m_ < first_look) return;
     first_nearest_.resize(positions.size() * first_look);
-    parallel_for(positions.size(), thread_count(threads), worth_threads / 4, [&](std::size_t begin, std::size_t end) {
+    ahead_ = std::thread([this] { search_ahead(); });
+}
+
+UnvisitedNear::~UnvisitedNear() {
+    stop_ = true;
+    if (ahead_.joinable()) ahead_.join();
+}
+
+void UnvisitedNear::search_ahead() {
+    constexpr std::size_t block = 64;
+    for (std::size_t begin = 0; begin < positions_.size() && !stop_; begin += block) {
+        const std::size_t end = std::min(begin + block, positions_.size());
         for (std::size_t v = begin; v < end; ++v)
             order_.find(static_cast<std::uint32_t>(v), std::span(first_nearest_).subspan(v * first_look, first_look));
-    });
+        searched_.store(end, std::memory_order_release);
+    }
 }
 
 void UnvisitedNear::look(const VisitedPositions& known, const FanState& fan, std::uint32_t focus) {
     if (focus != focus_) {
         focus_ = focus;
-        if (first_nearest_.empty()) {
+        if (focus >= searched_.load(std::memory_order_acquire)) {
             looked_ = found_ = order_.find(focus, std::span(nearest_).first(std::min(first_look, m_)));
         } else {
             looked_ = found_ = first_look;

@@ -5,9 +5,11 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <span>
+#include <thread>
 #include <vector>
 
 #include "codec/mtfan.h"
@@ -59,8 +61,12 @@ struct CandidateClasses {
 // The not yet visited vertices among the m nearest to a focus, nearest first.
 class UnvisitedNear {
 public:
-    // With more than one thread, the nearest ones of all vertices are searched for at once, beforehand.
+    // With more than one thread, another searches for the nearest ones of all vertices, ahead of the traversal, which
+    // searches itself where it is there first: both find the same.
     UnvisitedNear(std::span<const LatticePoint> positions, int m, unsigned threads);
+    ~UnvisitedNear();
+    UnvisitedNear(const UnvisitedNear&) = delete;
+    UnvisitedNear& operator=(const UnvisitedNear&) = delete;
 
     bool visited(std::uint32_t vertex) const { return visited_[vertex]; }
     void visit(std::uint32_t vertex) { visited_[vertex] = true; }
@@ -72,12 +78,16 @@ public:
     CandidateClasses classes(const VisitedPositions& known, const FanState& fan, std::size_t place) const;
 
 private:
+    void search_ahead();
     void add_candidate(const VisitedPositions& known, const FanState& fan, std::uint32_t vertex);
 
     std::span<const LatticePoint> positions_;
     NearestOrder order_;
     std::size_t m_;
-    std::vector<std::uint32_t> first_nearest_;  // by vertex, first_look each; empty: searched for when needed
+    std::vector<std::uint32_t> first_nearest_;  // by vertex, first_look each, of the vertices below searched_
+    std::atomic<std::size_t> searched_ = 0;
+    std::atomic<bool> stop_ = false;
+    std::thread ahead_;
     std::vector<bool> visited_;
     std::uint32_t focus_;  // whose nearest vertices `nearest_` holds
     std::size_t found_ = 0, looked_ = 0, count_ = 0;

@@ -21,8 +21,8 @@ struct RigidMotion {
 RigidMotion align(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to);
 
 struct RegistrationOptions {
-    int iterations = 16;              // at most; stops when the motion no longer changes
-    std::size_t samples = 500;        // points of the frame used, evenly spread
+    int iterations = 12;              // at most; stops when the motion no longer changes
+    std::size_t samples = 400;        // points of the frame used, evenly spread
     double trim = 0.1;                // share of the worst pairs left out in each iteration: mis-skinned vertices
     std::size_t minimum_points = 12;  // with fewer on either side the start is returned
     bool point_to_plane = false;      // needs normals
