@@ -124,6 +124,10 @@ EnhancedFrameOptions enhanced_options(const State& state) {
     out.geometry.lambda *= ratio * ratio;
     out.geometry.threads = out.colour.threads = out.threads = state.threads;
     out.registration.point_to_plane = state.options.point_to_plane;
+    if (!state.options.point_to_plane) {  // slower to settle
+        out.registration.iterations = 16;
+        out.registration.samples = 500;
+    }
     out.reference_choice =
         state.options.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone : ReferenceChoice::any;
     out.merge_duplicates = state.options.merge_duplicates;
