@@ -12,8 +12,6 @@ namespace {
 
 Eigen::Vector3d vector_of(LatticePoint p) { return {p.x * 1.0, p.y * 1.0, p.z * 1.0}; }
 
-Point3f point_of(LatticePoint p) { return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)}; }
-
 LatticePoint rounded(const Eigen::Vector3d& v) {
     auto whole = [](double c) {
         return static_cast<std::int32_t>(std::lround(std::clamp(c, -1.0 * lattice_limit, 1.0 * lattice_limit)));

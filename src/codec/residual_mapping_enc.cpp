@@ -8,8 +8,6 @@
 namespace htvm {
 namespace {
 
-Point3f point_of(LatticePoint p) { return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)}; }
-
 NearestPoints tree_of(std::span<const LatticePoint> positions) {
     std::vector<Point3f> points;
     points.reserve(positions.size());

@@ -6,9 +6,16 @@
 #include <memory>
 #include <span>
 
+#include "core/lattice.h"
+
 namespace htvm {
 
 using Point3f = std::array<float, 3>;
+
+// A lattice point as the searches take it.
+inline Point3f point_of(LatticePoint p) {
+    return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+}
 
 struct Neighbour {
     std::uint32_t index = 0;
