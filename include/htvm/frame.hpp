@@ -7,8 +7,9 @@
 namespace htvm {
 
 enum class FrameType : std::uint8_t {
-    intra,     // I: by itself
-    enhanced,  // EP: against the last I-frame
+    intra,      // I: by itself
+    enhanced,   // EP: against the last I-frame
+    predicted,  // P: the last I-frame's mesh moved, nothing else
 };
 
 // Bytes of one frame by layer. The paper's layers: geometry, colour, mapping, and connectivity = fans +

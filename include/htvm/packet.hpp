@@ -13,11 +13,12 @@
 namespace htvm {
 
 enum class PacketKind : std::uint8_t {
-    sequence = 1,  // sequence header: needed before any frame; may be repeated
-    intra = 2,     // I-frame
-    enhanced = 3,  // EP-frame: refers to an I-frame
-    codebook = 4,  // a codebook that later EP-frames name
-    index = 5,     // where the I-frames are, at the end of a file; optional
+    sequence = 1,   // sequence header: needed before any frame; may be repeated
+    intra = 2,      // I-frame
+    enhanced = 3,   // EP-frame: refers to an I-frame
+    codebook = 4,   // a codebook that later EP-frames name
+    index = 5,      // where the I-frames are, at the end of a file; optional
+    predicted = 6,  // P-frame: the I-frame's mesh moved
 };
 
 struct Packet {

@@ -160,6 +160,7 @@ Result<Frame> take(State& state, const Packet& packet) {
             return decode_intra(state, packet);
         case PacketKind::enhanced:
             return decode_enhanced(state, packet);
+        case PacketKind::predicted:
         case PacketKind::index:
             break;
     }

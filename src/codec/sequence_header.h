@@ -22,6 +22,7 @@ struct SequenceHeader {
     Skeleton skeleton;                      // at least one bone
     std::vector<std::int32_t> radii;        // r^i of each bone, lattice units
     std::uint8_t nearest_vertices = 16;     // m of the distance order
+    std::int32_t weight_width = 0;          // of smooth_weights(), lattice units; 0: rigid skinning, as in the paper
 };
 
 std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header);
