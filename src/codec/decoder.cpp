@@ -97,7 +97,7 @@ Result<Frame> decode_intra(State& state, const Packet& packet) {
     for (const auto& rotation : pose->orientations)
         out.pose.orientations.push_back(matrix_of(rotation_matrix(rotation)));
     state.reference = make_reference(std::move(*mesh), skeleton.bones, pose->joints, pose->orientations,
-                                     state.header->radii, packet.frame, state.threads);
+                                     state.header->radii, state.header->weight_width, packet.frame, state.threads);
     state.geometry_codebook.reset();
     state.colour_codebook.reset();
     return Frame{std::move(out)};

@@ -64,6 +64,7 @@ Result<void> check(const EncoderOptions& o) {
         (o.intra_coder->number == intra_coder_tfan || !o.intra_coder->encode || !o.intra_coder->decode))
         return bad("the intra coder must have a number above 0, encode and decode");
     if (!o.radii.empty() && o.radii.size() != o.skeleton.bones.size()) return bad("the radii are not one a bone");
+    if (!(o.weight_width >= 0 && o.weight_width <= 1000)) return bad("the weight width must be within 0 and 1000 mm");
     for (const auto r : o.radii)
         if (!(r >= 0 && r < 100000)) return bad("a bone radius must be within 0 and 100 m");
     for (const auto& bone : o.skeleton.bones)
@@ -110,6 +111,8 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
     header.fps_denominator = state.options.fps_denominator;
     header.unit_micrometres = state.options.unit_micrometres;
     header.nearest_vertices = static_cast<std::uint8_t>(state.options.nearest_vertices);
+    header.weight_width =
+        static_cast<std::int32_t>(std::lround(std::min(state.options.weight_width * units, 1.0 * lattice_limit)));
     state.geometry_step = static_cast<std::int32_t>(
         std::clamp(std::lround(state.options.geometry_step * units), 1L, static_cast<long>(lattice_limit)));
     return {};
@@ -170,7 +173,7 @@ Result<Packet> encode_intra(State& state, const LatticeMesh& mesh, const CodedPo
     clock.done("intra coding");
     state.decoded = std::move(*decoded);
     state.reference = make_reference(state.decoded, state.header.skeleton.bones, pose.joints, pose.orientations,
-                                     state.header.radii, state.next_frame, state.threads);
+                                     state.header.radii, state.header.weight_width, state.next_frame, state.threads);
     state.search = make_reference_search(*state.reference);
     state.motion_before.clear();
     state.geometry_codebook = {};

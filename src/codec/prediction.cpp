@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "codec/handle_weights.h"
 #include "core/parallel.h"
 
 namespace htvm {
@@ -40,11 +41,52 @@ std::vector<RotationMatrix> matrices(std::span<const QuantisedTransform> transfo
     return out;
 }
 
+bool blends(const ReferenceMesh& reference, std::size_t vertex) {
+    return !reference.weights.empty() && reference.weights[vertex].weight[1] > 0;
+}
+
+// A sum of weighted vectors, in 2^-(matrix_bits + weight_bits) lattice units. The weights sum to 2^12, so that sums of
+// turned vectors stay below sqrt(3) * 2^25 * 2^36 and those of points that are moved below 2^63.
+using WeightedSum = std::array<std::int64_t, 3>;
+
+void add_turned(WeightedSum& sum, std::int64_t weight, const RotationMatrix& m, LatticePoint v) {
+    for (std::size_t i = 0; i < 3; ++i) sum[i] += weight * (m[3 * i] * v.x + m[3 * i + 1] * v.y + m[3 * i + 2] * v.z);
+}
+
+std::int64_t rounded(std::int64_t sum) {
+    constexpr int bits = matrix_bits + weight_bits;
+    return (sum + (std::int64_t{1} << (bits - 1))) >> bits;
+}
+
+LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, const std::vector<RotationMatrix>& rotation,
+                          const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms) {
+    WeightedSum sum{};
+    for (std::size_t i = 0; i < handles_a_vertex && weights.weight[i] > 0; ++i) {
+        const auto handle = weights.handle[i];
+        const LatticePoint pivot = reference.pivots[handle], to = pivot + transforms[handle].shift;
+        add_turned(sum, weights.weight[i], rotation[handle], point - pivot);
+        const std::int64_t scale = std::int64_t{weights.weight[i]} << matrix_bits;
+        sum[0] += scale * to.x;
+        sum[1] += scale * to.y;
+        sum[2] += scale * to.z;
+    }
+    return {within_lattice(rounded(sum[0])), within_lattice(rounded(sum[1])), within_lattice(rounded(sum[2]))};
+}
+
+LatticePoint blended_turn(LatticePoint normal, const VertexWeights& weights,
+                          const std::vector<RotationMatrix>& rotation) {
+    WeightedSum sum{};
+    for (std::size_t i = 0; i < handles_a_vertex && weights.weight[i] > 0; ++i)
+        add_turned(sum, weights.weight[i], rotation[weights.handle[i]], normal);
+    return {static_cast<std::int32_t>(rounded(sum[0])), static_cast<std::int32_t>(rounded(sum[1])),
+            static_cast<std::int32_t>(rounded(sum[2]))};
+}
+
 }  // namespace
 
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
-                             std::uint32_t frame, unsigned threads) {
+                             std::int32_t weight_width, std::uint32_t frame, unsigned threads) {
     ReferenceMesh out;
     out.mesh = std::move(mesh);
     out.joints = std::move(joints);
@@ -52,6 +94,8 @@ ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, s
     out.frame = frame;
     out.bone_of_vertex = skin(out.mesh.positions, cylinders(bones, out.joints, radii), threads);
     out.sub_meshes = group_by_bone(out.bone_of_vertex, bones.size());
+    if (weight_width > 0)
+        out.weights = smooth_weights(out.bone_of_vertex, out.mesh.positions, out.mesh.triangles, weight_width, threads);
     out.pivots = sub_mesh_means(out, bones);
     out.mapping_prior = make_mapping_prior(out.mesh.positions, out.mesh.triangles);
     return out;
@@ -70,8 +114,10 @@ std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
     std::vector<LatticePoint> out(reference.mesh.positions.size());
     parallel_for(out.size(), threads, 16384, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
+            const LatticePoint v = reference.mesh.positions[k];
             const auto bone = reference.bone_of_vertex[k];
-            out[k] = move(reference.mesh.positions[k], rotation[bone], reference.pivots[bone], transforms[bone].shift);
+            out[k] = blends(reference, k) ? blended_move(v, reference.weights[k], rotation, reference, transforms)
+                                          : move(v, rotation[bone], reference.pivots[bone], transforms[bone].shift);
         }
     });
     return out;
@@ -84,7 +130,9 @@ std::vector<QuantisedNormal> predict_normals(const ReferenceMesh& reference,
     out.reserve(reference.mesh.normals.size());
     for (std::size_t k = 0; k < reference.mesh.normals.size(); ++k) {
         const auto& n = reference.mesh.normals[k];
-        const LatticePoint turned = rotate(rotation[reference.bone_of_vertex[k]], {n[0], n[1], n[2]});
+        const LatticePoint normal{n[0], n[1], n[2]};
+        const LatticePoint turned = blends(reference, k) ? blended_turn(normal, reference.weights[k], rotation)
+                                                         : rotate(rotation[reference.bone_of_vertex[k]], normal);
         out.push_back({turned.x, turned.y, turned.z});
     }
     return out;

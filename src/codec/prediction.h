@@ -8,6 +8,7 @@
 #include "codec/mapping.h"
 #include "codec/rigid_transform.h"
 #include "codec/skinning.h"
+#include "core/handles.h"
 
 namespace htvm {
 
@@ -16,6 +17,7 @@ struct ReferenceMesh {
     LatticeMesh mesh;
     std::vector<BoneIndex> bone_of_vertex;
     SubMeshes sub_meshes;
+    HandleWeights weights;                        // of the bones, one a vertex; empty: each vertex moves with its bone
     std::vector<LatticePoint> pivots;             // one a bone: the mean of its sub-mesh's vertices, or its first joint
     std::vector<LatticePoint> joints;             // of the I-frame's pose
     std::vector<QuantisedRotation> orientations;  // T_I^i of each bone
@@ -23,19 +25,21 @@ struct ReferenceMesh {
     std::uint32_t frame = 0;
 };
 
-// Skins the decoded I-mesh and derives the pivots. bones must not be empty.
+// Skins the decoded I-mesh and derives the pivots. bones must not be empty. weight_width, lattice units, is that of
+// smooth_weights(); 0: rigid.
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
-                             std::uint32_t frame, unsigned threads);
+                             std::int32_t weight_width, std::uint32_t frame, unsigned threads);
 
 // One point moved by a bone's transform; the result is kept within the lattice.
 LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift);
 
-// M_P: the reference vertices moved by their bones' transforms, one transform a bone.
+// M_P: the reference vertices moved by their bones' transforms, one transform a bone. A vertex of several bones goes to
+// the weighted mean of where they move it, rounded once and kept within the lattice.
 std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
                                             std::span<const QuantisedTransform> transforms, unsigned threads);
 
-// The reference's normals turned by their bones' transforms.
+// The reference's normals turned by their bones' transforms, blended likewise.
 std::vector<QuantisedNormal> predict_normals(const ReferenceMesh& reference,
                                              std::span<const QuantisedTransform> transforms);
 

@@ -24,6 +24,7 @@ std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
     out.u32(header.fps_denominator);
     out.u32(header.unit_micrometres);
     out.u8(header.nearest_vertices);
+    out.u32(static_cast<std::uint32_t>(header.weight_width));
     out.u8(header.skeleton_tracked);
     out.u16(static_cast<std::uint16_t>(header.skeleton.joint_names.size()));
     for (const auto& name : header.skeleton.joint_names) {
@@ -56,12 +57,14 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
     out.fps_denominator = in.u32();
     out.unit_micrometres = in.u32();
     out.nearest_vertices = in.u8();
+    const std::uint32_t weight_width = in.u32();
     out.skeleton_tracked = in.u8() != 0;
     const std::size_t joints = in.u16();
     if (!in.ok() || out.lattice.bits > 16 || out.fps_numerator == 0 || out.fps_denominator == 0 ||
         out.unit_micrometres == 0 || out.nearest_vertices < 1 || out.nearest_vertices > mtfan_max_nearest ||
-        joints > max_joints)
+        weight_width > static_cast<std::uint32_t>(lattice_limit) || joints > max_joints)
         return fail(ErrorKind::corrupt_stream, "sequence header: a field is out of range");
+    out.weight_width = static_cast<std::int32_t>(weight_width);
     for (std::size_t k = 0; k < joints && in.ok(); ++k) {
         const auto name = in.bytes(in.u8());
         out.skeleton.joint_names.emplace_back(name.begin(), name.end());

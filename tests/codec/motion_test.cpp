@@ -46,7 +46,7 @@ ReferenceMesh two_limbs() {
     LatticeMesh mesh;
     add_limb(mesh, {-8000, 0, 0});
     add_limb(mesh, {8000, 0, 0});
-    return make_reference(std::move(mesh), bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 1);
+    return make_reference(std::move(mesh), bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 0, 1);
 }
 
 TEST(QuantisedMotion, IsTheMotionToWithinHalfAUnitAndTwoQuantaOfTurning) {
@@ -138,7 +138,7 @@ TEST(BoneRegistration, NormalsThatMeanNothingDoNotLeadAstray) {
     const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
     for (auto& t : mesh.triangles)
         for (auto& v : t) v = test::below(random, vertices);
-    const auto reference = make_reference(mesh, bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 1);
+    const auto reference = make_reference(mesh, bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 0, 1);
     const auto search = make_reference_search(reference);
     std::vector<LatticePoint> frame;
     for (const auto p : reference.mesh.positions) frame.push_back(p + LatticePoint{60, 40, -30});

@@ -39,7 +39,7 @@ ReferenceMesh two_bones() {
     const std::vector<std::int32_t> radii = {10, 10, 10};
     return make_reference(std::move(mesh), {{0, 1}, {2, 3}, {4, 4}},
                           {{-100, 0, 0}, {-100, 100, 0}, {100, 0, 0}, {100, 100, 0}, {9000, 9000, 9000}},
-                          std::vector<QuantisedRotation>(3), radii, 7, 1);
+                          std::vector<QuantisedRotation>(3), radii, 0, 7, 1);
 }
 
 TEST(ReferenceMesh, IsSkinnedAndItsPivotsAreTheSubMeshesMeans) {
@@ -54,7 +54,7 @@ TEST(ReferenceMesh, IsSkinnedAndItsPivotsAreTheSubMeshesMeans) {
 
 TEST(ReferenceMesh, OfNothingIsLegal) {
     const std::vector<std::int32_t> radii = {10};
-    const auto reference = make_reference({}, {{0, 1}}, {{0, 0, 0}, {1, 1, 1}}, {{}}, radii, 0, 1);
+    const auto reference = make_reference({}, {{0, 1}}, {{0, 0, 0}, {1, 1, 1}}, {{}}, radii, 0, 0, 1);
     EXPECT_TRUE(predict_positions(reference, std::vector<QuantisedTransform>(1), 1).empty());
 }
 
@@ -111,7 +111,7 @@ TEST(Prediction, IsTheSameForAnyNumberOfThreads) {
     for (int i = 0; i < 50000; ++i) mesh.positions.push_back(random_point(random, 5000));
     const std::vector<std::int32_t> radii = {100, 100};
     const auto reference = make_reference(std::move(mesh), {{0, 1}, {1, 2}}, {{0, 0, 0}, {0, 999, 0}, {999, 0, 0}},
-                                          std::vector<QuantisedRotation>(2), radii, 0, 3);
+                                          std::vector<QuantisedRotation>(2), radii, 0, 0, 3);
     const std::vector<QuantisedTransform> transforms = {{random_rotation(random), {5, 6, 7}},
                                                         {random_rotation(random), {-5, 6, 700}}};
     EXPECT_EQ(predict_positions(reference, transforms, 1), predict_positions(reference, transforms, 7));

@@ -21,7 +21,7 @@ ReferenceMesh random_reference(std::size_t vertices, std::mt19937& random) {
     const std::vector<std::int32_t> radii = {100, 100, 0};
     return make_reference(std::move(mesh), {{0, 1}, {2, 3}, {4, 4}},
                           {{-2000, -3000, 0}, {-2000, 3000, 0}, {2000, -3000, 0}, {2000, 3000, 0}, {900000, 0, 0}},
-                          std::vector<QuantisedRotation>(3), radii, 0, 1);
+                          std::vector<QuantisedRotation>(3), radii, 0, 0, 1);
 }
 
 struct Case {

@@ -58,9 +58,11 @@ def read_sequence_header(payload):
     header.fps = (read.field("I"), read.field("I"))
     header.unit = read.field("I")
     header.m = read.field("B")
+    header.weight_width = read.field("I")
     header.tracked = read.field("B") != 0
     joints = read.field("H")
     check(header.bits <= 16 and min(header.fps) > 0 and header.unit > 0, "a field is out of range")
+    check(header.weight_width <= L, "a field is out of range")
     check(1 <= header.m <= 64 and joints <= 1024, "a field is out of range")
     header.joints = [read.take(read.field("B")) for _ in range(joints)]
     bones = read.field("H")
