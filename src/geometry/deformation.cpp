@@ -1,0 +1,466 @@
+#include "geometry/deformation.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+
+#include "core/parallel.h"
+
+namespace htvm {
+namespace {
+
+using Eigen::Matrix3d, Eigen::Vector3d;
+using Places = std::vector<std::pair<std::uint16_t, std::uint16_t>>;
+
+Vector3d vector_of(const Point3f& p) { return {p[0], p[1], p[2]}; }
+Point3f point_of(const Vector3d& v) {
+    return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+
+// ---- Set-up, once a reference ------------------------------------------------------------------------------------
+
+SampleBlend blend_of(const VertexWeights& weights) {
+    SampleBlend out;
+    for (std::size_t k = 0; k < handles_a_vertex; ++k) {
+        if (weights.weight[k] == 0) continue;
+        out.handle[out.count] = weights.handle[k];
+        out.weight[out.count++] = static_cast<float>(weights.weight[k]) / static_cast<float>(1 << weight_bits);
+    }
+    return out;
+}
+
+// The strongest few of (weight, handle), their weights made to sum to 1.
+SampleBlend strongest(std::vector<std::pair<float, std::uint16_t>> parts) {
+    std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+        return a.first != b.first ? a.first > b.first : a.second < b.second;
+    });
+    parts.resize(std::min(parts.size(), handles_a_vertex));
+    float sum = 0;
+    for (const auto& part : parts) sum += part.first;
+    SampleBlend out;
+    for (const auto& [weight, handle] : parts) {
+        if (weight < 0.02f * sum) continue;
+        out.handle[out.count] = handle;
+        out.weight[out.count++] = weight;
+    }
+    float kept = 0;
+    for (std::size_t k = 0; k < out.count; ++k) kept += out.weight[k];
+    for (std::size_t k = 0; k < out.count; ++k) out.weight[k] /= kept;
+    return out;
+}
+
+// As many vertices of each handle's region, evenly through them, as make up about `count` in all.
+std::vector<std::uint32_t> spread_samples(const HandleWeights& weights, std::size_t handles, std::size_t count) {
+    std::vector<std::vector<std::uint32_t>> region(handles);
+    for (std::uint32_t v = 0; v < weights.size(); ++v)
+        if (weights[v].weight[0] > 0) region[weights[v].handle[0]].push_back(v);
+    const std::size_t quota = std::max<std::size_t>(count / std::max<std::size_t>(handles, 1), 4);
+    std::vector<std::uint32_t> out;
+    for (const auto& vertices : region) {
+        const std::size_t taken = std::min(quota, vertices.size());
+        for (std::size_t i = 0; i < taken; ++i) out.push_back(vertices[(2 * i + 1) * vertices.size() / (2 * taken)]);
+    }
+    return out;
+}
+
+void find_blocks(std::vector<SampleBlend>& blends, const std::vector<HandlePair>& pairs, std::size_t handles,
+                 BlockPattern& pattern) {
+    Places places;
+    for (const auto& pair : pairs) places.emplace_back(pair.first, pair.second);
+    for (const auto& blend : blends)
+        for (std::size_t a = 0; a < blend.count; ++a)
+            for (std::size_t b = a + 1; b < blend.count; ++b) places.emplace_back(blend.handle[a], blend.handle[b]);
+    pattern = make_pattern(handles, std::move(places));
+    for (auto& blend : blends) {
+        // Ascending handles, so that every pair of a blend is above the diagonal.
+        for (std::size_t a = 1; a < blend.count; ++a)
+            for (std::size_t b = a; b > 0 && blend.handle[b] < blend.handle[b - 1]; --b) {
+                std::swap(blend.handle[b], blend.handle[b - 1]);
+                std::swap(blend.weight[b], blend.weight[b - 1]);
+            }
+        std::size_t slot = 0;
+        for (std::size_t a = 0; a < blend.count; ++a)
+            for (std::size_t b = a + 1; b < blend.count; ++b)
+                blend.block[slot++] = pattern.find(blend.handle[a], blend.handle[b]);
+    }
+}
+
+// Distances along the graph of pairs from one handle, no further than reach.
+std::vector<double> reach_over_pairs(const std::vector<Vector3d>& handles,
+                                     const std::vector<std::vector<std::uint16_t>>& tied, std::uint32_t start,
+                                     double reach) {
+    std::vector<double> distance(handles.size(), std::numeric_limits<double>::max());
+    using Entry = std::pair<double, std::uint32_t>;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> heap;
+    distance[start] = 0;
+    heap.emplace(0, start);
+    while (!heap.empty()) {
+        const auto [d, h] = heap.top();
+        heap.pop();
+        if (d > distance[h]) continue;
+        for (const std::uint16_t other : tied[h]) {
+            const double there = d + (handles[other] - handles[h]).norm();
+            if (there > reach || there >= distance[other]) continue;
+            distance[other] = there;
+            heap.emplace(there, other);
+        }
+    }
+    return distance;
+}
+
+// Groups of handles about `spacing` apart along their pairs, and how each handle follows the groups.
+void group_handles(DeformableMesh& mesh, double spacing) {
+    std::vector<std::vector<std::uint16_t>> tied(mesh.handles.size());
+    for (const auto& pair : mesh.fine.pairs) {
+        tied[pair.first].push_back(pair.second);
+        tied[pair.second].push_back(pair.first);
+    }
+    std::vector<bool> covered(mesh.handles.size(), false);
+    std::vector<std::vector<std::pair<float, std::uint16_t>>> parts(mesh.handles.size());
+    for (std::uint32_t h = 0; h < mesh.handles.size(); ++h) {
+        if (covered[h]) continue;
+        const auto group = static_cast<std::uint16_t>(mesh.coarse.centre.size());
+        mesh.coarse.centre.push_back(h);
+        const auto distance = reach_over_pairs(mesh.handles, tied, h, 2 * spacing);
+        for (std::size_t other = 0; other < distance.size(); ++other) {
+            if (distance[other] > 2 * spacing) continue;
+            covered[other] = covered[other] || distance[other] <= spacing;
+            const double nearness = 1 - distance[other] / (2.001 * spacing);
+            parts[other].emplace_back(static_cast<float>(nearness * nearness), group);
+        }
+    }
+    for (auto& part : parts) mesh.groups.push_back(strongest(std::move(part)));
+
+    std::vector<std::pair<std::uint16_t, std::uint16_t>> touching;
+    auto main_group = [&](std::size_t h) { return mesh.groups[h].handle[0]; };
+    for (const auto& pair : mesh.fine.pairs) {
+        const std::uint16_t a = main_group(pair.first), b = main_group(pair.second);
+        if (a != b) touching.emplace_back(std::min(a, b), std::max(a, b));
+    }
+    for (const auto& [first, second] : make_pattern(mesh.coarse.centre.size(), touching).place)
+        mesh.coarse.pairs.push_back({first, second});
+}
+
+// A sample follows the groups that its handles follow.
+SampleBlend over_groups(const SampleBlend& fine, const std::vector<SampleBlend>& groups) {
+    std::vector<std::pair<float, std::uint16_t>> parts;
+    for (std::size_t k = 0; k < fine.count; ++k) {
+        const auto& group = groups[fine.handle[k]];
+        for (std::size_t g = 0; g < group.count; ++g) {
+            auto it =
+                std::find_if(parts.begin(), parts.end(), [&](const auto& p) { return p.second == group.handle[g]; });
+            if (it == parts.end()) it = parts.insert(parts.end(), {0.0f, group.handle[g]});
+            it->first += fine.weight[k] * group.weight[g];
+        }
+    }
+    return strongest(std::move(parts));
+}
+
+// ---- One registration --------------------------------------------------------------------------------------------
+
+// Handles of one level, and the samples they move from where they rest.
+struct Stage {
+    const DeformationLevel& level;
+    std::vector<Vector3d> rest, rest_normals;  // of the samples
+    std::vector<Vector3d> centre;              // of the handles, at rest
+    std::vector<HandlePair> pairs;             // their points at rest
+    std::vector<RigidMotion> motion;
+};
+
+struct Moved {
+    std::vector<Point3f> points, normals;
+};
+
+Vector3d blended(const SampleBlend& blend, const std::vector<RigidMotion>& motion, const Vector3d& x) {
+    Vector3d out = Vector3d::Zero();
+    for (std::size_t k = 0; k < blend.count; ++k)
+        out += static_cast<double>(blend.weight[k]) * motion[blend.handle[k]](x);
+    return out;
+}
+
+Vector3d blended_turn(const SampleBlend& blend, const std::vector<RigidMotion>& motion, const Vector3d& direction) {
+    Vector3d out = Vector3d::Zero();
+    for (std::size_t k = 0; k < blend.count; ++k)
+        out += static_cast<double>(blend.weight[k]) * (motion[blend.handle[k]].rotation * direction);
+    const double length = out.norm();
+    return length > 0 ? Vector3d(out / length) : direction;
+}
+
+Moved move_samples(const Stage& stage, unsigned threads) {
+    Moved out{std::vector<Point3f>(stage.rest.size()), std::vector<Point3f>(stage.rest.size())};
+    parallel_for(stage.rest.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            out.points[i] = point_of(blended(stage.level.blends[i], stage.motion, stage.rest[i]));
+            out.normals[i] = point_of(blended_turn(stage.level.blends[i], stage.motion, stage.rest_normals[i]));
+        }
+    });
+    return out;
+}
+
+// A sample and the target's plane it should lie in.
+struct Match {
+    std::uint32_t sample = 0;
+    std::uint32_t vertex = 0;  // of the target
+    float weight = 0;          // 0: none
+};
+
+struct Round {
+    double reach = 0;  // positions' units
+    double stiffness = 0;
+    bool far = false;  // search among the target's samples; distant matches still count
+};
+
+// Near matches count fully and fade out at the reach; far ones all pull alike, however far they are.
+float match_weight(const OrientedMatch& match, const Round& round) {
+    if (!match.found) return 0;
+    const double d = std::sqrt(static_cast<double>(match.squared_distance));
+    if (round.far) return static_cast<float>(1 / std::max(1.0, d / (0.1 * round.reach)));
+    const double fade = std::max(0.0, 1 - d * d / (round.reach * round.reach));
+    return static_cast<float>(fade * fade);
+}
+
+// Both ways: each sample to the target, and each of the target's samples to the nearest moved sample.
+std::vector<Match> find_matches(const Moved& moved, const TargetSurface& target, const Round& round, float cell,
+                                const DeformationOptions& options) {
+    const std::size_t forward = moved.points.size(), back = target.samples.size();
+    const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
+    const OrientedPoints reference(moved.points, moved.normals, cell);
+    std::vector<Match> out(forward + back);
+    parallel_for(out.size(), options.threads, 256, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            if (i < forward) {
+                const auto& search = round.far ? target.coarse : target.fine;
+                const auto match = search.nearest(moved.points[i], moved.normals[i], reach, agreement);
+                const auto vertex = round.far && match.found ? target.samples[match.index] : match.index;
+                out[i] = {static_cast<std::uint32_t>(i), vertex, match_weight(match, round)};
+            } else {
+                const std::uint32_t vertex = target.samples[i - forward];
+                const auto match =
+                    reference.nearest(target.positions[vertex], target.normals[vertex], reach, agreement);
+                out[i] = {match.index, vertex, match_weight(match, round)};
+            }
+        }
+    });
+    std::erase_if(out, [](const Match& m) { return !(m.weight > 0); });
+    return out;
+}
+
+// How a point moves with a handle's six unknowns: the turn, about `centre`, and the shift.
+Eigen::Matrix<double, 3, 6> lever(const Vector3d& point, const Vector3d& centre) {
+    const Vector3d r = point - centre;
+    Eigen::Matrix<double, 3, 6> out;
+    out << 0, r.z(), -r.y(), 1, 0, 0, -r.z(), 0, r.x(), 0, 1, 0, r.y(), -r.x(), 0, 0, 0, 1;
+    return out;
+}
+
+void add_match(const Stage& stage, const std::vector<Vector3d>& centres, const Match& match, const Moved& moved,
+               const TargetSurface& target, double point_share, BlockSystem& system) {
+    const SampleBlend& blend = stage.level.blends[match.sample];
+    const Vector3d normal = vector_of(target.normals[match.vertex]);
+    const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
+    const Matrix3d metric = match.weight * (normal * normal.transpose() + point_share * Matrix3d::Identity());
+    std::array<Eigen::Matrix<double, 3, 6>, handles_a_vertex> levers, weighted;
+    for (std::size_t k = 0; k < blend.count; ++k) {
+        const std::size_t h = blend.handle[k];
+        levers[k] = static_cast<double>(blend.weight[k]) * lever(stage.motion[h](stage.rest[match.sample]), centres[h]);
+        weighted[k].noalias() = metric * levers[k];
+        system.diagonal[h].noalias() += levers[k].transpose() * weighted[k];
+        system.right[h].noalias() += weighted[k].transpose() * apart;
+    }
+    std::size_t slot = 0;
+    for (std::size_t a = 0; a < blend.count; ++a)
+        for (std::size_t b = a + 1; b < blend.count; ++b)
+            system.above[blend.block[slot++]].noalias() += levers[a].transpose() * weighted[b];
+}
+
+void add_pairs(const Stage& stage, const std::vector<Vector3d>& centres, double stiffness, BlockSystem& system) {
+    for (const HandlePair& pair : stage.pairs) {
+        const RigidMotion &a = stage.motion[pair.first], &b = stage.motion[pair.second];
+        const Vector3d at_a = a(pair.point), at_b = b(pair.point);
+        const auto lever_a = lever(at_a, centres[pair.first]), lever_b = lever(at_b, centres[pair.second]);
+        const double shift = stiffness * pair.shift_stiffness;
+        const double turn = stiffness * pair.turn_stiffness * 0.25 *
+                            (stage.centre[pair.first] - stage.centre[pair.second]).squaredNorm();
+        system.diagonal[pair.first].noalias() += shift * lever_a.transpose() * lever_a;
+        system.diagonal[pair.second].noalias() += shift * lever_b.transpose() * lever_b;
+        system.right[pair.first].noalias() += shift * lever_a.transpose() * (at_b - at_a);
+        system.right[pair.second].noalias() -= shift * lever_b.transpose() * (at_b - at_a);
+        Matrix6 across = -shift * lever_a.transpose() * lever_b;
+        const Matrix3d apart = b.rotation * a.rotation.transpose();
+        const Vector3d twist =
+            0.5 * Vector3d(apart(2, 1) - apart(1, 2), apart(0, 2) - apart(2, 0), apart(1, 0) - apart(0, 1));
+        for (int k = 0; k < 3; ++k) {
+            system.diagonal[pair.first](k, k) += turn;
+            system.diagonal[pair.second](k, k) += turn;
+            across(k, k) -= turn;
+            system.right[pair.first][k] += turn * twist[k];
+            system.right[pair.second][k] -= turn * twist[k];
+        }
+        system.above[stage.level.pattern.find(pair.first, pair.second)] += across;
+    }
+}
+
+void apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>& centres, Stage& stage) {
+    for (std::size_t h = 0; h < step.size(); ++h) {
+        if (!step[h].allFinite()) continue;
+        const Vector3d turn = step[h].head<3>();
+        const double angle = turn.norm();
+        RigidMotion& motion = stage.motion[h];
+        if (angle > 1e-12)
+            motion.rotation =
+                Eigen::AngleAxisd(std::min(angle, 0.6), turn / angle).toRotationMatrix() * motion.rotation;
+        motion.shift = centres[h] + step[h].tail<3>() - motion.rotation * stage.centre[h];
+    }
+}
+
+void run_round(Stage& stage, const TargetSurface& target, const Round& round, float cell, BlockSystem (&systems)[2],
+               const DeformationOptions& options) {
+    const Moved moved = move_samples(stage, options.threads);
+    const auto matches = find_matches(moved, target, round, cell, options);
+    std::vector<Vector3d> centres(stage.centre.size());
+    for (std::size_t h = 0; h < centres.size(); ++h) centres[h] = stage.motion[h](stage.centre[h]);
+    // Always in two halves, so that the sums do not depend on the number of threads.
+    auto add_half = [&](std::size_t half) {
+        systems[half].clear();
+        for (std::size_t i = half * matches.size() / 2; i < (half + 1) * matches.size() / 2; ++i)
+            add_match(stage, centres, matches[i], moved, target, options.point_share, systems[half]);
+    };
+    parallel_invoke(
+        options.threads, [&] { add_half(1); }, [&] { add_half(0); });
+    systems[0] += systems[1];
+    const double load = static_cast<double>(stage.rest.size()) / static_cast<double>(centres.size());
+    add_pairs(stage, centres, round.stiffness * load, systems[0]);
+    // What nothing holds stays where it is.
+    const double unit = options.millimetre * options.millimetre;
+    for (auto& diagonal : systems[0].diagonal) {
+        diagonal.topLeftCorner<3, 3>().diagonal().array() += 10 * load * unit;
+        diagonal.bottomRightCorner<3, 3>().diagonal().array() += 0.01 * load;
+    }
+    apply_step(solve(stage.level.pattern, systems[0], options.solver_iterations, 1e-3), centres, stage);
+}
+
+Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
+    Stage stage{mesh.fine, {}, {}, mesh.handles, mesh.fine.pairs, std::move(motion)};
+    for (std::size_t i = 0; i < mesh.samples.size(); ++i) {
+        stage.rest.push_back(vector_of(mesh.positions[mesh.samples[i]]));
+        stage.rest_normals.push_back(vector_of(mesh.sample_normals[i]));
+    }
+    return stage;
+}
+
+// Groups of handles move on from where `fine` has them.
+Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, unsigned threads) {
+    Stage stage{mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size())};
+    const Moved moved = move_samples(fine, threads);
+    for (std::size_t i = 0; i < moved.points.size(); ++i) {
+        stage.rest.push_back(vector_of(moved.points[i]));
+        stage.rest_normals.push_back(vector_of(moved.normals[i]));
+    }
+    for (const std::uint32_t h : mesh.coarse.centre) stage.centre.push_back(fine.motion[h](mesh.handles[h]));
+    for (auto& pair : stage.pairs) pair.point = 0.5 * (stage.centre[pair.first] + stage.centre[pair.second]);
+    return stage;
+}
+
+// Each handle moves on as its groups do, blended: the turn as a quaternion, the shift so that it arrives with them.
+void follow_groups(const DeformableMesh& mesh, const Stage& coarse, std::vector<RigidMotion>& motion) {
+    for (std::size_t h = 0; h < motion.size(); ++h) {
+        const SampleBlend& blend = mesh.groups[h];
+        Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+        const Eigen::Quaterniond first(coarse.motion[blend.handle[0]].rotation);
+        for (std::size_t k = 0; k < blend.count; ++k) {
+            const Eigen::Quaterniond turn(coarse.motion[blend.handle[k]].rotation);
+            sum += (turn.dot(first) < 0 ? -1.0 : 1.0) * static_cast<double>(blend.weight[k]) * turn.coeffs();
+        }
+        const Matrix3d turn = Eigen::Quaterniond(sum).normalized().toRotationMatrix();
+        const Vector3d before = motion[h](mesh.handles[h]);
+        const Vector3d after = blended(blend, coarse.motion, before);
+        motion[h].rotation = turn * motion[h].rotation;
+        motion[h].shift = after - motion[h].rotation * mesh.handles[h];
+    }
+}
+
+double between(double from, double to, int step, int steps) {
+    return steps <= 1 ? to : from * std::pow(to / from, static_cast<double>(step) / (steps - 1));
+}
+
+}  // namespace
+
+DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<const Triangle> triangles,
+                               HandleWeights weights, std::span<const Vector3d> handles, std::vector<HandlePair> pairs,
+                               const DeformationOptions& options) {
+    DeformableMesh mesh;
+    mesh.positions.assign(positions.begin(), positions.end());
+    mesh.triangles.assign(triangles.begin(), triangles.end());
+    mesh.weights = std::move(weights);
+    mesh.handles.assign(handles.begin(), handles.end());
+    if (handles.empty()) return mesh;
+    mesh.samples = spread_samples(mesh.weights, handles.size(), options.samples);
+    const auto normals = vertex_normals(positions, triangles, options.threads);
+    for (const std::uint32_t v : mesh.samples) {
+        mesh.sample_normals.push_back(normals[v]);
+        mesh.fine.blends.push_back(blend_of(mesh.weights[v]));
+    }
+    for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
+    mesh.fine.pairs = std::move(pairs);
+    group_handles(mesh, options.coarse_spacing * options.millimetre);
+    for (const auto& blend : mesh.fine.blends) mesh.coarse.blends.push_back(over_groups(blend, mesh.groups));
+    find_blocks(mesh.fine.blends, mesh.fine.pairs, handles.size(), mesh.fine.pattern);
+    find_blocks(mesh.coarse.blends, mesh.coarse.pairs, mesh.coarse.centre.size(), mesh.coarse.pattern);
+    return mesh;
+}
+
+std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const TargetSurface& target,
+                                              std::span<const RigidMotion> start, const DeformationOptions& options) {
+    std::vector<RigidMotion> motion(start.begin(), start.end());
+    motion.resize(mesh.handles.size());
+    if (mesh.samples.empty() || target.samples.empty()) return motion;
+    const double unit = options.millimetre;
+    const auto cell = static_cast<float>(30 * unit);
+    Stage fine = fine_stage(mesh, std::move(motion));
+    if (options.coarse_rounds > 0) {
+        Stage coarse = coarse_stage(mesh, fine, options.threads);
+        BlockSystem systems[2] = {BlockSystem(mesh.coarse.pattern), BlockSystem(mesh.coarse.pattern)};
+        for (int i = 0; i < options.coarse_rounds; ++i) {
+            const double reach = between(options.far_reach, 3 * options.near_reach, i, options.coarse_rounds);
+            run_round(coarse, target, {reach * unit, options.first_stiffness, true}, cell, systems, options);
+        }
+        follow_groups(mesh, coarse, fine.motion);
+    }
+    BlockSystem systems[2] = {BlockSystem(mesh.fine.pattern), BlockSystem(mesh.fine.pattern)};
+    for (int i = 0; i < options.fine_rounds; ++i) {
+        const double reach = between(2 * options.near_reach, options.near_reach, i, options.fine_rounds);
+        const double stiffness = between(options.first_stiffness, options.last_stiffness, i, options.fine_rounds);
+        run_round(fine, target, {reach * unit, stiffness, false}, cell, systems, options);
+    }
+    return fine.motion;
+}
+
+double deformation_error(const DeformableMesh& mesh, const TargetSurface& target, std::span<const RigidMotion> motions,
+                         const DeformationOptions& options) {
+    if (mesh.samples.empty() || target.samples.empty()) return 0;
+    const Stage stage = fine_stage(mesh, {motions.begin(), motions.end()});
+    const Moved moved = move_samples(stage, options.threads);
+    const double reach = options.near_reach * options.millimetre;
+    const auto matches = find_matches(moved, target, {reach, 0, false}, static_cast<float>(reach), options);
+    double near = 0;
+    for (const Match& match : matches) {
+        const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
+        near += reach - std::min(reach, std::abs(apart.dot(vector_of(target.normals[match.vertex]))));
+    }
+    return reach - near / static_cast<double>(mesh.samples.size() + target.samples.size());
+}
+
+std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, unsigned threads) {
+    std::vector<Point3f> out(mesh.positions);
+    if (motions.empty()) return out;
+    const std::vector<RigidMotion> motion(motions.begin(), motions.end());
+    parallel_for(out.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t v = begin; v < end; ++v)
+            out[v] = point_of(blended(blend_of(mesh.weights[v]), motion, vector_of(mesh.positions[v])));
+    });
+    return out;
+}
+
+}  // namespace htvm

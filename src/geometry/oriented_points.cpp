@@ -1,0 +1,85 @@
+#include "geometry/oriented_points.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace htvm {
+namespace {
+
+bool finite(const Point3f& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
+
+float product(const Point3f& a, const Point3f& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+}  // namespace
+
+OrientedPoints::OrientedPoints(std::span<const Point3f> points, std::span<const Point3f> normals, float cell)
+    : side_(cell), per_side_(1 / cell) {
+    mask_ = std::bit_ceil(static_cast<std::uint32_t>(std::max<std::size_t>(points.size() * 2, 64))) - 1;
+    first_.assign(std::size_t{mask_} + 2, 0);
+    std::vector<std::uint32_t> bucket(points.size());
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (!finite(points[i])) continue;
+        bucket[i] = bucket_of(cell_of(points[i]));
+        ++first_[bucket[i] + 1];
+        ++kept;
+    }
+    for (std::size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
+    entries_.resize(kept);
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (finite(points[i])) entries_[next[bucket[i]]++] = {points[i], normals[i], static_cast<std::uint32_t>(i)};
+}
+
+OrientedPoints::Cell OrientedPoints::cell_of(const Point3f& p) const {
+    auto index = [&](float c) { return static_cast<std::int32_t>(std::floor(std::clamp(c * per_side_, -1e9f, 1e9f))); };
+    return {index(p[0]), index(p[1]), index(p[2])};
+}
+
+std::uint32_t OrientedPoints::bucket_of(const Cell& cell) const {
+    const std::uint32_t h = static_cast<std::uint32_t>(cell[0]) * 73856093u ^
+                            static_cast<std::uint32_t>(cell[1]) * 19349663u ^
+                            static_cast<std::uint32_t>(cell[2]) * 83492791u;
+    return (h ^ (h >> 15)) & mask_;
+}
+
+OrientedMatch OrientedPoints::nearest(const Point3f& query, const Point3f& normal, float reach, float agreement) const {
+    OrientedMatch best;
+    if (entries_.empty() || !finite(query)) return best;
+    best.squared_distance = reach * reach;
+    const Cell middle = cell_of(query);
+    auto look_into = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+        const std::uint32_t bucket = bucket_of({x, y, z});
+        for (std::uint32_t e = first_[bucket]; e < first_[bucket + 1]; ++e) {
+            const Entry& entry = entries_[e];
+            const Point3f apart = {entry.point[0] - query[0], entry.point[1] - query[1], entry.point[2] - query[2]};
+            const float d = product(apart, apart);
+            if (d > best.squared_distance) continue;
+            if (d == best.squared_distance && best.found && entry.index >= best.index) continue;
+            if (entry.normal != Point3f{} && product(entry.normal, normal) < agreement) continue;
+            best = {entry.index, d, true};
+        }
+    };
+    // Shells of cells around the query's own; all points outside `shell` shells are at least shell - 1 sides away, and
+    // more by how far the query is inside its cell.
+    float inside = side_;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const float low = query[k] - static_cast<float>(middle[k]) * side_;
+        inside = std::min({inside, low, side_ - low});
+    }
+    inside = std::max(inside, 0.0f);
+    for (std::int32_t shell = 0;; ++shell) {
+        const float bound = static_cast<float>(shell - 1) * side_ + inside;
+        if (shell > 0 && bound > 0 && bound * bound > best.squared_distance) break;
+        for (std::int32_t x = -shell; x <= shell; ++x)
+            for (std::int32_t y = -shell; y <= shell; ++y) {
+                const bool on_side = std::abs(x) == shell || std::abs(y) == shell;
+                for (std::int32_t z = -shell; z <= shell; z += on_side || shell == 0 ? 1 : 2 * shell)
+                    look_into(middle[0] + x, middle[1] + y, middle[2] + z);
+            }
+    }
+    return best;
+}
+
+}  // namespace htvm
