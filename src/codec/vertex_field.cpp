@@ -1,0 +1,174 @@
+#include <cmath>
+
+#include "codec/vertex_field_walk.h"
+
+namespace htvm {
+
+namespace {
+
+// The axes of a turned field, in 1/65536: the mean, red less blue, green less the other two; orthonormal.
+constexpr std::int64_t third = 37837, half = 46341, sixth = 26755;  // 1/sqrt(3), 1/sqrt(2), 1/sqrt(6)
+
+}  // namespace
+
+std::int64_t root_step(std::uint32_t step, std::size_t vertex_count) {
+    const double root = std::sqrt(static_cast<double>(std::max<std::size_t>(vertex_count, 1)));
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(step / root));
+}
+
+void predict_splits(const HierarchyLevel& level, std::span<const std::int32_t> means,
+                    std::vector<std::int32_t>& splits) {
+    splits.assign(level.size(), 0);
+    for (std::size_t p = 0; p < level.size(); ++p) {
+        if (level.second[p] == no_node) continue;
+        std::int64_t sum = 0;
+        for (std::uint32_t i = level.first_neighbour[p]; i < level.first_neighbour[p + 1]; ++i)
+            sum += std::int64_t{level.slopes[i]} * (means[level.neighbours[i]] - means[p]);
+        splits[p] = static_cast<std::int32_t>(
+            std::clamp<std::int64_t>(sum >> slope_bits, -std::int64_t{2} * most_mean, std::int64_t{2} * most_mean));
+    }
+}
+
+void predict_level(const VertexHierarchy& hierarchy, std::size_t k, std::span<const std::int32_t> means,
+                   const FieldPlane* before, LevelPrediction& out) {
+    const HierarchyLevel& level = hierarchy.levels[k];
+    predict_splits(level, means, out.now);
+    out.before.clear();
+    out.slope_before.clear();
+    if (!before) return;
+    predict_splits(level, before->mean[k + 1], out.slope_before);
+    out.before.assign(level.size(), 0);
+    for (std::size_t p = 0; p < level.size(); ++p)
+        if (level.second[p] != no_node)
+            out.before[p] = before->mean[k][level.first[p]] - before->mean[k][level.second[p]];
+}
+
+void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means, const LevelPrediction& prediction,
+                 const LevelMode& mode, std::uint32_t step, std::span<const std::int32_t> rests,
+                 std::vector<std::int32_t>& finer) {
+    for (std::size_t p = 0; p < level.size(); ++p) {
+        if (level.second[p] == no_node) {
+            finer[level.first[p]] = means[p];
+            continue;
+        }
+        std::int64_t difference = prediction.of(p, mode);
+        if (rests[p] != 0) difference += rests[p] * split_step(step, level.split_scale[p]);
+        const SplitMeans children = split_mean(means[p], difference, level.second_share[p]);
+        finer[level.first[p]] = children.first;
+        finer[level.second[p]] = children.second;
+    }
+}
+
+void pass_down(const HierarchyLevel& coarser, std::span<const std::uint8_t> own, std::span<const std::uint8_t> above,
+               std::vector<std::uint8_t>& below) {
+    for (std::size_t p = 0; p < coarser.size(); ++p) {
+        const bool single = coarser.second[p] == no_node;
+        below[coarser.first[p]] = single ? above[p] : own[p];
+        if (!single) below[coarser.second[p]] = own[p];
+    }
+}
+
+FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldHeader& head, std::size_t components,
+                     const FieldHistory* frame_before)
+    : hierarchy(mesh), header(head), before(frame_before), planes(components), above(components), rests(components) {
+    for (FieldPlane& plane : planes) {
+        plane.mean.resize(hierarchy.levels.size() + 1);
+        plane.mean[0].resize(hierarchy.vertex_count);
+        plane.magnitude.resize(hierarchy.levels.size());
+        for (std::size_t k = 0; k < hierarchy.levels.size(); ++k) {
+            plane.mean[k + 1].resize(hierarchy.levels[k].size());
+            plane.magnitude[k].resize(hierarchy.levels[k].size());
+        }
+    }
+    for (auto& top : above) top.assign(1, 0);
+}
+
+void FieldWalk::begin_level(std::size_t k) {
+    for (auto& level : rests) level.assign(hierarchy.levels[k].size(), 0);
+}
+
+void FieldWalk::begin_component(std::size_t k, std::size_t c) {
+    predict_level(hierarchy, k, planes[c].mean[k + 1], plane_before(c), prediction);
+}
+
+void FieldWalk::end_component(std::size_t k, std::size_t c, const LevelMode& mode) {
+    split_level(hierarchy.levels[k], planes[c].mean[k + 1], prediction, mode, header.step[c], rests[c],
+                planes[c].mean[k]);
+}
+
+LevelMagnitudes FieldWalk::magnitudes(std::size_t k, std::size_t c) const {
+    LevelMagnitudes out{.above = above[c], .before = {}, .other = {}, .third = {}, .own = planes[c].magnitude[k]};
+    if (before) out.before = before->planes[c].magnitude[k];
+    if (c > 0) out.other = rests[c - 1];
+    if (c > 1) out.third = rests[c - 2];
+    return out;
+}
+
+void FieldWalk::end_level(std::size_t k) {
+    if (k == 0) return;
+    for (std::size_t c = 0; c < planes.size(); ++c) {
+        std::vector<std::uint8_t> below(hierarchy.levels[k - 1].size(), 0);
+        pass_down(hierarchy.levels[k], planes[c].magnitude[k], above[c], below);
+        above[c] = std::move(below);
+    }
+}
+
+std::vector<std::int32_t> field_values(const std::vector<FieldPlane>& planes, std::size_t vertex_count, bool turned) {
+    const std::size_t components = planes.size();
+    std::vector<std::int32_t> values(vertex_count * components);
+    if (!turned) {
+        for (std::size_t c = 0; c < components; ++c)
+            for (std::size_t v = 0; v < vertex_count; ++v)
+                values[v * components + c] = (planes[c].mean[0][v] + field_one / 2) >> field_bits;
+        return values;
+    }
+    constexpr int shift = 16 + field_bits;
+    constexpr std::int64_t rounding = std::int64_t{1} << (shift - 1);
+    for (std::size_t v = 0; v < vertex_count; ++v) {
+        const std::int64_t a = third * planes[0].mean[0][v], b = half * planes[1].mean[0][v];
+        const std::int64_t s = sixth * planes[2].mean[0][v];
+        values[v * 3 + 0] = static_cast<std::int32_t>((a + b - s + rounding) >> shift);
+        values[v * 3 + 1] = static_cast<std::int32_t>((a + 2 * s + rounding) >> shift);
+        values[v * 3 + 2] = static_cast<std::int32_t>((a - b - s + rounding) >> shift);
+    }
+    return values;
+}
+
+bool history_fits(const FieldHistory& history, const VertexHierarchy& hierarchy, std::size_t components, bool turned) {
+    if (history.planes.size() != components || history.turned != turned) return false;
+    const std::size_t levels = hierarchy.levels.size();
+    for (const FieldPlane& plane : history.planes) {
+        if (plane.mean.size() != levels + 1 || plane.magnitude.size() != levels) return false;
+        if (plane.mean[0].size() != hierarchy.vertex_count) return false;
+        for (std::size_t k = 0; k < levels; ++k)
+            if (plane.mean[k + 1].size() != hierarchy.levels[k].size() ||
+                plane.magnitude[k].size() != hierarchy.levels[k].size())
+                return false;
+    }
+    return true;
+}
+
+double field_error_bound(const VertexHierarchy& hierarchy, double step) {
+    const auto quantised = static_cast<std::uint32_t>(std::clamp(step, 0.0, 1048576.0) * field_one + 0.5);
+    std::vector<double> bound(1, static_cast<double>(root_step(quantised, hierarchy.vertex_count)) / 2 + 0.5);
+    for (std::size_t k = hierarchy.levels.size(); k-- > 0;) {
+        const HierarchyLevel& level = hierarchy.levels[k];
+        const std::size_t finer = k > 0 ? hierarchy.levels[k - 1].size() : hierarchy.vertex_count;
+        std::vector<double> below(finer);
+        for (std::size_t p = 0; p < level.size(); ++p) {
+            below[level.first[p]] = bound[p];
+            if (level.second[p] == no_node) continue;
+            constexpr double rounding = 2.5;  // of the means in the encoder, of the difference's share and its own
+            const double own = static_cast<double>(split_step(quantised, level.split_scale[p])) / 2;
+            const double share = static_cast<double>(level.second_share[p]) / (1 << share_bits);
+            below[level.first[p]] += own * share + rounding;
+            below[level.second[p]] = bound[p] + own * (1 - share) + rounding;
+        }
+        bound = std::move(below);
+    }
+    double largest = 0;
+    for (const double b : bound) largest = std::max(largest, b);
+    return largest / field_one;
+}
+
+}  // namespace htvm

@@ -1,0 +1,54 @@
+#include "codec/vertex_field_walk.h"
+#include "core/bytes.h"
+#include "entropy/range_decoder.h"
+
+namespace htvm {
+
+namespace {
+
+struct FieldReader {
+    RangeDecoder decoder;
+    bool bit(BinaryModel& model, bool) { return decoder.bit(model); }
+    std::uint32_t raw(std::uint32_t, int n) { return decoder.raw(n); }
+};
+
+struct NothingWanted {
+    std::int32_t root(std::size_t) const { return 0; }
+    LevelMode mode(std::size_t, std::size_t) const { return {}; }
+    std::int32_t rest(std::size_t, std::size_t, std::size_t) const { return 0; }
+};
+
+}  // namespace
+
+Result<DecodedField> decode_field(std::span<const std::uint8_t> bytes, const VertexHierarchy& hierarchy,
+                                  std::size_t components, const FieldHistory* before) {
+    if (components == 0 || components > most_field_components)
+        return fail(ErrorKind::bad_input, "vertex field: there must be one to three components");
+    ByteReader reader(bytes);
+    FieldHeader header;
+    const std::uint8_t flags = reader.u8();
+    header.turned = flags & 1;
+    header.has_history = flags & 2;
+    bool valid = flags < 4 && (!header.turned || components == 3);
+    for (std::size_t c = 0; c < components; ++c) {
+        const std::uint64_t step = reader.varint();
+        valid = valid && step <= most_step;
+        header.step[c] = static_cast<std::uint32_t>(std::min<std::uint64_t>(step, most_step));
+    }
+    if (!reader.ok()) return fail(ErrorKind::corrupt_stream, "vertex field: the layer ends within its header");
+    if (!valid) return fail(ErrorKind::corrupt_stream, "vertex field: the layer's header is not one of a field");
+    if (header.has_history && !before)
+        return fail(ErrorKind::corrupt_stream, "vertex field: the layer needs the frame before, which is missing");
+    if (header.has_history && !history_fits(*before, hierarchy, components, header.turned))
+        return fail(ErrorKind::bad_input, "vertex field: the frame before is of another mesh or another kind of field");
+    FieldWalk walk(hierarchy, header, components, header.has_history ? before : nullptr);
+    FieldReader coder{RangeDecoder(reader.bytes(reader.remaining()))};
+    if (hierarchy.vertex_count > 0) walk_field(walk, coder, NothingWanted{});
+    if (coder.decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "vertex field: the layer ends too early");
+    DecodedField out;
+    out.values = field_values(walk.planes, hierarchy.vertex_count, header.turned);
+    out.history = {.turned = header.turned, .planes = std::move(walk.planes)};
+    return out;
+}
+
+}  // namespace htvm

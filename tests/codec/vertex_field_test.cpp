@@ -1,0 +1,216 @@
+#include "codec/vertex_field.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <optional>
+
+#include "codec/hostile_bytes.h"
+#include "codec/intra_test_meshes.h"
+
+namespace htvm {
+namespace {
+
+VertexHierarchy hierarchy_of(const intra_test::Connectivity& mesh, unsigned seed = 1) {
+    return build_vertex_hierarchy(intra_test::points(mesh.vertex_count, seed), mesh.triangles).value();
+}
+
+// Waves over the vertices, with noise on every second seed; on every seventh nothing but noise up to the limit.
+std::vector<std::int32_t> field(std::size_t vertices, std::size_t components, unsigned seed) {
+    std::mt19937 random(seed);
+    std::vector<std::int32_t> values(vertices * components);
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t c = 0; c < components; ++c) {
+            const double wave = 200.0 * std::sin(0.02 * static_cast<double>(v) + static_cast<double>(c));
+            std::int32_t& value = values[v * components + c];
+            value = static_cast<std::int32_t>(wave);
+            if (seed % 2) value += test::between(random, -20, 20);
+            if (seed % 7 == 6) value = test::between(random, -field_limit, field_limit);
+        }
+    return values;
+}
+
+FieldOptions options_of(double step, double lambda) { return {.step = {step, step, step}, .lambda = lambda}; }
+
+double largest_difference(std::span<const std::int32_t> a, std::span<const std::int32_t> b) {
+    double largest = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) largest = std::max(largest, std::abs(1.0 * a[i] - b[i]));
+    return largest;
+}
+
+void expect_same(const FieldHistory& a, const FieldHistory& b) {
+    EXPECT_EQ(a.turned, b.turned);
+    ASSERT_EQ(a.planes.size(), b.planes.size());
+    for (std::size_t c = 0; c < a.planes.size(); ++c) {
+        EXPECT_EQ(a.planes[c].mean, b.planes[c].mean);
+        EXPECT_EQ(a.planes[c].magnitude, b.planes[c].magnitude);
+    }
+}
+
+TEST(VertexField, DecodesToWhatTheEncoderSawWhateverTheMesh) {
+    unsigned seed = 0;
+    for (const auto& mesh : intra_test::awkward()) {
+        const std::size_t components = 1 + seed % 3;
+        const VertexHierarchy hierarchy = hierarchy_of(mesh, seed);
+        FieldOptions options = options_of(seed % 5 ? 3.0 * (1 + seed % 11) : 0.01, seed % 3 * 0.1);
+        options.turned = components == 3 && seed % 4 == 1;
+        std::optional<FieldHistory> sent, received;
+        for (unsigned frame = 0; frame < 3; ++frame) {
+            const auto values = field(mesh.vertex_count, components, seed + (seed % 2 ? frame : 0));
+            const auto encoded = encode_field(hierarchy, values, components, options, sent ? &*sent : nullptr);
+            ASSERT_TRUE(encoded) << encoded.error().message;
+            const auto decoded = decode_field(encoded->bytes, hierarchy, components, received ? &*received : nullptr);
+            ASSERT_TRUE(decoded) << decoded.error().message;
+            EXPECT_EQ(decoded->values, encoded->values);
+            expect_same(decoded->history, encoded->history);
+            sent = encoded->history;
+            received = decoded->history;
+        }
+        ++seed;
+    }
+}
+
+TEST(VertexField, WithoutLambdaNoVertexIsFurtherOffThanTheBound) {
+    unsigned seed = 0;
+    for (const auto& mesh : intra_test::awkward()) {
+        const VertexHierarchy hierarchy = hierarchy_of(mesh, seed);
+        for (const double step : {0.1, 1.0, 7.5, 100.0}) {
+            const auto values = field(mesh.vertex_count, 2, seed);
+            const auto encoded = encode_field(hierarchy, values, 2, options_of(step, 0));
+            ASSERT_TRUE(encoded) << encoded.error().message;
+            EXPECT_LE(largest_difference(values, encoded->values), field_error_bound(hierarchy, step) + 0.5);
+        }
+        ++seed;
+    }
+}
+
+TEST(VertexField, IsLosslessWhereTheBoundIsBelowAHalf) {
+    const auto mesh = intra_test::grid(20);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    constexpr double step = 0.125;
+    ASSERT_LT(field_error_bound(hierarchy, step), 0.5);
+    for (unsigned seed = 0; seed < 8; ++seed) {
+        const auto values = field(mesh.vertex_count, 3, seed);
+        EXPECT_EQ(encode_field(hierarchy, values, 3, options_of(step, 0))->values, values);
+    }
+}
+
+TEST(VertexField, TheBoundGrowsWithTheStepAndStaysAFewSteps) {
+    const auto mesh = intra_test::grid(63);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    EXPECT_LT(field_error_bound(hierarchy, 4), field_error_bound(hierarchy, 8));
+    EXPECT_LT(field_error_bound(hierarchy, 32), 3 * 32);
+    EXPECT_GT(field_error_bound(hierarchy, 32), 16);
+}
+
+TEST(VertexField, AFieldOfZerosCostsAboutAByteALevel) {
+    const auto mesh = intra_test::grid(63);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    const std::vector<std::int32_t> values(mesh.vertex_count, 0);
+    const auto encoded = encode_field(hierarchy, values, 1);
+    EXPECT_EQ(encoded->values, values);
+    EXPECT_LE(encoded->bytes.size(), 16u);
+}
+
+TEST(VertexField, NoiseBelowTheStepCostsNextToNothing) {
+    const auto mesh = intra_test::grid(100);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    std::mt19937 random(1);
+    std::vector<std::int32_t> values(mesh.vertex_count);
+    for (auto& value : values) value = test::between(random, -12, 12);
+    const auto encoded = encode_field(hierarchy, values, 1, options_of(32, 0.15));
+    EXPECT_LT(static_cast<double>(encoded->bytes.size()) * 8, 0.01 * static_cast<double>(mesh.vertex_count));
+}
+
+TEST(VertexField, AHigherLambdaSparesBits) {
+    const auto mesh = intra_test::grid(63);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    const auto values = field(mesh.vertex_count, 1, 1);
+    const auto exact = encode_field(hierarchy, values, 1, options_of(16, 0));
+    const auto spared = encode_field(hierarchy, values, 1, options_of(16, 0.2));
+    EXPECT_LT(spared->bytes.size(), exact->bytes.size());
+}
+
+TEST(VertexField, ARepeatedFrameCostsNextToNothing) {
+    const auto mesh = intra_test::grid(63);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    const auto values = field(mesh.vertex_count, 1, 1);
+    const auto first = encode_field(hierarchy, values, 1, options_of(8, 0.1));
+    const auto second = encode_field(hierarchy, values, 1, options_of(8, 0.1), &first->history);
+    EXPECT_LT(second->bytes.size() * 10, first->bytes.size());
+}
+
+TEST(VertexField, AComponentOfStepZeroIsNotCoded) {
+    const auto mesh = intra_test::grid(10);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    const auto values = field(mesh.vertex_count, 2, 1);
+    const auto encoded = encode_field(hierarchy, values, 2, {.step = {4, 0, 0}, .lambda = 0});
+    for (std::size_t v = 0; v < mesh.vertex_count; ++v) EXPECT_EQ(encoded->values[v * 2 + 1], 0);
+    EXPECT_LE(largest_difference(values, encoded->values), 300);
+}
+
+TEST(VertexField, NoVerticesTakeTheHeaderAlone) {
+    const VertexHierarchy hierarchy;
+    const auto encoded = encode_field(hierarchy, {}, 3);
+    ASSERT_TRUE(encoded);
+    EXPECT_LE(encoded->bytes.size(), 8u);
+    EXPECT_TRUE(decode_field(encoded->bytes, hierarchy, 3)->values.empty());
+}
+
+TEST(VertexField, RefusesWhatDoesNotFit) {
+    const auto mesh = intra_test::grid(4);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    const std::vector<std::int32_t> values(mesh.vertex_count, 0), beyond(mesh.vertex_count, field_limit + 1);
+    EXPECT_FALSE(encode_field(hierarchy, values, 0));
+    EXPECT_FALSE(encode_field(hierarchy, values, 4));
+    EXPECT_FALSE(encode_field(hierarchy, values, 2));
+    EXPECT_FALSE(encode_field(hierarchy, beyond, 1));
+    EXPECT_FALSE(encode_field(hierarchy, values, 1, {.turned = true}));
+    EXPECT_FALSE(encode_field(hierarchy, values, 1, options_of(-1, 0)));
+    EXPECT_FALSE(encode_field(hierarchy, values, 1, options_of(1e9, 0)));
+    EXPECT_FALSE(encode_field(hierarchy, values, 1, options_of(std::nan(""), 0)));
+    EXPECT_FALSE(encode_field(hierarchy, values, 1, options_of(1, -1)));
+    const FieldHistory other;
+    EXPECT_FALSE(encode_field(hierarchy, values, 1, {}, &other));
+}
+
+TEST(VertexField, AMissingOrForeignFrameBeforeIsAnError) {
+    const auto mesh = intra_test::grid(6);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh), other = hierarchy_of(intra_test::grid(7));
+    const auto values = field(mesh.vertex_count, 1, 1);
+    const auto first = encode_field(hierarchy, values, 1);
+    const auto second = encode_field(hierarchy, values, 1, {}, &first->history);
+    EXPECT_EQ(decode_field(second->bytes, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
+    const auto foreign = encode_field(other, field(other.vertex_count, 1, 1), 1);
+    EXPECT_EQ(decode_field(second->bytes, hierarchy, 1, &foreign->history).error().kind, ErrorKind::bad_input);
+}
+
+TEST(VertexField, DamagedBytesGiveErrorsOrBoundedValues) {
+    for (const std::size_t components : {1u, 3u}) {
+        const auto mesh = intra_test::grid(15);
+        const VertexHierarchy hierarchy = hierarchy_of(mesh);
+        FieldOptions options = options_of(8, 0.1);
+        options.turned = components == 3;
+        const auto first = encode_field(hierarchy, field(mesh.vertex_count, components, 1), components, options);
+        const auto second =
+            encode_field(hierarchy, field(mesh.vertex_count, components, 3), components, options, &first->history);
+        hostile::try_everything(second->bytes, [&](const std::vector<std::uint8_t>& bytes) {
+            const auto decoded = decode_field(bytes, hierarchy, components, &first->history);
+            if (!decoded) return;
+            for (const std::int32_t value : decoded->values) EXPECT_LE(std::abs(value), 4 * field_limit);
+        });
+    }
+}
+
+TEST(VertexField, AShortenedLayerIsAnError) {
+    const auto mesh = intra_test::grid(15);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    const auto encoded = encode_field(hierarchy, field(mesh.vertex_count, 1, 1), 1, options_of(1, 0));
+    auto half = encoded->bytes;
+    half.resize(half.size() / 2);
+    EXPECT_EQ(decode_field(half, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
+    EXPECT_EQ(decode_field({}, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
+}
+
+}  // namespace
+}  // namespace htvm
