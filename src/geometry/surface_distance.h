@@ -4,6 +4,8 @@
 // Samples are a mesh's vertices and its triangles' centres, both weighted by area. METRO, and so M2, samples mostly
 // along edges, where an error that differs from vertex to vertex is larger than in the triangles' middle and smaller
 // than at their corners; vertex_share is the mixture that comes closest to it.
+// Beside M2, quantised to 1, 2, 4, 8 mm: a synthetic frame of 34,700 vertices +1.6, +0.2, +0.2, +1.2 %, a capture of
+// 25,900 (whose soles are large triangles) -0.4, -0.8, -0.5, +0.2 %.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +25,9 @@ struct SurfaceView {
 };
 
 struct SurfaceDistanceOptions {
-    unsigned threads = 1;        // 0: one per core; any number gives the same bits
-    std::uint32_t every = 1;     // take only every n-th vertex and every n-th triangle's centre; 0 counts as 1
-    double vertex_share = 0.45;  // 0..1, weight of the vertices beside the centres
+    unsigned threads = 1;       // 0: one per core; any number gives the same bits
+    std::uint32_t every = 1;    // take only every n-th vertex and every n-th triangle's centre; 0 counts as 1
+    double vertex_share = 0.4;  // 0..1, weight of the vertices beside the centres
 };
 
 // Mean squares over the samples of one surface against another. Zeros where nothing was sampled; the distance is

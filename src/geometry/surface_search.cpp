@@ -160,6 +160,7 @@ void SurfaceSearch::place_long_triangles(std::vector<Point3f>& places) {
     }
     const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
     std::nth_element(lengths.begin(), middle, lengths.end());
+    doubtful_ = 0.09 * *middle * *middle;
     const double least = 2 * *middle;
     if (!(least > 0)) return;
     const double most_points = 1000 + static_cast<double>(places.size());
@@ -223,13 +224,27 @@ SurfacePoint SurfaceSearch::closest(const Point3f& query) const {
         tried[count++] = place;
         for (std::uint32_t k = first_around_[place]; k < first_around_[place + 1]; ++k) try_triangle(around_[k]);
     };
-    if (nearest.index < vertex_at_.size())
-        try_around(nearest.index);
-    else
-        try_triangle(spread_over_[nearest.index - vertex_at_.size()]);
-    for (double before = std::numeric_limits<double>::infinity(); best.squared < before;) {
-        before = best.squared;
-        for (const auto place : Triangle(corners_[best_triangle])) try_around(place);
+    const auto walk_from = [&](std::uint32_t place) {
+        if (place < vertex_at_.size())
+            try_around(place);
+        else
+            try_triangle(spread_over_[place - vertex_at_.size()]);
+        for (double before = std::numeric_limits<double>::infinity(); best.squared < before;) {
+            before = best.squared;
+            for (const auto corner : Triangle(corners_[best_triangle])) try_around(corner);
+        }
+    };
+    walk_from(nearest.index);
+    if (best.squared > doubtful_) {
+        Point3f beyond{};
+        for (std::size_t i = 0; i < 3; ++i) {
+            double found = 0;
+            for (std::size_t c = 0; c < 3; ++c)
+                found += best.barycentric[c] * places_.point(corners_[best_triangle][c])[i];
+            beyond[i] = static_cast<float>(2 * query[i] - found);
+        }
+        const auto other = places_.nearest(beyond).index;
+        if (other != nearest.index) walk_from(other);
     }
     const auto& t = corners_[best_triangle];
     SurfacePoint out{best_triangle, to_float(best.barycentric), {}, static_cast<float>(best.squared)};

@@ -25,9 +25,11 @@ std::array<float, 3> closest_barycentric(const Point3f& query, const Point3f& a,
 
 // A mesh's surface, ready for searches. From the nearest vertex the triangles around it are tried, then those around
 // the corners of the best, as long as that comes nearer; triangles much longer than most are also found by points
-// spread over them. Almost always the closest point of all, never further than the nearest vertex. Vertices at the same
-// place count as one, so the seams of a mesh in pieces or of one quantised coarsely do not stop the search. Vertices
-// that no triangle uses are no part of the surface, unless there are no triangles: then the vertices are the surface.
+// spread over them, and where the result is far, beside short edges, a second search begins on the query's other side,
+// where another sheet may pass with no vertex as near. Almost always the closest point of all, never further than the
+// nearest vertex. Vertices at the same place count as one, so the seams of a mesh in pieces or of one quantised
+// coarsely do not stop the search. Vertices that no triangle uses are no part of the surface, unless there are no
+// triangles: then the vertices are the surface.
 class SurfaceSearch {
 public:
     // Copies what it needs. Every index < positions.size(), positions finite.
@@ -47,8 +49,9 @@ private:
     std::size_t vertices_ = 0;
     std::vector<Triangle> triangles_;
     NearestPoints places_;  // the different positions of the surface's vertices, then points of long triangles
-    std::vector<std::uint32_t> vertex_at_;              // the first vertex at each place
-    std::vector<Triangle> corners_;                     // triangles_ by places instead of vertices
+    std::vector<std::uint32_t> vertex_at_;  // the first vertex at each place
+    std::vector<Triangle> corners_;         // triangles_ by places instead of vertices
+    double doubtful_ = 0;                   // squared distance beyond which another sheet of the surface may be nearer
     std::vector<std::uint32_t> spread_over_;            // the triangle of each point of a long triangle
     std::vector<std::uint32_t> first_around_, around_;  // triangles around each vertex's place
 };
