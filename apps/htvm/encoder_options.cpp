@@ -62,7 +62,7 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
         .add_option(
             "--profile", options.profile,
             "topology (default): keeps the capture's connectivity, with the choices that measured best; paper:\n"
-            "the published method's own choices (--reference bone, --registration point)")
+            "the published method's own choices (--reference bone, --registration point, --weights 0)")
         ->check(CLI::IsMember({"topology", "paper"}));
     command
         .add_option("--reference", options.reference,
@@ -73,6 +73,11 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
         .add_option("--registration", options.registration,
                     "Of the bones: by distances from point to plane, or from point to point (default: by profile)")
         ->check(CLI::IsMember({"plane", "point"}));
+    command
+        .add_option("--weights", options.weight_width,
+                    "Width in mm of the borders between bones, over which their motions blend; 0: none, each vertex\n"
+                    "moves with one bone (default: by profile)")
+        ->check(CLI::Range(0.0, 1000.0));
     command.add_flag("--keep-duplicates", options.keep_duplicates,
                      "Keep vertices that decode to the same point and attributes, and triangles that collapse: the\n"
                      "decoded triangle set is then exactly the input's");
@@ -102,6 +107,8 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     out.reference_vertices =
         chosen(options.reference, paper ? "bone" : "any") == "bone" ? ReferenceVertices::bone : ReferenceVertices::any;
     out.point_to_plane = chosen(options.registration, paper ? "point" : "plane") == "plane";
+    if (paper) out.weight_width = 0;
+    if (options.weight_width >= 0) out.weight_width = options.weight_width;
     out.threads = options.threads;
     out.fps_numerator = static_cast<std::uint32_t>(std::lround(capture.fps() * 1000));
     out.fps_denominator = 1000;

@@ -17,6 +17,7 @@ struct EncodingOptions {
     int key_interval = 30;
     std::string intra = "tfan";
     std::string profile = "topology";
+    double weight_width = -1;             // mm; below 0: by profile
     std::string reference, registration;  // empty: by profile
     std::string radii_file;
     bool keep_duplicates = false;

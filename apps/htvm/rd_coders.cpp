@@ -92,6 +92,7 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
     EncoderOptions paper = ours;
     paper.reference_vertices = ReferenceVertices::bone;
     paper.point_to_plane = false;
+    paper.weight_width = 0;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
     return {

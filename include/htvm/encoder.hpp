@@ -36,7 +36,7 @@ struct EncoderOptions {
     bool merge_duplicates = true;  // merge vertices that decode to the same, drop triangles that collapse
     int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
     ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured better than the paper's, see docs
-    double weight_width = 0;     // mm, 0..1000: borders between bones blend over it; 0: rigid, as in the paper
+    double weight_width = 30;    // mm, 0..1000: borders between bones blend over it; 0: rigid, as in the paper
     bool point_to_plane = true;  // register bones by distances to planes; false: to points, as in the paper
     int lattice_bits = 0;        // decoded positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is
     unsigned threads = 0;        // 0: one a core; the bytes are the same for any number

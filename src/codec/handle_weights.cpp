@@ -1,9 +1,13 @@
 #include "codec/handle_weights.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <compare>
+#include <functional>
 #include <queue>
 #include <tuple>
+#include <vector>
 
 namespace htvm {
 namespace {
@@ -41,7 +45,7 @@ struct Near {
 
 // The nearest other handles of each vertex, nearest first, that lie nearer than half the width.
 struct NearHandles {
-    std::array<Near, others_a_vertex> near;
+    std::array<Near, others_a_vertex> near{};
     std::uint8_t count = 0;
 };
 
@@ -69,57 +73,53 @@ std::int32_t edge_length(LatticePoint a, LatticePoint b, std::int32_t longest) {
     return std::max(1, static_cast<std::int32_t>(std::sqrt(static_cast<double>(squared))));
 }
 
+// The lists under way, and the steps that are still to be passed on.
+struct Spreading {
+    std::span<const std::uint16_t> own;
+    std::span<const LatticePoint> positions;
+    std::int32_t width;
+    Neighbours neighbours;
+    std::vector<NearHandles> lists;
+    using Step = std::tuple<std::int32_t, std::uint32_t, std::uint16_t>;  // distance, vertex, handle
+    std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
+};
+
+void reach(Spreading& state, std::uint32_t v, std::int64_t distance, std::uint16_t handle) {
+    if (distance >= state.width || state.own[v] == handle) return;
+    const auto d = static_cast<std::int32_t>(distance);
+    if (enter(state.lists[v], {d, handle})) state.steps.push({d, v, handle});
+}
+
+void cross_borders(Spreading& state) {
+    for (std::uint32_t v = 0; v < state.own.size(); ++v)
+        for (std::size_t i = state.neighbours.begin[v]; i < state.neighbours.begin[v + 1]; ++i) {
+            const auto u = state.neighbours.vertices[i];
+            if (state.own[u] == state.own[v]) continue;
+            reach(state, u, edge_length(state.positions[v], state.positions[u], state.width), state.own[v]);
+        }
+}
+
+void pass_on(Spreading& state, std::uint32_t v, Near near) {
+    for (std::size_t i = state.neighbours.begin[v]; i < state.neighbours.begin[v + 1]; ++i) {
+        const auto u = state.neighbours.vertices[i];
+        const std::int64_t length = edge_length(state.positions[v], state.positions[u], state.width);
+        reach(state, u, near.distance + 2 * length, near.handle);
+    }
+}
+
 // Dijkstra's shortest paths from all borders at once. A handle that is not among a vertex's nearest is not among those
 // of any vertex that it would reach through that vertex, so that the lists are exact although they are short.
-class Spreading {
-public:
-    Spreading(std::span<const std::uint16_t> own, std::span<const LatticePoint> positions,
-              std::span<const Triangle> triangles, std::int32_t width)
-        : own_(own), positions_(positions), width_(width), neighbours_(neighbours_of(own.size(), triangles)) {}
-
-    std::vector<NearHandles> run() {
-        lists_.resize(own_.size());
-        for (std::size_t v = 0; v < own_.size(); ++v)
-            for (std::size_t i = neighbours_.begin[v]; i < neighbours_.begin[v + 1]; ++i) {
-                const auto u = neighbours_.vertices[i];
-                if (own_[u] != own_[v]) reach(u, edge_length(positions_[v], positions_[u], width_), own_[v]);
-            }
-        while (!queue_.empty()) {
-            const auto [distance, v, handle] = queue_.top();
-            queue_.pop();
-            if (is_current(lists_[v], {distance, handle})) pass_on(v, {distance, handle});
-        }
-        return std::move(lists_);
+std::vector<NearHandles> near_handles(Spreading state) {
+    cross_borders(state);
+    while (!state.steps.empty()) {
+        const auto [distance, v, handle] = state.steps.top();
+        state.steps.pop();
+        const Near near{distance, handle};
+        const auto known = std::span(state.lists[v].near).first(state.lists[v].count);
+        if (std::find(known.begin(), known.end(), near) != known.end()) pass_on(state, v, near);
     }
-
-private:
-    using Step = std::tuple<std::int32_t, std::uint32_t, std::uint16_t>;  // distance, vertex, handle
-
-    static bool is_current(const NearHandles& list, Near near) {
-        return std::find(list.near.begin(), list.near.begin() + list.count, near) != list.near.begin() + list.count;
-    }
-
-    void reach(std::uint32_t v, std::int64_t distance, std::uint16_t handle) {
-        if (distance >= width_ || own_[v] == handle) return;
-        const auto d = static_cast<std::int32_t>(distance);
-        if (enter(lists_[v], {d, handle})) queue_.push({d, v, handle});
-    }
-
-    void pass_on(std::uint32_t v, Near near) {
-        for (std::size_t i = neighbours_.begin[v]; i < neighbours_.begin[v + 1]; ++i) {
-            const auto u = neighbours_.vertices[i];
-            const std::int64_t length = edge_length(positions_[v], positions_[u], width_);
-            reach(u, near.distance + 2 * length, near.handle);
-        }
-    }
-
-    std::span<const std::uint16_t> own_;
-    std::span<const LatticePoint> positions_;
-    std::int32_t width_;
-    Neighbours neighbours_;
-    std::vector<NearHandles> lists_;
-    std::priority_queue<Step, std::vector<Step>, std::greater<>> queue_;
-};
+    return std::move(state.lists);
+}
 
 // On the border between two handles both weigh the same; from there the weight of the other one falls in a straight
 // line to 0 at half the width.
@@ -154,7 +154,9 @@ VertexWeights weights_of(std::uint16_t own, const NearHandles& others, std::int3
 HandleWeights smooth_weights(std::span<const std::uint16_t> handle_of_vertex, std::span<const LatticePoint> positions,
                              std::span<const Triangle> triangles, std::int32_t width, unsigned threads) {
     static_cast<void>(threads);  // one pass of some milliseconds
-    const auto others = Spreading(handle_of_vertex, positions, triangles, width).run();
+    const auto count = positions.size();
+    const auto others = near_handles(
+        {handle_of_vertex, positions, width, neighbours_of(count, triangles), std::vector<NearHandles>(count), {}});
     HandleWeights out;
     out.reserve(others.size());
     for (std::size_t v = 0; v < others.size(); ++v) out.push_back(weights_of(handle_of_vertex[v], others[v], width));

@@ -10,9 +10,13 @@
 
 namespace htvm {
 
-// Each vertex begins with its own handle alone (for bones: its bone; for nodes: the nearest one along the mesh); the
-// weights then spread over the mesh's edges, until a border between two handles is about `width` lattice units wide.
-// handle_of_vertex: one a vertex. Vertices without triangles keep their handle. The same for any number of threads.
+// Each vertex has a handle of its own (for bones: its bone; for nodes: the nearest one along the mesh). On the border
+// between two handles both weigh the same; away from it, along the mesh's edges, the weight of the other one falls in a
+// straight line to 0 at half the width, so that the border is `width` lattice units wide. Of more than three others the
+// nearest three count. docs/bitstream.md, section 7.4.
+// handle_of_vertex: one a position; triangles name positions; width 0..lattice_limit, 0: each vertex its own handle.
+// Vertices without triangles keep their handle. The same for any number of threads.
+// About 3 ms for 35,000 vertices and 14 bones.
 HandleWeights smooth_weights(std::span<const std::uint16_t> handle_of_vertex, std::span<const LatticePoint> positions,
                              std::span<const Triangle> triangles, std::int32_t width, unsigned threads);
 

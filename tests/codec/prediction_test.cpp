@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "codec/handle_weights.h"
 #include "codec/random_numbers.h"
 
 namespace htvm {
@@ -79,6 +80,103 @@ TEST(Prediction, EachBoneMovesItsOwnVerticesAboutItsPivot) {
     EXPECT_EQ(normals[0], (QuantisedNormal{0, 127, 0}));
     EXPECT_EQ(normals[2], (QuantisedNormal{0, 0, 127}));
     EXPECT_EQ(normals[1], reference.mesh.normals[1]);
+}
+
+// The vertices of two_bones() in one strip, so that the bones share them.
+ReferenceMesh two_bones_that_share() {
+    auto reference = two_bones();
+    reference.weights = {
+        {{0, 1}, {3072, 1024}}, {{1, 0}, {2048 + 1, 2047}}, {{0}, {4096}}, {{0, 1}, {2048, 2048}}, {{1}, {4096}}};
+    return reference;
+}
+
+TEST(Prediction, WeightsThatAreWholeChangeNothing) {
+    std::mt19937 random(5);
+    const auto rigid = two_bones();
+    auto whole = rigid;
+    for (const auto bone : rigid.bone_of_vertex) whole.weights.push_back({{bone}, {4096}});
+    std::vector<QuantisedTransform> transforms(3);
+    for (auto& t : transforms) t = {random_rotation(random), random_point(random, 1000)};
+    EXPECT_EQ(predict_positions(whole, transforms, 1), predict_positions(rigid, transforms, 1));
+    EXPECT_EQ(predict_normals(whole, transforms), predict_normals(rigid, transforms));
+}
+
+TEST(Prediction, SharedVerticesGoToTheWeightedMean) {
+    const auto reference = two_bones_that_share();
+    std::vector<QuantisedTransform> transforms(3);
+    transforms[0].shift = {400, 0, 0};
+    transforms[1].shift = {0, 800, 1};
+    const auto moved = predict_positions(reference, transforms, 1);
+    EXPECT_EQ(moved[0], (LatticePoint{-100 + 300, 200, 0}));
+    EXPECT_EQ(moved[3], (LatticePoint{-80 + 200, 100 + 400, 1})) << "halves are rounded up";
+    EXPECT_EQ(moved[2], (LatticePoint{-120 + 400, 50, 0}));
+    EXPECT_EQ(moved[4], (LatticePoint{110, 880, 11}));
+    EXPECT_EQ(predict_normals(reference, transforms), reference.mesh.normals);
+    transforms[0].rotation = transforms[1].rotation = quantise_rotation({1, 0, 0, 1});  // both a quarter turn about z
+    EXPECT_EQ(predict_normals(reference, transforms)[0], (QuantisedNormal{0, 127, 0}));
+}
+
+TEST(Prediction, RoundsTheRealBlendOnce) {
+    std::mt19937 random(6);
+    for (int i = 0; i < 2000; ++i) {
+        auto reference = two_bones_that_share();
+        for (auto& p : reference.mesh.positions) p = random_point(random, 1 << 20);
+        for (auto& p : reference.pivots) p = random_point(random, 1 << 20);
+        std::vector<QuantisedTransform> transforms(3);
+        for (auto& t : transforms) t = {random_rotation(random), random_point(random, 1 << 20)};
+        const auto moved = predict_positions(reference, transforms, 1);
+        Eigen::Vector3d expected = Eigen::Vector3d::Zero();
+        for (const std::size_t bone : {0, 1}) {
+            const Eigen::Vector3d pivot = real(reference.pivots[bone]);
+            expected += (bone == 0 ? 0.75 : 0.25) *
+                        (real(transforms[bone].rotation) * (real(reference.mesh.positions[0]) - pivot) + pivot +
+                         real(transforms[bone].shift));
+        }
+        ASSERT_LT((real(moved[0]) - expected).cwiseAbs().maxCoeff(), 0.75) << "a half and the matrix's own rounding";
+    }
+}
+
+TEST(Prediction, OfSharedVerticesNeverLeavesTheLattice) {
+    std::mt19937 random(7);
+    auto corner = [&](std::int32_t reach) {
+        auto c = [&] { return test::below(random, 2) ? reach : -reach; };
+        return LatticePoint{c(), c(), c()};
+    };
+    for (int i = 0; i < 5000; ++i) {
+        auto reference = two_bones_that_share();
+        for (auto& p : reference.mesh.positions) p = corner(lattice_limit);
+        for (auto& p : reference.pivots) p = corner(lattice_limit);
+        std::vector<QuantisedTransform> transforms(3);
+        for (auto& t : transforms) t = {random_rotation(random), corner(2 * lattice_limit)};  // the most of a stream
+        const auto moved = predict_positions(reference, transforms, 1);
+        for (const auto p : moved) ASSERT_TRUE(on_lattice(p));
+        // Where the sum overflowed, it would land on the other side.
+        const double x =
+            0.75 * (real(transforms[0].rotation) * real(reference.mesh.positions[0] - reference.pivots[0]) +
+                    real(reference.pivots[0]) + real(transforms[0].shift))
+                       .x() +
+            0.25 * (real(transforms[1].rotation) * real(reference.mesh.positions[0] - reference.pivots[1]) +
+                    real(reference.pivots[1]) + real(transforms[1].shift))
+                       .x();
+        ASSERT_NEAR(moved[0].x, std::clamp(x, -1.0 * lattice_limit, 1.0 * lattice_limit), 8);
+    }
+}
+
+TEST(ReferenceMesh, OfSomeWidthHasWeightsWhereItsBonesMeet) {
+    LatticeMesh mesh;
+    mesh.positions = {{-100, 0, 0}, {100, 0, 0}, {0, 90, 0}, {0, -200, 0}};
+    mesh.triangles = {{0, 1, 2}};
+    const std::vector<std::int32_t> radii = {1, 1};
+    const auto make = [&](std::int32_t width) {
+        return make_reference(mesh, {{0, 1}, {2, 3}}, {{-100, -9, 0}, {-100, 200, 0}, {100, -9, 0}, {100, 200, 0}},
+                              std::vector<QuantisedRotation>(2), radii, width, 0, 1);
+    };
+    EXPECT_TRUE(make(0).weights.empty());
+    const auto reference = make(1000);
+    ASSERT_EQ(reference.weights.size(), 4u);
+    EXPECT_EQ(reference.weights, smooth_weights(reference.bone_of_vertex, mesh.positions, mesh.triangles, 1000, 1));
+    EXPECT_GT(reference.weights[0].weight[1], 0);
+    EXPECT_EQ(reference.weights[3].weight[0], 4096);
 }
 
 TEST(Move, IsTheRealRotationToWithinALatticeUnit) {

@@ -19,6 +19,7 @@ SequenceHeader full_header() {
     header.skeleton.bones = {{0, 1}, {3, 2}, {1, 1}};
     header.radii = {0, 1234, lattice_limit};
     header.nearest_vertices = 64;
+    header.weight_width = lattice_limit;
     return header;
 }
 
@@ -32,6 +33,7 @@ void expect_equal(const SequenceHeader& a, const SequenceHeader& b) {
     EXPECT_EQ(a.skeleton.joint_names, b.skeleton.joint_names);
     EXPECT_EQ(a.radii, b.radii);
     EXPECT_EQ(a.nearest_vertices, b.nearest_vertices);
+    EXPECT_EQ(a.weight_width, b.weight_width);
     ASSERT_EQ(a.skeleton.bones.size(), b.skeleton.bones.size());
     for (std::size_t i = 0; i < a.skeleton.bones.size(); ++i) {
         EXPECT_EQ(a.skeleton.bones[i].first, b.skeleton.bones[i].first);
@@ -92,6 +94,12 @@ TEST(SequenceHeader, FieldsOutOfRangeAreRefused) {
     header = full_header();
     header.nearest_vertices = mtfan_max_nearest + 1;
     expect_refused(header, "too many nearest vertices");
+    header = full_header();
+    header.weight_width = lattice_limit + 1;
+    expect_refused(header, "weight width");
+    header = full_header();
+    header.weight_width = -1;
+    expect_refused(header, "negative weight width");
     header = full_header();
     header.skeleton.bones.clear();
     expect_refused(header, "no bones");

@@ -35,11 +35,14 @@ for quality in 0 20 90 100; do
     same person "$person" -q $quality --keep-duplicates
 done
 same person "$person" --skeleton "$person/skeleton.json" --profile paper
+for width in 0 7 40 1000; do
+    same person "$person" --skeleton "$person/skeleton.json" --weights $width
+done
 same person "$person" --keyint 2 --lambda 0 --geometry-step 0.02 --colour-step 1
 for nearest in 1 5 8 9 64; do
     same person "$person" --nearest $nearest -q 70
 done
-same normals "$work/normals" --skeleton "$work/normals/skeleton.json" -q 60
+same normals "$work/normals" --skeleton "$work/normals/skeleton.json" -q 60 --weights 60
 python3 "$here/awkward.py" "$work/awkward"
 for sequence in "$work"/awkward/*; do
     name=$(basename "$sequence")

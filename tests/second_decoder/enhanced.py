@@ -6,7 +6,7 @@ from arithmetic import Decoder, Mixer, Model, Models, SignedModel, SymbolModel, 
 from conventions import Bytes, L, add, check, clamp, sub
 from intra import Mesh, decode_attributes
 from mtfan import decode_mtfan
-from reference import decode_point, decode_rotation, matrix, rotate
+from reference import decode_point, decode_rotation, matrix
 from stream import COLOUR, GEOMETRY, MAPPING, NORMALS, TEXCOORDS, TRANSFORMS
 
 
@@ -30,12 +30,26 @@ def decode_transforms(data, bones):
 
 def predict_positions(reference, transforms):
     out = []
-    for v, bone in zip(reference.mesh.positions, reference.bone):
-        M, shift = transforms[bone]
-        pivot = reference.pivots[bone]
-        moved = add(add(rotate(M, sub(v, pivot)), pivot), shift)
-        out.append(tuple(clamp(x, -L, L) for x in moved))
+    for v, weights in zip(reference.mesh.positions, reference.weights):
+        total = [0, 0, 0]
+        for weight, bone in weights:
+            M, shift = transforms[bone]
+            pivot = reference.pivots[bone]
+            moved, d = add(pivot, shift), sub(v, pivot)
+            for i in range(3):
+                turned = M[3 * i] * d[0] + M[3 * i + 1] * d[1] + M[3 * i + 2] * d[2]
+                total[i] += weight * (turned + (moved[i] << 24))
+        out.append(tuple(clamp((x + (1 << 35)) >> 36, -L, L) for x in total))
     return out
+
+
+def turned_normal(reference, transforms, r):
+    n, total = reference.mesh.normals[r], [0, 0, 0]
+    for weight, bone in reference.weights[r]:
+        M = transforms[bone][0]
+        for i in range(3):
+            total[i] += weight * (M[3 * i] * n[0] + M[3 * i + 1] * n[1] + M[3 * i + 2] * n[2])
+    return tuple((x + (1 << 35)) >> 36 for x in total)
 
 
 def area_classes(mesh):
@@ -185,7 +199,7 @@ def decode_enhanced_mesh(frame, reference, books, m):
         residuals = decode_residuals(frame.layer(COLOUR), len(ref), colour_book)
         mesh.colours = [tuple(clamp(x, 0, 255) for x in add(base.colours[r], e)) for r, e in zip(ref, residuals)]
     if base.normals:
-        given = [rotate(transforms[reference.bone[r]][0], base.normals[r]) for r in ref]
+        given = [turned_normal(reference, transforms, r) for r in ref]
         mesh.normals = decode_attributes(frame.layer(NORMALS), 3, given=given)
     if base.texcoords:
         mesh.texcoords = decode_attributes(frame.layer(TEXCOORDS), 2, given=[base.texcoords[r] for r in ref])

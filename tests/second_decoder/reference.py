@@ -1,5 +1,6 @@
 """Chapter 7 of docs/bitstream.md: the pose (7.1), skinning (7.2), and the reference mesh that EP-frames are
-predicted from (7.3)."""
+predicted from (7.3) with its weights (7.4)."""
+import heapq
 import math
 
 from arithmetic import Decoder, SignedModel
@@ -58,6 +59,37 @@ def distance_to_bone(v, first, second, radius):
     return math.sqrt(float(min(squared_distance(v, first), squared_distance(v, second))))
 
 
+def smooth_weights(bone, positions, triangles, width):
+    """Per vertex a list of (weight, bone), in 2^-12 (7.4)."""
+    neighbours = [set() for _ in positions]
+    for triangle in triangles:
+        for v in triangle:
+            neighbours[v].update(u for u in triangle if u != v)
+
+    def length(u, v):
+        return max(1, math.isqrt(squared_distance(positions[u], positions[v])))
+
+    queue = [(length(u, v), v, bone[u]) for v in range(len(bone)) for u in neighbours[v] if bone[u] != bone[v]]
+    queue = [step for step in queue if step[0] < width]
+    heapq.heapify(queue)
+    near = [{} for _ in positions]
+    while queue:
+        distance, v, other = heapq.heappop(queue)
+        if other in near[v] or other == bone[v] or len(near[v]) == 3:
+            continue
+        near[v][other] = distance
+        for u in neighbours[v]:
+            farther = distance + 2 * length(u, v)
+            if farther < width:
+                heapq.heappush(queue, (farther, u, other))
+    out = []
+    for v, others in enumerate(near):
+        total = width + min(others.values(), default=0) + sum(width - distance for distance in others.values())
+        entries = [((width - distance) * 4096 // total, other) for other, distance in others.items()]
+        out.append([(4096 - sum(weight for weight, _ in entries), bone[v])] + entries)
+    return out
+
+
 class Reference:
     """The reference mesh (7.3)."""
 
@@ -68,6 +100,10 @@ class Reference:
         for v in mesh.positions:
             distances = [distance_to_bone(v, *cylinder) for cylinder in cylinders]
             self.bone.append(distances.index(min(distances)))
+        if header.weight_width > 0:
+            self.weights = smooth_weights(self.bone, mesh.positions, mesh.triangles, header.weight_width)
+        else:
+            self.weights = [[(4096, bone)] for bone in self.bone]
         self.pivots = []
         for i, (first, _) in enumerate(header.bones):
             own = [p for p, bone in zip(mesh.positions, self.bone) if bone == i]
