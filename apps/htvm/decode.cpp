@@ -112,7 +112,7 @@ Result<bool> decode_next(const Options& options, StreamInput& input, Decoder& de
     if (!frame) {
         if (frame.error().kind == ErrorKind::unsupported || frame.error().kind == ErrorKind::limit)
             return tl::unexpected(frame.error());
-        if (packet->kind == PacketKind::intra || packet->kind == PacketKind::enhanced) tell_gap(summary, packet->frame);
+        if (frame_type(packet->kind)) tell_gap(summary, packet->frame);
         warn(fmt::format("frame {} is lost: {}", packet->frame, frame.error().message));
         ++summary.failed;
         return true;

@@ -28,7 +28,7 @@ Result<void> drain(Encoder& encoder, StreamOutput& output) {
 }
 
 struct Summary {
-    LayerTotals intra, enhanced;
+    TotalsByType totals;
     double encode_seconds = 0;
     std::size_t without_triangles = 0;
     nlohmann::json frames = nlohmann::json::array();
@@ -43,12 +43,11 @@ Result<void> encode_frames(Capture& capture, Encoder& encoder, StreamOutput& out
         if ((*mesh)->triangles.empty()) ++summary.without_triangles;
         const auto start = std::chrono::steady_clock::now();
         if (auto ok = encoder.push(**mesh, capture.pose(), capture.timestamp_us()); !ok) {
-            const auto done = summary.intra.frames + summary.enhanced.frames;
-            return fail(ok.error().kind, fmt::format("frame {}: {}", done, ok.error().message));
+            return fail(ok.error().kind, fmt::format("frame {}: {}", summary.totals.all().frames, ok.error().message));
         }
         summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         const auto& info = encoder.last_frame();
-        add(info.type == FrameType::intra ? summary.intra : summary.enhanced, info);
+        add(summary.totals, info);
         if (json) summary.frames.push_back(frame_json(info));
         if (auto written = drain(encoder, output); !written) return written;
         progress.step(fmt::format("{} {:.2f} bpv", type_name(info.type),
@@ -71,7 +70,7 @@ Result<void> encode(const Options& options) {
     if (!output) return tl::unexpected(output.error());
     Summary summary;
     if (auto ok = encode_frames(*capture, *encoder, *output, options.json, summary); !ok) return ok;
-    const auto frames = summary.intra.frames + summary.enhanced.frames;
+    const auto frames = summary.totals.all().frames;
     if (frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
     if (summary.without_triangles > 0)
         warn(fmt::format("{} of {} frames have no triangles; see that the files hold meshes", summary.without_triangles,
@@ -87,7 +86,7 @@ Result<void> encode(const Options& options) {
         fmt::print("{}\n", out.dump(2));
         return {};
     }
-    fmt::print(stderr, "{}", layer_table(summary.intra, summary.enhanced));
+    fmt::print(stderr, "{}", layer_table(summary.totals));
     note(fmt::format("{}: {} frames, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s", options.output,
                      frames, output->bytes(), megabits / seconds, capture->fps(),
                      static_cast<double>(frames) / summary.encode_seconds));

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -30,6 +31,49 @@ Result<std::vector<double>> read_radii(const std::string& path, std::size_t bone
     return radii;
 }
 
+// Which kind of frame a frame becomes.
+void add_choice_options(CLI::App& command, EncodingOptions& options) {
+    const auto millimetres = CLI::Range(0.0, 1e6);
+    command
+        .add_option("--min-keyint", options.least_key_interval,
+                    "Fewest frames from one I-frame to the next, unless the scene changes (default 1)")
+        ->check(CLI::Range(1, 1000000));
+    command
+        .add_option(
+            "--decide", options.decide,
+            "Choice of frames: fixed (I every --keyint, EP between), motion (by how far the skeleton's bones\n"
+            "are from the last I-frame: --predicted-below, --intra-above), or rd (by measured bits and errors;\n"
+            "slow). Default: by profile")
+        ->check(CLI::IsMember({"fixed", "motion", "rd"}));
+    command
+        .add_option("--predicted-below", options.predicted_below,
+                    "--decide motion: frames whose bones moved less than this in all, mm, are P-frames: the I-frame's\n"
+                    "mesh moved")
+        ->check(millimetres);
+    command
+        .add_option("--intra-above", options.intra_above,
+                    "--decide motion: frames whose bones moved more than this in all, mm, are I-frames; 0: never")
+        ->check(millimetres);
+    command
+        .add_option("--still-below", options.still_below,
+                    "Motion-based coding: the sub-meshes of bones that moved less than this, mm, are animated, the\n"
+                    "others coded, and both zippered; 0 (default): all are coded")
+        ->check(millimetres);
+    command
+        .add_option("--animation-error", options.animation_error,
+                    "What would be animated is coded after all where it is farther than this, mm, from the capture's\n"
+                    "surface (root mean square, bone by bone; default 2); 0: unchecked, as the paper has it")
+        ->check(millimetres);
+    command.add_flag("--no-scene-changes", options.no_scene_changes,
+                     "No I-frame of its own accord where the scene changes");
+}
+
+FrameChoice frame_choice(const std::string& name) {
+    if (name == "fixed") return FrameChoice::fixed;
+    if (name == "motion") return FrameChoice::motion;
+    return FrameChoice::rate_distortion;
+}
+
 }  // namespace
 
 void add_encoding_options(CLI::App& command, EncodingOptions& options) {
@@ -51,8 +95,9 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
         ->check(CLI::Range(0.0, 1000.0));
     command
         .add_option("--keyint", options.key_interval,
-                    "Frames from one I-frame to the next (default 30); 1: I-frames only")
+                    "Most frames from one I-frame to the next (default 30); 1: I-frames only")
         ->check(CLI::Range(1, 1000000));
+    add_choice_options(command, options);
     command
         .add_option("--intra", options.intra,
                     "Coder of the I-frames: tfan (default; keeps every triangle) or draco (drops isolated\n"
@@ -98,6 +143,13 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     out.colour_step = options.colour_step > 0 ? options.colour_step : steps.colour_step;
     if (options.lambda >= 0) out.lambda = options.lambda;
     out.key_interval = options.key_interval;
+    out.least_key_interval = std::min(options.least_key_interval, options.key_interval);
+    if (!options.decide.empty()) out.frame_choice = frame_choice(options.decide);
+    if (options.predicted_below >= 0) out.predicted_below = options.predicted_below;
+    if (options.intra_above >= 0) out.intra_above = options.intra_above;
+    if (options.still_below >= 0) out.still_below = options.still_below;
+    if (options.animation_error >= 0) out.animation_error = options.animation_error;
+    out.scene_changes = !options.no_scene_changes;
     out.merge_duplicates = !options.keep_duplicates;
     out.nearest_vertices = options.nearest_vertices;
     const bool paper = options.profile == "paper";

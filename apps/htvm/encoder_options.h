@@ -14,7 +14,12 @@ struct EncodingOptions {
     double geometry_step = 0;  // mm; 0: by quality
     double colour_step = 0;    // levels; 0: by quality
     double lambda = -1;        // below 0: the library's default
-    int key_interval = 30;
+    int key_interval = 30, least_key_interval = 1;
+    std::string decide;                                                                     // empty: by profile
+    double predicted_below = -1, intra_above = -1, still_below = -1, animation_error = -1;  // mm; below 0: by profile
+    bool no_scene_changes = false;
+    double megabits = 0, buffer_seconds = 1;  // rate control; 0: none
+    double target_error = 0;                  // mm; 0: none
     std::string intra = "tfan";
     std::string profile = "topology";
     double weight_width = -1;             // mm; below 0: by profile

@@ -64,7 +64,8 @@ Result<void> info(const Options& options) {
     auto input = StreamInput::open(options.input);
     if (!input) return tl::unexpected(input.error());
     Decoder headers;  // for the sequence header alone: frames are inspected, not decoded
-    LayerTotals intra, enhanced;
+    TotalsByType totals;
+    std::size_t count = 0;
     LayerBytes codebooks;
     nlohmann::json frames = nlohmann::json::array();
     std::uint64_t bytes = 0;
@@ -84,15 +85,14 @@ Result<void> info(const Options& options) {
         }
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
         if (packet->kind == PacketKind::index) index = true;
-        if (packet->kind != PacketKind::intra && packet->kind != PacketKind::enhanced) continue;
+        if (!frame_type(packet->kind)) continue;
         auto frame = inspect(*packet);
         if (!frame) return tl::unexpected(frame.error());
         frame->bytes.overhead += codebooks.overhead;
         frame->bytes.geometry += codebooks.geometry;
         frame->bytes.colour += codebooks.colour;
         codebooks = {};
-        auto& totals = frame->type == FrameType::intra ? intra : enhanced;
-        if (intra.frames + enhanced.frames == 0) first_us = frame->timestamp_us;
+        if (count++ == 0) first_us = frame->timestamp_us;
         last_us = frame->timestamp_us;
         add(totals, *frame);
         if (options.json) frames.push_back(frame_json(*frame));
@@ -100,7 +100,6 @@ Result<void> info(const Options& options) {
     }
     if (!headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
-    const auto count = intra.frames + enhanced.frames;
     const auto& s = *headers.sequence();
     const double seconds = count > 1 ? static_cast<double>(last_us - first_us) / 1e6 * static_cast<double>(count) /
                                            static_cast<double>(count - 1)
@@ -115,8 +114,8 @@ Result<void> info(const Options& options) {
                                           {"megabits_per_second", megabits}}
                                .dump(2));
     } else {
-        fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(intra, enhanced), count, seconds,
-                   bytes, megabits, index ? ", with an index for seeking" : "");
+        fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), count, seconds, bytes,
+                   megabits, index ? ", with an index for seeking" : "");
     }
     if (input->damaged_bytes() > 0)
         return fail(ErrorKind::corrupt_stream,

@@ -35,29 +35,38 @@ void add(LayerTotals& totals, const FrameInfo& info) {
     for (const auto& [name, member] : columns) totals.bytes.*member += info.bytes.*member;
 }
 
+void add(TotalsByType& totals, const FrameInfo& info) { add(totals.of(info.type), info); }
+
+LayerTotals TotalsByType::all() const {
+    LayerTotals out;
+    for (const auto& sums : totals) {
+        out.frames += sums.frames;
+        out.source_vertices += sums.source_vertices;
+        for (const auto& [name, member] : columns) out.bytes.*member += sums.bytes.*member;
+    }
+    return out;
+}
+
 double bits_per_vertex(std::size_t bytes, std::uint64_t vertices) {
     return vertices == 0 ? 0 : 8.0 * static_cast<double>(bytes) / static_cast<double>(vertices);
 }
 
-std::string layer_table(const LayerTotals& intra, const LayerTotals& enhanced) {
-    LayerTotals all = intra;
-    all.frames += enhanced.frames;
-    all.source_vertices += enhanced.source_vertices;
-    for (const auto& [name, member] : columns) all.bytes.*member += enhanced.bytes.*member;
+std::string layer_table(const TotalsByType& totals) {
+    const LayerTotals all = totals.all();
     std::string out = fmt::format("{:<10}{:>8}", "bits/vertex", "frames");
     for (const auto& [name, member] : columns)
         if (all.bytes.*member > 0) out += fmt::format("{:>16}", name);
     out += fmt::format("{:>10}\n", "total");
-    const std::array<std::pair<const char*, const LayerTotals*>, 3> rows = {
-        {{"I", &intra}, {"EP", &enhanced}, {"all", &all}}};
-    for (const auto& [name, totals] : rows) {
-        if (totals->frames == 0) continue;
-        out += fmt::format("{:<11}{:>7}", name, totals->frames);
+    const auto row = [&](const char* row_name, const LayerTotals& sums) {
+        if (sums.frames == 0) return;
+        out += fmt::format("{:<11}{:>7}", row_name, sums.frames);
         for (const auto& [column, member] : columns)
             if (all.bytes.*member > 0)
-                out += fmt::format("{:>16.3f}", bits_per_vertex(totals->bytes.*member, totals->source_vertices));
-        out += fmt::format("{:>10.3f}\n", bits_per_vertex(totals->bytes.total(), totals->source_vertices));
-    }
+                out += fmt::format("{:>16.3f}", bits_per_vertex(sums.bytes.*member, sums.source_vertices));
+        out += fmt::format("{:>10.3f}\n", bits_per_vertex(sums.bytes.total(), sums.source_vertices));
+    };
+    for (const auto type : all_frame_types) row(type_name(type), totals.of(type));
+    row("all", all);
     return out;
 }
 
@@ -87,6 +96,22 @@ nlohmann::json frame_json(const FrameInfo& info) {
             {"bits_per_vertex", bits_per_vertex(info.bytes.total(), info.source_vertices)}};
 }
 
-const char* type_name(FrameType type) { return type == FrameType::intra ? "I" : "EP"; }
+const char* type_name(FrameType type) {
+    switch (type) {
+        case FrameType::intra:
+            return "I";
+        case FrameType::enhanced:
+            return "EP";
+        case FrameType::predicted:
+            return "P";
+    }
+    return "?";
+}
+
+std::optional<FrameType> type_named(const std::string& name) {
+    for (const auto type : all_frame_types)
+        if (name == type_name(type)) return type;
+    return std::nullopt;
+}
 
 }  // namespace htvm::app

@@ -1,7 +1,9 @@
 // Where a sequence's bytes went, added up over frames, as text and as JSON.
 #pragma once
 
+#include <array>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,16 +19,26 @@ struct LayerTotals {
 
 void add(LayerTotals& totals, const FrameInfo& info);
 
+// The same by kind of frame.
+struct TotalsByType {
+    std::array<LayerTotals, frame_type_count> totals;
+    LayerTotals& of(FrameType type) { return totals[static_cast<std::size_t>(type)]; }
+    const LayerTotals& of(FrameType type) const { return totals[static_cast<std::size_t>(type)]; }
+    LayerTotals all() const;
+};
+void add(TotalsByType& totals, const FrameInfo& info);
+
 // Bits per captured vertex; 0 where there is no vertex.
 double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);
 
 // A table of bits per vertex by layer, one line a kind of frame and one for all.
-std::string layer_table(const LayerTotals& intra, const LayerTotals& enhanced);
+std::string layer_table(const TotalsByType& totals);
 
 nlohmann::json layers_json(const LayerBytes& bytes);
 // The reverse; throws as nlohmann-json does where a layer is missing or no number.
 LayerBytes layers_from_json(const nlohmann::json& json);
 nlohmann::json frame_json(const FrameInfo& info);
-const char* type_name(FrameType type);  // I, EP
+const char* type_name(FrameType type);  // I, EP, P
+std::optional<FrameType> type_named(const std::string& name);
 
 }  // namespace htvm::app

@@ -48,8 +48,7 @@ nlohmann::json frame_to_json(const RdFrame& frame) {
 
 RdFrame frame_from_json(const nlohmann::json& json) {
     RdFrame frame;
-    frame.type =
-        json.at("type").get<std::string>() == type_name(FrameType::enhanced) ? FrameType::enhanced : FrameType::intra;
+    frame.type = type_named(json.at("type").get<std::string>()).value_or(FrameType::intra);
     frame.vertices = json.at("vertices").get<std::uint32_t>();
     frame.bytes = layers_from_json(json.at("bytes"));
     frame.encode_ms = json.at("encode_ms").get<double>();

@@ -66,7 +66,11 @@ private:
     std::unique_ptr<State> state_;
 };
 
-// The layer sizes of a frame packet without decoding it, for inspection.
+// The kind of frame that a packet is, or nothing where it is none.
+std::optional<FrameType> frame_type(PacketKind kind);
+
+// The layer sizes of a frame packet without decoding it, for inspection. Of an EP-frame by motion-based coding,
+// vertices and triangles are those coded; DecodedFrame::info has those of the whole mesh.
 Result<FrameInfo> inspect(const Packet& packet);
 
 }  // namespace htvm

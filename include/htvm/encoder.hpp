@@ -28,11 +28,29 @@ enum class ReferenceVertices : std::uint8_t {
     any,   // the nearest vertex of the whole predicted mesh
 };
 
+enum class FrameChoice : std::uint8_t {
+    fixed,            // an I-frame every key_interval frames, EP-frames between
+    motion,           // the paper's (section III-B): by skeletal motion since the last I-frame
+    rate_distortion,  // by measured bits and errors: the fewest bits among those no worse than an I-frame
+};
+
 struct EncoderOptions {
-    double geometry_step = 2.0;    // mm, > 0: cell of the position quantiser; errors are about half of it
-    double colour_step = 6.0;      // levels of 255, >= 1: cell of the colour quantiser
-    double lambda = 0.12;          // EP: squared error worth one bit, in units of step^2; 0 takes the nearest codeword
-    int key_interval = 30;         // frames from one I-frame to the next; 1: I-frames only
+    double geometry_step = 2.0;  // mm, > 0: cell of the position quantiser; errors are about half of it
+    double colour_step = 6.0;    // levels of 255, >= 1: cell of the colour quantiser
+    double lambda = 0.12;        // EP: squared error worth one bit, in units of step^2; 0 takes the nearest codeword
+    int key_interval = 30;       // most frames from one I-frame to the next; 1: I-frames only
+    int least_key_interval = 1;  // fewest, unless the frame cannot refer to the I-frame or the scene changes
+    bool scene_changes = true;   // an I-frame where much of the mesh is nowhere near the reference's
+    FrameChoice frame_choice = FrameChoice::fixed;
+    double predicted_below = 0;  // mm, choice by motion: with less skeletal motion since the I-frame, a P-frame
+    double intra_above = 0;      // mm, choice by motion: with more, an I-frame; 0: never
+    double still_below = 0;      // mm, motion-based coding (section V): bones that moved less since the I-frame are
+                                 // animated, not coded; 0: all are coded
+    double animation_error = 2;  // mm: what is animated is coded after all where it is farther (root mean square, bone
+                                 // by bone) from the capture's surface; 0: unchecked, as in the paper
+    double bits_per_second = 0;    // > 0: quality follows from it, instead of from the steps
+    double buffer_seconds = 1;     // of the receiver: what a frame may come late against a constant rate
+    double target_error = 0;       // mm (M2), > 0: quality follows from it, instead of from the steps
     bool merge_duplicates = true;  // merge vertices that decode to the same, drop triangles that collapse
     int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
     ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured better than the paper's, see docs

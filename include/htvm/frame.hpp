@@ -1,6 +1,7 @@
 // What encoder and decoder say of a frame: its kind and where its bytes went.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -11,6 +12,9 @@ enum class FrameType : std::uint8_t {
     enhanced,   // EP: against the last I-frame
     predicted,  // P: the last I-frame's mesh moved, nothing else
 };
+
+inline constexpr std::array all_frame_types = {FrameType::intra, FrameType::enhanced, FrameType::predicted};
+inline constexpr std::size_t frame_type_count = all_frame_types.size();
 
 // Bytes of one frame by layer. The paper's layers: geometry, colour, mapping, and connectivity = fans +
 // distance_orders.

@@ -3,6 +3,7 @@
 
 #include <new>
 
+#include "codec/animated_frame.h"
 #include "codec/enhanced_frame.h"
 #include "codec/intra_frame.h"
 #include "codec/sequence_header.h"
@@ -133,16 +134,32 @@ const Codebook* named(const std::optional<NumberedCodebook>& codebook, std::uint
     return codebook && codebook->number == number ? &codebook->codebook : nullptr;
 }
 
+Result<void> check_reference(const State& state, const Packet& packet) {
+    if (state.reference && state.reference->frame == packet.reference) return {};
+    return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " refers to I-frame " +
+                                               std::to_string(packet.reference) + ", which is not there");
+}
+
 Result<Frame> decode_enhanced(State& state, const Packet& packet) {
     const auto payload = read_frame(state, packet);
     if (!payload) return tl::unexpected(payload.error());
-    if (!state.reference || state.reference->frame != packet.reference)
-        return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " refers to I-frame " +
-                                                   std::to_string(packet.reference) + ", which is not there");
+    if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
     const EnhancedFrameContext context{
         *state.reference, named(state.geometry_codebook, payload->header.geometry_codebook),
         named(state.colour_codebook, payload->header.colour_codebook), state.header->nearest_vertices, state.threads};
     auto decoded = decode_enhanced_frame(*payload, context);
+    if (!decoded) return tl::unexpected(decoded.error());
+    DecodedFrame out;
+    out.mesh = to_mesh(decoded->mesh, state.header->lattice);
+    out.pose = moved_pose(state, decoded->transforms);
+    return Frame{std::move(out)};
+}
+
+Result<Frame> decode_predicted(State& state, const Packet& packet) {
+    const auto payload = read_frame(state, packet);
+    if (!payload) return tl::unexpected(payload.error());
+    if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
+    auto decoded = decode_predicted_frame(*payload, *state.reference, state.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     DecodedFrame out;
     out.mesh = to_mesh(decoded->mesh, state.header->lattice);
@@ -161,6 +178,7 @@ Result<Frame> take(State& state, const Packet& packet) {
         case PacketKind::enhanced:
             return decode_enhanced(state, packet);
         case PacketKind::predicted:
+            return decode_predicted(state, packet);
         case PacketKind::index:
             break;
     }
@@ -180,7 +198,12 @@ Decoder::~Decoder() = default;
 Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
     try {
         auto frame = take(*state_, packet);
-        if (frame && *frame) (*frame)->info = *inspect(packet);
+        if (frame && *frame) {
+            auto& info = (*frame)->info = *inspect(packet);
+            // Motion-based coding counts only what is coded in its header.
+            info.vertices = static_cast<std::uint32_t>((*frame)->mesh.positions.size());
+            info.triangles = static_cast<std::uint32_t>((*frame)->mesh.triangles.size());
+        }
         return frame;
     } catch (const std::bad_alloc&) {
         return fail(ErrorKind::limit, "there is not enough memory for frame " + std::to_string(packet.frame));
@@ -189,13 +212,29 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
 
 const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->info; }
 
+std::optional<FrameType> frame_type(PacketKind kind) {
+    switch (kind) {
+        case PacketKind::intra:
+            return FrameType::intra;
+        case PacketKind::enhanced:
+            return FrameType::enhanced;
+        case PacketKind::predicted:
+            return FrameType::predicted;
+        case PacketKind::sequence:
+        case PacketKind::codebook:
+        case PacketKind::index:
+            break;
+    }
+    return std::nullopt;
+}
+
 Result<FrameInfo> inspect(const Packet& packet) {
-    if (packet.kind != PacketKind::intra && packet.kind != PacketKind::enhanced)
-        return fail(ErrorKind::bad_input, "the packet is not a frame");
+    const auto type = frame_type(packet.kind);
+    if (!type) return fail(ErrorKind::bad_input, "the packet is not a frame");
     const auto payload = read_frame_payload(packet.payload);
     if (!payload) return tl::unexpected(payload.error());
     FrameInfo out;
-    out.type = packet.kind == PacketKind::intra ? FrameType::intra : FrameType::enhanced;
+    out.type = *type;
     out.frame = packet.frame;
     out.reference = packet.reference;
     out.timestamp_us = packet.timestamp_us;

@@ -1,11 +1,14 @@
 #include <algorithm>
 
+#include "codec/animated_frame.h"
 #include "codec/attribute_values.h"
+#include "codec/coded_bones.h"
 #include "codec/enhanced_frame.h"
 #include "codec/mapping.h"
 #include "codec/mtfan.h"
 #include "codec/residual_layer.h"
 #include "codec/transforms.h"
+#include "codec/zipper.h"
 #include "core/parallel.h"
 
 namespace htvm {
@@ -108,11 +111,21 @@ Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, 
     auto transforms = decode_transforms(payload.of(Layer::transforms), reference.pivots.size());
     if (!transforms) return tl::unexpected(transforms.error());
     out.transforms = std::move(*transforms);
+    std::vector<bool> coded_bones;
+    std::vector<std::uint8_t> eligible;
+    if (payload.has(Layer::coded_bones)) {
+        auto coded = read_coded_bones(payload.of(Layer::coded_bones), reference.pivots.size());
+        if (!coded) return tl::unexpected(coded.error());
+        coded_bones = std::move(*coded);
+        eligible = vertices_of_coded_bones(reference, coded_bones);
+    }
     const auto residuals_of =
-        decode_mapping(payload.of(Layer::mapping), payload.header.vertices, reference.mapping_prior);
+        decode_mapping(payload.of(Layer::mapping), payload.header.vertices, reference.mapping_prior, eligible);
     if (!residuals_of) return tl::unexpected(residuals_of.error());
     const auto reference_of = references_of_residuals(*residuals_of, payload.header.vertices);
-    const auto predicted = predict_positions(reference, out.transforms, context.threads);
+    if (reference_of.size() != payload.header.vertices)
+        return fail(ErrorKind::corrupt_stream, "EP-frame: it has vertices, but its bones no reference vertex");
+    auto predicted = predict_positions(reference, out.transforms, context.threads);
     auto positions = decode_positions(payload, context, predicted, reference_of);
     if (!positions) return tl::unexpected(positions.error());
     out.mesh.positions = std::move(*positions);

@@ -1,12 +1,16 @@
 #include "codec/enhanced_frame_enc.h"
 
+#include "codec/animated_frame.h"
 #include "codec/attribute_values.h"
+#include "codec/coded_bones.h"
 #include "codec/duplicates_enc.h"
 #include "codec/enhanced_frame.h"
 #include "codec/mapping.h"
 #include "codec/mtfan.h"
 #include "codec/residual_layer.h"
 #include "codec/stage_clock_enc.h"
+#include "codec/transforms.h"
+#include "codec/zipper.h"
 #include "core/parallel.h"
 
 namespace htvm {
@@ -118,16 +122,17 @@ std::vector<Triangle> remove_duplicates(OrderedResiduals& residuals, const std::
 }
 
 // The layers that need no connectivity.
-void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrameState& state,
-                          std::span<const QuantisedTransform> transforms, FramePayload& payload) {
-    const auto& reference = *state.reference;
+void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrameSource& source,
+                          std::span<const std::uint8_t> eligible, const Codebooks& codebooks, FramePayload& payload) {
+    const auto& reference = *source.reference;
+    const auto& transforms = source.motion->transforms;
     std::vector<std::uint32_t> residuals_of(reference.mesh.positions.size(), 0);
     for (const auto r : residuals.order.reference) ++residuals_of[r];
     payload.set(Layer::transforms, encode_transforms(transforms));
-    payload.set(Layer::mapping, encode_mapping(residuals_of, reference.mapping_prior));
-    payload.set(Layer::geometry, encode_residuals(residuals.geometry, *state.geometry_codebook->codebook));
+    payload.set(Layer::mapping, encode_mapping(residuals_of, reference.mapping_prior, eligible));
+    payload.set(Layer::geometry, encode_residuals(residuals.geometry, *codebooks.geometry.codebook));
     if (!reference.mesh.colours.empty())
-        payload.set(Layer::colour, encode_residuals(residuals.colour, *state.colour_codebook->codebook));
+        payload.set(Layer::colour, encode_residuals(residuals.colour, *codebooks.colour.codebook));
     if (!reference.mesh.normals.empty()) {
         const auto turned = selected(predict_normals(reference, transforms), residuals.order.reference);
         payload.set(Layer::normals, encode_attribute_values(residuals.decoded.normals, turned));
@@ -138,50 +143,43 @@ void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrame
     }
 }
 
+// Residuals against the predicted mesh, quantised, and what they decode to.
+OrderedResiduals quantise_residuals(const EnhancedFrameSource& source, std::span<const std::uint8_t> eligible,
+                                    Codebooks& codebooks, const EnhancedFrameOptions& options, StageClock& clock) {
+    const auto& mesh = *source.mesh;
+    const auto& reference = *source.reference;
+    const auto& predicted = source.motion->predicted;
+    const auto reference_of_vertex =
+        find_reference_vertices(reference, *source.search, predicted, source.motion->transforms, mesh.positions,
+                                source.bone_of_vertex, eligible, options.reference_choice, options.threads);
+    OrderedResiduals out;
+    out.order = order_residuals(reference_of_vertex, predicted.size());
+    clock.done("reference vertices");
+    out.geometry = quantise_with(codebooks.geometry, position_residuals(mesh, predicted, out.order), options.geometry);
+    if (!reference.mesh.colours.empty())
+        out.colour = quantise_with(codebooks.colour, colour_residuals(mesh, reference.mesh, out.order), options.colour);
+    out.decoded = decode_vertices(mesh, reference, predicted, out);
+    clock.done("quantisation");
+    return out;
+}
+
 }  // namespace
 
-EncodedEnhancedFrame encode_enhanced_frame(const LatticeMesh& mesh, const CodedPose& pose, EnhancedFrameState& state,
+EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);
-    const auto& reference = *state.reference;
+    const auto& reference = *source.reference;
     const unsigned threads = options.threads;
-
-    const auto bone_of_vertex = skin(mesh.positions, cylinders(*state.bones, pose.joints, state.radii), threads);
-    const auto sub_meshes = group_by_bone(bone_of_vertex, state.bones->size());
-    clock.done("skinning");
-
-    const auto skeletal = skeletal_motion(reference, *state.bones, pose);
-    const auto motion = register_bones(*state.search, mesh.positions, sub_meshes, skeletal, *state.motion_before,
-                                       options.registration, threads);
-    std::vector<QuantisedTransform> transforms;
-    for (std::size_t i = 0; i < motion.size(); ++i)
-        transforms.push_back(quantise_motion(motion[i], reference.pivots[i]));
-    *state.motion_before = motion;
-    clock.done("registration");
-
-    const auto predicted = predict_positions(reference, transforms, threads);
-    const auto reference_of_vertex =
-        find_reference_vertices(reference, *state.search, predicted, transforms, mesh.positions, bone_of_vertex,
-                                options.reference_choice, threads);
-    OrderedResiduals residuals;
-    residuals.order = order_residuals(reference_of_vertex, predicted.size());
-    clock.done("reference vertices");
-
-    residuals.geometry =
-        quantise_with(*state.geometry_codebook, position_residuals(mesh, predicted, residuals.order), options.geometry);
-    if (!reference.mesh.colours.empty())
-        residuals.colour = quantise_with(*state.colour_codebook,
-                                         colour_residuals(mesh, reference.mesh, residuals.order), options.colour);
-    residuals.decoded = decode_vertices(mesh, reference, predicted, residuals);
-    clock.done("quantisation");
-
-    const auto triangles = remove_duplicates(residuals, mesh.triangles, options.merge_duplicates);
+    std::vector<std::uint8_t> eligible;
+    if (!source.coded_bones.empty()) eligible = vertices_of_coded_bones(reference, source.coded_bones);
+    auto residuals = quantise_residuals(source, eligible, codebooks, options, clock);
+    const auto triangles = remove_duplicates(residuals, source.mesh->triangles, options.merge_duplicates);
     clock.done("duplicates");
 
     EncodedEnhancedFrame out;
     EncodedMtfan connectivity;
     parallel_invoke(
-        threads, [&] { encode_vertex_layers(residuals, state, transforms, out.payload); },
+        threads, [&] { encode_vertex_layers(residuals, source, eligible, codebooks, out.payload); },
         [&] {
             connectivity = encode_mtfan(residuals.decoded.positions, triangles, options.nearest_vertices, threads);
         });
@@ -190,15 +188,19 @@ EncodedEnhancedFrame encode_enhanced_frame(const LatticeMesh& mesh, const CodedP
     out.payload.set(Layer::fans, std::move(connectivity.fans));
     out.payload.set(Layer::distance_orders, std::move(connectivity.distance_orders));
     auto& header = out.payload.header;
-    header.source_vertices = static_cast<std::uint32_t>(mesh.positions.size());
-    header.source_triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+    header.source_vertices = source.source_vertices;
+    header.source_triangles = source.source_triangles;
     header.vertices = static_cast<std::uint32_t>(residuals.decoded.positions.size());
     header.triangles = static_cast<std::uint32_t>(connectivity.triangles.size());
-    header.geometry_codebook = state.geometry_codebook->number;
-    header.colour_codebook = state.colour_codebook->number;
+    header.geometry_codebook = codebooks.geometry.number;
+    header.colour_codebook = codebooks.colour.number;
     out.mesh = std::move(residuals.decoded);
     out.mesh.triangles = std::move(connectivity.triangles);
     out.distance_order_counts = std::move(connectivity.distance_order_counts);
+    if (!source.coded_bones.empty()) {
+        out.payload.set(Layer::coded_bones, write_coded_bones(source.coded_bones));
+        clock.done("zippering");
+    }
     return out;
 }
 

@@ -5,8 +5,8 @@
 #include <span>
 
 #include "codec/codebook.h"
+#include "codec/frame_motion_enc.h"
 #include "codec/frame_payload.h"
-#include "codec/motion_enc.h"
 #include "codec/prediction.h"
 #include "codec/residual_mapping_enc.h"
 #include "codec/vector_quantiser_enc.h"
@@ -24,22 +24,26 @@ struct CodebookInUse {
 
 struct EnhancedFrameOptions {
     QuantiserOptions geometry, colour;
-    RegistrationOptions registration;
     ReferenceChoice reference_choice = ReferenceChoice::any;
     bool merge_duplicates = true;
     int nearest_vertices = 16;
     unsigned threads = 1;
 };
 
-// What an EP-frame refers to and what the encoder keeps between frames.
-struct EnhancedFrameState {
+// What of the frame is coded, and against what.
+struct EnhancedFrameSource {
+    const LatticeMesh* mesh = nullptr;          // the captured mesh, or the moving part of it
+    std::span<const BoneIndex> bone_of_vertex;  // of that mesh
+    const FrameMotion* motion = nullptr;        // of the whole frame
     const ReferenceMesh* reference = nullptr;
     const ReferenceSearch* search = nullptr;
-    const std::vector<Bone>* bones = nullptr;
-    std::span<const std::int32_t> radii;
-    std::vector<RigidMotion>* motion_before = nullptr;  // empty behind an I-frame
-    CodebookInUse* geometry_codebook = nullptr;
-    CodebookInUse* colour_codebook = nullptr;
+    std::vector<bool> coded_bones;  // motion-based coding: one a bone; empty: all of the frame is coded
+    std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
+};
+
+// Codebooks as they were before the frame go in, and come out as the frame used them.
+struct Codebooks {
+    CodebookInUse geometry, colour;
 };
 
 struct EncodedEnhancedFrame {
@@ -48,8 +52,9 @@ struct EncodedEnhancedFrame {
     std::vector<std::uint32_t> distance_order_counts;
 };
 
-// The mesh must have the attributes that the reference has, and the reference a vertex. stages: times are added.
-EncodedEnhancedFrame encode_enhanced_frame(const LatticeMesh& mesh, const CodedPose& pose, EnhancedFrameState& state,
+// The mesh must have the attributes that the reference has, and the reference a vertex that may be referred to.
+// stages: times are added.
+EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages);
 
 }  // namespace htvm

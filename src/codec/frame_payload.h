@@ -12,7 +12,7 @@ namespace htvm {
 
 enum class Layer : std::uint8_t {
     pose = 1,             // I: joints and orientations of the skeleton
-    transforms = 2,       // EP: one rigid transform a bone
+    transforms = 2,       // P, EP: one rigid transform a bone
     geometry = 3,         // I: positions in the order of TFAN; EP: quantised residuals
     colour = 4,           // likewise
     normals = 5,          // likewise, without a codebook
@@ -21,8 +21,9 @@ enum class Layer : std::uint8_t {
     fans = 8,             // I: TFAN; EP: the part of M-TFAN that TFAN has too
     distance_orders = 9,  // EP: the generalised distance orders of M-TFAN
     external_intra = 10,  // I: a mesh as another coder packed it
+    coded_bones = 11,     // EP with motion-based coding: the bones whose sub-meshes are coded
 };
-inline constexpr std::size_t layer_count = 11;  // one more than the largest number
+inline constexpr std::size_t layer_count = 12;  // one more than the largest number
 
 inline constexpr std::uint8_t intra_coder_tfan = 0;
 inline constexpr std::uint8_t intra_coder_draco = 1;

@@ -25,11 +25,18 @@ struct MappingPrior {
 };
 MappingPrior make_mapping_prior(std::span<const LatticePoint> positions, std::span<const Triangle> triangles);
 
-// residuals_of[k]: how many residuals reference vertex k has. The layer needs no counts: both sides know N_I and N_t.
-std::vector<std::uint8_t> encode_mapping(std::span<const std::uint32_t> residuals_of, const MappingPrior& prior);
+// Reference vertices that may have residuals: where eligible is empty, all; else those of the `references` whose entry
+// is not 0 (motion-based coding, section V). Ascending.
+std::vector<std::uint32_t> eligible_references(std::span<const std::uint8_t> eligible, std::size_t references);
 
-// Gives residuals_of, one a reference vertex, with sum `residuals`; where there is no reference vertex, nothing.
+// residuals_of[k]: how many residuals reference vertex k has, 0 where it is not eligible. The layer needs no counts:
+// both sides know N_I and N_t.
+std::vector<std::uint8_t> encode_mapping(std::span<const std::uint32_t> residuals_of, const MappingPrior& prior,
+                                         std::span<const std::uint8_t> eligible = {});
+
+// Gives residuals_of, one a reference vertex, with sum `residuals`; where no reference vertex is eligible, all 0.
 Result<std::vector<std::uint32_t>> decode_mapping(std::span<const std::uint8_t> bytes, std::size_t residuals,
-                                                  const MappingPrior& prior);
+                                                  const MappingPrior& prior,
+                                                  std::span<const std::uint8_t> eligible = {});
 
 }  // namespace htvm

@@ -65,15 +65,24 @@ MappingPrior make_mapping_prior(std::span<const LatticePoint> positions, std::sp
     return out;
 }
 
+std::vector<std::uint32_t> eligible_references(std::span<const std::uint8_t> eligible, std::size_t references) {
+    std::vector<std::uint32_t> out;
+    out.reserve(references);
+    for (std::uint32_t k = 0; k < references; ++k)
+        if (eligible.empty() || eligible[k] != 0) out.push_back(k);
+    return out;
+}
+
 Result<std::vector<std::uint32_t>> decode_mapping(std::span<const std::uint8_t> bytes, std::size_t residuals,
-                                                  const MappingPrior& prior) {
-    const std::size_t references = prior.area_class.size();
-    std::vector<std::uint32_t> out(references, 0);
+                                                  const MappingPrior& prior, std::span<const std::uint8_t> eligible) {
+    std::vector<std::uint32_t> out(prior.area_class.size(), 0);
+    const auto references = eligible_references(eligible, out.size());
     RangeDecoder decoder(bytes);
     Reader reader{decoder};
     MappingContext context(prior);
     std::size_t left = residuals;
-    for (std::size_t k = 0; k + 1 < references && left > 0; ++k) {
+    for (std::size_t i = 0; i + 1 < references.size() && left > 0; ++i) {
+        const std::uint32_t k = references[i];
         std::uint32_t n = 0;
         context.stand_on(k, out);
         if (context.code(reader, 0, false)) {
@@ -86,7 +95,7 @@ Result<std::vector<std::uint32_t>> decode_mapping(std::span<const std::uint8_t> 
         context.leave(n);
         if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "mapping layer: it ends too early");
     }
-    if (references > 0) out[references - 1] += static_cast<std::uint32_t>(left);
+    if (!references.empty()) out[references.back()] += static_cast<std::uint32_t>(left);
     return out;
 }
 

@@ -3,15 +3,22 @@
 #include <algorithm>
 #include <optional>
 
+#include "codec/mapping.h"
 #include "core/parallel.h"
 
 namespace htvm {
 namespace {
 
-NearestPoints tree_of(std::span<const LatticePoint> positions) {
+// A bone's vertices are eligible together.
+bool is_eligible(const ReferenceMesh& reference, std::span<const std::uint8_t> eligible, std::size_t bone) {
+    const auto vertices = reference.sub_meshes.of(bone);
+    return !vertices.empty() && (eligible.empty() || eligible[vertices.front()] != 0);
+}
+
+NearestPoints tree_of(std::span<const LatticePoint> positions, std::span<const std::uint32_t> chosen) {
     std::vector<Point3f> points;
-    points.reserve(positions.size());
-    for (const auto p : positions) points.push_back(point_of(p));
+    points.reserve(chosen.size());
+    for (const auto k : chosen) points.push_back(point_of(positions[k]));
     return NearestPoints(points);
 }
 
@@ -21,12 +28,18 @@ std::vector<std::uint32_t> find_reference_vertices(const ReferenceMesh& referenc
                                                    std::span<const LatticePoint> predicted,
                                                    std::span<const QuantisedTransform> transforms,
                                                    std::span<const LatticePoint> frame,
-                                                   std::span<const BoneIndex> bone_of_vertex, ReferenceChoice choice,
+                                                   std::span<const BoneIndex> bone_of_vertex,
+                                                   std::span<const std::uint8_t> eligible, ReferenceChoice choice,
                                                    unsigned threads) {
-    const bool some_bone_is_bare = std::any_of(bone_of_vertex.begin(), bone_of_vertex.end(),
-                                               [&](BoneIndex bone) { return search.sub_mesh[bone].size() == 0; });
+    std::vector<bool> own(transforms.size());  // bones whose vertices refer to the bone's own sub-mesh
+    for (std::size_t bone = 0; bone < own.size(); ++bone)
+        own[bone] = choice == ReferenceChoice::bone && is_eligible(reference, eligible, bone);
+    std::vector<std::uint32_t> candidates;
     std::optional<NearestPoints> all;
-    if (choice == ReferenceChoice::any || some_bone_is_bare) all.emplace(tree_of(predicted));
+    if (!std::all_of(bone_of_vertex.begin(), bone_of_vertex.end(), [&](BoneIndex bone) { return own[bone]; })) {
+        candidates = eligible_references(eligible, predicted.size());
+        all.emplace(tree_of(predicted, candidates));
+    }
     // The trees stand in the reference's own space: a vertex is taken back there, not the sub-mesh forth.
     std::vector<RigidMotion> back;
     for (std::size_t bone = 0; bone < transforms.size(); ++bone)
@@ -35,8 +48,8 @@ std::vector<std::uint32_t> find_reference_vertices(const ReferenceMesh& referenc
     parallel_for(frame.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const auto bone = bone_of_vertex[k];
-            if (choice == ReferenceChoice::any || search.sub_mesh[bone].size() == 0) {
-                out[k] = all->nearest(point_of(frame[k])).index;
+            if (!own[bone]) {
+                out[k] = candidates[all->nearest(point_of(frame[k])).index];
                 continue;
             }
             const Eigen::Vector3d v(frame[k].x, frame[k].y, frame[k].z);

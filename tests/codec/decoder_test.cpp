@@ -151,7 +151,7 @@ TEST(Independence, FlippedBitsOnTheWayCostThePacketsTheyHit) {
 
 TEST(Decoder, UnknownPacketKindsAndTheIndexAreSkipped) {
     Decoder decoder;
-    for (const int kind : {0, 5, 6, 77, 255}) {
+    for (const int kind : {0, 5, 99, 77, 255}) {
         Packet packet;
         packet.kind = static_cast<PacketKind>(kind);
         packet.payload = {1, 2, 3};

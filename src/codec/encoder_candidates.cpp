@@ -1,0 +1,196 @@
+#include "codec/encoder_candidates.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/animated_frame.h"
+#include "codec/intra_frame.h"
+#include "codec/stage_clock_enc.h"
+
+namespace htvm {
+namespace {
+
+using State = Encoder::State;
+
+// Where frames refer to an I-frame, its step is no wider than half an edge: EP-frames then save more than it costs.
+// Their quantiser starts from the same cells; the price of a bit stays that of the step asked for, so that it is the
+// entropy constraint that makes it coarse. At 8 mm and 35,000 vertices: a fifth fewer bits at the same error.
+std::int32_t step_for_reference(double edge, std::int32_t step) {
+    const double half_edge = edge / 2;
+    return half_edge >= 1 && half_edge < step ? static_cast<std::int32_t>(half_edge) : step;
+}
+
+RegistrationOptions registration_options(const State& state) {
+    RegistrationOptions out;
+    out.point_to_plane = state.options.point_to_plane;
+    if (!out.point_to_plane) {  // slower to settle
+        out.iterations = 16;
+        out.samples = 500;
+    }
+    return out;
+}
+
+EnhancedFrameOptions enhanced_options(const State& state, const FrameSteps& steps) {
+    EnhancedFrameOptions out;
+    out.geometry.step = step_for_reference(state.group->edge, steps.geometry);
+    out.colour.step = steps.colour;
+    const double ratio = static_cast<double>(steps.geometry) / out.geometry.step;
+    out.geometry.lambda = state.options.lambda * ratio * ratio;
+    out.colour.lambda = state.options.lambda;
+    out.geometry.threads = out.colour.threads = out.threads = state.threads;
+    out.reference_choice =
+        state.options.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone : ReferenceChoice::any;
+    out.merge_duplicates = state.options.merge_duplicates;
+    out.nearest_vertices = state.options.nearest_vertices;
+    return out;
+}
+
+Packet frame_packet(PacketKind kind, const FramePayload& payload) {
+    Packet packet;
+    packet.kind = kind;
+    packet.payload = write_frame_payload(payload);
+    return packet;
+}
+
+Packet codebook_packet(std::uint8_t purpose, const CodebookInUse& use) {
+    Packet packet;
+    packet.kind = PacketKind::codebook;
+    packet.payload = write_codebook_payload(purpose, use.number, *use.codebook);
+    return packet;
+}
+
+FrameCandidate encode_residual_frame(State& state, const FrameUnderWay& frame, const EnhancedFrameSource& source,
+                                     const FrameSteps& steps) {
+    FrameCandidate out;
+    out.type = FrameType::enhanced;
+    out.codebooks = state.group->codebooks;
+    auto encoded = encode_enhanced_frame(source, out.codebooks, enhanced_options(state, steps), state.stages);
+    if (out.codebooks.geometry.is_new)
+        out.packets.push_back(codebook_packet(codebook_for_geometry, out.codebooks.geometry));
+    if (out.codebooks.colour.is_new) out.packets.push_back(codebook_packet(codebook_for_colour, out.codebooks.colour));
+    out.packets.push_back(frame_packet(PacketKind::enhanced, encoded.payload));
+    out.decoded = std::move(encoded.mesh);
+    out.motion = frame.motion->motion;
+    out.distance_order_counts = std::move(encoded.distance_order_counts);
+    return out;
+}
+
+EnhancedFrameSource source_of(const State& state, const FrameUnderWay& frame) {
+    EnhancedFrameSource out;
+    out.mesh = &frame.mesh;
+    out.bone_of_vertex = frame.motion->bone_of_vertex;
+    out.motion = &*frame.motion;
+    out.reference = &state.group->reference;
+    out.search = &state.group->search;
+    out.source_vertices = static_cast<std::uint32_t>(frame.mesh.positions.size());
+    out.source_triangles = static_cast<std::uint32_t>(frame.mesh.triangles.size());
+    return out;
+}
+
+}  // namespace
+
+const FrameMotion& motion_of(State& state, FrameUnderWay& frame) {
+    if (!frame.motion) {
+        const auto& group = *state.group;
+        const MotionReference against{&group.reference, &group.search, &state.header.skeleton.bones, state.header.radii,
+                                      group.motion};
+        frame.motion = find_frame_motion(frame.mesh.positions, frame.pose, against, registration_options(state),
+                                         state.threads, state.stages);
+    }
+    return *frame.motion;
+}
+
+const AnimationFit& fit_of(State& state, FrameUnderWay& frame) {
+    if (!frame.fit) {
+        const auto& predicted = motion_of(state, frame).predicted;
+        StageClock clock(state.stages);
+        frame.fit = measure_animation(frame.mesh, state.group->reference, predicted, state.threads);
+        clock.done("fit of the animation");
+    }
+    return *frame.fit;
+}
+
+Result<FrameCandidate> encode_intra(State& state, const FrameUnderWay& frame, const FrameSteps& steps) {
+    StageClock clock(state.stages);
+    IntraFrameOptions options;
+    const double edge = mean_edge(frame.mesh);
+    options.geometry_step = state.options.key_interval == 1 ? steps.geometry : step_for_reference(edge, steps.geometry);
+    options.colour_step = steps.colour;
+    options.merge_duplicates = state.options.merge_duplicates;
+    options.external = state.options.intra_coder ? &*state.options.intra_coder : nullptr;
+    FramePayload payload;
+    auto decoded = encode_intra_frame(frame.mesh, options, payload);
+    if (!decoded) return tl::unexpected(decoded.error());
+    payload.set(Layer::pose, encode_pose(frame.pose));
+    FrameCandidate out;
+    out.type = FrameType::intra;
+    out.decoded = std::move(*decoded);
+    out.pose = frame.pose;
+    out.edge = edge;
+    out.packets.push_back(frame_packet(PacketKind::intra, payload));
+    clock.done("intra coding");
+    return out;
+}
+
+FrameCandidate encode_predicted(State& state, FrameUnderWay& frame) {
+    const auto& motion = motion_of(state, frame);
+    const auto& reference = state.group->reference;
+    FrameCandidate out;
+    out.type = FrameType::predicted;
+    out.packets.push_back(frame_packet(
+        PacketKind::predicted,
+        predicted_frame_payload(reference, motion.transforms, static_cast<std::uint32_t>(frame.mesh.positions.size()),
+                                static_cast<std::uint32_t>(frame.mesh.triangles.size()))));
+    out.decoded = animate(reference, motion.transforms, motion.predicted);
+    out.motion = motion.motion;
+    out.codebooks = state.group->codebooks;
+    return out;
+}
+
+FrameCandidate encode_enhanced(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
+    motion_of(state, frame);
+    return encode_residual_frame(state, frame, source_of(state, frame), steps);
+}
+
+FrameCandidate encode_moving(State& state, FrameUnderWay& frame, const FrameSteps& steps,
+                             const std::vector<bool>& coded_bones) {
+    const auto& fit = fit_of(state, frame);
+    StageClock clock(state.stages);
+    constexpr double stray_in_edges = 4;
+    const auto part = cut_moving_part(frame.mesh, frame.motion->bone_of_vertex, state.group->reference, fit,
+                                      coded_bones, stray_in_edges * state.group->edge);
+    clock.done("cutting");
+    auto source = source_of(state, frame);
+    source.mesh = &part.mesh;
+    source.bone_of_vertex = part.bone_of_vertex;
+    source.coded_bones = coded_bones;
+    return encode_residual_frame(state, frame, source, steps);
+}
+
+void adopt(State& state, const FrameCandidate& candidate) {
+    StageClock clock(state.stages);
+    const auto bytes = static_cast<double>(candidate.bytes());
+    if (candidate.type == FrameType::intra) {
+        Group group;
+        group.reference = make_reference(candidate.decoded, state.header.skeleton.bones, candidate.pose.joints,
+                                         candidate.pose.orientations, state.header.radii, state.header.weight_width,
+                                         state.next_frame, state.threads);
+        group.search = make_reference_search(group.reference);
+        group.edge = candidate.edge;
+        group.intra_bytes = bytes;
+        state.group = std::move(group);
+    } else {
+        auto& group = *state.group;
+        group.motion = candidate.motion;
+        group.codebooks = candidate.codebooks;
+        if (candidate.type == FrameType::enhanced) {
+            if (group.least_bytes == 0 || bytes < group.least_bytes) group.least_bytes = bytes;
+            group.excess_bytes += bytes - group.least_bytes;
+        }
+    }
+    state.decoded = candidate.decoded;
+    state.distance_order_counts = candidate.distance_order_counts;
+    clock.done("reference");
+}
+
+}  // namespace htvm

@@ -1,0 +1,31 @@
+// The ways to code a frame: by itself, moved, moved and corrected, or corrected where it moves.
+#pragma once
+
+#include "codec/encoder_state.h"
+#include "codec/moving_part_enc.h"
+
+namespace htvm {
+
+// A frame on its way through the encoder; what several candidates need is found once.
+struct FrameUnderWay {
+    const LatticeMesh& mesh;
+    const CodedPose& pose;
+    std::optional<FrameMotion> motion;
+    std::optional<AnimationFit> fit;
+};
+
+// Needs state.group, and the attributes of its reference.
+const FrameMotion& motion_of(Encoder::State& state, FrameUnderWay& frame);
+const AnimationFit& fit_of(Encoder::State& state, FrameUnderWay& frame);
+
+Result<FrameCandidate> encode_intra(Encoder::State& state, const FrameUnderWay& frame, const FrameSteps& steps);
+FrameCandidate encode_predicted(Encoder::State& state, FrameUnderWay& frame);
+FrameCandidate encode_enhanced(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps);
+// Motion-based: coded_bones has one entry a bone, at least one true whose sub-mesh in the reference has a vertex.
+FrameCandidate encode_moving(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps,
+                             const std::vector<bool>& coded_bones);
+
+// The state after the frame: a new reference after an I-frame, the motion and codebooks after the others.
+void adopt(Encoder::State& state, const FrameCandidate& candidate);
+
+}  // namespace htvm

@@ -1,0 +1,11 @@
+// Whether the encoder's options make sense.
+#pragma once
+
+#include "htvm/encoder.hpp"
+
+namespace htvm {
+
+// bad_input, naming the option and its range, where one is out of it or contradicts another.
+Result<void> check(const EncoderOptions& options);
+
+}  // namespace htvm

@@ -1,0 +1,75 @@
+// What the encoder remembers from frame to frame, and what a coded frame changes of it.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "codec/encoder_pose.h"
+#include "codec/enhanced_frame_enc.h"
+#include "codec/rate_control_enc.h"
+#include "codec/sequence_header.h"
+#include "codec/sequence_index.h"
+#include "htvm/encoder.hpp"
+
+namespace htvm {
+
+// How coarsely a frame is quantised.
+struct FrameSteps {
+    std::int32_t geometry = 32;  // lattice units
+    std::int32_t colour = 6;     // levels
+};
+
+// A frame coded in one way. Nothing of the encoder's state changes until it is adopted, so that several ways can be
+// compared.
+struct FrameCandidate {
+    FrameType type = FrameType::intra;
+    std::vector<Packet> packets;  // new codebooks first, the frame last; frame numbers are filled in when it is sent
+    LatticeMesh decoded;
+    CodedPose pose;                   // I: what the reference is skinned with
+    double edge = 0;                  // I: mean edge of the captured mesh, lattice units
+    std::vector<RigidMotion> motion;  // P, EP: of each bone
+    Codebooks codebooks;              // EP: as the frame leaves them
+    std::vector<std::uint32_t> distance_order_counts;
+    std::size_t bytes() const {
+        std::size_t sum = 0;
+        for (const auto& packet : packets) sum += packet.payload.size() + packet_overhead;
+        return sum;
+    }
+};
+
+// What the frames since the last I-frame refer to.
+struct Group {
+    ReferenceMesh reference;
+    ReferenceSearch search;
+    double edge = 0;                  // mean edge of the I-frame's captured mesh, lattice units
+    std::vector<RigidMotion> motion;  // of each bone in the frame before; empty behind the I-frame
+    Codebooks codebooks;
+    double intra_bytes = 0;   // what the I-frame cost
+    double least_bytes = 0;   // the cheapest EP-frame since
+    double excess_bytes = 0;  // what the others cost above it
+};
+
+struct Encoder::State {
+    EncoderOptions options;
+    unsigned threads = 1;
+    SequenceHeader header;
+    bool begun = false, finished = false;
+    PoseTracker poses;
+    std::uint32_t next_frame = 0;
+    std::optional<std::int64_t> last_timestamp;
+    std::optional<Group> group;
+    std::optional<RateController> rate;
+
+    std::deque<Packet> packets;
+    std::uint64_t stream_bytes = 0;
+    std::vector<IndexEntry> index;
+
+    FrameInfo info;
+    LatticeMesh decoded;
+    std::vector<StageTime> stages;
+    std::vector<std::uint32_t> distance_order_counts;
+};
+
+}  // namespace htvm
