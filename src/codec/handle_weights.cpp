@@ -4,9 +4,7 @@
 #include <array>
 #include <cmath>
 #include <compare>
-#include <functional>
 #include <queue>
-#include <tuple>
 #include <vector>
 
 namespace htvm {
@@ -73,6 +71,14 @@ std::int32_t edge_length(LatticePoint a, LatticePoint b, std::int32_t longest) {
     return std::max(1, static_cast<std::int32_t>(std::sqrt(static_cast<double>(squared))));
 }
 
+struct Step {
+    std::uint32_t vertex;
+    Near near;
+};
+struct FartherStep {  // what comes of steps that are equally far does not depend on their order
+    bool operator()(const Step& a, const Step& b) const { return a.near.distance > b.near.distance; }
+};
+
 // The lists under way, and the steps that are still to be passed on.
 struct Spreading {
     std::span<const std::uint16_t> own;
@@ -80,14 +86,13 @@ struct Spreading {
     std::int32_t width;
     Neighbours neighbours;
     std::vector<NearHandles> lists;
-    using Step = std::tuple<std::int32_t, std::uint32_t, std::uint16_t>;  // distance, vertex, handle
-    std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
+    std::priority_queue<Step, std::vector<Step>, FartherStep> steps;
 };
 
 void reach(Spreading& state, std::uint32_t v, std::int64_t distance, std::uint16_t handle) {
     if (distance >= state.width || state.own[v] == handle) return;
     const auto d = static_cast<std::int32_t>(distance);
-    if (enter(state.lists[v], {d, handle})) state.steps.push({d, v, handle});
+    if (enter(state.lists[v], {d, handle})) state.steps.push({v, {d, handle}});
 }
 
 void cross_borders(Spreading& state) {
@@ -112,9 +117,8 @@ void pass_on(Spreading& state, std::uint32_t v, Near near) {
 std::vector<NearHandles> near_handles(Spreading state) {
     cross_borders(state);
     while (!state.steps.empty()) {
-        const auto [distance, v, handle] = state.steps.top();
+        const auto [v, near] = state.steps.top();
         state.steps.pop();
-        const Near near{distance, handle};
         const auto known = std::span(state.lists[v].near).first(state.lists[v].count);
         if (std::find(known.begin(), known.end(), near) != known.end()) pass_on(state, v, near);
     }
