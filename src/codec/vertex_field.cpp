@@ -81,6 +81,7 @@ FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldHeader& head, std::
         }
     }
     for (auto& top : above) top.assign(1, 0);
+    models.last.fill({.coded = true, .slope = 4, .before = before ? 4u : 0u});
 }
 
 void FieldWalk::begin_level(std::size_t k) {

@@ -124,9 +124,9 @@ std::vector<Means> means_of(const VertexHierarchy& hierarchy, std::span<const st
     return means;
 }
 
-// The weights of slopes and of the frame before that leave the least squared error.
+// The weights of slopes and of the frame before that leave the least squared error, and bits for saying so.
 LevelMode choose_mode(const HierarchyLevel& level, std::span<const std::int32_t> finer,
-                      const LevelPrediction& prediction) {
+                      const LevelPrediction& prediction, const LevelMode& above, std::uint32_t step, double lambda) {
     const bool history = !prediction.before.empty();
     // Products of: difference, its prediction by slopes, difference before, its prediction before.
     std::array<std::array<double, 4>, 4> product{};
@@ -138,8 +138,9 @@ LevelMode choose_mode(const HierarchyLevel& level, std::span<const std::int32_t>
         for (std::size_t i = 0; i < 4; ++i)
             for (std::size_t j = i; j < 4; ++j) product[i][j] += weight * x[i] * x[j];
     }
+    const double in_steps = static_cast<double>(1 << split_scale_bits) / step;
     LevelMode best;
-    double least = 0;
+    double least = -1;
     for (std::uint32_t before = 0; before <= (history ? 4u : 0u); ++before)
         for (std::uint32_t slope = 0; slope < 8; ++slope) {
             const double a = before / 4.0, b = slope / 4.0;
@@ -147,8 +148,11 @@ LevelMode choose_mode(const HierarchyLevel& level, std::span<const std::int32_t>
             double error = 0;
             for (std::size_t i = 0; i < 4; ++i)
                 for (std::size_t j = i; j < 4; ++j) error += (i == j ? 1 : 2) * w[i] * w[j] * product[i][j];
-            if ((before > 0 || slope > 0) && error >= least) continue;
-            least = error;
+            const bool same = slope == above.slope && before == above.before;
+            const double bits = same ? 0.5 : history ? 7.5 : 4.5;
+            const double price = error * in_steps * in_steps + lambda * bits;
+            if (least >= 0 && price >= least) continue;
+            least = price;
             best = {.coded = true, .slope = slope, .before = before};
         }
     return best;
@@ -159,7 +163,7 @@ LevelMode plan_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<co
                      double lambda) {
     const HierarchyLevel& level = walk.hierarchy.levels[k];
     walk.begin_component(k, c);
-    LevelMode mode = choose_mode(level, finer, walk.prediction);
+    LevelMode mode = choose_mode(level, finer, walk.prediction, walk.models.last[c], walk.header.step[c], lambda);
     SplitModels& models = walk.models.splits[c];
     const SplitModels models_before = models;
     double gained = 0;  // squared steps that the rests spare
@@ -191,6 +195,7 @@ LevelMode plan_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<co
         std::fill(walk.rests[c].begin(), walk.rests[c].end(), 0);
         std::fill(walk.planes[c].magnitude[k].begin(), walk.planes[c].magnitude[k].end(), std::uint8_t{0});
     }
+    code_mode(coder, walk.models, c, walk.before != nullptr, mode);  // so that the next level knows
     walk.end_component(k, c, mode);
     return mode;
 }

@@ -119,10 +119,12 @@ inline SplitContext split_context(const HierarchyLevel& level, std::size_t k, st
     return c;
 }
 
-// The models of a field.
+// The models of a field. Of each component, the mode of the level above, which most levels repeat.
 struct FieldModels {
     std::array<SplitModels, most_field_components> splits;
-    BinaryModel coded;
+    std::array<BinaryModel, 2> coded;  // by whether the level above was
+    BinaryModel same;
+    std::array<LevelMode, most_field_components> last;
 };
 
 // Codes the differences of one level and component into `rests` and `own`. choose(node, predicted, step, context) gives
@@ -142,10 +144,12 @@ void code_level(Coder& coder, SplitModels& models, const HierarchyLevel& level, 
     }
 }
 
+// Codes how the differences of a level and component are coded.
 template <class Coder>
-LevelMode code_mode(Coder& coder, FieldModels& models, bool has_history, const LevelMode& wanted) {
-    LevelMode mode;
-    mode.coded = coder.bit(models.coded, wanted.coded);
+LevelMode code_mode(Coder& coder, FieldModels& models, std::size_t c, bool has_history, const LevelMode& wanted) {
+    LevelMode& mode = models.last[c];
+    mode.coded = coder.bit(models.coded[mode.coded], wanted.coded);
+    if (coder.bit(models.same, wanted.slope == mode.slope && wanted.before == mode.before)) return mode;
     mode.slope = coder.raw(wanted.slope, 3);
     if (has_history) mode.before = std::min(coder.raw(wanted.before, 3), 4u);
     return mode;
@@ -200,7 +204,7 @@ void walk_field(FieldWalk& walk, Coder& coder, const Source& source) {
         for (std::size_t c = 0; c < walk.planes.size(); ++c) {
             if (walk.header.step[c] == 0) continue;
             walk.begin_component(k, c);
-            const LevelMode mode = code_mode(coder, walk.models, walk.before != nullptr, source.mode(k, c));
+            const LevelMode mode = code_mode(coder, walk.models, c, walk.before != nullptr, source.mode(k, c));
             if (mode.coded)
                 code_level(coder, walk.models.splits[c], levels[k], k, walk.prediction, mode, walk.header.step[c],
                            walk.magnitudes(k, c), walk.rests[c], walk.planes[c].magnitude[k],
