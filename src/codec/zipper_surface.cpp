@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace htvm::zipping {
 namespace {
@@ -50,8 +51,13 @@ Cells cells_of(const Box& box, std::int64_t cell) {
 // No box is farther away than what it holds; this is for rounding.
 double with_margin(double squared_distance) { return squared_distance * 1.001 + 1; }
 
-std::int64_t outside(std::int32_t low, std::int32_t high, std::int32_t c) {
-    return std::max<std::int64_t>({0, std::int64_t{low} - c, std::int64_t{c} - high});
+double distance_to_box(LatticePoint p, const Box& box) {  // squared
+    const auto outside = [](std::int32_t low, std::int32_t high, std::int32_t c) {
+        return std::max<std::int64_t>({0, std::int64_t{low} - c, std::int64_t{c} - high});
+    };
+    const std::int64_t dx = outside(box.low.x, box.high.x, p.x), dy = outside(box.low.y, box.high.y, p.y),
+                       dz = outside(box.low.z, box.high.z, p.z);
+    return static_cast<double>(dx * dx + dy * dy + dz * dz);
 }
 
 // Of the triangle with corners p and normal n, the point nearest to x.
@@ -177,26 +183,36 @@ std::size_t SurfaceGrid::slot_of(std::uint64_t key) const {
     return slot;
 }
 
-// Looks at the triangles of one cell.
+void SurfaceGrid::look_at(const Entry& entry, LatticePoint point, Direction facing, SurfacePoint& best) const {
+    const Triangle& t = triangles_[entry.triangle];
+    const std::array<LatticePoint, 3> corners = {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
+    const Direction normal = cross(direction(corners[0], corners[1]), direction(corners[0], corners[2]));
+    if (!(dot(normal, facing) > 0)) return;
+    SurfacePoint here = nearest_on_triangle(point, corners, normal);
+    here.triangle = entry.triangle;
+    if (here.squared_distance < best.squared_distance ||
+        (here.squared_distance == best.squared_distance && here.triangle < best.triangle))
+        best = here;
+}
+
+// Looks at the triangles of one cell; the order does not matter.
 void SurfaceGrid::look_into(std::uint64_t key, LatticePoint point, Direction facing, SurfacePoint& best) const {
     const Cell& cell = cells_[slot_of(key)];
     if (cell.key == 0) return;
+    std::array<std::pair<double, std::uint32_t>, most_in_cell> boxes;  // squared distance, entry
+    std::size_t count = 0, nearest = 0;
+    const double limit = with_margin(best.squared_distance);
     for (std::uint32_t i = cell.begin; i < cell.end; ++i) {
-        const Entry& entry = entries_[i];
-        const std::int64_t dx = outside(entry.box.low.x, entry.box.high.x, point.x),
-                           dy = outside(entry.box.low.y, entry.box.high.y, point.y),
-                           dz = outside(entry.box.low.z, entry.box.high.z, point.z);
-        if (static_cast<double>(dx * dx + dy * dy + dz * dz) > with_margin(best.squared_distance)) continue;
-        const Triangle& t = triangles_[entry.triangle];
-        const std::array<LatticePoint, 3> corners = {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
-        const Direction normal = cross(direction(corners[0], corners[1]), direction(corners[0], corners[2]));
-        if (!(dot(normal, facing) > 0)) continue;
-        SurfacePoint here = nearest_on_triangle(point, corners, normal);
-        here.triangle = entry.triangle;
-        if (here.squared_distance < best.squared_distance ||
-            (here.squared_distance == best.squared_distance && here.triangle < best.triangle))
-            best = here;
+        const double distance = distance_to_box(point, entries_[i].box);
+        if (distance > limit) continue;
+        if (count == 0 || distance < boxes[nearest].first) nearest = count;
+        boxes[count++] = {distance, i};
     }
+    if (count == 0) return;
+    look_at(entries_[boxes[nearest].second], point, facing, best);
+    for (std::size_t k = 0; k < count; ++k)
+        if (k != nearest && boxes[k].first <= with_margin(best.squared_distance))
+            look_at(entries_[boxes[k].second], point, facing, best);
 }
 
 SurfacePoint SurfaceGrid::nearest(LatticePoint point, Direction facing) const {

@@ -83,6 +83,7 @@ private:
         std::uint64_t key = 0;  // 0: free
         std::uint32_t begin = 0, end = 0;
     };
+    void look_at(const Entry& entry, LatticePoint point, Direction facing, SurfacePoint& best) const;
     void look_into(std::uint64_t key, LatticePoint point, Direction facing, SurfacePoint& best) const;
     std::size_t slot_of(std::uint64_t key) const;
 

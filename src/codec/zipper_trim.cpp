@@ -117,6 +117,23 @@ std::vector<TriangleSide> border_around(const Surface& animated, std::span<const
     return border_sides(animated.triangles, used, around);
 }
 
+// The box of all points, wider on every side.
+Box widened_box(std::span<const LatticePoint> points, std::int64_t by) {
+    if (points.empty()) return {};
+    Box box{points[0], points[0]};
+    for (const LatticePoint p : points) {
+        box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
+        box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
+    }
+    const auto d = static_cast<std::int32_t>(std::min<std::int64_t>(by, 4 * lattice_limit));
+    return {box.low - LatticePoint{d, d, d}, box.high + LatticePoint{d, d, d}};
+}
+
+bool overlap(const Box& a, const Box& b) {
+    return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y &&
+           a.low.z <= b.high.z && b.low.z <= a.high.z;
+}
+
 // The parts of both meshes that may be near each other.
 struct Near {
     std::vector<std::uint32_t> coded, animated;  // triangles
@@ -124,9 +141,16 @@ struct Near {
 Near near_each_other(const Surface& coded, const Surface& animated, std::span<const std::uint8_t> candidate,
                      std::int64_t reach) {
     Near out;
+    const Box around = widened_box(coded.positions, 2 * cell_side(reach) + 1);
+    std::vector<std::pair<std::uint32_t, Box>> boxes;
     CellFilter near_animated(reach), near_coded(reach);
-    for (std::size_t t = 0; t < candidate.size(); ++t)
-        if (candidate[t]) near_animated.mark(box_of(animated.positions, animated.triangles[t]));
+    for (std::uint32_t t = 0; t < candidate.size(); ++t) {
+        if (!candidate[t]) continue;
+        const Box box = box_of(animated.positions, animated.triangles[t]);
+        if (!overlap(box, around)) continue;
+        boxes.push_back({t, box});
+        near_animated.mark(box);
+    }
     near_animated.widen();
     for (std::uint32_t t = 0; t < coded.triangles.size(); ++t) {
         const Box box = box_of(coded.positions, coded.triangles[t]);
@@ -135,9 +159,8 @@ Near near_each_other(const Surface& coded, const Surface& animated, std::span<co
         near_coded.mark(box);
     }
     near_coded.widen();
-    for (std::uint32_t t = 0; t < candidate.size(); ++t)
-        if (candidate[t] && near_coded.may_touch(box_of(animated.positions, animated.triangles[t])))
-            out.animated.push_back(t);
+    for (const auto& [t, box] : boxes)
+        if (near_coded.may_touch(box)) out.animated.push_back(t);
     return out;
 }
 
@@ -156,15 +179,17 @@ std::vector<TriangleSide> border_of(const Surface& surface, std::span<const std:
 
 // The coded border sides that lie over the animated candidates, not beyond an edge of the captured surface itself.
 std::vector<TriangleSide> coded_seam_sides(const Surface& coded, const Surface& animated, const Near& near,
-                                           std::int64_t reach) {
+                                           std::int64_t reach, unsigned threads) {
     const std::vector<TriangleSide> border = border_of(coded, near.coded);
     const SurfaceGrid grid(animated.positions, animated.triangles, near.animated, reach);
     std::vector<SurfacePoint> under(border.size());
-    for (std::size_t k = 0; k < border.size(); ++k) {
-        const Triangle& t = coded.triangles[border[k].triangle];
-        const LatticePoint a = coded.positions[t[border[k].side]], b = coded.positions[t[(border[k].side + 1) % 3]];
-        under[k] = grid.nearest(middle(a, b), normal_of(coded.positions, t));
-    }
+    parallel_for(border.size(), threads, 128, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const Triangle& t = coded.triangles[border[k].triangle];
+            const std::uint32_t a = t[border[k].side], b = t[(border[k].side + 1) % 3];
+            under[k] = grid.nearest(middle(coded.positions[a], coded.positions[b]), normal_of(coded.positions, t));
+        }
+    });
     const SideMarks ends(animated.triangles, animated.positions.size(), border_around(animated, under));
     std::vector<TriangleSide> out;
     for (std::size_t k = 0; k < border.size(); ++k)
@@ -310,7 +335,7 @@ Trimmed trim(const Surface& coded, const Surface& animated, std::span<const std:
     Trimmed out;
     out.kept = candidates(animated, still, rings_beyond_still);
     const Near near = near_each_other(coded, animated, out.kept, reach);
-    out.coded_seam = coded_seam_sides(coded, animated, near, reach);
+    out.coded_seam = coded_seam_sides(coded, animated, near, reach, threads);
     const SideMarks seam(coded.triangles, coded.positions.size(), out.coded_seam);
     const SurfaceGrid grid(coded.positions, coded.triangles, near.coded, reach);
     const Cover cover{coded, grid, seam, cover_clearance * unit * (cover_clearance * unit)};
