@@ -44,8 +44,9 @@ struct SequenceInfo {
 struct DecodedFrame {
     FrameInfo info;
     Mesh mesh;  // mm
-    // Of an I-frame, the skeleton as sent; of an EP-frame, the I-frame's moved by the transforms.
+    // Of an I-frame, the skeleton as sent; of the others, the I-frame's moved by the transforms.
     Pose pose;
+    bool concealed = false;  // from conceal()
 };
 
 class Decoder {
@@ -59,6 +60,9 @@ public:
     // Takes one packet; gives a frame where the packet is one. Errors cost that packet only: corrupt_stream where its
     // bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported, limit.
     Result<std::optional<DecodedFrame>> push(const Packet& packet);
+    // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh moved as the last frame
+    // was, or, where that much of a frame could be read, as it is itself. Nothing before an I-frame.
+    std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us) const;
     // Known once a sequence header was pushed.
     const std::optional<SequenceInfo>& sequence() const;
 

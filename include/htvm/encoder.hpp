@@ -48,11 +48,13 @@ struct EncoderOptions {
                                  // animated, not coded; 0: all are coded
     double animation_error = 2;  // mm: what is animated is coded after all where it is farther (root mean square, bone
                                  // by bone) from the capture's surface; 0: unchecked, as in the paper
-    double bits_per_second = 0;    // > 0: quality follows from it, instead of from the steps
-    double buffer_seconds = 1;     // of the receiver: what a frame may come late against a constant rate
-    double target_error = 0;       // mm (M2), > 0: quality follows from it, instead of from the steps
-    bool merge_duplicates = true;  // merge vertices that decode to the same, drop triangles that collapse
-    int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
+    double bits_per_second = 0;  // > 0: quality follows from it, instead of from the steps
+    double buffer_seconds = 1;   // of the receiver: what a frame may come late against a constant rate
+    std::vector<FrameCost> first_pass;  // with bits_per_second: last_cost() of every frame of a first run over the same
+                                        // capture; the quality then stays as even as the buffer allows
+    double target_error = 0;            // mm (M2), > 0: quality follows from it, instead of from the steps
+    bool merge_duplicates = true;       // merge vertices that decode to the same, drop triangles that collapse
+    int nearest_vertices = 16;          // m of the distance order, 1..64 (paper: 8, 16, 32)
     ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured better than the paper's, see docs
     double weight_width = 30;    // mm, 0..1000: borders between bones blend over it; 0: rigid, as in the paper
     bool point_to_plane = true;  // register bones by distances to planes; false: to points, as in the paper
@@ -97,7 +99,8 @@ public:
     ~Encoder();
 
     // Codes one frame. pose: of the options' skeleton; null where the tracker lost it, the last one is then kept.
-    // Timestamps must ascend. After an error the frame is not part of the stream; the next may be pushed.
+    // Timestamps must ascend. After an error the frame is not part of the stream; the next may be pushed. Under rate
+    // control a frame that the buffer cannot hold at the lowest quality is a limit error.
     Result<void> push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra = false);
     // Ends the sequence: queues the index of I-frames.
     void finish();
@@ -106,6 +109,7 @@ public:
 
     // Of the last frame pushed: what it is, what the decoder will show for it, and how long its stages took.
     const FrameInfo& last_frame() const;
+    FrameCost last_cost() const;
     Mesh reconstruction() const;
     const std::vector<StageTime>& stage_times() const;
     // Of the last EP-frame: how often each distance order was coded, the escapes last (paper, Fig. 23).

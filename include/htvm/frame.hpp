@@ -46,4 +46,11 @@ struct FrameInfo {
     LayerBytes bytes;
 };
 
+// What a frame took in a first pass: what a second one spreads its bits by.
+struct FrameCost {
+    FrameType type = FrameType::intra;
+    double quality = 50;  // of the quality knob
+    double bits = 0;
+};
+
 }  // namespace htvm

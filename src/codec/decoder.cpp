@@ -20,6 +20,7 @@ struct Decoder::State {
     std::vector<std::uint8_t> header_payload;
     std::optional<SequenceInfo> info;
     std::optional<ReferenceMesh> reference;
+    std::vector<QuantisedTransform> last_transforms;  // of the frame before, one a bone
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
@@ -99,13 +100,14 @@ Result<Frame> decode_intra(State& state, const Packet& packet) {
         out.pose.orientations.push_back(matrix_of(rotation_matrix(rotation)));
     state.reference = make_reference(std::move(*mesh), skeleton.bones, pose->joints, pose->orientations,
                                      state.header->radii, state.header->weight_width, packet.frame, state.threads);
+    state.last_transforms.assign(skeleton.bones.size(), {});
     state.geometry_codebook.reset();
     state.colour_codebook.reset();
     return Frame{std::move(out)};
 }
 
 // The I-frame's joints, each moved by the first bone that it belongs to.
-Pose moved_pose(const State& state, const std::vector<QuantisedTransform>& transforms) {
+Pose moved_pose(const State& state, std::span<const QuantisedTransform> transforms) {
     const auto& reference = *state.reference;
     const auto& bones = state.header->skeleton.bones;
     Pose pose;
@@ -144,6 +146,9 @@ Result<Frame> decode_enhanced(State& state, const Packet& packet) {
     const auto payload = read_frame(state, packet);
     if (!payload) return tl::unexpected(payload.error());
     if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
+    // Should the rest fail, this much serves to conceal the frame.
+    if (auto moved = decode_transforms(payload->of(Layer::transforms), state.reference->pivots.size()))
+        state.last_transforms = std::move(*moved);
     const EnhancedFrameContext context{
         *state.reference, named(state.geometry_codebook, payload->header.geometry_codebook),
         named(state.colour_codebook, payload->header.colour_codebook), state.header->nearest_vertices, state.threads};
@@ -164,6 +169,7 @@ Result<Frame> decode_predicted(State& state, const Packet& packet) {
     DecodedFrame out;
     out.mesh = to_mesh(decoded->mesh, state.header->lattice);
     out.pose = moved_pose(state, decoded->transforms);
+    state.last_transforms = std::move(decoded->transforms);
     return Frame{std::move(out)};
 }
 
@@ -208,6 +214,27 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
     } catch (const std::bad_alloc&) {
         return fail(ErrorKind::limit, "there is not enough memory for frame " + std::to_string(packet.frame));
     }
+}
+
+std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) const try {
+    const auto& state = *state_;
+    if (!state.reference) return std::nullopt;
+    const auto& reference = *state.reference;
+    DecodedFrame out;
+    out.mesh = to_mesh(
+        animate(reference, state.last_transforms, predict_positions(reference, state.last_transforms, state.threads)),
+        state.header->lattice);
+    out.pose = moved_pose(state, state.last_transforms);
+    out.concealed = true;
+    out.info.type = FrameType::predicted;
+    out.info.frame = frame;
+    out.info.reference = reference.frame;
+    out.info.timestamp_us = timestamp_us;
+    out.info.vertices = static_cast<std::uint32_t>(out.mesh.positions.size());
+    out.info.triangles = static_cast<std::uint32_t>(out.mesh.triangles.size());
+    return out;
+} catch (const std::bad_alloc&) {
+    return std::nullopt;
 }
 
 const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->info; }

@@ -21,7 +21,9 @@ using State = Encoder::State;
 // 1/16 mm, or as fine as makes the step eight units.
 int lattice_bits(const EncoderOptions& options) {
     if (options.lattice_bits > 0) return options.lattice_bits;
-    const int needed = static_cast<int>(std::ceil(3 - std::log2(options.geometry_step)));
+    const bool controlled = options.bits_per_second > 0 || options.target_error > 0;
+    const double finest = controlled ? quality_steps(100).geometry_step : options.geometry_step;
+    const int needed = static_cast<int>(std::ceil(3 - std::log2(finest)));
     return std::clamp(needed, 4, 16);
 }
 
@@ -95,6 +97,8 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     auto coded = code_frame(state, frame, force_intra);
     if (!coded) return tl::unexpected(coded.error());
     adopt(state, *coded);
+    state.cost = {coded->type, coded->quality, bits_of(state, *coded)};
+    if (state.rate) state.rate->coded(state.cost.type, state.cost.quality, state.cost.bits);
     if (!state.begun) {
         Packet header;
         header.payload = write_sequence_header(state.header);
@@ -106,6 +110,15 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     ++state.next_frame;
     state.last_timestamp = timestamp_us;
     return {};
+}
+
+RateControlOptions rate_options(const EncoderOptions& options) {
+    RateControlOptions out;
+    out.bits_per_second = options.bits_per_second;
+    out.frames_per_second = static_cast<double>(options.fps_numerator) / options.fps_denominator;
+    out.buffer_seconds = options.buffer_seconds;
+    out.key_interval = options.key_interval;
+    return out;
 }
 
 }  // namespace
@@ -120,6 +133,8 @@ Result<Encoder> Encoder::create(const EncoderOptions& options) {
     auto state = std::make_unique<State>();
     state->options = options;
     state->threads = thread_count(options.threads);
+    if (options.bits_per_second > 0) state->rate.emplace(rate_options(options), options.first_pass);
+    if (options.target_error > 0) state->error.emplace(options.target_error);
     return Encoder(std::move(state));
 }
 
@@ -159,6 +174,7 @@ std::optional<Packet> Encoder::pull() {
 }
 
 const FrameInfo& Encoder::last_frame() const { return state_->info; }
+FrameCost Encoder::last_cost() const { return state_->cost; }
 Mesh Encoder::reconstruction() const { return to_mesh(state_->decoded, state_->header.lattice); }
 const std::vector<StageTime>& Encoder::stage_times() const { return state_->stages; }
 const std::vector<std::uint32_t>& Encoder::distance_order_counts() const { return state_->distance_order_counts; }

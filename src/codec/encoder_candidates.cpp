@@ -164,7 +164,21 @@ FrameCandidate encode_moving(State& state, FrameUnderWay& frame, const FrameStep
     source.mesh = &part.mesh;
     source.bone_of_vertex = part.bone_of_vertex;
     source.coded_bones = coded_bones;
-    return encode_residual_frame(state, frame, source, steps);
+    auto out = encode_residual_frame(state, frame, source, steps);
+    out.in_part = true;
+    return out;
+}
+
+FrameCandidate encode_coded_bones(State& state, FrameUnderWay& frame, const FrameSteps& steps,
+                                  const std::vector<bool>& coded) {
+    if (std::find(coded.begin(), coded.end(), true) == coded.end()) return encode_predicted(state, frame);
+    bool something = false, everything = true;
+    for (std::size_t bone = 0; bone < coded.size(); ++bone) {
+        const bool bare = state.group->reference.sub_meshes.of(bone).empty();
+        something = something || (coded[bone] && !bare);
+        everything = everything && (coded[bone] || bare);
+    }
+    return everything || !something ? encode_enhanced(state, frame, steps) : encode_moving(state, frame, steps, coded);
 }
 
 void adopt(State& state, const FrameCandidate& candidate) {
@@ -177,13 +191,15 @@ void adopt(State& state, const FrameCandidate& candidate) {
                                          state.next_frame, state.threads);
         group.search = make_reference_search(group.reference);
         group.edge = candidate.edge;
+        group.plain_intra = candidate.plain_intra;
+        group.steps = candidate.steps;
         group.intra_bytes = bytes;
         state.group = std::move(group);
     } else {
         auto& group = *state.group;
         group.motion = candidate.motion;
         group.codebooks = candidate.codebooks;
-        if (candidate.type == FrameType::enhanced) {
+        if (candidate.type == FrameType::enhanced && !candidate.in_part) {
             if (group.least_bytes == 0 || bytes < group.least_bytes) group.least_bytes = bytes;
             group.excess_bytes += bytes - group.least_bytes;
         }

@@ -25,6 +25,10 @@ FrameCandidate encode_enhanced(Encoder::State& state, FrameUnderWay& frame, cons
 FrameCandidate encode_moving(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps,
                              const std::vector<bool>& coded_bones);
 
+// Motion-based coding where some bones are coded and some not; else an EP-frame of all, or a P-frame.
+FrameCandidate encode_coded_bones(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps,
+                                  const std::vector<bool>& coded);
+
 // The state after the frame: a new reference after an I-frame, the motion and codebooks after the others.
 void adopt(Encoder::State& state, const FrameCandidate& candidate);
 

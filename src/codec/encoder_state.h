@@ -8,9 +8,11 @@
 
 #include "codec/encoder_pose.h"
 #include "codec/enhanced_frame_enc.h"
+#include "codec/error_control_enc.h"
 #include "codec/rate_control_enc.h"
 #include "codec/sequence_header.h"
 #include "codec/sequence_index.h"
+#include "geometry/surface_distance.h"
 #include "htvm/encoder.hpp"
 
 namespace htvm {
@@ -31,7 +33,11 @@ struct FrameCandidate {
     double edge = 0;                  // I: mean edge of the captured mesh, lattice units
     std::vector<RigidMotion> motion;  // P, EP: of each bone
     Codebooks codebooks;              // EP: as the frame leaves them
+    bool in_part = false;             // EP: by motion-based coding
     std::vector<std::uint32_t> distance_order_counts;
+    double quality = 50;        // under rate or error control: of the quality knob
+    SurfaceErrors plain_intra;  // I, choice by rate and distortion: errors of an I-frame at the steps asked for
+    FrameSteps steps;           // as asked for
     std::size_t bytes() const {
         std::size_t sum = 0;
         for (const auto& packet : packets) sum += packet.payload.size() + packet_overhead;
@@ -46,6 +52,8 @@ struct Group {
     double edge = 0;                  // mean edge of the I-frame's captured mesh, lattice units
     std::vector<RigidMotion> motion;  // of each bone in the frame before; empty behind the I-frame
     Codebooks codebooks;
+    SurfaceErrors plain_intra;  // errors of the I-frame's mesh as an I-frame at `steps` that nothing refers to
+    FrameSteps steps;
     double intra_bytes = 0;   // what the I-frame cost
     double least_bytes = 0;   // the cheapest EP-frame since
     double excess_bytes = 0;  // what the others cost above it
@@ -61,6 +69,8 @@ struct Encoder::State {
     std::optional<std::int64_t> last_timestamp;
     std::optional<Group> group;
     std::optional<RateController> rate;
+    std::optional<ErrorController> error;
+    FrameCost cost;  // of the last frame
 
     std::deque<Packet> packets;
     std::uint64_t stream_bytes = 0;

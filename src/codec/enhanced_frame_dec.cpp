@@ -142,6 +142,9 @@ Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, 
     if (!attributes) return tl::unexpected(attributes.error());
     if (!triangles) return tl::unexpected(triangles.error());
     out.mesh.triangles = std::move(*triangles);
+    if (payload.has(Layer::coded_bones))
+        out.mesh = zipper(out.mesh, animate(reference, out.transforms, std::move(predicted)),
+                          still_vertices(reference, coded_bones), context.threads);
     return out;
 }
 

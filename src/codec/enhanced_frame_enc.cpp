@@ -199,6 +199,8 @@ EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Co
     out.distance_order_counts = std::move(connectivity.distance_order_counts);
     if (!source.coded_bones.empty()) {
         out.payload.set(Layer::coded_bones, write_coded_bones(source.coded_bones));
+        out.mesh = zipper(out.mesh, animate(reference, source.motion->transforms, source.motion->predicted),
+                          still_vertices(reference, source.coded_bones), threads);
         clock.done("zippering");
     }
     return out;

@@ -28,13 +28,6 @@ struct RateControlOptions {
     double largest_step = 2;  // most that the quality changes from frame to frame, unless the buffer is in danger
 };
 
-// What a first pass found for a frame: what the second spreads its bits by.
-struct FrameCost {
-    FrameType type = FrameType::intra;
-    double quality = 50;
-    double bits = 0;
-};
-
 // What is known of the sizes of frames.
 struct FrameSizeModel {
     double content = 17;                       // log2(bits) of an EP-frame at quality 0, of the content as it is now
@@ -43,8 +36,8 @@ struct FrameSizeModel {
     double slope = 0.04;                       // of log2(bits) over quality
     double slope_weight = 100, slope_sum = 4;  // squared quality steps seen and their products with those of log2(bits)
     double last_surprise = 0;                  // log2, of the last I- or EP-frame
-    std::array<int, 3> seen{};                 // frames by type
-    std::array<FrameCost, 3> last{};           // by type
+    std::array<int, frame_type_count> seen{};  // frames by type
+    std::array<FrameCost, frame_type_count> last{};  // by type
 };
 
 // Bits that a frame of this type should take at this quality.
