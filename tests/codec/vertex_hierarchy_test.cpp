@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "codec/intra_test_meshes.h"
+#include "core/bytes.h"
+#include "core/crc32.h"
 
 namespace htvm {
 namespace {
@@ -96,6 +98,25 @@ TEST(VertexHierarchy, SlopesFindTheDifferenceOfALinearField) {
         all += std::abs(actual);
     }
     EXPECT_LT(off, 0.1 * all);
+}
+
+TEST(VertexHierarchy, IsTheSameOnEveryMachine) {
+    std::uint32_t digest = 0;
+    unsigned seed = 0;
+    for (const auto& mesh : intra_test::awkward()) {
+        const auto hierarchy = build_vertex_hierarchy(intra_test::points(mesh.vertex_count, seed++), mesh.triangles);
+        ByteWriter writer;
+        writer.u32(digest);
+        for (const HierarchyLevel& level : hierarchy->levels) {
+            for (const auto* numbers : {&level.first, &level.second, &level.vertices, &level.second_share,
+                                        &level.first_neighbour, &level.neighbours})
+                for (const std::uint32_t number : *numbers) writer.u32(number);
+            for (const std::uint16_t scale : level.split_scale) writer.u16(scale);
+            for (const std::int32_t slope : level.slopes) writer.signed_varint(slope);
+        }
+        digest = crc32(writer.data());
+    }
+    EXPECT_EQ(digest, 982336371u);
 }
 
 TEST(VertexHierarchy, RefusesWhatIsNoMeshOnTheLattice) {
