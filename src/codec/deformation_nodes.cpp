@@ -84,15 +84,14 @@ private:
 
 // Vertices at the same place, each with the next of them.
 void link_coincident(std::span<const LatticePoint> positions, Pieces& pieces, std::vector<VertexPair>& links) {
-    std::vector<std::uint32_t> order(positions.size());
-    for (std::uint32_t v = 0; v < order.size(); ++v) order[v] = v;
-    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-        return std::pair{positions[a], a} < std::pair{positions[b], b};
-    });
+    std::vector<std::pair<LatticePoint, std::uint32_t>> order;
+    order.reserve(positions.size());
+    for (std::uint32_t v = 0; v < positions.size(); ++v) order.emplace_back(positions[v], v);
+    std::sort(order.begin(), order.end());
     for (std::size_t i = 1; i < order.size(); ++i)
-        if (positions[order[i - 1]] == positions[order[i]]) {
-            links.emplace_back(order[i - 1], order[i]);
-            pieces.join(order[i - 1], order[i]);
+        if (order[i - 1].first == order[i].first) {
+            links.emplace_back(order[i - 1].second, order[i].second);
+            pieces.join(order[i - 1].second, order[i].second);
         }
 }
 
@@ -118,6 +117,22 @@ void link_near(std::span<const LatticePoint> positions, std::int32_t reach, Piec
     }
 }
 
+// An edge between two triangles comes twice in a row; measures those that stay.
+void keep_each_step_once(std::span<const LatticePoint> positions, Graph& graph) {
+    std::uint32_t kept = 0;
+    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+        const auto begin = graph.steps.begin() + graph.first[v], end = graph.steps.begin() + graph.first[v + 1];
+        std::sort(begin, end, [](const Step& a, const Step& b) { return a.vertex < b.vertex; });
+        graph.first[v] = kept;
+        for (auto it = begin; it != end; ++it) {
+            if (it != begin && it->vertex == graph.steps[kept - 1].vertex) continue;
+            graph.steps[kept++] = {it->vertex, integer_root(squared_distance(positions[v], positions[it->vertex]))};
+        }
+    }
+    graph.first.back() = kept;
+    graph.steps.resize(kept);
+}
+
 Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach) {
     Pieces pieces(positions.size());
     for (const auto& t : triangles) {
@@ -128,27 +143,23 @@ Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triang
     link_coincident(positions, pieces, links);
     link_near(positions, reach, pieces, links);
 
-    // An edge between two triangles stands twice in a row; that changes no distance.
     Graph graph;
     graph.first.assign(positions.size() + 1, 0);
-    auto count = [&](std::uint32_t a, std::uint32_t b) { ++graph.first[a + 1], ++graph.first[b + 1]; };
     auto over_all = [&](const auto& visit) {
         for (const auto& t : triangles)
-            for (std::size_t k = 0; k < 3; ++k) {
-                const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-                if (a != b) visit(a, b);
-            }
+            for (std::size_t k = 0; k < 3; ++k)
+                if (t[k] != t[(k + 1) % 3]) visit(t[k], t[(k + 1) % 3]);
         for (const auto& [a, b] : links) visit(a, b);
     };
-    over_all(count);
+    over_all([&](std::uint32_t a, std::uint32_t b) { ++graph.first[a + 1], ++graph.first[b + 1]; });
     for (std::size_t v = 1; v < graph.first.size(); ++v) graph.first[v] += graph.first[v - 1];
     graph.steps.resize(graph.first.back());
     std::vector<std::uint32_t> next(graph.first.begin(), graph.first.end() - 1);
     over_all([&](std::uint32_t a, std::uint32_t b) {
-        const Distance length = integer_root(squared_distance(positions[a], positions[b]));
-        graph.steps[next[a]++] = {b, length};
-        graph.steps[next[b]++] = {a, length};
+        graph.steps[next[a]++].vertex = b;
+        graph.steps[next[b]++].vertex = a;
     });
+    keep_each_step_once(positions, graph);
     return graph;
 }
 
@@ -257,11 +268,10 @@ std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::
 
 // Sumner's weights, (1 - distance / distance of the next node)^2, made to sum to one: the rest goes to the nearest.
 VertexWeights weights_of(const NearNodes& list, Distance spacing) {
-    VertexWeights out;
     const std::size_t count = std::min<std::size_t>(list.count, handles_a_vertex);
     const Distance last = list.near[count - 1].distance;
     const Distance zero = list.count == near_nodes ? std::max<Distance>(list.near[near_nodes - 1].distance, 1)
-                                                   : std::max<Distance>(2 * spacing, last + spacing / 4);
+                                                   : std::max<Distance>(2 * spacing, last + spacing / 4 + 1);
     std::array<std::uint64_t, handles_a_vertex> share{};
     std::uint64_t sum = 0;
     for (std::size_t k = 0; k < count; ++k) {
@@ -270,16 +280,20 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
         share[k] = nearness * nearness;
         sum += share[k];
     }
-    constexpr std::uint32_t one = 1u << weight_bits;
-    std::uint32_t rest = one;
+    std::array<std::pair<std::int32_t, std::uint16_t>, handles_a_vertex> entries{};  // weight below zero, node
+    std::int32_t rest = 1 << weight_bits;
     for (std::size_t k = 1; k < count; ++k) {
-        out.handle[k] = list.near[k].node;
-        out.weight[k] = sum == 0 ? std::uint16_t{0} : static_cast<std::uint16_t>(share[k] * one / sum);
-        if (out.weight[k] == 0) out.handle[k] = 0;
-        rest -= out.weight[k];
+        const auto weight = sum == 0 ? 0 : static_cast<std::int32_t>((share[k] << weight_bits) / sum);
+        entries[k] = {-weight, list.near[k].node};
+        rest -= weight;
     }
-    out.handle[0] = list.near[0].node;
-    out.weight[0] = static_cast<std::uint16_t>(rest);
+    entries[0] = {-rest, list.near[0].node};
+    std::sort(entries.begin(), entries.end());
+    VertexWeights out;
+    for (std::size_t k = 0; k < handles_a_vertex && entries[k].first < 0; ++k) {
+        out.handle[k] = entries[k].second;
+        out.weight[k] = static_cast<std::uint16_t>(-entries[k].first);
+    }
     return out;
 }
 

@@ -20,7 +20,7 @@ namespace htvm {
 inline constexpr std::size_t most_deformation_nodes = 1024;
 
 struct DeformationNodeOptions {
-    std::int32_t spacing = 60 * 16;    // lattice units, > 0: every vertex has a node at most this far along the mesh
+    std::int32_t spacing = 80 * 16;    // lattice units, > 0: every vertex has a node at most this far along the mesh
     std::int32_t link_reach = 8 * 16;  // lattice units, >= 0: pieces that come this near to each other are linked
     std::size_t most_nodes = most_deformation_nodes;  // 1 .. most_deformation_nodes; fewer fit by a wider spacing
 };

@@ -3,8 +3,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <queue>
 
 #include "core/parallel.h"
 
@@ -12,153 +10,11 @@ namespace htvm {
 namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
-using Places = std::vector<std::pair<std::uint16_t, std::uint16_t>>;
 
 Vector3d vector_of(const Point3f& p) { return {p[0], p[1], p[2]}; }
 Point3f point_of(const Vector3d& v) {
     return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
-
-// ---- Set-up, once a reference ------------------------------------------------------------------------------------
-
-SampleBlend blend_of(const VertexWeights& weights) {
-    SampleBlend out;
-    for (std::size_t k = 0; k < handles_a_vertex; ++k) {
-        if (weights.weight[k] == 0) continue;
-        out.handle[out.count] = weights.handle[k];
-        out.weight[out.count++] = static_cast<float>(weights.weight[k]) / static_cast<float>(1 << weight_bits);
-    }
-    return out;
-}
-
-// The strongest few of (weight, handle), their weights made to sum to 1.
-SampleBlend strongest(std::vector<std::pair<float, std::uint16_t>> parts) {
-    std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
-        return a.first != b.first ? a.first > b.first : a.second < b.second;
-    });
-    parts.resize(std::min(parts.size(), handles_a_vertex));
-    float sum = 0;
-    for (const auto& part : parts) sum += part.first;
-    SampleBlend out;
-    for (const auto& [weight, handle] : parts) {
-        if (weight < 0.02f * sum) continue;
-        out.handle[out.count] = handle;
-        out.weight[out.count++] = weight;
-    }
-    float kept = 0;
-    for (std::size_t k = 0; k < out.count; ++k) kept += out.weight[k];
-    for (std::size_t k = 0; k < out.count; ++k) out.weight[k] /= kept;
-    return out;
-}
-
-// As many vertices of each handle's region, evenly through them, as make up about `count` in all.
-std::vector<std::uint32_t> spread_samples(const HandleWeights& weights, std::size_t handles, std::size_t count) {
-    std::vector<std::vector<std::uint32_t>> region(handles);
-    for (std::uint32_t v = 0; v < weights.size(); ++v)
-        if (weights[v].weight[0] > 0) region[weights[v].handle[0]].push_back(v);
-    const std::size_t quota = std::max<std::size_t>(count / std::max<std::size_t>(handles, 1), 4);
-    std::vector<std::uint32_t> out;
-    for (const auto& vertices : region) {
-        const std::size_t taken = std::min(quota, vertices.size());
-        for (std::size_t i = 0; i < taken; ++i) out.push_back(vertices[(2 * i + 1) * vertices.size() / (2 * taken)]);
-    }
-    return out;
-}
-
-void find_blocks(std::vector<SampleBlend>& blends, const std::vector<HandlePair>& pairs, std::size_t handles,
-                 BlockPattern& pattern) {
-    Places places;
-    for (const auto& pair : pairs) places.emplace_back(pair.first, pair.second);
-    for (const auto& blend : blends)
-        for (std::size_t a = 0; a < blend.count; ++a)
-            for (std::size_t b = a + 1; b < blend.count; ++b) places.emplace_back(blend.handle[a], blend.handle[b]);
-    pattern = make_pattern(handles, std::move(places));
-    for (auto& blend : blends) {
-        // Ascending handles, so that every pair of a blend is above the diagonal.
-        for (std::size_t a = 1; a < blend.count; ++a)
-            for (std::size_t b = a; b > 0 && blend.handle[b] < blend.handle[b - 1]; --b) {
-                std::swap(blend.handle[b], blend.handle[b - 1]);
-                std::swap(blend.weight[b], blend.weight[b - 1]);
-            }
-        std::size_t slot = 0;
-        for (std::size_t a = 0; a < blend.count; ++a)
-            for (std::size_t b = a + 1; b < blend.count; ++b)
-                blend.block[slot++] = pattern.find(blend.handle[a], blend.handle[b]);
-    }
-}
-
-// Distances along the graph of pairs from one handle, no further than reach.
-std::vector<double> reach_over_pairs(const std::vector<Vector3d>& handles,
-                                     const std::vector<std::vector<std::uint16_t>>& tied, std::uint32_t start,
-                                     double reach) {
-    std::vector<double> distance(handles.size(), std::numeric_limits<double>::max());
-    using Entry = std::pair<double, std::uint32_t>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> heap;
-    distance[start] = 0;
-    heap.emplace(0, start);
-    while (!heap.empty()) {
-        const auto [d, h] = heap.top();
-        heap.pop();
-        if (d > distance[h]) continue;
-        for (const std::uint16_t other : tied[h]) {
-            const double there = d + (handles[other] - handles[h]).norm();
-            if (there > reach || there >= distance[other]) continue;
-            distance[other] = there;
-            heap.emplace(there, other);
-        }
-    }
-    return distance;
-}
-
-// Groups of handles about `spacing` apart along their pairs, and how each handle follows the groups.
-void group_handles(DeformableMesh& mesh, double spacing) {
-    std::vector<std::vector<std::uint16_t>> tied(mesh.handles.size());
-    for (const auto& pair : mesh.fine.pairs) {
-        tied[pair.first].push_back(pair.second);
-        tied[pair.second].push_back(pair.first);
-    }
-    std::vector<bool> covered(mesh.handles.size(), false);
-    std::vector<std::vector<std::pair<float, std::uint16_t>>> parts(mesh.handles.size());
-    for (std::uint32_t h = 0; h < mesh.handles.size(); ++h) {
-        if (covered[h]) continue;
-        const auto group = static_cast<std::uint16_t>(mesh.coarse.centre.size());
-        mesh.coarse.centre.push_back(h);
-        const auto distance = reach_over_pairs(mesh.handles, tied, h, 2 * spacing);
-        for (std::size_t other = 0; other < distance.size(); ++other) {
-            if (distance[other] > 2 * spacing) continue;
-            covered[other] = covered[other] || distance[other] <= spacing;
-            const double nearness = 1 - distance[other] / (2.001 * spacing);
-            parts[other].emplace_back(static_cast<float>(nearness * nearness), group);
-        }
-    }
-    for (auto& part : parts) mesh.groups.push_back(strongest(std::move(part)));
-
-    std::vector<std::pair<std::uint16_t, std::uint16_t>> touching;
-    auto main_group = [&](std::size_t h) { return mesh.groups[h].handle[0]; };
-    for (const auto& pair : mesh.fine.pairs) {
-        const std::uint16_t a = main_group(pair.first), b = main_group(pair.second);
-        if (a != b) touching.emplace_back(std::min(a, b), std::max(a, b));
-    }
-    for (const auto& [first, second] : make_pattern(mesh.coarse.centre.size(), touching).place)
-        mesh.coarse.pairs.push_back({first, second});
-}
-
-// A sample follows the groups that its handles follow.
-SampleBlend over_groups(const SampleBlend& fine, const std::vector<SampleBlend>& groups) {
-    std::vector<std::pair<float, std::uint16_t>> parts;
-    for (std::size_t k = 0; k < fine.count; ++k) {
-        const auto& group = groups[fine.handle[k]];
-        for (std::size_t g = 0; g < group.count; ++g) {
-            auto it =
-                std::find_if(parts.begin(), parts.end(), [&](const auto& p) { return p.second == group.handle[g]; });
-            if (it == parts.end()) it = parts.insert(parts.end(), {0.0f, group.handle[g]});
-            it->first += fine.weight[k] * group.weight[g];
-        }
-    }
-    return strongest(std::move(parts));
-}
-
-// ---- One registration --------------------------------------------------------------------------------------------
 
 // Handles of one level, and the samples they move from where they rest.
 struct Stage {
@@ -204,11 +60,14 @@ struct Match {
     std::uint32_t sample = 0;
     std::uint32_t vertex = 0;  // of the target
     float weight = 0;          // 0: none
+    float gap = 0;             // between the points searched
 };
 
 struct Round {
     double reach = 0;  // positions' units
     double stiffness = 0;
+    double point_share = 0;
+    float gap = 0;     // between samples of the reference
     bool far = false;  // search among the target's samples; distant matches still count
 };
 
@@ -224,9 +83,11 @@ float match_weight(const OrientedMatch& match, const Round& round) {
 // Both ways: each sample to the target, and each of the target's samples to the nearest moved sample.
 std::vector<Match> find_matches(const Moved& moved, const TargetSurface& target, const Round& round, float cell,
                                 const DeformationOptions& options) {
-    const std::size_t forward = moved.points.size(), back = target.samples.size();
+    const std::size_t skip = round.far ? 2 : 1;
+    const std::size_t forward = moved.points.size(), back = target.samples.size() / skip;
     const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
     const OrientedPoints reference(moved.points, moved.normals, cell);
+    const float gap = (round.far ? target.coarse_gap : target.fine_gap);
     std::vector<Match> out(forward + back);
     parallel_for(out.size(), options.threads, 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
@@ -234,12 +95,12 @@ std::vector<Match> find_matches(const Moved& moved, const TargetSurface& target,
                 const auto& search = round.far ? target.coarse : target.fine;
                 const auto match = search.nearest(moved.points[i], moved.normals[i], reach, agreement);
                 const auto vertex = round.far && match.found ? target.samples[match.index] : match.index;
-                out[i] = {static_cast<std::uint32_t>(i), vertex, match_weight(match, round)};
+                out[i] = {static_cast<std::uint32_t>(i), vertex, match_weight(match, round), gap};
             } else {
-                const std::uint32_t vertex = target.samples[i - forward];
+                const std::uint32_t vertex = target.samples[(i - forward) * skip];
                 const auto match =
                     reference.nearest(target.positions[vertex], target.normals[vertex], reach, agreement);
-                out[i] = {match.index, vertex, match_weight(match, round)};
+                out[i] = {match.index, vertex, match_weight(match, round), round.gap};
             }
         }
     });
@@ -255,24 +116,66 @@ Eigen::Matrix<double, 3, 6> lever(const Vector3d& point, const Vector3d& centre)
     return out;
 }
 
-void add_match(const Stage& stage, const std::vector<Vector3d>& centres, const Match& match, const Moved& moved,
-               const TargetSurface& target, double point_share, BlockSystem& system) {
-    const SampleBlend& blend = stage.level.blends[match.sample];
-    const Vector3d normal = vector_of(target.normals[match.vertex]);
-    const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
-    const Matrix3d metric = match.weight * (normal * normal.transpose() + point_share * Matrix3d::Identity());
-    std::array<Eigen::Matrix<double, 3, 6>, handles_a_vertex> levers, weighted;
+// What all matches of one sample ask of it: the quadratic form of the distances, and its slope.
+struct Pull {
+    Matrix3d metric = Matrix3d::Zero();
+    Vector3d force = Vector3d::Zero();
+};
+
+std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& moved, const TargetSurface& target,
+                            double point_share) {
+    std::vector<Pull> pulls(moved.points.size());
+    for (const Match& match : matches) {
+        const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
+        // The mean of the two normals: across it, points of one round surface are no distance apart.
+        const Vector3d sum = vector_of(target.normals[match.vertex]) + vector_of(moved.normals[match.sample]);
+        const double length = sum.norm();
+        const Vector3d normal = length > 0 ? Vector3d(sum / length) : Vector3d::Zero();
+        // Samples have gaps between them: only what is further along the surface than that is apart.
+        const double across = normal.dot(apart);
+        const Vector3d along = apart - across * normal;
+        const double weight = static_cast<double>(match.weight);
+        const double slide = along.norm();
+        const double share = slide > match.gap ? weight * point_share * (1 - match.gap / slide) : 0;
+        Pull& pull = pulls[match.sample];
+        pull.metric.noalias() += (weight - share) * normal * normal.transpose();
+        pull.metric.diagonal().array() += share;
+        pull.force += weight * across * normal + share * along;
+    }
+    return pulls;
+}
+
+Matrix3d cross_matrix(const Vector3d& r) {
+    Matrix3d out;
+    out << 0, -r.z(), r.y(), r.z(), 0, -r.x(), -r.y(), r.x(), 0;
+    return out;
+}
+
+// A sample moves with the turn and the shift of handle k by weight_k (turn x r_k + shift): the blocks are written out,
+// for this is where the time goes.
+void add_pull(const Stage& stage, const std::vector<Vector3d>& centres, std::size_t sample, const Pull& pull,
+              BlockSystem& system) {
+    const SampleBlend& blend = stage.level.blends[sample];
+    std::array<Matrix3d, handles_a_vertex> arm, pressed;
+    auto add = [&](std::size_t a, std::size_t b, Matrix6& block) {
+        const double weight_a = static_cast<double>(blend.weight[a]), weight_b = static_cast<double>(blend.weight[b]);
+        block.topLeftCorner<3, 3>().noalias() += arm[a] * pressed[b];
+        block.topRightCorner<3, 3>() += weight_b * pressed[a].transpose();
+        block.bottomLeftCorner<3, 3>() += weight_a * pressed[b];
+        block.bottomRightCorner<3, 3>() += (weight_a * weight_b) * pull.metric;
+    };
     for (std::size_t k = 0; k < blend.count; ++k) {
         const std::size_t h = blend.handle[k];
-        levers[k] = static_cast<double>(blend.weight[k]) * lever(stage.motion[h](stage.rest[match.sample]), centres[h]);
-        weighted[k].noalias() = metric * levers[k];
-        system.diagonal[h].noalias() += levers[k].transpose() * weighted[k];
-        system.right[h].noalias() += weighted[k].transpose() * apart;
+        const double weight = static_cast<double>(blend.weight[k]);
+        arm[k] = cross_matrix(weight * (stage.motion[h](stage.rest[sample]) - centres[h]));
+        pressed[k].noalias() = pull.metric * arm[k].transpose();
+        add(k, k, system.diagonal[h]);
+        system.right[h].head<3>() += arm[k] * pull.force;
+        system.right[h].tail<3>() += weight * pull.force;
     }
     std::size_t slot = 0;
     for (std::size_t a = 0; a < blend.count; ++a)
-        for (std::size_t b = a + 1; b < blend.count; ++b)
-            system.above[blend.block[slot++]].noalias() += levers[a].transpose() * weighted[b];
+        for (std::size_t b = a + 1; b < blend.count; ++b) add(a, b, system.above[blend.block[slot++]]);
 }
 
 void add_pairs(const Stage& stage, const std::vector<Vector3d>& centres, double stiffness, BlockSystem& system) {
@@ -319,13 +222,14 @@ void run_round(Stage& stage, const TargetSurface& target, const Round& round, fl
                const DeformationOptions& options) {
     const Moved moved = move_samples(stage, options.threads);
     const auto matches = find_matches(moved, target, round, cell, options);
+    const auto pulls = sum_pulls(matches, moved, target, round.point_share);
     std::vector<Vector3d> centres(stage.centre.size());
     for (std::size_t h = 0; h < centres.size(); ++h) centres[h] = stage.motion[h](stage.centre[h]);
     // Always in two halves, so that the sums do not depend on the number of threads.
     auto add_half = [&](std::size_t half) {
         systems[half].clear();
-        for (std::size_t i = half * matches.size() / 2; i < (half + 1) * matches.size() / 2; ++i)
-            add_match(stage, centres, matches[i], moved, target, options.point_share, systems[half]);
+        for (std::size_t i = half * pulls.size() / 2; i < (half + 1) * pulls.size() / 2; ++i)
+            if (pulls[i].metric(0, 0) > 0) add_pull(stage, centres, i, pulls[i], systems[half]);
     };
     parallel_invoke(
         options.threads, [&] { add_half(1); }, [&] { add_half(0); });
@@ -354,7 +258,7 @@ Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
 Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, unsigned threads) {
     Stage stage{mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size())};
     const Moved moved = move_samples(fine, threads);
-    for (std::size_t i = 0; i < moved.points.size(); ++i) {
+    for (const std::uint32_t i : mesh.coarse.samples) {
         stage.rest.push_back(vector_of(moved.points[i]));
         stage.rest_normals.push_back(vector_of(moved.normals[i]));
     }
@@ -387,30 +291,6 @@ double between(double from, double to, int step, int steps) {
 
 }  // namespace
 
-DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<const Triangle> triangles,
-                               HandleWeights weights, std::span<const Vector3d> handles, std::vector<HandlePair> pairs,
-                               const DeformationOptions& options) {
-    DeformableMesh mesh;
-    mesh.positions.assign(positions.begin(), positions.end());
-    mesh.triangles.assign(triangles.begin(), triangles.end());
-    mesh.weights = std::move(weights);
-    mesh.handles.assign(handles.begin(), handles.end());
-    if (handles.empty()) return mesh;
-    mesh.samples = spread_samples(mesh.weights, handles.size(), options.samples);
-    const auto normals = vertex_normals(positions, triangles, options.threads);
-    for (const std::uint32_t v : mesh.samples) {
-        mesh.sample_normals.push_back(normals[v]);
-        mesh.fine.blends.push_back(blend_of(mesh.weights[v]));
-    }
-    for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
-    mesh.fine.pairs = std::move(pairs);
-    group_handles(mesh, options.coarse_spacing * options.millimetre);
-    for (const auto& blend : mesh.fine.blends) mesh.coarse.blends.push_back(over_groups(blend, mesh.groups));
-    find_blocks(mesh.fine.blends, mesh.fine.pairs, handles.size(), mesh.fine.pattern);
-    find_blocks(mesh.coarse.blends, mesh.coarse.pairs, mesh.coarse.centre.size(), mesh.coarse.pattern);
-    return mesh;
-}
-
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const TargetSurface& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options) {
     std::vector<RigidMotion> motion(start.begin(), start.end());
@@ -423,18 +303,33 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
         Stage coarse = coarse_stage(mesh, fine, options.threads);
         BlockSystem systems[2] = {BlockSystem(mesh.coarse.pattern), BlockSystem(mesh.coarse.pattern)};
         for (int i = 0; i < options.coarse_rounds; ++i) {
-            const double reach = between(options.far_reach, 3 * options.near_reach, i, options.coarse_rounds);
-            run_round(coarse, target, {reach * unit, options.first_stiffness, true}, cell, systems, options);
+            const double reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
+            const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
+                                 0.7f * mesh.sample_gap, true};
+            run_round(coarse, target, round, cell, systems, options);
         }
         follow_groups(mesh, coarse, fine.motion);
     }
     BlockSystem systems[2] = {BlockSystem(mesh.fine.pattern), BlockSystem(mesh.fine.pattern)};
     for (int i = 0; i < options.fine_rounds; ++i) {
-        const double reach = between(2 * options.near_reach, options.near_reach, i, options.fine_rounds);
-        const double stiffness = between(options.first_stiffness, options.last_stiffness, i, options.fine_rounds);
-        run_round(fine, target, {reach * unit, stiffness, false}, cell, systems, options);
+        auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
+        const Round round = {value(options.middle_reach, options.near_reach) * unit,
+                             value(options.first_stiffness, options.last_stiffness),
+                             value(options.first_point_share, options.last_point_share), 0.5f * mesh.sample_gap, false};
+        run_round(fine, target, round, cell, systems, options);
     }
     return fine.motion;
+}
+
+std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const RigidMotion> before,
+                                  std::span<const RigidMotion> last) {
+    std::vector<RigidMotion> next(last.begin(), last.end());
+    for (std::size_t h = 0; h < next.size(); ++h) {
+        const Vector3d was = before[h](mesh.handles[h]), is = last[h](mesh.handles[h]);
+        next[h].rotation = last[h].rotation * before[h].rotation.transpose() * last[h].rotation;
+        next[h].shift = 2 * is - was - next[h].rotation * mesh.handles[h];
+    }
+    return next;
 }
 
 double deformation_error(const DeformableMesh& mesh, const TargetSurface& target, std::span<const RigidMotion> motions,
@@ -443,7 +338,7 @@ double deformation_error(const DeformableMesh& mesh, const TargetSurface& target
     const Stage stage = fine_stage(mesh, {motions.begin(), motions.end()});
     const Moved moved = move_samples(stage, options.threads);
     const double reach = options.near_reach * options.millimetre;
-    const auto matches = find_matches(moved, target, {reach, 0, false}, static_cast<float>(reach), options);
+    const auto matches = find_matches(moved, target, {reach, 0, 0, 0, false}, static_cast<float>(reach), options);
     double near = 0;
     for (const Match& match : matches) {
         const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);

@@ -34,15 +34,17 @@ struct DeformationOptions {
     int coarse_rounds = 6;            // with groups of handles that move together, for far motion
     int fine_rounds = 4;              // with all handles
     double coarse_spacing = 180;      // mm between the groups' middles
-    double far_reach = 250;           // mm: how far the first rounds look for the other surface
-    double near_reach = 25;           // mm: and the last
-    std::size_t samples = 3000;       // of the reference's vertices, spread over the handles
-    std::size_t back_samples = 2500;  // of the target's vertices, which pull the nearest reference vertex
-    double first_stiffness = 20;      // of a handle's ties against its samples, at first
-    double last_stiffness = 1;        // and at last
-    double point_share = 0.1;         // weight of the distance to the point against that to its plane
-    double agreement = 0.4;           // least product of the normals of a match
-    int solver_iterations = 40;       // of conjugate gradients, at most, a round
+    double far_reach = 250;           // mm: how far the first coarse round looks for the other surface
+    double middle_reach = 120;        // mm: the last coarse round and the first fine one
+    double near_reach = 60;           // mm: the last fine round
+    std::size_t samples = 4500;       // of the reference's vertices, spread over the handles
+    std::size_t back_samples = 3500;  // of the target's vertices, which pull the nearest reference vertex
+    double first_stiffness = 1;       // of a handle's ties against its samples: in the coarse rounds and the first fine
+    double last_stiffness = 0.02;     // in the last fine round
+    double first_point_share = 0.5;   // weight of the distance to the point against that to its plane, likewise
+    double last_point_share = 0.2;
+    double agreement = 0.2;      // least product of the normals of a match
+    int solver_iterations = 40;  // of conjugate gradients, at most, a round
     unsigned threads = 1;
 };
 
@@ -54,10 +56,14 @@ struct SampleBlend {
     std::uint8_t count = 0;
 };
 
+// How a vertex follows its handles; the blocks are left open.
+SampleBlend blend_of(const VertexWeights& weights);
+
 // One level of handles over the samples.
 struct DeformationLevel {
-    std::vector<SampleBlend> blends;    // one a sample
-    std::vector<std::uint32_t> centre;  // handles of the finer level that stand for these; of the finest: 0, 1, 2, ...
+    std::vector<std::uint32_t> samples;  // among the mesh's samples
+    std::vector<SampleBlend> blends;     // one a sample
+    std::vector<std::uint32_t> centre;   // handles of the finer level that stand for these; of the finest: 0, 1, 2, ...
     std::vector<HandlePair> pairs;
     BlockPattern pattern;
 };
@@ -70,6 +76,7 @@ struct DeformableMesh {
     std::vector<Eigen::Vector3d> handles;  // positions
     std::vector<std::uint32_t> samples;    // vertices
     std::vector<Point3f> sample_normals;
+    float sample_gap = 0;  // about how far apart neighbouring samples are
     DeformationLevel fine, coarse;
     std::vector<SampleBlend> groups;  // how each handle follows the coarse ones
 };
@@ -83,6 +90,10 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
 // empty: no motion). The same for any number of threads.
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const TargetSurface& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options);
+
+// A start for the next frame: each handle takes the step from `before` to `last` once more. One motion a handle each.
+std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const RigidMotion> before,
+                                  std::span<const RigidMotion> last);
 
 // Mean distance of the samples to the target's planes and of the target's samples to the reference, each bounded by
 // near_reach: to choose between starts.

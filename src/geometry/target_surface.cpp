@@ -93,6 +93,16 @@ std::vector<Point3f> vertex_normals(std::span<const Point3f> positions, std::spa
     return out;
 }
 
+float point_gap(std::span<const Point3f> positions, std::span<const Triangle> triangles, std::size_t count) {
+    double area = 0;
+    for (const auto& t : triangles) {
+        const Vector a = vector_of(positions[t[0]]);
+        area += 0.5 * (vector_of(positions[t[1]]) - a).cross(vector_of(positions[t[2]]) - a).norm();
+    }
+    const double gap = count > 0 ? std::sqrt(area / static_cast<double>(count)) : 0;
+    return std::isfinite(gap) ? static_cast<float>(gap) : 0.0f;
+}
+
 TargetSurface make_target_surface(std::span<const Point3f> positions, std::span<const Triangle> triangles, float cell,
                                   std::size_t samples, unsigned threads) {
     std::vector<Point3f> normals;
@@ -118,6 +128,8 @@ TargetSurface make_target_surface(std::span<const Point3f> positions, std::span<
             std::move(around.first),
             std::move(around.triangles),
             std::move(chosen),
+            point_gap(positions, triangles, positions.size()),
+            point_gap(positions, triangles, count),
             std::move(fine),
             std::move(coarse)};
 }

@@ -16,11 +16,15 @@ namespace htvm {
 std::vector<Point3f> vertex_normals(std::span<const Point3f> positions, std::span<const Triangle> triangles,
                                     unsigned threads = 1);
 
+// About how far apart neighbours are where `count` points are spread over the surface.
+float point_gap(std::span<const Point3f> positions, std::span<const Triangle> triangles, std::size_t count);
+
 struct TargetSurface {
     std::vector<Point3f> positions, normals;
     std::vector<Triangle> triangles;
     std::vector<std::uint32_t> first_around, around;  // triangles around each vertex, in compressed rows
     std::vector<std::uint32_t> samples;  // every so many vertices, for searches far away and for the way back
+    float fine_gap, coarse_gap;          // between vertices, and between samples
     OrientedPoints fine;                 // all vertices
     OrientedPoints coarse;               // the samples; found indices count in samples
 };
