@@ -77,6 +77,8 @@ void send_frame(State& state, std::vector<Packet> packets, std::int64_t timestam
             continue;
         }
         state.info = *inspect(packet);
+        state.info.vertices = static_cast<std::uint32_t>(state.decoded.positions.size());
+        state.info.triangles = static_cast<std::uint32_t>(state.decoded.triangles.size());
         state.info.bytes.overhead += codebooks.overhead;
         state.info.bytes.geometry += codebooks.geometry;
         state.info.bytes.colour += codebooks.colour;
