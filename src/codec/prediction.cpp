@@ -8,11 +8,6 @@
 namespace htvm {
 namespace {
 
-std::int32_t within_lattice(std::int64_t c) {
-    return static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(c, -std::int64_t{lattice_limit}, std::int64_t{lattice_limit}));
-}
-
 std::vector<LatticePoint> sub_mesh_means(const ReferenceMesh& reference, const std::vector<Bone>& bones) {
     std::vector<LatticePoint> means;
     for (std::size_t bone = 0; bone < bones.size(); ++bone) {
@@ -35,51 +30,8 @@ std::vector<LatticePoint> sub_mesh_means(const ReferenceMesh& reference, const s
     return means;
 }
 
-std::vector<RotationMatrix> matrices(std::span<const QuantisedTransform> transforms) {
-    std::vector<RotationMatrix> out;
-    for (const auto& t : transforms) out.push_back(rotation_matrix(t.rotation));
-    return out;
-}
-
 bool blends(const ReferenceMesh& reference, std::size_t vertex) {
     return !reference.weights.empty() && reference.weights[vertex].weight[1] > 0;
-}
-
-// A sum of weighted vectors, in 2^-(matrix_bits + weight_bits) lattice units. The weights sum to 2^12, so that sums of
-// turned vectors stay below sqrt(3) * 2^25 * 2^36 and those of points that are moved below 2^63.
-using WeightedSum = std::array<std::int64_t, 3>;
-
-void add_turned(WeightedSum& sum, std::int64_t weight, const RotationMatrix& m, LatticePoint v) {
-    for (std::size_t i = 0; i < 3; ++i) sum[i] += weight * (m[3 * i] * v.x + m[3 * i + 1] * v.y + m[3 * i + 2] * v.z);
-}
-
-std::int64_t rounded(std::int64_t sum) {
-    constexpr int bits = matrix_bits + weight_bits;
-    return (sum + (std::int64_t{1} << (bits - 1))) >> bits;
-}
-
-LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, const std::vector<RotationMatrix>& rotation,
-                          const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms) {
-    WeightedSum sum{};
-    for (std::size_t i = 0; i < handles_a_vertex && weights.weight[i] > 0; ++i) {
-        const auto handle = weights.handle[i];
-        const LatticePoint pivot = reference.pivots[handle], to = pivot + transforms[handle].shift;
-        add_turned(sum, weights.weight[i], rotation[handle], point - pivot);
-        const std::int64_t scale = std::int64_t{weights.weight[i]} << matrix_bits;
-        sum[0] += scale * to.x;
-        sum[1] += scale * to.y;
-        sum[2] += scale * to.z;
-    }
-    return {within_lattice(rounded(sum[0])), within_lattice(rounded(sum[1])), within_lattice(rounded(sum[2]))};
-}
-
-LatticePoint blended_turn(LatticePoint normal, const VertexWeights& weights,
-                          const std::vector<RotationMatrix>& rotation) {
-    WeightedSum sum{};
-    for (std::size_t i = 0; i < handles_a_vertex && weights.weight[i] > 0; ++i)
-        add_turned(sum, weights.weight[i], rotation[weights.handle[i]], normal);
-    return {static_cast<std::int32_t>(rounded(sum[0])), static_cast<std::int32_t>(rounded(sum[1])),
-            static_cast<std::int32_t>(rounded(sum[2]))};
 }
 
 }  // namespace
@@ -101,22 +53,15 @@ ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, s
     return out;
 }
 
-LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift) {
-    const LatticePoint turned = rotate(matrix, point - pivot);
-    return {within_lattice(std::int64_t{turned.x} + pivot.x + shift.x),
-            within_lattice(std::int64_t{turned.y} + pivot.y + shift.y),
-            within_lattice(std::int64_t{turned.z} + pivot.z + shift.z)};
-}
-
 std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
                                             std::span<const QuantisedTransform> transforms, unsigned threads) {
-    const auto rotation = matrices(transforms);
+    const auto rotation = rotation_matrices(transforms);
     std::vector<LatticePoint> out(reference.mesh.positions.size());
     parallel_for(out.size(), threads, 16384, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const LatticePoint v = reference.mesh.positions[k];
             const auto bone = reference.bone_of_vertex[k];
-            out[k] = blends(reference, k) ? blended_move(v, reference.weights[k], rotation, reference, transforms)
+            out[k] = blends(reference, k) ? blended_move(v, reference.weights[k], rotation, reference.pivots, transforms)
                                           : move(v, rotation[bone], reference.pivots[bone], transforms[bone].shift);
         }
     });
@@ -125,7 +70,7 @@ std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
 
 std::vector<QuantisedNormal> predict_normals(const ReferenceMesh& reference,
                                              std::span<const QuantisedTransform> transforms) {
-    const auto rotation = matrices(transforms);
+    const auto rotation = rotation_matrices(transforms);
     std::vector<QuantisedNormal> out;
     out.reserve(reference.mesh.normals.size());
     for (std::size_t k = 0; k < reference.mesh.normals.size(); ++k) {

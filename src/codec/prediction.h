@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "codec/blending.h"
 #include "codec/lattice_mesh.h"
 #include "codec/mapping.h"
 #include "codec/rigid_transform.h"
@@ -30,9 +31,6 @@ struct ReferenceMesh {
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
                              std::int32_t weight_width, std::uint32_t frame, unsigned threads);
-
-// One point moved by a bone's transform; the result is kept within the lattice.
-LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift);
 
 // M_P: the reference vertices moved by their bones' transforms, one transform a bone. A vertex of several bones goes to
 // the weighted mean of where they move it, rounded once and kept within the lattice.

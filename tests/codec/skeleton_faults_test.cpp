@@ -127,8 +127,7 @@ TEST(SkeletonFaults, NeverLetAnAnimatedFrameOrPartOfOneBeFartherOffThanAllowed) 
             EXPECT_LT(coded.bytes.size(), fully_coded) << "something was animated";
         }
         for (std::size_t t = 0; t < errors.size(); ++t)
-            EXPECT_LE(errors[t],
-                      1.2 * options.animation_error)  // asked bone by bone, measured by area << "frame " << t;
+            EXPECT_LE(errors[t], 1.2 * options.animation_error) << "frame " << t;  // asked by bone, measured by area
         EXPECT_EQ(decode_packets(coded.packets).errors.size(), 0u);
     }
 }
