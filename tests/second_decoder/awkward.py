@@ -3,8 +3,10 @@
 
 What they have: degenerate, duplicate and inconsistently turned triangles, edges and vertices that many triangles share,
 isolated and coincident vertices, several components, meshes of one vertex or without triangles, normals, texture
-coordinates. Positions are in millimetres. The same bytes every time.
+coordinates. Positions are in millimetres. Each folder also has a skeleton of which some bones move and others do not,
+for P-frames and motion-based coding. The same bytes every time.
 """
+import json
 import math
 import os
 import random
@@ -78,6 +80,19 @@ def points(random_numbers, n, size):
     return [tuple(random_numbers.uniform(-size, size) for _ in range(3)) for _ in range(n)]
 
 
+def write_skeleton(path, frames):
+    """Six joints along the axes; the bones to the first three stay, those to the others go farther in every frame."""
+    ends = [(700, 0, 0), (0, 700, 0), (0, 0, 700), (-700, 0, 0), (0, -700, 0), (0, 0, -700)]
+    bones = [[0, k + 1] for k in range(len(ends))]
+    joints = []
+    for t in range(frames):
+        moved = [(x, y, z) if k < 3 else (x + 40 * t, y + 90 * t, z - 30 * t) for k, (x, y, z) in enumerate(ends)]
+        joints.append([(0, 0, 0)] + moved)
+    names = ["centre", "right", "up", "front", "left", "down", "back"]
+    with open(path, "w") as file:
+        json.dump({"units": "mm", "fps": 30, "joints": names, "bones": bones, "frames": joints}, file)
+
+
 def main(folder):
     r = random.Random(7)
 
@@ -127,6 +142,9 @@ def main(folder):
     frame("vanishing", 1, [(0.0, 0.0, 0.0)], [], texcoords=[(-3.5, 7.25)])
     frame("vanishing", 2, v, t[3:], texcoords=uv)
     frame("vanishing", 3, v, t, colours=colours_of(v))
+    for name in os.listdir(folder):
+        frames = [file for file in os.listdir(os.path.join(folder, name)) if file.endswith(".ply")]
+        write_skeleton(os.path.join(folder, name, "skeleton.json"), len(frames))
 
 
 if __name__ == "__main__":

@@ -11,6 +11,10 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 checked=0
+# contains KIND: the stream compared last has frames of that kind, predicted or in_part.
+contains() {
+    grep -q " $1" "$work/kinds" || { echo "$name: no frame is $1"; cat "$work/kinds"; exit 1; }
+}
 # same NAME INPUT OPTION...: encodes the input with the options, decodes it with both, compares.
 same() {
     name=$1
@@ -21,7 +25,9 @@ same() {
         { echo "$name: encode $* failed"; cat "$work/log"; exit 1; }
     "$htvm" decode "$work/stream.htvm" -o "$work/decoded" --unit mm >"$work/log" 2>&1 ||
         { echo "$name: decode failed"; cat "$work/log"; exit 1; }
-    python3 "$here/compare.py" "$work/stream.htvm" "$work/decoded" || { echo "$name: $*"; exit 1; }
+    python3 "$here/compare.py" "$work/stream.htvm" "$work/decoded" >"$work/kinds" ||
+        { cat "$work/kinds"; echo "$name: $*"; exit 1; }
+    grep -o " in_part\| predicted" "$work/kinds" >>"$work/all_kinds" || true
     checked=$((checked + 1))
 }
 
@@ -42,6 +48,24 @@ same person "$person" --keyint 2 --lambda 0 --geometry-step 0.02 --colour-step 1
 for nearest in 1 5 8 9 64; do
     same person "$person" --nearest $nearest -q 70
 done
+# P-frames, and frames of which only the moving bones are coded.
+"$htvm" synth "$work/moving" --vertices 500 --frames 5 --first-frame 40 >/dev/null 2>&1
+"$htvm" synth "$work/moving_normals" --vertices 400 --frames 4 --first-frame 60 --normals >/dev/null 2>&1
+same person "$person" --skeleton "$person/skeleton.json" --decide motion --predicted-below 400 --animation-error 0
+contains predicted
+for name in moving moving_normals; do
+    moving=$work/$name
+    same $name "$moving" --skeleton "$moving/skeleton.json" --decide motion --predicted-below 900 --animation-error 0
+    contains predicted
+    for still in 20 60 100; do
+        same $name "$moving" --skeleton "$moving/skeleton.json" --still-below $still --animation-error 0
+        contains in_part
+    done
+    same $name "$moving" --skeleton "$moving/skeleton.json" --still-below 60 --animation-error 0 --weights 0 -q 80
+    same $name "$moving" --skeleton "$moving/skeleton.json" --decide motion --predicted-below 250 --intra-above 1200 \
+        --still-below 60 --animation-error 0 --keep-duplicates
+    same $name "$moving" --skeleton "$moving/skeleton.json" --decide rd
+done
 same normals "$work/normals" --skeleton "$work/normals/skeleton.json" -q 60 --weights 60
 python3 "$here/awkward.py" "$work/awkward"
 for sequence in "$work"/awkward/*; do
@@ -49,5 +73,13 @@ for sequence in "$work"/awkward/*; do
     same "$name" "$sequence" -q 50
     same "$name" "$sequence" -q 5 --keep-duplicates
     same "$name" "$sequence" -q 95 --nearest 12
+    for still in 70 250; do
+        same "$name" "$sequence" --skeleton "$sequence/skeleton.json" --still-below $still --animation-error 0 -q 40
+    done
+    same "$name" "$sequence" --skeleton "$sequence/skeleton.json" --still-below 120 --animation-error 0 -q 80 \
+        --keep-duplicates --no-scene-changes
+    same "$name" "$sequence" --skeleton "$sequence/skeleton.json" --decide motion --predicted-below 500 \
+        --animation-error 0 --no-scene-changes
 done
-echo "second decoder: $checked streams decode to the same meshes"
+echo "second decoder: $checked streams decode to the same meshes;" \
+    "$(grep -c predicted "$work/all_kinds") P-frames, $(grep -c in_part "$work/all_kinds") motion-based EP-frames"

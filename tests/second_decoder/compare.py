@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """Holds the second decoder against another: compare.py STREAM.htvm FOLDER, the folder being what
-`htvm decode STREAM.htvm -o FOLDER --unit mm` wrote. Every float, index and colour must be the same to the bit."""
+`htvm decode STREAM.htvm -o FOLDER --unit mm` wrote. Every float, index and colour must be the same to the bit. Prints a
+line per frame of how it was coded."""
 import math
 import os
 import struct
 import sys
 
 import decoder
+from stream import CODED_BONES, ENHANCED, PREDICTED, read_frame_payload
 
 CODES = {"float": "f", "double": "d", "uchar": "B", "char": "b", "ushort": "H", "short": "h", "uint": "I", "int": "i"}
 
@@ -71,6 +73,12 @@ def in_millimetres(mesh, header):
     return out
 
 
+def how_coded(packet):
+    if packet.kind == ENHANCED:
+        return "in_part" if CODED_BONES in read_frame_payload(packet.payload).layers else "enhanced"
+    return "predicted" if packet.kind == PREDICTED else "intra"
+
+
 def main(stream, folder):
     files = sorted(os.path.join(folder, name) for name in os.listdir(folder) if name.endswith(".ply"))
     with open(stream, "rb") as file:
@@ -93,6 +101,7 @@ def main(stream, folder):
         if mesh.triangles != triangles:
             print("%s: frame %d: the triangles differ from %s" % (stream, packet.frame, path))
             return 1
+        print("frame %d: %s" % (packet.frame, how_coded(packet)))
     return 0
 
 

@@ -13,10 +13,10 @@ import sys
 import zlib
 
 from conventions import Corrupt, Unsupported, check
-from enhanced import decode_enhanced_mesh, read_codebook
+from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from intra import decode_intra_mesh
 from reference import Reference, decode_pose
-from stream import CODEBOOK, ENHANCED, INTRA, POSE, SEQUENCE, packets, read_frame_payload, read_sequence_header
+from stream import CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, packets, read_frame_payload, read_sequence_header
 
 
 def digest(mesh):
@@ -51,11 +51,14 @@ def decode_stream(data):
                 mesh = decode_intra_mesh(frame)
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
                 yield packet, header, mesh
-            elif packet.kind == ENHANCED:
+            elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
                 check(reference and reference.frame == packet.reference, "its I-frame is not there")
                 frame = read_frame_payload(packet.payload)
-                yield packet, header, decode_enhanced_mesh(frame, reference, books, header.m)
+                if packet.kind == PREDICTED:
+                    yield packet, header, decode_predicted_mesh(frame, reference)
+                else:
+                    yield packet, header, decode_enhanced_mesh(frame, reference, books, header.m)
         except (Corrupt, Unsupported) as error:
             yield packet, None, error
 
@@ -76,7 +79,7 @@ def main(arguments):
             continue
         attributes = [name for name in ("colours", "normals", "texcoords") if getattr(mesh, name)]
         print("frame %d %s %d vertices %d triangles %s %08x" % (
-            packet.frame, "I" if packet.kind == INTRA else "EP", len(mesh.positions), len(mesh.triangles),
+            packet.frame, {INTRA: "I", ENHANCED: "EP", PREDICTED: "P"}[packet.kind], len(mesh.positions), len(mesh.triangles),
             "+".join(attributes) or "-", digest(mesh)))
     return 1 if failed else 0
 

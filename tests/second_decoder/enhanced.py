@@ -1,5 +1,6 @@
-"""Chapter 8 of docs/bitstream.md, EP-frames: transforms, prediction, mapping (8.1 to 8.3), codebooks and residuals
-(8.4, 8.5), and the whole mesh. M-TFAN (8.7) is in mtfan.py."""
+"""Chapter 8 of docs/bitstream.md, EP- and P-frames: transforms, prediction, mapping (8.1 to 8.3), codebooks and
+residuals (8.4, 8.5), the coded bones (8.9) and the whole mesh. M-TFAN (8.7) is in mtfan.py, zippering (8.9) in
+zipper.py."""
 import math
 
 from arithmetic import Decoder, Mixer, Model, Models, SignedModel, SymbolModel, UnsignedModel
@@ -7,7 +8,8 @@ from conventions import Bytes, L, add, check, clamp, sub
 from intra import Mesh, decode_attributes
 from mtfan import decode_mtfan
 from reference import decode_point, decode_rotation, matrix
-from stream import COLOUR, GEOMETRY, MAPPING, NORMALS, TEXCOORDS, TRANSFORMS
+from stream import CODED_BONES, COLOUR, GEOMETRY, MAPPING, NORMALS, TEXCOORDS, TRANSFORMS
+from zipper import zipper
 
 
 # ---------------------------------------------------------------------------------------------- 8.1 to 8.3
@@ -77,7 +79,7 @@ def lower_neighbours(mesh):
     return lower
 
 
-def decode_mapping(data, reference, vertices):
+def decode_mapping(data, reference, eligible, vertices):
     """ref[k], the reference vertex of each of the frame's vertices."""
     decoder = Decoder(data)
     area_class, lower = area_classes(reference), lower_neighbours(reference)
@@ -92,7 +94,7 @@ def decode_mapping(data, reference, vertices):
                     ("neighbours", s, known, surplus), ("both", s, area_class[k], surplus)]
         return decoder.mixed(mixer[s], [model[context] for context in contexts])
 
-    for k in range(len(count) - 1):
+    for k in eligible[:-1]:
         if left == 0:
             break
         known = min(len(lower[k]), 7)
@@ -105,7 +107,10 @@ def decode_mapping(data, reference, vertices):
         count[k] = n
         last, before, before_that = min(n, 3), last, min(before, 2)
         decoder.check_end()
-    count[-1] += left
+    if eligible:
+        count[eligible[-1]] += left
+    else:
+        check(left == 0, "it has vertices, but its bones no reference vertex")
     return [k for k, n in enumerate(count) for _ in range(n)]
 
 
@@ -179,6 +184,29 @@ def decode_residuals(data, count, book):
     return out
 
 
+# ---------------------------------------------------------------------------------------------- 8.9, 8.10
+
+
+def read_coded_bones(data, bones):
+    check(len(data) == (bones + 7) // 8, "not one bit for every bone")
+    return [data[i // 8] >> (i % 8) & 1 == 1 for i in range(bones)]
+
+
+def animate(reference, transforms):
+    base, mesh = reference.mesh, Mesh()
+    mesh.positions = predict_positions(reference, transforms)
+    mesh.triangles, mesh.colours, mesh.texcoords = base.triangles, base.colours, base.texcoords
+    if base.normals:
+        mesh.normals = [turned_normal(reference, transforms, v) for v in range(len(base.normals))]
+    return mesh
+
+
+def decode_predicted_mesh(frame, reference):
+    base = reference.mesh
+    check(frame.vertices == len(base.positions) and frame.triangles == len(base.triangles), "other counts")
+    return animate(reference, decode_transforms(frame.layer(TRANSFORMS), len(reference.pivots)))
+
+
 # ---------------------------------------------------------------------------------------------- 8. EP-frames
 
 
@@ -190,7 +218,12 @@ def decode_enhanced_mesh(frame, reference, books, m):
     if base.colours:
         check(colour_book and colour_book.number == frame.colour_codebook, "the colour codebook is not there")
     transforms = decode_transforms(frame.layer(TRANSFORMS), len(reference.pivots))
-    ref = decode_mapping(frame.layer(MAPPING), base, frame.vertices)
+    in_part = CODED_BONES in frame.layers
+    eligible = list(range(len(base.positions)))
+    if in_part:
+        coded_bones = read_coded_bones(frame.layer(CODED_BONES), len(reference.pivots))
+        eligible = [v for v in eligible if coded_bones[reference.bone[v]]]
+    ref = decode_mapping(frame.layer(MAPPING), base, eligible, frame.vertices)
     predicted = predict_positions(reference, transforms)
     mesh = Mesh()
     for r, residual in zip(ref, decode_residuals(frame.layer(GEOMETRY), len(ref), geometry_book)):
@@ -204,4 +237,7 @@ def decode_enhanced_mesh(frame, reference, books, m):
     if base.texcoords:
         mesh.texcoords = decode_attributes(frame.layer(TEXCOORDS), 2, given=[base.texcoords[r] for r in ref])
     mesh.triangles = decode_mtfan(frame, mesh.positions, m)
+    if in_part:
+        still = [not coded_bones[bone] for bone in reference.bone]
+        mesh = zipper(mesh, animate(reference, transforms), still)
     return mesh

@@ -1,4 +1,4 @@
-"""Chapter 7 of docs/bitstream.md: the pose (7.1), skinning (7.2), and the reference mesh that EP-frames are
+"""Chapter 7 of docs/bitstream.md: the pose (7.1), skinning (7.2), and the reference mesh that EP- and P-frames are
 predicted from (7.3) with its weights (7.4)."""
 import heapq
 import math

@@ -8,7 +8,7 @@ from conventions import Bytes, L, Unsupported, check
 
 # ---------------------------------------------------------------------------------------------- 2. packets
 
-SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX = 1, 2, 3, 4, 5
+SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED = 1, 2, 3, 4, 5, 6
 
 
 class Packet:
@@ -80,7 +80,8 @@ def read_sequence_header(payload):
 
 # ---------------------------------------------------------------------------------------------- 4. frame payload
 
-POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL = range(1, 11)
+(POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL,
+ CODED_BONES) = range(1, 12)
 
 
 class Frame:
@@ -102,7 +103,7 @@ def read_frame_payload(payload):
     frame.layers = {}
     for number, size in table:
         layer = read.take(size)
-        if number < 11:
+        if number < 12:
             check(number not in frame.layers, "a layer comes twice")
             frame.layers[number] = layer
     return frame
