@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -229,39 +230,61 @@ bool enter(NearNodes& list, NearNode candidate) {
     return true;
 }
 
+struct Visit {
+    std::uint32_t vertex = 0;
+    NearNode near;
+};
+
+// A queue by distance for Dijkstra's algorithm, which never asks for less than it got last (Ahuja, Mehlhorn, Orlin,
+// Tarjan: Faster algorithms for the shortest path problem, 1990): visits wait by the highest bit in which their
+// distance differs from the last one, and move to lower bits when their turn comes near.
+class RadixQueue {
+public:
+    bool empty() const { return size_ == 0; }
+    void push(const Visit& visit) {
+        waiting_[static_cast<std::size_t>(std::bit_width(visit.near.distance ^ last_))].push_back(visit);
+        ++size_;
+    }
+    Visit pop() {
+        if (waiting_[0].empty()) refill();
+        const Visit visit = waiting_[0].back();
+        waiting_[0].pop_back();
+        --size_;
+        return visit;
+    }
+
+private:
+    void refill() {
+        std::size_t bit = 1;
+        while (waiting_[bit].empty()) ++bit;
+        last_ = unreached;
+        for (const Visit& visit : waiting_[bit]) last_ = std::min(last_, visit.near.distance);
+        for (const Visit& visit : waiting_[bit])
+            waiting_[static_cast<std::size_t>(std::bit_width(visit.near.distance ^ last_))].push_back(visit);
+        waiting_[bit].clear();
+    }
+    std::array<std::vector<Visit>, 33> waiting_;
+    Distance last_ = 0;
+    std::size_t size_ = 0;
+};
+
 // The shortest ways from all nodes at once. A node that is not among a vertex's nearest is not among those of any
-// vertex beyond it either, so the lists are exact although they are short, and whatever the order of the steps: buckets
-// of distances are enough, and faster than a heap.
-std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::uint32_t>& nodes, Distance spacing) {
-    struct Visit {
-        std::uint32_t vertex;
-        NearNode near;
-    };
-    constexpr std::size_t buckets = 64;  // in a ring; what is further ahead waits in the last
-    const Distance width = std::max<Distance>(spacing / 16, 1);
+// vertex beyond it either, so the lists are exact although they are short.
+std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::uint32_t>& nodes) {
     std::vector<NearNodes> lists(graph.first.size() - 1);
-    std::array<std::vector<Visit>, buckets> ring;
-    std::size_t waiting = 0;
-    auto enqueue = [&](std::uint32_t vertex, NearNode near, std::size_t now) {
-        if (!enter(lists[vertex], near)) return;
-        const std::size_t at = std::clamp<std::size_t>(near.distance / width, now, now + buckets - 1);
-        ring[at % buckets].push_back({vertex, near});
-        ++waiting;
+    RadixQueue queue;
+    auto reach = [&](std::uint32_t vertex, NearNode near) {
+        if (enter(lists[vertex], near)) queue.push({vertex, near});
     };
-    for (std::size_t n = 0; n < nodes.size(); ++n) enqueue(nodes[n], {0, static_cast<std::uint16_t>(n)}, 0);
-    for (std::size_t now = 0; waiting > 0; ++now) {
-        auto& bucket = ring[now % buckets];
-        for (std::size_t i = 0; i < bucket.size(); ++i) {
-            const Visit visit = bucket[i];
-            const auto& list = lists[visit.vertex];
-            if (std::find(list.near.begin(), list.near.begin() + list.count, visit.near) ==
-                list.near.begin() + list.count)
-                continue;
-            for (const Step& step : graph.from(visit.vertex))
-                enqueue(step.vertex, {visit.near.distance + step.length, visit.near.node}, now);
-        }
-        waiting -= bucket.size();
-        bucket.clear();
+    for (std::size_t n = 0; n < nodes.size(); ++n) reach(nodes[n], {0, static_cast<std::uint16_t>(n)});
+    while (!queue.empty()) {
+        const Visit visit = queue.pop();
+        const NearNodes& list = lists[visit.vertex];
+        const auto end = list.near.begin() + list.count;
+        if (std::find(list.near.begin(), end, visit.near) == end) continue;
+        for (const Step& step : graph.from(visit.vertex))
+            if (visit.near.distance <= unreached / 2)
+                reach(step.vertex, {visit.near.distance + step.length, visit.near.node});
     }
     return lists;
 }
@@ -377,7 +400,7 @@ DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> position
         spacing = std::min<std::int64_t>(spacing + spacing / 2 + 1, 2 * lattice_limit);
         covered = cover_all(graph, static_cast<Distance>(spacing), most, cover);
     }
-    auto lists = nearest_nodes(graph, cover.nodes, static_cast<Distance>(spacing));
+    auto lists = nearest_nodes(graph, cover.nodes);
     if (!covered) take_nearest_in_space(positions, cover.nodes, lists);
 
     nodes.vertex = std::move(cover.nodes);
