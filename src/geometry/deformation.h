@@ -40,7 +40,7 @@ struct DeformationOptions {
     std::size_t samples = 4500;       // of the reference's vertices, spread over the handles
     std::size_t back_samples = 3500;  // of the target's vertices, which pull the nearest reference vertex
     double first_stiffness = 1;       // of a handle's ties against its samples: in the coarse rounds and the first fine
-    double last_stiffness = 0.02;     // in the last fine round
+    double last_stiffness = 0.01;     // in the last fine round
     double first_point_share = 0.5;   // weight of the distance to the point against that to its plane, likewise
     double last_point_share = 0.2;
     double agreement = 0.2;      // least product of the normals of a match

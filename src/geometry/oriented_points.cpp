@@ -61,23 +61,34 @@ OrientedMatch OrientedPoints::nearest(const Point3f& query, const Point3f& norma
             best = {entry.index, d, true};
         }
     };
-    // Shells of cells around the query's own; all points outside `shell` shells are at least shell - 1 sides away, and
-    // more by how far the query is inside its cell.
+    // Shells of cells around the query's own; cells that begin further away than the best so far are passed over.
+    std::array<float, 3> low{};
     float inside = side_;
     for (std::size_t k = 0; k < 3; ++k) {
-        const float low = query[k] - static_cast<float>(middle[k]) * side_;
-        inside = std::min({inside, low, side_ - low});
+        low[k] = std::clamp(query[k] - static_cast<float>(middle[k]) * side_, 0.0f, side_);
+        inside = std::min({inside, low[k], side_ - low[k]});
     }
-    inside = std::max(inside, 0.0f);
+    auto squared_gap = [&](std::size_t axis, std::int32_t offset) {
+        if (offset == 0) return 0.0f;
+        const float gap = offset > 0 ? static_cast<float>(offset) * side_ - low[axis]
+                                     : low[axis] - static_cast<float>(offset + 1) * side_;
+        return gap * gap;
+    };
     for (std::int32_t shell = 0;; ++shell) {
         const float bound = static_cast<float>(shell - 1) * side_ + inside;
         if (shell > 0 && bound > 0 && bound * bound > best.squared_distance) break;
-        for (std::int32_t x = -shell; x <= shell; ++x)
+        for (std::int32_t x = -shell; x <= shell; ++x) {
+            const float gap_x = squared_gap(0, x);
+            if (gap_x > best.squared_distance) continue;
             for (std::int32_t y = -shell; y <= shell; ++y) {
+                const float gap_xy = gap_x + squared_gap(1, y);
+                if (gap_xy > best.squared_distance) continue;
                 const bool on_side = std::abs(x) == shell || std::abs(y) == shell;
                 for (std::int32_t z = -shell; z <= shell; z += on_side || shell == 0 ? 1 : 2 * shell)
-                    look_into(middle[0] + x, middle[1] + y, middle[2] + z);
+                    if (gap_xy + squared_gap(2, z) <= best.squared_distance)
+                        look_into(middle[0] + x, middle[1] + y, middle[2] + z);
             }
+        }
     }
     return best;
 }
