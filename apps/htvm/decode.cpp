@@ -1,12 +1,14 @@
 // htvm decode: a stream in, meshes out.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -24,17 +26,24 @@ namespace htvm::app {
 namespace {
 
 struct Options {
-    std::string input, output, format = "ply", unit = "capture";
+    std::string input, output, format = "ply", unit = "capture", conceal = "gap";
     std::size_t frames = 0;
     unsigned threads = 0;
     bool json = false;
 };
 
 struct Summary {
-    std::size_t frames = 0, failed = 0;
-    std::uint32_t due = 0;  // the number of the frame that should come next
+    std::size_t decoded = 0, concealed = 0;
+    std::size_t undecodable = 0;      // frames that came, but could not be decoded
+    std::size_t missing = 0;          // frames that did not come, between others
+    std::size_t damaged_packets = 0;  // codebooks and headers that could not be read
+    std::size_t concealed_in_a_row = 0;
+    std::uint32_t due = 0;                     // the number of the frame that should come next
+    std::optional<std::int64_t> timestamp_us;  // of the frame before
     double decode_seconds = 0;
     nlohmann::json list = nlohmann::json::array();
+    std::size_t written() const { return decoded + concealed; }
+    double frames_per_second() const { return static_cast<double>(decoded) / std::max(decode_seconds, 1e-9); }
 };
 
 class MeshOutput {
@@ -94,44 +103,160 @@ Result<double> output_unit(const Options& options, const SequenceInfo& info) {
     return millimetres_of_unit(options.unit);
 }
 
+// What the steps of decoding work on.
+struct Decoding {
+    const Options& options;
+    StreamInput& input;
+    MeshOutput& output;
+    Decoder& decoder;
+    Summary& summary;
+    Progress& progress;
+};
+
+bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.written() >= d.options.frames; }
+
+Result<void> write(Decoding& d, DecodedFrame& frame) {
+    const auto unit = output_unit(d.options, *d.decoder.sequence());
+    if (!unit) return tl::unexpected(unit.error());
+    const auto name = d.output.write(frame.mesh, frame.info.frame, *unit);
+    if (!name) return tl::unexpected(name.error());
+    d.progress.step();
+    if (!d.options.json) return {};
+    auto entry = frame_json(frame.info);
+    entry["file"] = *name;
+    entry["concealed"] = frame.concealed;
+    d.summary.list.push_back(std::move(entry));
+    return {};
+}
+
+// More frames than that in a row would be a still picture, and a false frame number a disk full of them.
+constexpr std::size_t most_concealed_in_a_row = 300;
+
+// Writes a stand-in for a frame. False where there is none.
+Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_us) {
+    if (d.options.conceal != "animate" || d.summary.concealed_in_a_row >= most_concealed_in_a_row) return false;
+    auto frame = d.decoder.conceal(number, timestamp_us);
+    if (!frame) return false;
+    if (auto ok = write(d, *frame); !ok) return tl::unexpected(ok.error());
+    ++d.summary.concealed;
+    ++d.summary.concealed_in_a_row;
+    return true;
+}
+
 // Frames that were lost on the way leave no damage behind, only a gap in the numbers.
-void tell_gap(Summary& summary, std::uint32_t frame) {
-    if (frame == summary.due + 1) warn(fmt::format("frame {} is not in the stream", summary.due));
-    if (frame > summary.due + 1) warn(fmt::format("frames {} to {} are not in the stream", summary.due, frame - 1));
-    summary.due = frame + 1;
+Result<void> fill_gap(Decoding& d, const Packet& next) {
+    auto& summary = d.summary;
+    const std::uint32_t first = summary.due;
+    if (next.frame <= first) return {};
+    const std::uint32_t gap = next.frame - first;
+    const auto before = static_cast<std::uint64_t>(summary.timestamp_us.value_or(next.timestamp_us));
+    const bool ascends = summary.timestamp_us && *summary.timestamp_us < next.timestamp_us;
+    const std::uint64_t interval =
+        ascends ? (static_cast<std::uint64_t>(next.timestamp_us) - before) / (std::uint64_t{gap} + 1) : 0;
+    std::uint32_t shown = 0;
+    while (shown < gap && !is_enough(d)) {
+        const auto done = conceal(d, first + shown, static_cast<std::int64_t>(before + interval * (shown + 1)));
+        if (!done) return tl::unexpected(done.error());
+        if (!*done) break;
+        ++shown;
+    }
+    if (summary.timestamp_us) summary.missing += gap;
+    const std::string what =
+        gap == 1 ? fmt::format("frame {} is", first) : fmt::format("frames {} to {} are", first, first + (gap - 1));
+    std::string instead;
+    if (shown > 0) {
+        const std::string whom = shown < gap ? fmt::format("the first {}", shown) : gap == 1 ? "it" : "them";
+        instead = "; the I-frame's mesh, moved, stands in for " + whom;
+    }
+    warn(what + " not in the stream" + instead);
+    return {};
+}
+
+// A packet that is sound, but cannot be decoded.
+Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error) {
+    if (error.kind == ErrorKind::unsupported || error.kind == ErrorKind::limit) return tl::unexpected(error);
+    if (!frame_type(packet.kind)) {
+        warn(fmt::format("a packet that came with frame {} is lost: {}", packet.frame, error.message));
+        ++d.summary.damaged_packets;
+        return {};
+    }
+    const auto done = conceal(d, packet.frame, packet.timestamp_us);
+    if (!done) return tl::unexpected(done.error());
+    warn(fmt::format("frame {} is lost: {}{}", packet.frame, error.message,
+                     *done ? "; the I-frame's mesh, moved, stands in for it" : ""));
+    ++d.summary.undecodable;
+    return {};
 }
 
 // True while there is more to decode.
-Result<bool> decode_next(const Options& options, StreamInput& input, Decoder& decoder, MeshOutput& output,
-                         Summary& summary, Progress& progress) {
-    if (options.frames > 0 && summary.frames >= options.frames) return false;
-    const auto packet = input.next();
+Result<bool> decode_next(Decoding& d) {
+    if (is_enough(d)) return false;
+    const auto packet = d.input.next();
     if (!packet) return false;
+    const bool is_frame = frame_type(packet->kind).has_value();
+    if (is_frame || packet->kind == PacketKind::index) {  // the index has the number of frames
+        // Before the packet is decoded: it may be the I-frame that the lost ones did not refer to.
+        if (auto ok = fill_gap(d, *packet); !ok) return tl::unexpected(ok.error());
+        if (is_enough(d)) return false;
+    }
+    if (is_frame) d.summary.due = packet->frame + 1;
     const auto start = std::chrono::steady_clock::now();
-    auto frame = decoder.push(*packet);
+    auto frame = d.decoder.push(*packet);
+    if (is_frame) d.summary.timestamp_us = packet->timestamp_us;
     if (!frame) {
-        if (frame.error().kind == ErrorKind::unsupported || frame.error().kind == ErrorKind::limit)
-            return tl::unexpected(frame.error());
-        if (frame_type(packet->kind)) tell_gap(summary, packet->frame);
-        warn(fmt::format("frame {} is lost: {}", packet->frame, frame.error().message));
-        ++summary.failed;
+        if (auto ok = take_failure(d, *packet, frame.error()); !ok) return tl::unexpected(ok.error());
         return true;
     }
     if (!*frame) return true;
-    tell_gap(summary, packet->frame);
-    summary.decode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    auto unit = output_unit(options, *decoder.sequence());
-    if (!unit) return tl::unexpected(unit.error());
-    auto name = output.write((*frame)->mesh, packet->frame, *unit);
-    if (!name) return tl::unexpected(name.error());
-    if (options.json) {
-        auto entry = frame_json((*frame)->info);
-        entry["file"] = *name;
-        summary.list.push_back(std::move(entry));
-    }
-    ++summary.frames;
-    progress.step();
-    return !output.one_file();
+    d.summary.decode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    d.summary.concealed_in_a_row = 0;
+    if (auto ok = write(d, **frame); !ok) return tl::unexpected(ok.error());
+    ++d.summary.decoded;
+    return !d.output.one_file();
+}
+
+void print_json(const Summary& summary, const StreamInput& input) {
+    fmt::print("{}\n", nlohmann::json{{"frames", summary.list},
+                                      {"lost_frames", summary.undecodable},
+                                      {"missing_frames", summary.missing},
+                                      {"concealed_frames", summary.concealed},
+                                      {"damaged_bytes", input.damaged_bytes()},
+                                      {"decode_frames_per_second", summary.frames_per_second()}}
+                           .dump(2));
+}
+
+void tell_what_was_written(const Options& options, const MeshOutput& output, const Summary& summary) {
+    std::string frames = output.one_file() ? "the first frame alone" : fmt::format("{} frames", summary.written());
+    const std::string where = options.output == "-" ? "standard output" : options.output;
+    if (summary.concealed > 0) frames += fmt::format(" ({} concealed)", summary.concealed);
+    note(fmt::format("{} to {}, decoded at {:.1f} frames/s", frames, where, summary.frames_per_second()));
+    const auto others = output.other_meshes();
+    if (others > 0 && summary.written() > 0)
+        warn(
+            fmt::format("the output folder holds {} mesh files besides, of an earlier run perhaps; whoever reads the "
+                        "folder reads them too",
+                        others));
+}
+
+// An error where the stream is not all there.
+Result<void> judge(const Options& options, const MeshOutput& output, const StreamInput& input, const Summary& summary) {
+    const auto lost = summary.undecodable + summary.missing;
+    if (input.damaged_bytes() > 0)
+        return fail(ErrorKind::corrupt_stream,
+                    fmt::format("{} is damaged: {} bytes were no sound packet; {} frames were decoded, {} lost besides",
+                                options.input, input.damaged_bytes(), summary.decoded, lost));
+    const bool all = options.frames == 0 || summary.written() < options.frames;
+    if (all && !output.one_file() && input.cut_short_bytes() > 0)
+        return fail(ErrorKind::corrupt_stream, fmt::format("{} ends in the middle of a packet; the {} complete frames "
+                                                           "before it were decoded",
+                                                           options.input, summary.decoded));
+    if (lost == 0 && summary.damaged_packets == 0) return {};
+    if (lost == 0)
+        return fail(ErrorKind::corrupt_stream,
+                    fmt::format("{} has packets that could not be read, but no frame was lost", options.input));
+    return fail(ErrorKind::corrupt_stream,
+                fmt::format("{} is not whole: {} frames could not be decoded, {} are not in it", options.input,
+                            summary.undecodable, summary.missing));
 }
 
 Result<void> decode(const Options& options) {
@@ -148,44 +273,18 @@ Result<void> decode(const Options& options) {
     Summary summary;
     {
         Progress progress("decoding", options.frames);
+        Decoding decoding{options, *input, *output, decoder, summary, progress};
         for (;;) {
-            const auto more = decode_next(options, *input, decoder, *output, summary, progress);
+            const auto more = decode_next(decoding);
             if (!more) return tl::unexpected(more.error());
             if (!*more) break;
         }
     }
-    const bool all = options.frames == 0 || summary.frames < options.frames;
-    const bool cut_short = all && !output->one_file() && input->cut_short_bytes() > 0;
-    if (options.json)
-        fmt::print("{}\n", nlohmann::json{{"frames", summary.list},
-                                          {"lost_frames", summary.failed},
-                                          {"damaged_bytes", input->damaged_bytes()},
-                                          {"decode_frames_per_second", static_cast<double>(summary.frames) /
-                                                                           std::max(summary.decode_seconds, 1e-9)}}
-                               .dump(2));
+    if (options.json) print_json(summary, *input);
     if (!decoder.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
-    const double rate = static_cast<double>(summary.frames) / std::max(summary.decode_seconds, 1e-9);
-    const std::string where = options.output == "-" ? "standard output" : options.output;
-    note(fmt::format("{} to {}, decoded at {:.1f} frames/s",
-                     output->one_file() ? "the first frame alone" : fmt::format("{} frames", summary.frames), where,
-                     rate));
-    if (const auto others = output->other_meshes(); others > 0 && summary.frames > 0)
-        warn(
-            fmt::format("the output folder holds {} mesh files besides, of an earlier run perhaps; whoever reads the "
-                        "folder reads them too",
-                        others));
-    if (input->damaged_bytes() > 0)
-        return fail(ErrorKind::corrupt_stream,
-                    fmt::format("{} is damaged: {} bytes were no sound packet; {} frames were decoded, {} lost besides",
-                                options.input, input->damaged_bytes(), summary.frames, summary.failed));
-    if (cut_short)
-        return fail(ErrorKind::corrupt_stream, fmt::format("{} ends in the middle of a packet; the {} complete frames "
-                                                           "before it were decoded",
-                                                           options.input, summary.frames));
-    if (summary.failed > 0)
-        return fail(ErrorKind::corrupt_stream, fmt::format("{} frames could not be decoded", summary.failed));
-    return {};
+    tell_what_was_written(options, *output, summary);
+    return judge(options, *output, *input, summary);
 }
 
 }  // namespace
@@ -203,11 +302,17 @@ void add_decode(CLI::App& app, Run& run) {
         ->check(CLI::IsMember({"ply", "obj"}));
     command->add_option("--unit", options->unit, "Unit of the positions: the capture's (default), mm, cm or m")
         ->check(CLI::IsMember({"capture", "mm", "cm", "m"}));
+    command
+        ->add_option("--conceal", options->conceal,
+                     "What stands for a frame that is lost: gap (default), nothing is written and the numbers go on;\n"
+                     "or animate, the I-frame's mesh moved as the last known frame was, for up to 300 in a row")
+        ->check(CLI::IsMember({"gap", "animate"}));
     command->add_option("--frames", options->frames, "Decode at most this many frames (default: all)");
     command->add_option("--threads", options->threads, "Threads (default: one a core); the meshes do not depend on it");
     command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output");
     command->footer(
-        "A damaged or shortened stream gives every frame that is whole, says what was lost, and exits with 3.\n"
+        "A damaged or shortened stream gives every frame that is whole, says what was lost, and exits with 3; so does\n"
+        "one that frames are missing from. A lost P- or EP-frame costs no other one.\n"
         "Examples:\n"
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"
