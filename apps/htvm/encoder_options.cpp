@@ -108,7 +108,7 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
             "--profile", options.profile,
             "topology (default): keeps the capture's connectivity, with the choices that measured best; paper:\n"
             "the published method's own choices (--reference bone, --registration point, --weights 0)")
-        ->check(CLI::IsMember({"topology", "paper"}));
+        ->check(CLI::IsMember({"topology", "paper", "tracked"}));
     command
         .add_option("--reference", options.reference,
                     "Reference vertex of a residual: any, the nearest of the predicted mesh, or bone, the nearest of\n"
@@ -150,6 +150,7 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     if (options.still_below >= 0) out.still_below = options.still_below;
     if (options.animation_error >= 0) out.animation_error = options.animation_error;
     out.scene_changes = !options.no_scene_changes;
+    out.tracked = options.profile == "tracked";
     out.merge_duplicates = !options.keep_duplicates;
     out.nearest_vertices = options.nearest_vertices;
     const bool paper = options.profile == "paper";

@@ -104,6 +104,8 @@ const char* type_name(FrameType type) {
             return "EP";
         case FrameType::predicted:
             return "P";
+        case FrameType::tracked:
+            return "T";
     }
     return "?";
 }

@@ -34,6 +34,11 @@ enum class FrameChoice : std::uint8_t {
     rate_distortion,  // by measured bits and errors: the fewest bits among those no worse than an I-frame
 };
 
+enum class TrackedReferences : std::uint8_t {
+    intra,     // T-frames refer to the I-frame alone: any may be lost
+    previous,  // to the frame before: fewer bits; a lost one costs those up to the next I-frame
+};
+
 struct EncoderOptions {
     double geometry_step = 2.0;  // mm, > 0: cell of the position quantiser; errors are about half of it
     double colour_step = 6.0;    // levels of 255, >= 1: cell of the colour quantiser
@@ -42,6 +47,10 @@ struct EncoderOptions {
     int least_key_interval = 1;  // fewest, unless the frame cannot refer to the I-frame or the scene changes
     bool scene_changes = true;   // an I-frame where much of the mesh is nowhere near the reference's
     FrameChoice frame_choice = FrameChoice::fixed;
+    bool tracked = false;  // T-frames between I-frames, where they fit the capture: the I-frame's connectivity instead
+                           // of the frame's own, for a fraction of the bits
+    TrackedReferences tracked_references = TrackedReferences::previous;
+    double node_spacing = 80;    // mm, T-frames: between the nodes of the deformation graph
     double predicted_below = 0;  // mm, choice by motion: with less skeletal motion since the I-frame, a P-frame
     double intra_above = 0;      // mm, choice by motion: with more, an I-frame; 0: never
     double still_below = 0;      // mm, motion-based coding (section V): bones that moved less since the I-frame are

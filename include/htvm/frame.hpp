@@ -11,9 +11,11 @@ enum class FrameType : std::uint8_t {
     intra,      // I: by itself
     enhanced,   // EP: against the last I-frame
     predicted,  // P: the last I-frame's mesh moved, nothing else
+    tracked,    // T: the last I-frame's mesh laid on the captured surface
 };
 
-inline constexpr std::array all_frame_types = {FrameType::intra, FrameType::enhanced, FrameType::predicted};
+inline constexpr std::array all_frame_types = {FrameType::intra, FrameType::enhanced, FrameType::predicted,
+                                               FrameType::tracked};
 inline constexpr std::size_t frame_type_count = all_frame_types.size();
 
 // Bytes of one frame by layer. The paper's layers: geometry, colour, mapping, and connectivity = fans +
@@ -39,7 +41,7 @@ struct LayerBytes {
 struct FrameInfo {
     FrameType type = FrameType::intra;
     std::uint32_t frame = 0;
-    std::uint32_t reference = 0;    // number of the I-frame it refers to; its own for an I-frame
+    std::uint32_t reference = 0;    // number of the frame it refers to: the I-frame, of a T-frame also the frame before
     std::int64_t timestamp_us = 0;  // microseconds
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
     std::uint32_t vertices = 0, triangles = 0;                // of the decoded mesh

@@ -19,6 +19,7 @@ enum class PacketKind : std::uint8_t {
     codebook = 4,   // a codebook that later EP-frames name
     index = 5,      // where the I-frames are, at the end of a file; optional
     predicted = 6,  // P-frame: the I-frame's mesh moved
+    tracked = 7,    // T-frame: the I-frame's mesh laid on the captured surface
 };
 
 struct Packet {

@@ -8,6 +8,7 @@
 #include "codec/intra_frame.h"
 #include "codec/sequence_header.h"
 #include "codec/sequence_index.h"
+#include "codec/tracked_frame.h"
 #include "codec/transforms.h"
 #include "core/parallel.h"
 
@@ -21,6 +22,10 @@ struct Decoder::State {
     std::optional<SequenceInfo> info;
     std::optional<ReferenceMesh> reference;
     std::vector<QuantisedTransform> last_transforms;  // of the frame before, one a bone
+    std::int32_t reference_step = 1;                  // quantiser step of the I-frame's positions, lattice units
+    std::optional<TrackedReference> tracked;          // made when the first T-frame asks for it
+    std::optional<TrackedState> tracked_state;        // of the last T-frame since the I-frame
+    std::uint32_t tracked_frame = 0;                  // its number
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
@@ -32,6 +37,14 @@ using Frame = std::optional<DecodedFrame>;
 std::array<double, 9> matrix_of(const RotationMatrix& m) {
     std::array<double, 9> out{};
     for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<double>(m[i]) / static_cast<double>(1 << matrix_bits);
+    return out;
+}
+
+Rotation product(const Rotation& a, const Rotation& b) {
+    Rotation out{};
+    for (std::size_t row = 0; row < 3; ++row)
+        for (std::size_t column = 0; column < 3; ++column)
+            for (std::size_t k = 0; k < 3; ++k) out[3 * row + column] += a[3 * row + k] * b[3 * k + column];
     return out;
 }
 
@@ -101,6 +114,9 @@ Result<Frame> decode_intra(State& state, const Packet& packet) {
     state.reference = make_reference(std::move(*mesh), skeleton.bones, pose->joints, pose->orientations,
                                      state.header->radii, state.header->weight_width, packet.frame, state.threads);
     state.last_transforms.assign(skeleton.bones.size(), {});
+    state.reference_step = static_cast<std::int32_t>(payload->header.geometry_step);
+    state.tracked.reset();
+    state.tracked_state.reset();
     state.geometry_codebook.reset();
     state.colour_codebook.reset();
     return Frame{std::move(out)};
@@ -120,13 +136,7 @@ Pose moved_pose(const State& state, std::span<const QuantisedTransform> transfor
             joints[joint] = move(reference.joints[joint], matrix, reference.pivots[i], transforms[i].shift);
             moved[joint] = true;
         }
-        const auto turn = matrix_of(matrix), rest = matrix_of(rotation_matrix(reference.orientations[i]));
-        Rotation orientation{};
-        for (std::size_t row = 0; row < 3; ++row)
-            for (std::size_t column = 0; column < 3; ++column)
-                for (std::size_t k = 0; k < 3; ++k)
-                    orientation[3 * row + column] += turn[3 * row + k] * rest[3 * k + column];
-        pose.orientations.push_back(orientation);
+        pose.orientations.push_back(product(matrix_of(matrix), matrix_of(rotation_matrix(reference.orientations[i]))));
     }
     for (const auto joint : joints) pose.joints.push_back(to_millimetres(joint, state.header->lattice));
     return pose;
@@ -173,6 +183,56 @@ Result<Frame> decode_predicted(State& state, const Packet& packet) {
     return Frame{std::move(out)};
 }
 
+// The I-frame's joints, each moved as the node nearest to it.
+Pose tracked_pose(const State& state, const TrackedReference& tracked, std::span<const QuantisedTransform> transforms) {
+    const auto& bones = state.header->skeleton.bones;
+    std::vector<std::size_t> node_of_joint;
+    Pose pose;
+    for (const auto joint : state.reference->joints) {
+        std::size_t nearest = 0;
+        for (std::size_t i = 1; i < tracked.pivots.size(); ++i)
+            if (squared_distance(joint, tracked.pivots[i]) < squared_distance(joint, tracked.pivots[nearest]))
+                nearest = i;
+        node_of_joint.push_back(nearest);
+        const auto moved = tracked.pivots.empty() ? joint
+                                                  : move(joint, rotation_matrix(transforms[nearest].rotation),
+                                                         tracked.pivots[nearest], transforms[nearest].shift);
+        pose.joints.push_back(to_millimetres(moved, state.header->lattice));
+    }
+    for (std::size_t i = 0; i < bones.size(); ++i) {
+        const auto rest = matrix_of(rotation_matrix(state.reference->orientations[i]));
+        pose.orientations.push_back(
+            tracked.pivots.empty()
+                ? rest
+                : product(matrix_of(rotation_matrix(transforms[node_of_joint[bones[i].first]].rotation)), rest));
+    }
+    return pose;
+}
+
+Result<Frame> decode_tracked(State& state, const Packet& packet) {
+    const auto payload = read_frame(state, packet);
+    if (!payload) return tl::unexpected(payload.error());
+    if (state.header->node_spacing == 0)
+        return fail(ErrorKind::corrupt_stream, "a tracked frame in a stream whose header says that it has none");
+    const bool of_frame_before = state.tracked_state && state.tracked_frame == packet.reference;
+    if (!of_frame_before)
+        if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
+    if (!state.tracked) {
+        auto tracked = make_tracked_reference(state.reference->mesh, state.header->node_spacing, state.reference_step);
+        if (!tracked) return tl::unexpected(tracked.error());
+        state.tracked = std::move(*tracked);
+    }
+    auto decoded = decode_tracked_frame(*payload, *state.tracked, of_frame_before ? &*state.tracked_state : nullptr,
+                                        state.threads);
+    if (!decoded) return tl::unexpected(decoded.error());
+    DecodedFrame out;
+    out.mesh = to_mesh(decoded->mesh, state.header->lattice);
+    out.pose = tracked_pose(state, *state.tracked, decoded->state.transforms);
+    state.tracked_state = std::move(decoded->state);
+    state.tracked_frame = packet.frame;
+    return Frame{std::move(out)};
+}
+
 Result<Frame> take(State& state, const Packet& packet) {
     switch (packet.kind) {
         case PacketKind::sequence:
@@ -185,6 +245,8 @@ Result<Frame> take(State& state, const Packet& packet) {
             return decode_enhanced(state, packet);
         case PacketKind::predicted:
             return decode_predicted(state, packet);
+        case PacketKind::tracked:
+            return decode_tracked(state, packet);
         case PacketKind::index:
             break;
     }
@@ -247,6 +309,8 @@ std::optional<FrameType> frame_type(PacketKind kind) {
             return FrameType::enhanced;
         case PacketKind::predicted:
             return FrameType::predicted;
+        case PacketKind::tracked:
+            return FrameType::tracked;
         case PacketKind::sequence:
         case PacketKind::codebook:
         case PacketKind::index:

@@ -60,15 +60,18 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
     header.nearest_vertices = static_cast<std::uint8_t>(state.options.nearest_vertices);
     header.weight_width =
         static_cast<std::int32_t>(std::lround(std::min(state.options.weight_width * units, 1.0 * lattice_limit)));
+    if (state.options.tracked)
+        header.node_spacing = static_cast<std::int32_t>(
+            std::clamp(std::lround(state.options.node_spacing * units), 1L, static_cast<long>(lattice_limit)));
     return {};
 }
 
 // Numbers and queues a frame's packets, and adds up where their bytes went.
-void send_frame(State& state, std::vector<Packet> packets, std::int64_t timestamp_us) {
+void send_frame(State& state, std::vector<Packet> packets, std::uint32_t reference, std::int64_t timestamp_us) {
     LayerBytes codebooks;
     for (auto& packet : packets) {
         packet.frame = state.next_frame;
-        packet.reference = state.group->reference.frame;
+        packet.reference = packet.kind == PacketKind::tracked ? reference : state.group->reference.frame;
         packet.timestamp_us = timestamp_us;
         if (packet.kind == PacketKind::codebook) {
             codebooks.overhead += packet_overhead;
@@ -108,7 +111,7 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
         send(state, std::move(header));
         state.begun = true;
     }
-    send_frame(state, std::move(coded->packets), timestamp_us);
+    send_frame(state, std::move(coded->packets), coded->reference, timestamp_us);
     ++state.next_frame;
     state.last_timestamp = timestamp_us;
     return {};

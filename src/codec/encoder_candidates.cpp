@@ -127,6 +127,7 @@ Result<FrameCandidate> encode_intra(State& state, const FrameUnderWay& frame, co
     out.decoded = std::move(*decoded);
     out.pose = frame.pose;
     out.edge = edge;
+    out.intra_step = options.geometry_step;
     out.packets.push_back(frame_packet(PacketKind::intra, payload));
     clock.done("intra coding");
     return out;
@@ -181,6 +182,52 @@ FrameCandidate encode_coded_bones(State& state, FrameUnderWay& frame, const Fram
     return everything || !something ? encode_enhanced(state, frame, steps) : encode_moving(state, frame, steps, coded);
 }
 
+DeformationOptions deformation_options(const State& state) {
+    DeformationOptions out;
+    out.millimetre = 1.0 / state.header.lattice.step();
+    out.threads = state.threads;
+    return out;
+}
+
+// Where the skeleton moves each node: with the bone of the vertex that it sits on.
+std::vector<RigidMotion> skeletal_node_motion(const State& state, const FrameUnderWay& frame) {
+    if (!state.header.skeleton_tracked) return {};
+    const auto& group = *state.group;
+    const auto bones = skeletal_motion(group.reference, state.header.skeleton.bones, frame.pose);
+    std::vector<RigidMotion> out;
+    for (const auto v : group.tracked->reference.nodes.vertex) out.push_back(bones[group.reference.bone_of_vertex[v]]);
+    return out;
+}
+
+Result<FrameCandidate> encode_tracked(State& state, const FrameUnderWay& frame, const FrameSteps& steps) {
+    auto& group = *state.group;
+    TrackedFrameOptions options;
+    options.deformation = deformation_options(state);
+    options.geometry_step = steps.geometry;
+    options.colour_step = 2.0 * steps.colour;
+    options.lambda = state.options.lambda;
+    options.threads = state.threads;
+    if (!group.tracked) {
+        StageClock clock(state.stages);
+        auto reference = make_tracked_reference(group.reference.mesh, state.header.node_spacing, group.intra_step);
+        if (!reference) return tl::unexpected(reference.error());
+        group.tracked = make_tracked_group(std::move(*reference), options.deformation);
+        clock.done("deformation graph");
+    }
+    const bool refer_to_last = group.last_tracked && state.options.tracked_references == TrackedReferences::previous;
+    auto encoded = encode_tracked_frame(frame.mesh, *group.tracked, refer_to_last, skeletal_node_motion(state, frame),
+                                        options, state.stages);
+    if (!encoded) return tl::unexpected(encoded.error());
+    FrameCandidate out;
+    out.type = FrameType::tracked;
+    out.reference = refer_to_last ? *group.last_tracked : group.reference.frame;
+    out.packets.push_back(frame_packet(PacketKind::tracked, encoded->payload));
+    out.decoded = std::move(encoded->mesh);
+    out.motion = std::move(encoded->motion);
+    out.tracked = std::move(encoded->state);
+    return out;
+}
+
 void adopt(State& state, const FrameCandidate& candidate) {
     StageClock clock(state.stages);
     const auto bytes = static_cast<double>(candidate.bytes());
@@ -191,14 +238,22 @@ void adopt(State& state, const FrameCandidate& candidate) {
                                          state.next_frame, state.threads);
         group.search = make_reference_search(group.reference);
         group.edge = candidate.edge;
+        group.intra_step = candidate.intra_step;
         group.plain_intra = candidate.plain_intra;
         group.steps = candidate.steps;
         group.intra_bytes = bytes;
         state.group = std::move(group);
     } else {
         auto& group = *state.group;
-        group.motion = candidate.motion;
-        group.codebooks = candidate.codebooks;
+        if (candidate.type == FrameType::tracked) {
+            group.tracked->before_last = std::move(group.tracked->last);
+            group.tracked->last = candidate.motion;
+            group.tracked->state = candidate.tracked;
+            group.last_tracked = state.next_frame;
+        } else {
+            group.motion = candidate.motion;
+            group.codebooks = candidate.codebooks;
+        }
         if (candidate.type == FrameType::enhanced && !candidate.in_part) {
             if (group.least_bytes == 0 || bytes < group.least_bytes) group.least_bytes = bytes;
             group.excess_bytes += bytes - group.least_bytes;

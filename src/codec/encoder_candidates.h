@@ -29,6 +29,9 @@ FrameCandidate encode_moving(Encoder::State& state, FrameUnderWay& frame, const 
 FrameCandidate encode_coded_bones(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps,
                                   const std::vector<bool>& coded);
 
+// Needs options.tracked.
+Result<FrameCandidate> encode_tracked(Encoder::State& state, const FrameUnderWay& frame, const FrameSteps& steps);
+
 // The state after the frame: a new reference after an I-frame, the motion and codebooks after the others.
 void adopt(Encoder::State& state, const FrameCandidate& candidate);
 

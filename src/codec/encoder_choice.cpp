@@ -35,7 +35,7 @@ bool cannot_refer(const State& state, const LatticeMesh& mesh) {
 }
 
 bool is_scene_change(State& state, FrameUnderWay& frame) {
-    if (!state.options.scene_changes) return false;
+    if (!state.options.scene_changes || state.options.tracked) return false;
     constexpr double far_mm = 150;
     return scene_changed(frame.mesh.positions, motion_of(state, frame).predicted, far_mm / state.header.lattice.step());
 }
@@ -77,6 +77,11 @@ Result<FrameCandidate> choose_by_motion(State& state, FrameUnderWay& frame, cons
     return encode_what_moves(state, frame, steps);
 }
 
+// A T-frame where it fits the capture, else an I-frame.
+Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
+    return encode_tracked(state, frame, steps);
+}
+
 bool is_due(const State& state, const LatticeMesh& mesh) {
     return cannot_refer(state, mesh) || frames_since_intra(state) >= state.options.key_interval;
 }
@@ -85,6 +90,7 @@ Result<FrameCandidate> choose(State& state, FrameUnderWay& frame, const FrameSte
     if (force_intra || is_due(state, frame.mesh) || is_scene_change(state, frame))
         return state.options.frame_choice == FrameChoice::rate_distortion ? encode_measured_intra(state, frame, steps)
                                                                           : encode_intra(state, frame, steps);
+    if (state.options.tracked) return choose_tracked(state, frame, steps);
     switch (state.options.frame_choice) {
         case FrameChoice::motion:
             return choose_by_motion(state, frame, steps);

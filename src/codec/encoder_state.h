@@ -12,6 +12,7 @@
 #include "codec/rate_control_enc.h"
 #include "codec/sequence_header.h"
 #include "codec/sequence_index.h"
+#include "codec/tracked_frame_enc.h"
 #include "geometry/surface_distance.h"
 #include "htvm/encoder.hpp"
 
@@ -31,8 +32,11 @@ struct FrameCandidate {
     LatticeMesh decoded;
     CodedPose pose;                   // I: what the reference is skinned with
     double edge = 0;                  // I: mean edge of the captured mesh, lattice units
+    std::int32_t intra_step = 1;      // I: of the positions, lattice units
     std::vector<RigidMotion> motion;  // P, EP: of each bone
     Codebooks codebooks;              // EP: as the frame leaves them
+    TrackedState tracked;             // T: likewise; motion is then that of the nodes
+    std::uint32_t reference = 0;      // T: number of the frame that it refers to
     bool in_part = false;             // EP: by motion-based coding
     std::vector<std::uint32_t> distance_order_counts;
     double quality = 50;        // under rate or error control: of the quality knob
@@ -52,6 +56,9 @@ struct Group {
     double edge = 0;                  // mean edge of the I-frame's captured mesh, lattice units
     std::vector<RigidMotion> motion;  // of each bone in the frame before; empty behind the I-frame
     Codebooks codebooks;
+    std::optional<TrackedGroup> tracked;        // made when the first T-frame asks for it
+    std::optional<std::uint32_t> last_tracked;  // number of the last T-frame
+    std::int32_t intra_step = 1;                // of the I-frame's positions
     SurfaceErrors plain_intra;  // errors of the I-frame's mesh as an I-frame at `steps` that nothing refers to
     FrameSteps steps;
     double intra_bytes = 0;   // what the I-frame cost

@@ -21,7 +21,7 @@ public:
 private:
     double target_;
     // log2 of a frame's error over its step, by type: about 2/9 of the step at first, as measured.
-    std::array<double, frame_type_count> log_ratio_{-2.15, -2.15, -2.15};
+    std::array<double, frame_type_count> log_ratio_{-2.15, -2.15, -2.15, -2.15};
 };
 
 }  // namespace htvm

@@ -38,6 +38,7 @@ std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
         out.u16(header.skeleton.bones[i].second);
         out.u32(static_cast<std::uint32_t>(header.radii[i]));
     }
+    if (header.node_spacing > 0) out.u32(static_cast<std::uint32_t>(header.node_spacing));
     return out.take();
 }
 
@@ -83,6 +84,12 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
         out.radii.push_back(static_cast<std::int32_t>(radius));
     }
     if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
+    if (in.remaining() >= 4) {
+        const std::uint32_t spacing = in.u32();
+        if (spacing > static_cast<std::uint32_t>(lattice_limit))
+            return fail(ErrorKind::corrupt_stream, "sequence header: the nodes' spacing is out of range");
+        out.node_spacing = static_cast<std::int32_t>(spacing);
+    }
     return out;
 }
 

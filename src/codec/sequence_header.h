@@ -21,6 +21,7 @@ struct SequenceHeader {
     bool skeleton_tracked = true;           // false: the bones stand in for a skeleton that the capture has not
     Skeleton skeleton;                      // at least one bone
     std::vector<std::int32_t> radii;        // r^i of each bone, lattice units
+    std::int32_t node_spacing = 0;          // of T-frames' deformation nodes, lattice units; 0: no T-frames
     std::uint8_t nearest_vertices = 16;     // m of the distance order
     std::int32_t weight_width = 0;          // of smooth_weights(), lattice units; 0: rigid skinning, as in the paper
 };
