@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "compare_report.h"
+#include "frame_pairs.h"
+#include "io/sequence.h"
 #include "mesh_source.h"
 #include "metrics/compare.h"
 #include "terminal.h"
@@ -52,16 +54,31 @@ void choose_metrics(Options& options) {
     c.topology = only.contains("topology");
 }
 
-// Both names may carry frame numbers: their gaps must then be the same, or frames would be compared with others.
-Result<void> check_numbers(const MeshSource& original, const MeshSource& decoded) {
-    if (original.numbers.empty() || decoded.numbers.empty()) return {};
-    for (std::size_t i = 0; i < std::min(original.numbers.size(), decoded.numbers.size()); ++i)
-        if (original.numbers[i] - original.numbers[0] != decoded.numbers[i] - decoded.numbers[0])
-            return fail(ErrorKind::bad_input,
-                        fmt::format("The frames' numbers do not go together: {} has {} where {} has {}; give the same "
-                                    "frames on both sides.",
-                                    original.name, original.numbers[i], decoded.name, decoded.numbers[i]));
-    return {};
+// The places of the frames to compare, by the numbers in the files' names; empty where a side has none (a stream, files
+// without numbers): frames are then compared in their order.
+Result<std::vector<FramePair>> pairs_of(const Options& options) {
+    if (options.decoded.ends_with(".htvm") || options.original.ends_with(".htvm")) return std::vector<FramePair>{};
+    const auto originals = find_sequence(options.original), decoded = find_sequence(options.decoded);
+    if (!originals) return tl::unexpected(originals.error());
+    if (!decoded) return tl::unexpected(decoded.error());
+    const auto a = numbers_in_names(originals->paths), b = numbers_in_names(decoded->paths);
+    if (a.empty() || b.empty()) return std::vector<FramePair>{};
+    auto pairs = pair_by_number(a, b);
+    if (options.frames > 0 && pairs.size() > options.frames) {
+        pairs.resize(options.frames);
+        return pairs;  // what comes behind was not asked for
+    }
+    std::vector<std::size_t> of_original, of_decoded;
+    for (const auto& pair : pairs) {
+        of_original.push_back(pair.original);
+        of_decoded.push_back(pair.decoded);
+    }
+    const auto tell = [](const std::string& frames, const std::string& name, const std::string& other) {
+        if (!frames.empty()) warn(fmt::format("{} of {} left out: {} has no such", frames, name, other));
+    };
+    tell(frames_left_out(a, of_original), options.original, options.decoded);
+    tell(frames_left_out(b, of_decoded), options.decoded, options.original);
+    return pairs;
 }
 
 // The box round all originals, for cameras that stand still.
@@ -105,6 +122,7 @@ Result<void> write_pictures(const Options& options, const Mesh& original, const 
 struct Measured {
     SequenceComparison sums;
     std::vector<FrameComparison> frames;
+    std::vector<std::size_t> places;  // of each among the originals
 };
 
 void warn_of_length(const MeshSource& original, const MeshSource& decoded, const Options& options) {
@@ -125,24 +143,36 @@ void warn_of_ends(const MeshSource& original, const MeshSource& decoded, bool or
                      longer.name, compared));
 }
 
+// The mesh at a place of the sequence; `at` is the place that comes next.
+Result<std::optional<Mesh>> mesh_at(MeshSource& source, std::size_t place, std::size_t& at) {
+    for (;;) {
+        auto mesh = source.next(source);
+        if (!mesh || !*mesh || at++ == place) return mesh;
+    }
+}
+
 Result<Measured> measure(const Options& options) {
     auto original = open_meshes(options.original, options.unit);
     if (!original) return tl::unexpected(original.error());
     auto decoded = open_meshes(options.decoded, options.unit);
     if (!decoded) return tl::unexpected(decoded.error());
-    if (const auto ok = check_numbers(*original, *decoded); !ok) return tl::unexpected(ok.error());
-    warn_of_length(*original, *decoded, options);
+    const auto pairs = pairs_of(options);
+    if (!pairs) return tl::unexpected(pairs.error());
+    if (pairs->empty()) warn_of_length(*original, *decoded, options);
     std::size_t total = decoded->frames > 0 ? std::min(original->frames, decoded->frames) : original->frames;
     if (options.frames > 0) total = std::min(total, options.frames);
+    if (!pairs->empty()) total = pairs->size();
     Measured out;
     Progress progress("compare", total);
-    for (std::size_t frame = 0; options.frames == 0 || frame < options.frames; ++frame) {
-        auto first = original->next(*original);
+    std::size_t next_original = 0, next_decoded = 0;
+    for (std::size_t k = 0; pairs->empty() ? options.frames == 0 || k < options.frames : k < pairs->size(); ++k) {
+        const auto [frame, counterpart] = pairs->empty() ? FramePair{k, k} : (*pairs)[k];
+        auto first = mesh_at(*original, frame, next_original);
         if (!first) return tl::unexpected(first.error());
-        auto second = decoded->next(*decoded);
+        auto second = mesh_at(*decoded, counterpart, next_decoded);
         if (!second) return tl::unexpected(second.error());
         if (!*first || !*second) {
-            warn_of_ends(*original, *decoded, !*first, !*second, frame);
+            warn_of_ends(*original, *decoded, !*first, !*second, k);
             break;
         }
         auto comparison = compare_frame(**first, **second, options.compare);
@@ -150,6 +180,7 @@ Result<Measured> measure(const Options& options) {
             return fail(comparison.error().kind, fmt::format("Frame {}: {}", frame, comparison.error().message));
         out.sums += *comparison;
         out.frames.push_back(*comparison);
+        out.places.push_back(frame);
         if (!options.pictures.empty())
             if (const auto ok = write_pictures(options, **first, **second, frame); !ok)
                 return tl::unexpected(ok.error());
@@ -165,7 +196,7 @@ Result<Measured> measure(const Options& options) {
 Result<void> write_csv(const Options& options, const Measured& measured, double peak_mm) {
     std::string text = csv_header(options.compare);
     for (std::size_t i = 0; i < measured.frames.size(); ++i)
-        text += csv_line(i, measured.frames[i], options.compare, peak_mm);
+        text += csv_line(measured.places[i], measured.frames[i], options.compare, peak_mm);
     if (options.csv == "-") {
         fmt::print("{}", text);
         return {};
@@ -179,8 +210,10 @@ Result<void> write_csv(const Options& options, const Measured& measured, double 
 
 nlohmann::json as_json(const Options& options, const Measured& measured, double peak_mm) {
     nlohmann::json frames = nlohmann::json::array();
-    for (const auto& frame : measured.frames) {
+    for (std::size_t i = 0; i < measured.frames.size(); ++i) {
+        const auto& frame = measured.frames[i];
         auto line = summary_json(summarise(as_sequence(frame), peak_mm), options.compare);
+        line["frame"] = measured.places[i];
         line["original_vertices"] = frame.original_vertices;
         line["decoded_vertices"] = frame.decoded_vertices;
         if (options.compare.topology) {
@@ -254,7 +287,8 @@ void add_compare(CLI::App& app, Run& run) {
     auto& o = *options;
     CLI::App* command = app.add_subcommand("compare", "Measure decoded meshes against their originals");
     command->description(
-        "Measures decoded meshes against their originals, frame by frame in the order of their names:\n"
+        "Measures decoded meshes against their originals, frame by frame: by the numbers in their names, in the order\n"
+        "of their names where they have none:\n"
         "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
         "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
         "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"

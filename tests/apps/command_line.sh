@@ -60,6 +60,97 @@ head -c $(($(wc -c <a.htvm) - 2000)) a.htvm >short.htvm
 expect 3 "middle of a packet" "$htvm" decode short.htvm -o x
 { head -c 3000 a.htvm; printf 'damage'; tail -c +3007 a.htvm; } >damaged.htvm
 expect 3 "damaged" "$htvm" decode damaged.htvm -o x
+
+# Lost frames: everything else is decoded, it is said what is not, and --conceal shows something instead.
+# The offsets of the packets are found by their sync words; pick KIND FRAME says where such a packet begins and ends.
+"$htvm" synth walk --frames 8 --first-frame 40 --vertices 500 2>/dev/null >/dev/null
+expect 0 '"type": "P"' "$htvm" encode walk -s walk/skeleton.json --keyint 4 --still-below 100 --animation-error 0 --json -o walk.htvm
+packets() { # offset, size, kind, frame of every packet
+    local at=0 size end header
+    end=$(wc -c <walk.htvm)
+    while [ "$at" -lt "$end" ]; do
+        header=$(tail -c +$((at + 1)) walk.htvm | head -c 28 | od -An -v -tu4 -w28)
+        set -- $header
+        size=$(($7 + 36))
+        echo "$at $size $(($2 % 256)) $3"
+        at=$((at + size))
+    done
+}
+packets >walk.packets
+packet() { awk -v kind="$1" -v frame="$2" '$3 == kind && $4 == frame { print $1, $2; exit }' walk.packets; }
+without() { # without KIND FRAME: the stream without that packet
+    local place
+    place=($(packet "$1" "$2"))
+    head -c "${place[0]}" walk.htvm
+    tail -c +$((place[0] + place[1] + 1)) walk.htvm
+}
+harmed() { # harmed KIND FRAME: a byte of the packet's payload is another
+    local place
+    place=($(packet "$1" "$2"))
+    head -c $((place[0] + 40)) walk.htvm
+    printf '~'
+    tail -c +$((place[0] + 42)) walk.htvm
+}
+"$htvm" decode walk.htvm -o walk_whole 2>/dev/null
+[ "$(packet 6 1)" ] && [ "$(packet 3 2)" ] && [ "$(packet 4 2)" ] || { echo "FAILED: walk.htvm has other kinds of frames"; failures=$((failures + 1)); }
+# lost STREAM GONE...: without --conceal all files but those; with it all files, those frames said to be concealed.
+lost() {
+    local stream=$1 frame
+    shift
+    rm -rf gap animated
+    "$htvm" decode "$stream" -o gap >/dev/null 2>&1
+    [ $? -eq 3 ] || { echo "FAILED: decoding $stream does not end with 3"; failures=$((failures + 1)); }
+    "$htvm" decode "$stream" -o animated --conceal animate --json >animated.json 2>said
+    [ $? -eq 3 ] || { echo "FAILED: decoding $stream with --conceal does not end with 3"; failures=$((failures + 1)); }
+    grep -q "($# concealed)" said || { echo "FAILED: $stream: not $# frames are concealed:"; cat said; failures=$((failures + 1)); }
+    grep -q "\"concealed_frames\": $#" animated.json && [ "$(grep -c '"concealed": true' animated.json)" -eq $# ] ||
+        { echo "FAILED: $stream: the JSON does not mark $# concealed frames"; failures=$((failures + 1)); }
+    for frame in 0 1 2 3 4 5 6 7; do
+        if [[ " $* " == *" $frame "* ]]; then
+            [ ! -e gap/0000$frame.ply ] && [ -s animated/0000$frame.ply ]
+        else
+            cmp -s gap/0000$frame.ply walk_whole/0000$frame.ply && cmp -s animated/0000$frame.ply walk_whole/0000$frame.ply
+        fi || { echo "FAILED: $stream: frame $frame is not as it should be"; failures=$((failures + 1)); }
+    done
+}
+for frame in 1 2 3 5 6 7; do
+    kind=$(awk -v frame=$frame '($3 == 3 || $3 == 6) && $4 == frame { print $3 }' walk.packets)
+    without "$kind" $frame >without.htvm
+    lost without.htvm $frame
+    harmed "$kind" $frame >harmed.htvm
+    lost harmed.htvm $frame
+done
+expect 3 "frame 7 is not in the stream" "$htvm" decode without.htvm -o x
+without 4 2 >no_codebook.htvm
+lost no_codebook.htvm 2 3
+expect 3 "codebook that it names did not arrive" "$htvm" decode no_codebook.htvm -o x
+without 2 4 >no_intra.htvm
+lost no_intra.htvm 4 5 6 7
+expect 3 "I-frame 4, which is not there" "$htvm" decode no_intra.htvm -o x
+expect 2 "conceal" "$htvm" decode walk.htvm -o x --conceal perhaps
+# A gap of a thousand million frames is not filled with as many files. (gzip ends with the CRC-32 of what it packed.)
+place=($(packet 6 5))
+tail -c +$((place[0] + 1)) walk.htvm | head -c 28 | { head -c 8; head -c 4 >/dev/null; printf '\0\0\0\077'; cat; } >header
+{
+    head -c "${place[0]}" walk.htvm
+    cat header
+    tail -c +5 header | gzip -c | tail -c 8 | head -c 4
+    tail -c +$((place[0] + 33)) walk.htvm
+} >far.htvm
+rm -rf x
+expect 3 "frames 5 to 1056964607 are not in the stream; the I-frame's mesh, moved, stands in for the first 300" \
+    "$htvm" decode far.htvm -o x --conceal animate
+[ "$(find x -name '*.ply' | wc -l)" -eq 306 ] || { echo "FAILED: a false frame number fills the disk"; failures=$((failures + 1)); }
+
+# Files are compared by their numbers: what is missing on one side moves nothing.
+without 3 2 >without.htvm
+rm -rf gap
+"$htvm" decode without.htvm -o gap 2>/dev/null
+expect 0 "frame 42 of walk left out: gap has no such" "$htvm" compare walk gap --only m1
+"$htvm" compare walk walk_whole --only m1 --csv - 2>/dev/null | grep -v '^2,' >whole.csv
+"$htvm" compare walk gap --only m1 --csv - 2>/dev/null >gap.csv
+cmp -s whole.csv gap.csv || { echo "FAILED: a missing file changes what others are compared with"; failures=$((failures + 1)); }
+
 for command in synth encode decode info calibrate compare rd; do expect 0 "Usage" "$htvm" $command --help; done
 
 [ $failures -eq 0 ] && echo "the command line does what it should"
