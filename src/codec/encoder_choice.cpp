@@ -1,12 +1,15 @@
 #include "codec/encoder_choice.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <numeric>
 #include <string>
 
 #include "codec/encoder_cost.h"
 #include "codec/scene_change_enc.h"
+#include "codec/stage_clock_enc.h"
 
 namespace htvm {
 namespace {
@@ -77,9 +80,18 @@ Result<FrameCandidate> choose_by_motion(State& state, FrameUnderWay& frame, cons
     return encode_what_moves(state, frame, steps);
 }
 
-// A T-frame where it fits the capture, else an I-frame.
+// A T-frame where it fits the capture: where a hand has left a pocket, or an arm was lost, the I-frame's mesh no longer
+// serves, and an I-frame is due; so it is where the T-frames since the last one have grown too dear.
 Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
-    return encode_tracked(state, frame, steps);
+    constexpr double stray_in_edges = 2, most_strays = 0.004;
+    auto candidate = encode_tracked(state, frame, steps);
+    if (!candidate) return candidate;
+    StageClock clock(state.stages);
+    const auto fit =
+        measure_tracked_fit(frame.mesh, candidate->decoded, stray_in_edges * state.group->edge, state.threads);
+    clock.done("fit of the tracking");
+    if (fit.stray_share <= most_strays && !intra_is_paid_for(state, *candidate)) return candidate;
+    return encode_intra(state, frame, steps);
 }
 
 bool is_due(const State& state, const LatticeMesh& mesh) {
@@ -102,17 +114,39 @@ Result<FrameCandidate> choose(State& state, FrameUnderWay& frame, const FrameSte
     return encode_what_moves(state, frame, steps);
 }
 
+// Under rate control, of a frame that takes so many bits even at the lowest quality.
+tl::unexpected<Error> does_not_fit(const State& state, double bits) {
+    const double capacity = state.options.bits_per_second * state.options.buffer_seconds;
+    const auto number = [](double x) {
+        std::array<char, 32> text{};
+        std::snprintf(text.data(), text.size(), "%.3g", x);
+        return std::string(text.data());
+    };
+    std::string message = "the frame takes " + number(bits / 8000) +
+                          " kB even at the lowest quality, and the buffer has room for " +
+                          number(state.rate->room() / 8000) + " kB of its " + number(capacity / 8000) + " kB; give ";
+    // Rounded up, as what is asked for must do.
+    const auto enough = [&](double x) { return number(1.01 * x); };
+    if (bits > capacity)
+        message += "a bitrate of at least " + enough(bits / state.options.buffer_seconds / 1e6) +
+                   " Mbit/s or a buffer of at least " + enough(bits / state.options.bits_per_second) + " s";
+    else
+        message += "a higher bitrate or a larger buffer";
+    return fail(ErrorKind::limit, message);
+}
+
 // Rate control: coarser until the frame fits into the buffer; a P-frame at the last.
 Result<FrameCandidate> code_within_buffer(State& state, FrameUnderWay& frame, bool force_intra) {
     const auto fits = [&](const FrameCandidate& candidate) { return bits_of(state, candidate) <= state.rate->room(); };
     const bool intra = force_intra || is_due(state, frame.mesh);
-    double quality = state.rate->quality(intra ? FrameType::intra : FrameType::enhanced);
+    double quality = state.rate->quality(intra ? FrameType::intra : FrameType::enhanced), bits = 0;
     for (;;) {
         auto candidate = choose(state, frame, steps_of(state, quality_steps(quality)), force_intra);
         if (!candidate) return candidate;
         candidate->quality = quality;
         if (fits(*candidate)) return candidate;
-        const double lower = state.rate->lower_quality(candidate->type, quality, bits_of(state, *candidate));
+        bits = bits_of(state, *candidate);
+        const double lower = state.rate->lower_quality(candidate->type, quality, bits);
         if (lower >= quality) break;
         quality = lower;
     }
@@ -121,10 +155,9 @@ Result<FrameCandidate> code_within_buffer(State& state, FrameUnderWay& frame, bo
         moved.quality = quality;
         if (fits(moved)) return moved;
     }
+    auto error = does_not_fit(state, bits);
     state.rate->coded(FrameType::predicted, quality, 0);
-    return fail(ErrorKind::limit, "frame " + std::to_string(state.next_frame) +
-                                      " does not fit into the buffer even at the lowest quality; give a higher bitrate "
-                                      "or a larger buffer");
+    return error;
 }
 
 // Error control: again with what was learnt where the error is off.

@@ -37,15 +37,6 @@ bool is_dear(const Group& group, const FrameUnderWay& frame, const FrameCandidat
     return static_cast<double>(enhanced.bytes()) >= 0.95 * group.intra_bytes * vertices / of_reference;
 }
 
-// What the EP-frames since the I-frame have cost above the cheapest of them would have paid for a new one.
-bool intra_is_paid_for(const State& state, const FrameCandidate& enhanced) {
-    const auto& group = *state.group;
-    const double bytes = static_cast<double>(enhanced.bytes());
-    const double least = group.least_bytes > 0 ? std::min(group.least_bytes, bytes) : bytes;
-    return std::int64_t{state.next_frame} - group.reference.frame >= state.options.least_key_interval &&
-           group.excess_bytes + bytes - least > group.intra_bytes - least;
-}
-
 // The frames without residuals, or with some, where they are good enough.
 std::optional<FrameCandidate> choose_animation(State& state, FrameUnderWay& frame, const FrameSteps& steps,
                                                const SurfaceErrors& allowed) {
@@ -63,6 +54,14 @@ std::optional<FrameCandidate> choose_animation(State& state, FrameUnderWay& fram
 }
 
 }  // namespace
+
+bool intra_is_paid_for(const State& state, const FrameCandidate& candidate) {
+    const auto& group = *state.group;
+    const double bytes = static_cast<double>(candidate.bytes());
+    const double least = group.least_bytes > 0 ? std::min(group.least_bytes, bytes) : bytes;
+    return std::int64_t{state.next_frame} - group.reference.frame >= state.options.least_key_interval &&
+           group.excess_bytes + bytes - least > group.intra_bytes - least;
+}
 
 SurfaceErrors errors_of(const State& state, const FrameUnderWay& frame, const LatticeMesh& decoded) {
     SurfaceDistanceOptions options;

@@ -59,8 +59,9 @@ Result<std::vector<QuantisedTransform>> decode_node_motion(std::span<const std::
         return fail(ErrorKind::corrupt_stream, "node motion layer: the frame that it refers to is not there");
     const int rotation_exponent = bytes[1], shift_exponent = bytes[2];
     RangeDecoder decoder(bytes.subspan(3));
-    BinaryModel same_largest;
-    SignedModel rotation, shift;
+    NodeMotionModels models;
+    std::vector<std::array<std::uint8_t, 2>> corrected(
+        parents.size());  // of each node: components of rotation, of shift
     std::vector<QuantisedTransform> out;
     out.reserve(parents.size());
     for (std::size_t node = 0; node < parents.size(); ++node) {
@@ -71,10 +72,11 @@ Result<std::vector<QuantisedTransform>> decode_node_motion(std::span<const std::
             transform.rotation.largest = static_cast<std::uint8_t>(decoder.raw(2));
         }
         for (auto& c : transform.rotation.others)
-            c = static_cast<std::int16_t>(
-                within(c + (std::int64_t{decode_signed(decoder, rotation)} << rotation_exponent), 1 << rotation_bits));
+            c = static_cast<std::int16_t>(within(
+                c + std::int64_t{decode_signed(decoder, rotation)} * (1 << rotation_exponent), 1 << rotation_bits));
         for (auto* c : {&transform.shift.x, &transform.shift.y, &transform.shift.z})
-            *c = within(*c + (std::int64_t{decode_signed(decoder, shift)} << shift_exponent), shift_limit);
+            *c = within(*c + std::int64_t{decode_signed(decoder, shift)} * (std::int64_t{1} << shift_exponent),
+                        shift_limit);
         out.push_back(transform);
         if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "node motion layer: it ends too early");
     }

@@ -56,11 +56,12 @@ std::vector<QuantisedTransform> quantised(const std::vector<RigidMotion>& motion
     return out;
 }
 
-// Steps in which errors of motion stay well below the displacement's own step a node's spacing away.
+// Half the displacement's step for shifts; turns so coarse that most stay as predicted: measured, see
+// docs/algorithm.md.
 NodeMotionOptions motion_options(double geometry_step) {
     NodeMotionOptions out;
-    out.shift_exponent = std::clamp(static_cast<int>(std::lround(std::log2(std::max(geometry_step, 1.0)))) - 2, 0, 8);
-    out.rotation_exponent = std::clamp(out.shift_exponent + 1, 0, 7);
+    out.shift_exponent = std::clamp(static_cast<int>(std::lround(std::log2(std::max(geometry_step, 1.0)))) - 1, 0, 8);
+    out.rotation_exponent = std::clamp(out.shift_exponent + 4, 0, 10);
     return out;
 }
 
@@ -147,7 +148,46 @@ std::vector<std::int32_t> colour_changes(const LatticeMesh& captured, const std:
     return out;
 }
 
+// From samples of one surface to the other.
+TrackedFit one_way_fit(const TargetSurface& from, const TargetSurface& to, double stray, unsigned threads) {
+    std::vector<Point3f> points, normals;
+    for (const auto v : from.samples) {
+        points.push_back(from.positions[v]);
+        normals.push_back(from.normals[v]);
+    }
+    SurfaceTargetOptions options;
+    options.reach = static_cast<float>(stray);
+    options.agreement = 0;
+    options.threads = threads;
+    const auto found = surface_targets(points, normals, to, options);
+    double squares = 0;
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+        if (!found[i].valid) continue;
+        ++near;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const double d = static_cast<double>(found[i].point[axis]) - points[i][axis];
+            squares += d * d;
+        }
+    }
+    if (found.empty()) return {};
+    return {std::sqrt(squares / static_cast<double>(std::max<std::size_t>(near, 1))),
+            static_cast<double>(found.size() - near) / static_cast<double>(found.size())};
+}
+
 }  // namespace
+
+TrackedFit measure_tracked_fit(const LatticeMesh& captured, const LatticeMesh& decoded, double stray,
+                               unsigned threads) {
+    constexpr std::size_t samples = 4000;
+    const auto surface_of = [&](const LatticeMesh& mesh) {
+        return make_target_surface(points_of(mesh.positions), mesh.triangles,
+                                   static_cast<float>(2 * std::max(mean_edge(mesh), 1.0)), samples, threads);
+    };
+    const auto a = surface_of(captured), b = surface_of(decoded);
+    const auto forth = one_way_fit(a, b, stray, threads), back = one_way_fit(b, a, stray, threads);
+    return {std::max(forth.rms, back.rms), std::max(forth.stray_share, back.stray_share)};
+}
 
 TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOptions& options) {
     TrackedGroup out;

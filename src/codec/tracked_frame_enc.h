@@ -29,6 +29,14 @@ struct TrackedGroup {
 };
 TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOptions& options);
 
+// How well a tracked frame stands for the captured mesh, from a few thousand samples each way.
+struct TrackedFit {
+    double rms = 0;          // lattice units, the larger direction
+    double stray_share = 0;  // of the samples that have no surface within `stray` facing the same way, likewise
+};
+// stray: lattice units.
+TrackedFit measure_tracked_fit(const LatticeMesh& captured, const LatticeMesh& decoded, double stray, unsigned threads);
+
 struct EncodedTrackedFrame {
     FramePayload payload;  // header and layers
     LatticeMesh mesh;      // what the decoder will have
