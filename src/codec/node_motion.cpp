@@ -59,9 +59,8 @@ Result<std::vector<QuantisedTransform>> decode_node_motion(std::span<const std::
         return fail(ErrorKind::corrupt_stream, "node motion layer: the frame that it refers to is not there");
     const int rotation_exponent = bytes[1], shift_exponent = bytes[2];
     RangeDecoder decoder(bytes.subspan(3));
-    NodeMotionModels models;
-    std::vector<std::array<std::uint8_t, 2>> corrected(
-        parents.size());  // of each node: components of rotation, of shift
+    BinaryModel same_largest;
+    SignedModel rotation, shift;
     std::vector<QuantisedTransform> out;
     out.reserve(parents.size());
     for (std::size_t node = 0; node < parents.size(); ++node) {
