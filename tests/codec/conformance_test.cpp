@@ -1,13 +1,17 @@
 // Streams that every version must decode to the same integers, with a digest of each frame beside them: *.htvm and
-// *.digests in tests/data/conformance. HTVM_WRITE_CONFORMANCE=1 in the environment writes them anew.
+// *.digests in tests/data/conformance. HTVM_WRITE_CONFORMANCE=1 in the environment writes them anew, or one of them
+// where that is its name.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
 
+#include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 #include "core/bytes.h"
 #include "core/crc32.h"
@@ -43,14 +47,15 @@ std::uint32_t digest(const Mesh& mesh) {
 }
 
 std::string line_of(const DecodedFrame& frame) {
+    constexpr std::array letters = {'I', 'E', 'P', 'T'};
+    const char letter = letters.at(static_cast<std::size_t>(frame.info.type));
     char line[80];
-    std::snprintf(line, sizeof line, "%u %c %zu %zu %08x", frame.info.frame,
-                  frame.info.type == FrameType::intra ? 'I' : 'E', frame.mesh.positions.size(),
+    std::snprintf(line, sizeof line, "%u %c %zu %zu %08x", frame.info.frame, letter, frame.mesh.positions.size(),
                   frame.mesh.triangles.size(), digest(frame.mesh));
     return line;
 }
 
-// One line a frame: its number, I or E, its vertices, its triangles, its digest.
+// One line a frame: its number, its kind, its vertices, its triangles, its digest.
 std::vector<std::string> digests(const std::vector<std::uint8_t>& bytes) {
     const auto decoded = decode_packets(read_packets(bytes, 1000));
     for (const auto& error : decoded.errors) ADD_FAILURE() << error.message;
@@ -71,18 +76,80 @@ std::vector<std::string> lines_in(const fs::path& path) {
     return out;
 }
 
+// HTVM_WRITE_CONFORMANCE
+std::string asked_for() {
+    const char* name = std::getenv("HTVM_WRITE_CONFORMANCE");
+    return name ? name : "";
+}
+
+void write_packets(const std::string& name, const std::vector<Packet>& packets) {
+    if (asked_for() != "1" && asked_for() != name) return;
+    std::vector<std::uint8_t> bytes;
+    for (const auto& packet : packets) {
+        const auto more = write_packet(packet);
+        bytes.insert(bytes.end(), more.begin(), more.end());
+    }
+    ASSERT_LE(bytes.size(), 40000u) << name << ": the repository holds small streams only";
+    std::ofstream(folder / (name + ".htvm"), std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    std::ofstream text(folder / (name + ".digests"));
+    for (const auto& line : digests(bytes)) text << line << "\n";
+}
+
 void write_stream(const std::string& name, const TestSequence& sequence, const EncoderOptions& options) {
     const auto coded = encode(sequence, options);
     ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
-    ASSERT_LE(coded.bytes.size(), 40000u) << name << ": the repository holds small streams only";
-    std::ofstream(folder / (name + ".htvm"), std::ios::binary)
-        .write(reinterpret_cast<const char*>(coded.bytes.data()), static_cast<std::streamsize>(coded.bytes.size()));
-    std::ofstream text(folder / (name + ".digests"));
-    for (const auto& line : digests(coded.bytes)) text << line << "\n";
+    write_packets(name, coded.packets);
+}
+
+// P-frames, and EP-frames of which some bones are coded; at the end one of no bone, one of bones without any vertex,
+// and one of vertices without any triangle.
+void write_moving() {
+    auto options = motion_based(40, 5);
+    options.frame_choice = FrameChoice::motion;
+    options.predicted_below = 800;
+    auto coded = encode(walking(5, 400), options);
+    ASSERT_GE(frames_in_part(coded), 2u);
+    ASSERT_GE(frames_of(coded, FrameType::predicted), 1u);
+    coded.packets.pop_back();  // the index
+    const auto model = std::find_if(coded.packets.rbegin(), coded.packets.rend(), is_in_part);
+    ASSERT_NE(model, coded.packets.rend());
+    const Packet last = *model;
+    const auto add = [&](const std::optional<std::vector<std::uint8_t>>& bones) {
+        auto payload = *read_frame_payload(last.payload);
+        payload.header.triangles = 0;
+        for (const auto layer : {Layer::fans, Layer::distance_orders}) payload.set(layer, {});
+        if (bones) {
+            payload.set(Layer::coded_bones, *bones);
+            payload.header.vertices = 0;
+            for (const auto layer : {Layer::mapping, Layer::geometry, Layer::colour}) payload.set(layer, {});
+        }
+        Packet packet = last;
+        packet.frame = coded.packets.back().frame + 1;
+        packet.timestamp_us = coded.packets.back().timestamp_us + 33333;
+        packet.payload = write_frame_payload(payload);
+        coded.packets.push_back(std::move(packet));
+    };
+    add(std::vector<std::uint8_t>{0, 0});
+    add(std::vector<std::uint8_t>{0x55, 0x15});
+    add(std::nullopt);
+    write_packets("moving", coded.packets);
 }
 
 void write_all() {
     fs::create_directories(folder);
+    write_moving();
+
+    TestSequence spokes{"awkward, moving", {}, {}};
+    for (const auto& shape : tfan_test::special_meshes()) {
+        if (shape.vertex_count < 4 || shape.vertex_count > 200) continue;
+        for (auto& frame : sequence_of(shape, 3, none).frames) spokes.frames.push_back(std::move(frame));
+    }
+    spokes = with_spokes(std::move(spokes));
+    auto moving = motion_based(40, 3);
+    moving.nearest_vertices = 5;
+    write_stream("awkward_moving", spokes, moving);
+
     EncoderOptions options;
     options.key_interval = 3;
     auto person = synthetic(true, 5, 800);
@@ -114,7 +181,7 @@ void write_all() {
 
 TEST(Conformance, StoredStreamsDecodeToTheirDigests) {
     if (folder.empty()) GTEST_SKIP() << "built without HTVM_TEST_DATA";
-    if (const char* write = std::getenv("HTVM_WRITE_CONFORMANCE"); write && std::string(write) == "1") write_all();
+    if (!asked_for().empty()) write_all();
     if (!fs::exists(folder)) GTEST_SKIP() << folder << " is missing; HTVM_WRITE_CONFORMANCE=1 makes it";
     int streams = 0;
     for (const auto& entry : fs::directory_iterator(folder)) {
@@ -123,7 +190,7 @@ TEST(Conformance, StoredStreamsDecodeToTheirDigests) {
         ++streams;
         EXPECT_EQ(digests(stream_in(entry.path())), lines_in(fs::path(entry.path()).replace_extension(".digests")));
     }
-    EXPECT_GE(streams, 3);
+    EXPECT_GE(streams, 5);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "codec/frame_payload.h"
 #include "codec/hostile_bytes.h"
+#include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 
 namespace htvm {
@@ -223,7 +224,8 @@ void expect_harmless(const std::vector<Packet>& packets, std::size_t at, const D
                 const auto frame = decoder.push(packet);
                 if (!frame || !*frame) continue;
                 const auto& mesh = (**frame).mesh;
-                ASSERT_LE(mesh.positions.size(), options.max_vertices);
+                // Zippering joins what the packet holds with the I-frame's mesh.
+                ASSERT_LE(mesh.positions.size(), is_in_part(packet) ? 2 * options.max_vertices : options.max_vertices);
                 for (const auto& t : mesh.triangles)
                     for (const auto v : t) ASSERT_LT(v, mesh.positions.size());
                 for (const auto& p : mesh.positions)
@@ -253,6 +255,31 @@ TEST(Hostile, EveryPacketDamagedBehindItsCrcDoesNoHarm) {
     for (std::size_t at = 0; at < coded.packets.size(); ++at) expect_harmless(coded.packets, at, small_limits(), 300);
 }
 
+CodedSequence small_moving_stream() {
+    const auto sequence = walking(3, 80);
+    auto options = motion_based(40, 3);
+    auto out = encode(sequence, options);
+    options.frame_choice = FrameChoice::motion;
+    options.predicted_below = 1e6;
+    auto predicted = encode(sequence, options);
+    for (auto& packet : predicted.packets)
+        if (packet.kind == PacketKind::predicted && packet.frame == 1) out.packets.push_back(std::move(packet));
+    return out;
+}
+
+TEST(Hostile, PredictedAndMotionBasedFramesDamagedBehindTheirCrcDoNoHarm) {
+    const auto coded = small_moving_stream();
+    std::size_t in_part = 0, predicted = 0;
+    for (std::size_t at = 0; at < coded.packets.size(); ++at) {
+        const auto& packet = coded.packets[at];
+        if (!is_in_part(packet) && packet.kind != PacketKind::predicted) continue;
+        ++(packet.kind == PacketKind::predicted ? predicted : in_part);
+        expect_harmless(coded.packets, at, small_limits(), 300);
+    }
+    EXPECT_GE(in_part, 1u);
+    EXPECT_EQ(predicted, 1u);
+}
+
 TEST(Hostile, DracoIntraFramesDamagedBehindTheirCrcDoNoHarm) {
     const auto coded = small_stream(true);
     auto options = small_limits();
@@ -261,10 +288,9 @@ TEST(Hostile, DracoIntraFramesDamagedBehindTheirCrcDoNoHarm) {
         if (coded.packets[at].kind == PacketKind::intra) expect_harmless(coded.packets, at, options, 60);
 }
 
-TEST(Hostile, EveryLayerReplacedByNoiseDoesNoHarm) {
-    const auto coded = small_stream(false);
+void expect_noise_is_harmless(const CodedSequence& coded) {
     for (const auto& original : coded.packets) {
-        if (original.kind != PacketKind::intra && original.kind != PacketKind::enhanced) continue;
+        if (!is_frame(original)) continue;
         std::mt19937 random(1);
         for (int i = 0; i < 300; ++i) {
             auto payload = *read_frame_payload(original.payload);
@@ -282,6 +308,11 @@ TEST(Hostile, EveryLayerReplacedByNoiseDoesNoHarm) {
             }
         }
     }
+}
+
+TEST(Hostile, EveryLayerReplacedByNoiseDoesNoHarm) {
+    expect_noise_is_harmless(small_stream(false));
+    expect_noise_is_harmless(small_moving_stream());
 }
 
 }  // namespace
