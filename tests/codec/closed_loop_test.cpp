@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 #include "codec/tfan_test_meshes.h"
 
@@ -17,7 +18,7 @@ void expect_closed_loop(const TestSequence& sequence, EncoderOptions options) {
     options.threads = 1;
     const auto coded = encode(sequence, options);
     EXPECT_TRUE(options.intra_coder || coded.errors.empty()) << coded.errors[0];
-    for (const unsigned threads : {2u, 7u}) {
+    for (const unsigned threads : {3u, 7u}) {
         options.threads = threads;
         EXPECT_EQ(encode(sequence, options).bytes, coded.bytes) << threads << " threads";
     }
@@ -150,6 +151,64 @@ TEST(ClosedLoop, NoChoiceOfCodewordLeavesTheLattice) {
     options.geometry_step = 100;
     options.merge_duplicates = false;
     expect_closed_loop(sequence, options);
+}
+
+TEST(ClosedLoop, PredictedFrames) {
+    auto options = motion_based(0);
+    options.frame_choice = FrameChoice::motion;
+    options.predicted_below = 1e6;
+    const auto sequence = walking(6, 800);
+    EXPECT_EQ(frames_of(encode(sequence, options), FrameType::predicted), 4u) << "all but two I-frames";
+    expect_closed_loop(sequence, options);
+    options.weight_width = 0;
+    options.geometry_step = 0.1;
+    expect_closed_loop(sequence, options);
+}
+
+TEST(ClosedLoop, MotionBasedFramesByThreshold) {
+    const auto sequence = walking(5, 800);
+    for (const double still_below : {15.0, 50.0, 120.0}) {
+        SCOPED_TRACE("still below " + std::to_string(still_below));
+        auto options = motion_based(still_below, 5);
+        EXPECT_GT(frames_in_part(encode(sequence, options)), 0u);
+        expect_closed_loop(sequence, options);
+        options.weight_width = 0;
+        options.merge_duplicates = false;
+        expect_closed_loop(sequence, options);
+    }
+}
+
+TEST(ClosedLoop, MotionBasedFramesWhoseAnimationIsChecked) {
+    auto options = motion_based(200);
+    for (const double error : {0.5, 2.0, 20.0}) {
+        options.animation_error = error;
+        expect_closed_loop(walking(4, 800), options);
+    }
+}
+
+TEST(ClosedLoop, MotionBasedFramesOfEveryAwkwardSequence) {
+    std::size_t in_part = 0;
+    for (const auto& sequence : awkward_sequences()) {
+        const auto spokes = with_spokes(sequence);
+        for (const double still_below : {20.0, 75.0}) {
+            in_part += frames_in_part(encode(spokes, motion_based(still_below)));
+            expect_closed_loop(spokes, motion_based(still_below));
+        }
+    }
+    EXPECT_GE(in_part, 20u);
+}
+
+TEST(ClosedLoop, EveryChoiceOfFrames) {
+    for (const auto choice : {FrameChoice::fixed, FrameChoice::motion, FrameChoice::rate_distortion})
+        for (const double still_below : {0.0, 60.0}) {
+            auto options = motion_based(still_below, 6);
+            options.frame_choice = choice;
+            options.predicted_below = 500;
+            options.intra_above = 2500;
+            options.animation_error = 2;
+            expect_closed_loop(walking(7, 500), options);
+            for (const auto& sequence : awkward_sequences()) expect_closed_loop(with_spokes(sequence), options);
+        }
 }
 
 std::vector<Triangle> by_source_vertex(const Mesh& decoded) {
