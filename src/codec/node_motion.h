@@ -5,8 +5,7 @@
 //
 // Layer: a byte of flags (bit 0: refers to the frame before), a byte for the rotations' step (its exponent), one for
 // the shifts', then range coded: per node whether the rotation's largest component is the predicted one's (else which
-// it is, raw), the other three components, the shift; each in the context of how many of the three its parent
-// corrected.
+// it is, raw), the other three components, the shift.
 #pragma once
 
 #include <cstdint>
