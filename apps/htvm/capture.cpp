@@ -147,6 +147,11 @@ Result<std::optional<Mesh>> Capture::next() {
     return mesh;
 }
 
+void Capture::rewind() {
+    peeked_.reset();
+    read_ = given_ = 0;
+}
+
 const Pose* Capture::pose() const {
     if (poses_.empty()) return nullptr;
     return &poses_[std::min(options_.first + given_ - 1, poses_.size() - 1)];

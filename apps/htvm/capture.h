@@ -37,6 +37,8 @@ public:
     static Result<Capture> open(const CaptureOptions& options);
     // The next frame's mesh in mm, or nothing at the end.
     Result<std::optional<Mesh>> next();
+    // Back to the first frame. From files only: standard input does not come again.
+    void rewind();
     // Of the frame that next() gave last: null where there is no skeleton.
     const Pose* pose() const;
     std::int64_t timestamp_us() const;

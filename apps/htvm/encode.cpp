@@ -8,6 +8,7 @@
 #include "commands.h"
 #include "encoder_options.h"
 #include "layer_table.h"
+#include "rate_report.h"
 #include "stream_file.h"
 #include "terminal.h"
 
@@ -21,9 +22,22 @@ struct Options {
     bool json = false;
 };
 
-Result<void> drain(Encoder& encoder, StreamOutput& output) {
-    while (auto packet = encoder.pull())
-        if (auto written = output.write(*packet); !written) return written;
+// One run over the capture: of two, the first writes nothing.
+struct Pass {
+    Capture& capture;
+    Encoder& encoder;
+    StreamOutput* output;  // null: the packets go nowhere
+    RateReport& rate;
+    std::string name;  // for the progress line
+    bool json;
+};
+
+Result<void> drain(const Pass& pass) {
+    while (auto packet = pass.encoder.pull()) {
+        pass.rate.buffer.add(*packet);
+        if (!pass.output) continue;
+        if (auto written = pass.output->write(*packet); !written) return written;
+    }
     return {};
 }
 
@@ -34,62 +48,120 @@ struct Summary {
     nlohmann::json frames = nlohmann::json::array();
 };
 
-Result<void> encode_frames(Capture& capture, Encoder& encoder, StreamOutput& output, bool json, Summary& summary) {
-    Progress progress("encoding", capture.frames());
+// Under rate control a frame that does not fit is left out, and the stream goes on without it; but not the first, as
+// all others need an I-frame before them.
+Result<void> drop(const Pass& pass, const Error& error) {
+    const auto frame = pass.rate.costs.size();
+    const bool goes_on = error.kind == ErrorKind::limit && pass.rate.rate_controlled() && frame > 0;
+    if (!goes_on) return fail(error.kind, fmt::format("frame {}: {}", frame, error.message));
+    if (pass.output) warn(fmt::format("frame {} is dropped: {}", frame, error.message));
+    add_dropped(pass.rate);
+    return {};
+}
+
+std::string progress_text(const Pass& pass, const FrameInfo& info) {
+    std::string text =
+        fmt::format("{} {:.2f} bpv", type_name(info.type), bits_per_vertex(info.bytes.total(), info.source_vertices));
+    if (pass.rate.controlled()) text += fmt::format(", quality {:.0f}", pass.encoder.last_cost().quality);
+    return text;
+}
+
+Result<void> encode_frames(const Pass& pass, Summary& summary) {
+    Progress progress(pass.name, pass.capture.frames());
     for (;;) {
-        const auto mesh = capture.next();
+        const auto mesh = pass.capture.next();
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) break;
         if ((*mesh)->triangles.empty()) ++summary.without_triangles;
         const auto start = std::chrono::steady_clock::now();
-        if (auto ok = encoder.push(**mesh, capture.pose(), capture.timestamp_us()); !ok) {
-            return fail(ok.error().kind, fmt::format("frame {}: {}", summary.totals.all().frames, ok.error().message));
-        }
+        const auto pushed = pass.encoder.push(**mesh, pass.capture.pose(), pass.capture.timestamp_us());
         summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        const auto& info = encoder.last_frame();
+        if (!pushed) {
+            if (auto dropped = drop(pass, pushed.error()); !dropped) return dropped;
+            progress.step("dropped");
+            continue;
+        }
+        const auto& info = pass.encoder.last_frame();
         add(summary.totals, info);
-        if (json) summary.frames.push_back(frame_json(info));
-        if (auto written = drain(encoder, output); !written) return written;
-        progress.step(fmt::format("{} {:.2f} bpv", type_name(info.type),
-                                  bits_per_vertex(info.bytes.total(), info.source_vertices)));
+        add_coded(pass.rate, pass.encoder.last_cost());
+        if (pass.json) {
+            summary.frames.push_back(frame_json(info));
+            if (pass.rate.controlled()) summary.frames.back()["quality"] = pass.encoder.last_cost().quality;
+        }
+        if (auto written = drain(pass); !written) return written;
+        progress.step(progress_text(pass, info));
     }
-    encoder.finish();
-    return drain(encoder, output);
+    pass.encoder.finish();
+    return drain(pass);
+}
+
+// The first of two passes: what each frame costs.
+Result<void> first_pass(Capture& capture, EncoderOptions& settings) {
+    auto encoder = Encoder::create(settings);
+    if (!encoder) return tl::unexpected(encoder.error());
+    RateReport rate(settings);
+    Summary unused;
+    if (auto ok = encode_frames({capture, *encoder, nullptr, rate, "pass 1 of 2", false}, unused); !ok) return ok;
+    settings.first_pass = std::move(rate.costs);
+    capture.rewind();
+    return {};
+}
+
+void report(const Options& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes, double fps) {
+    const auto frames = summary.totals.all().frames;
+    const double seconds = static_cast<double>(frames + rate.dropped.size()) / fps;
+    const double megabits = 8e-6 * static_cast<double>(bytes);
+    if (options.json) {
+        nlohmann::json out = {{"output", options.output},
+                              {"bytes", bytes},
+                              {"frames", summary.frames},
+                              {"megabits_per_second", megabits / seconds},
+                              {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
+        if (rate.controlled()) out["control"] = rate_json(rate, bytes, seconds);
+        fmt::print("{}\n", out.dump(2));
+        return;
+    }
+    fmt::print(stderr, "{}", layer_table(summary.totals));
+    note(fmt::format("{}: {} frames, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s", options.output,
+                     frames, bytes, megabits / seconds, fps, static_cast<double>(frames) / summary.encode_seconds));
+    if (rate.controlled()) note(rate_summary(rate, bytes, seconds));
 }
 
 Result<void> encode(const Options& options) {
     if (options.output == "-" && options.json)
         return fail(ErrorKind::bad_input, "--json prints on standard output, where -o - puts the stream; choose one");
+    const bool two_passes = options.encoding.passes == 2;
+    if (two_passes && options.capture.input == "-")
+        return fail(
+            ErrorKind::bad_input,
+            "--passes 2 reads the capture twice, which standard input does not allow; give files, or --passes 1");
     auto capture = Capture::open(options.capture);
     if (!capture) return tl::unexpected(capture.error());
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
-    auto encoder = Encoder::create(*settings);
-    if (!encoder) return tl::unexpected(encoder.error());
+    // Before the first pass, so that a place that cannot be written to does not cost one.
     auto output = StreamOutput::open(options.output);
     if (!output) return tl::unexpected(output.error());
+    if (two_passes)
+        if (auto ok = first_pass(*capture, *settings); !ok) return ok;
+    auto encoder = Encoder::create(*settings);
+    if (!encoder) return tl::unexpected(encoder.error());
     Summary summary;
-    if (auto ok = encode_frames(*capture, *encoder, *output, options.json, summary); !ok) return ok;
+    RateReport rate(*settings);
+    const std::string name = two_passes ? "pass 2 of 2" : "encoding";
+    if (auto ok = encode_frames({*capture, *encoder, &*output, rate, name, options.json}, summary); !ok) return ok;
     const auto frames = summary.totals.all().frames;
     if (frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
     if (summary.without_triangles > 0)
         warn(fmt::format("{} of {} frames have no triangles; see that the files hold meshes", summary.without_triangles,
                          frames));
-    const double seconds = static_cast<double>(frames) / capture->fps();
-    const double megabits = 8e-6 * static_cast<double>(output->bytes());
-    if (options.json) {
-        nlohmann::json out = {{"output", options.output},
-                              {"bytes", output->bytes()},
-                              {"frames", summary.frames},
-                              {"megabits_per_second", megabits / seconds},
-                              {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
-        fmt::print("{}\n", out.dump(2));
-        return {};
-    }
-    fmt::print(stderr, "{}", layer_table(summary.totals));
-    note(fmt::format("{}: {} frames, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s", options.output,
-                     frames, output->bytes(), megabits / seconds, capture->fps(),
-                     static_cast<double>(frames) / summary.encode_seconds));
+    report(options, summary, rate, output->bytes(), capture->fps());
+    if (!rate.dropped.empty())
+        return fail(
+            ErrorKind::limit,
+            fmt::format("{} is complete but for {} of {} frames, which did not fit into the buffer; give a higher "
+                        "--bitrate or a larger --buffer",
+                        options.output, rate.dropped.size(), rate.costs.size()));
     return {};
 }
 
@@ -106,7 +178,8 @@ void add_encode(CLI::App& app, Run& run) {
         "Examples:\n"
         "  htvm encode capture/ --skeleton capture/skeleton.json -o person.htvm\n"
         "  htvm encode 'scan_%05d.obj' -q 70 --keyint 60 -o person.htvm\n"
-        "  rig --ply | htvm encode - -o - | nc host 9000");
+        "  htvm encode capture/ --bitrate 6 --buffer 0.5 --passes 2 -o person.htvm\n"
+        "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
     command->callback([options, &run] { run = [options] { return encode(*options); }; });
 }
 

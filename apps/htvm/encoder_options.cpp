@@ -68,6 +68,38 @@ void add_choice_options(CLI::App& command, EncodingOptions& options) {
                      "No I-frame of its own accord where the scene changes");
 }
 
+// Quality that follows from a bitrate or an error. What sets the steps by hand contradicts it.
+void add_control_options(CLI::App& command, EncodingOptions& options) {
+    auto* bitrate =
+        command
+            .add_option("--bitrate", options.megabits,
+                        "Mbit/s that the stream keeps to, instead of a quality: the quality follows, and frames that\n"
+                        "do not fit into the buffer even at the lowest are dropped (exit code 5)")
+            ->check(CLI::Range(1e-3, 1e6));
+    command
+        .add_option("--buffer", options.buffer_seconds,
+                    "--bitrate: seconds of stream that the receiver's buffer holds, which is the delay that a live\n"
+                    "receiver needs (default 1)")
+        ->check(CLI::Range(0.01, 3600.0))
+        ->needs(bitrate);
+    command
+        .add_option("--passes", options.passes,
+                    "--bitrate: 2 encodes twice, so that the quality stays even from frame to frame; from files only\n"
+                    "(default 1)")
+        ->check(CLI::Range(1, 2))
+        ->needs(bitrate);
+    auto* error = command
+                      .add_option("--target-error", options.target_error,
+                                  "Error that every frame comes near to, mm, instead of a quality: root mean square\n"
+                                  "between the surfaces (M2)")
+                      ->check(CLI::Range(1e-3, 1e3));
+    bitrate->excludes(error);
+    for (const char* by_hand : {"--quality", "--geometry-step", "--colour-step"}) {
+        bitrate->excludes(command.get_option(by_hand));
+        error->excludes(command.get_option(by_hand));
+    }
+}
+
 FrameChoice frame_choice(const std::string& name) {
     if (name == "fixed") return FrameChoice::fixed;
     if (name == "motion") return FrameChoice::motion;
@@ -88,6 +120,7 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
         ->check(CLI::Range(1.0 / 65536, 1000.0));
     command.add_option("--colour-step", options.colour_step, "Step of the colours in levels of 255, likewise")
         ->check(CLI::Range(1.0, 255.0));
+    add_control_options(command, options);
     command
         .add_option("--lambda", options.lambda,
                     "EP-frames: squared error that is worth one bit, in steps squared (default 0.12); more saves\n"
@@ -141,6 +174,9 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     const auto steps = quality_steps(options.quality);
     out.geometry_step = options.geometry_step > 0 ? options.geometry_step : steps.geometry_step;
     out.colour_step = options.colour_step > 0 ? options.colour_step : steps.colour_step;
+    out.bits_per_second = 1e6 * options.megabits;
+    out.buffer_seconds = options.buffer_seconds;
+    out.target_error = options.target_error;
     if (options.lambda >= 0) out.lambda = options.lambda;
     out.key_interval = options.key_interval;
     out.least_key_interval = std::min(options.least_key_interval, options.key_interval);

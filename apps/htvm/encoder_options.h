@@ -18,7 +18,8 @@ struct EncodingOptions {
     std::string decide;                                                                     // empty: by profile
     double predicted_below = -1, intra_above = -1, still_below = -1, animation_error = -1;  // mm; below 0: by profile
     bool no_scene_changes = false;
-    double megabits = 0, buffer_seconds = 1;  // rate control; 0: none
+    double megabits = 0, buffer_seconds = 1;  // Mbit/s, s: rate control; 0: none
+    int passes = 1;                           // of rate control: the caller runs the first of two
     double target_error = 0;                  // mm; 0: none
     std::string intra = "tfan";
     std::string profile = "topology";

@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "buffer_model.h"
 #include "commands.h"
 #include "htvm/decoder.hpp"
 #include "layer_table.h"
@@ -16,6 +17,7 @@ namespace {
 struct Options {
     std::string input;
     bool json = false, summary = false;
+    double megabits = 0, buffer_seconds = 1;  // of the line and the receiver's buffer to check against; 0: none
 };
 
 // A frame's bytes, with those of the codebooks that came with it.
@@ -60,6 +62,24 @@ nlohmann::json sequence_json(const SequenceInfo& s) {
             {"nearest_vertices", s.nearest_vertices}};
 }
 
+// What the stream would do on such a line; an error where its receiver would have to wait.
+Result<void> check_buffer(const Options& options, const BufferModel& buffer) {
+    if (!options.json)
+        fmt::print("over {:g} Mbit/s, a buffer of {:g} s is at most {:.1f} % full (frame {})\n", options.megabits,
+                   options.buffer_seconds, buffer.peak_percent(), buffer.peak_frame());
+    if (!buffer.overflows()) return {};
+    return fail(ErrorKind::limit,
+                fmt::format("{}: frame {} overfills the buffer; over {:g} Mbit/s the stream needs one "
+                            "of {:.3f} s",
+                            options.input, buffer.first_overflow(), options.megabits, buffer.seconds_needed()));
+}
+
+nlohmann::json buffer_json(const Options& options, const BufferModel& buffer) {
+    return {{"megabits_per_second", options.megabits},   {"seconds", options.buffer_seconds},
+            {"peak_percent", buffer.peak_percent()},     {"peak_frame", buffer.peak_frame()},
+            {"seconds_needed", buffer.seconds_needed()}, {"overflows", buffer.overflows()}};
+}
+
 Result<void> info(const Options& options) {
     auto input = StreamInput::open(options.input);
     if (!input) return tl::unexpected(input.error());
@@ -71,7 +91,10 @@ Result<void> info(const Options& options) {
     std::uint64_t bytes = 0;
     bool index = false;
     std::int64_t first_us = 0, last_us = 0;
+    std::optional<BufferModel> buffer;
+    if (options.megabits > 0) buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
     while (auto packet = input->next()) {
+        if (buffer) buffer->add(*packet);
         bytes += packet->payload.size() + packet_overhead;
         if (packet->kind == PacketKind::sequence) {
             const bool first = !headers.sequence();
@@ -106,13 +129,14 @@ Result<void> info(const Options& options) {
                                      : static_cast<double>(s.fps_denominator) / s.fps_numerator;
     const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
     if (options.json) {
-        fmt::print("{}\n", nlohmann::json{{"sequence", sequence_json(s)},
-                                          {"frames", frames},
-                                          {"bytes", bytes},
-                                          {"index", index},
-                                          {"damaged_bytes", input->damaged_bytes()},
-                                          {"megabits_per_second", megabits}}
-                               .dump(2));
+        nlohmann::json out{{"sequence", sequence_json(s)},
+                           {"frames", frames},
+                           {"bytes", bytes},
+                           {"index", index},
+                           {"damaged_bytes", input->damaged_bytes()},
+                           {"megabits_per_second", megabits}};
+        if (buffer) out["buffer"] = buffer_json(options, *buffer);
+        fmt::print("{}\n", out.dump(2));
     } else {
         fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), count, seconds, bytes,
                    megabits, index ? ", with an index for seeking" : "");
@@ -122,6 +146,7 @@ Result<void> info(const Options& options) {
                     fmt::format("{}: {} bytes are no sound packet", options.input, input->damaged_bytes()));
     if (input->cut_short_bytes() > 0)
         return fail(ErrorKind::corrupt_stream, options.input + " ends in the middle of a packet");
+    if (buffer) return check_buffer(options, *buffer);
     return {};
 }
 
@@ -133,6 +158,16 @@ void add_info(CLI::App& app, Run& run) {
     command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
     command->add_flag("--summary", options->summary, "The totals only, no line a frame");
     command->add_flag("--json", options->json, "Everything as JSON");
+    auto* bitrate =
+        command->add_option("--bitrate", options->megabits,
+                            "Check that the stream plays without a pause over a line of so many Mbit/s, by\n"
+                            "all bytes of its packets (exit code 5 where not)");
+    bitrate->check(CLI::Range(1e-3, 1e6));
+    command
+        ->add_option("--buffer", options->buffer_seconds,
+                     "--bitrate: seconds of stream that the receiver holds (default 1)")
+        ->check(CLI::Range(0.01, 3600.0))
+        ->needs(bitrate);
     command->footer(
         "Columns: motion is the skeleton (I) or the bones' transforms (EP); fans and d.order are the connectivity's\n"
         "two parts, TFAN's and the distance order's; attribs are normals and texture coordinates; bpv is the frame's\n"

@@ -123,6 +123,7 @@ RateControlOptions rate_options(const EncoderOptions& options) {
     out.frames_per_second = static_cast<double>(options.fps_numerator) / options.fps_denominator;
     out.buffer_seconds = options.buffer_seconds;
     out.key_interval = options.key_interval;
+    if (options.tracked) out.intra_extra = 3;
     return out;
 }
 

@@ -8,15 +8,20 @@
 namespace htvm {
 namespace {
 
-constexpr double prior_slope = 0.04;  // bits double every 25 points
-
 std::size_t index_of(FrameType type) { return static_cast<std::size_t>(type); }
 bool is_intra(FrameType type) { return type == FrameType::intra; }
 
+// Frames that were seen of this type, EP and T counted as one.
+int seen_like(const FrameSizeModel& model, FrameType type) {
+    if (is_intra(type) || type == FrameType::predicted) return model.seen[index_of(type)];
+    return model.seen[index_of(FrameType::enhanced)] + model.seen[index_of(FrameType::tracked)];
+}
+
 // How much of a surprise is believed: little of the usual noise; half of a jump, and nearly all when it comes again.
-double belief(double surprise, double last_surprise) {
+double belief(const FrameSizeModel& model, double surprise) {
     constexpr double jump = 0.35;
-    if (std::abs(surprise) < jump) return 0.15;
+    const double last_surprise = model.last_surprise;
+    if (std::abs(surprise) < jump) return model.usual_belief;
     return surprise * last_surprise > 0 && std::abs(last_surprise) >= jump ? 0.8 : 0.4;
 }
 
@@ -57,7 +62,7 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
     }
     const double surprise = std::log2(frame.bits / expected_bits(model, frame.type, frame.quality));
     if (first) {
-        const bool other = model.seen[index_of(is_intra(frame.type) ? FrameType::enhanced : FrameType::intra)] > 0;
+        const bool other = seen_like(model, is_intra(frame.type) ? FrameType::enhanced : FrameType::intra) > 0;
         if (is_intra(frame.type) && other) {
             model.intra_extra += surprise;
         } else {
@@ -68,7 +73,7 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
         learn_slope(model, model.last[index_of(frame.type)], frame);
         // The slope turns about the quality of now, where the sizes are known.
         const double again = std::log2(frame.bits / expected_bits(model, frame.type, frame.quality));
-        const double believed = belief(again, model.last_surprise) * again;
+        const double believed = belief(model, again) * again;
         model.content += is_intra(frame.type) ? believed / 2 : believed;
         if (is_intra(frame.type)) model.intra_extra += believed;
         model.last_surprise = again;
@@ -81,26 +86,36 @@ RateController::RateController(const RateControlOptions& options, std::vector<Fr
     per_frame_ = options_.bits_per_second / options_.frames_per_second;
     capacity_ = options_.bits_per_second * options_.buffer_seconds;
     level_ = (options_.lowest_quality + options_.highest_quality) / 2;
+    model_.intra_extra = options_.intra_extra;
+    // What a large buffer can take need not be followed.
+    model_.usual_belief = std::clamp(3 * per_frame_ / capacity_, 0.05, 0.15);
     // Before anything is seen: as many I-frames as the key interval asks for.
     recent_.assign(static_cast<std::size_t>(std::clamp(options_.key_interval, 1, 1000)), FrameType::enhanced);
     recent_[0] = FrameType::intra;
     if (first_pass_.empty()) return;
     for (auto& cost : first_pass_) cost.bits = std::isfinite(cost.bits) ? std::max(cost.bits, 0.0) : 0.0;
-    plan_ = plan_qualities(first_pass_, options_, prior_slope);
+    // What the first pass taught counts little against what this one will.
+    for (const auto& cost : first_pass_) learn(model_, cost);
+    plan_slope_ = model_.slope;
+    plan_ = plan_qualities(first_pass_, options_, plan_slope_);
     rest_.assign(first_pass_.size() + 1, {});
     for (std::size_t i = first_pass_.size(); i-- > 0;) {
         rest_[i] = rest_[i + 1];
-        rest_[i][first_pass_[i].type == FrameType::predicted ? 0 : 1] += bits_at(first_pass_[i], plan_[i], prior_slope);
+        rest_[i][first_pass_[i].type == FrameType::predicted ? 0 : 1] += bits_at(first_pass_[i], plan_[i], plan_slope_);
     }
 }
 
 double RateController::room() const { return capacity_ - buffer_; }
 
+bool RateController::is_guess(FrameType type) const {
+    return type != FrameType::predicted && first_pass_.empty() && (frames_ == 0 || (!is_intra(type) && !sent_between_));
+}
+
 double RateController::quality(FrameType type) const {
     double q = frames_ < plan_.size() ? planned_quality() : live_quality(type);
     if (type != FrameType::predicted) {
         const double most = 0.9 * room(), expected = expected_bits(model_, type, q);
-        const bool known = model_.seen[index_of(FrameType::intra)] + model_.seen[index_of(FrameType::enhanced)] > 0;
+        const bool known = seen_like(model_, FrameType::intra) + seen_like(model_, FrameType::enhanced) > 0;
         if (known && expected > most) q -= std::log2(expected / std::max(most, 1.0)) / model_.slope;
     }
     return std::clamp(q, options_.lowest_quality, options_.highest_quality);
@@ -109,14 +124,14 @@ double RateController::quality(FrameType type) const {
 // The line's bits, and what brings the buffer to the level wanted just before an I-frame: the bits that the line idled,
 // so that all of them together are on target; at least a little, so that it does not idle, at most half the buffer.
 double RateController::wanted_bits() const {
-    const double frames = capacity_ / per_frame_, horizon = std::clamp(frames / 2, 4.0, 30.0);
+    const double frames = capacity_ / per_frame_, horizon = std::clamp(1.5 * frames, 4.0, 60.0);
     const double phase = 1 - static_cast<double>(since_intra_) / options_.key_interval;
     const double of_intra = std::max(0.0, expected_bits(model_, FrameType::intra, level_) - per_frame_);
     const double before_intra = buffer_ - (since_intra_ > 0 ? of_intra * std::max(0.0, phase) : 0);
-    const double least = std::min(capacity_ / 10, 2 * per_frame_);
+    const double least = std::min(capacity_ / 5, 6 * per_frame_);
     const double most = std::max(least, std::min(capacity_ / 2, 0.85 * capacity_ - of_intra));
     const double wanted = std::clamp(idle_bits_, least, most);
-    return std::clamp(per_frame_ + (wanted - before_intra) / horizon, per_frame_ / 4, per_frame_ * 2);
+    return std::clamp(per_frame_ + (wanted - before_intra) / horizon, per_frame_ / 4, per_frame_ * 1.06);
 }
 
 double RateController::live_quality(FrameType type) const {
@@ -133,16 +148,18 @@ double RateController::live_quality(FrameType type) const {
         (average(middle) <= wanted ? low : high) = middle;
     }
     // The first frames know little, and may go far from each other.
-    const int seen = model_.seen[index_of(FrameType::enhanced)] + model_.seen[index_of(FrameType::intra)] - 1;
-    if (seen <= 0 || (seen == 1 && type == FrameType::enhanced)) return low;
-    const double step = std::max(options_.largest_step, 20.0 / seen);
-    const double change = std::abs(low - level_) < 0.5 ? low - level_ : (low - level_) / 2;
+    const int seen = seen_like(model_, FrameType::enhanced) + seen_like(model_, FrameType::intra);
+    if (is_guess(type)) return low;
+    // An I-frame and the frame behind it may both move at no cost.
+    const bool free = since_intra_ == 1 || is_intra(type);
+    const double change = low - level_, step = std::max(options_.largest_step / (free ? 2 : 1), 20.0 / seen);
+    if (std::abs(change) < (free ? 0.5 : options_.stay)) return level_;
     return level_ + std::clamp(change, -step, step);
 }
 
 double RateController::planned_bits(std::size_t frame, double correction) const {
     const auto& cost = first_pass_[frame];
-    const double bits = bits_at(cost, plan_[frame], prior_slope);
+    const double bits = bits_at(cost, plan_[frame], plan_slope_);
     return cost.type == FrameType::predicted ? bits : bits * std::exp2(planned_surprise_ + model_.slope * correction);
 }
 
@@ -194,12 +211,14 @@ double RateController::lower_quality(FrameType type, double quality, double bits
 void RateController::coded(FrameType type, double quality, double bits) {
     bits = std::isfinite(bits) ? std::max(bits, 0.0) : 0.0;
     // An I-frame that had to be cut to fit does not pull the EP-frames after it down.
-    if (type == FrameType::enhanced || model_.seen[index_of(FrameType::enhanced)] == 0) level_ = quality;
+    const bool between = !is_intra(type) && type != FrameType::predicted;
+    if (between || !sent_between_) level_ = quality;
+    sent_between_ = sent_between_ || between;
     if (is_intra(type) && std::abs(quality - level_) <= options_.largest_step) level_ = quality;
     if (frames_ < plan_.size() && type == first_pass_[frames_].type && type != FrameType::predicted && bits > 0) {
         const double planned = planned_bits(frames_, quality - plan_[frames_]);
         if (planned > 0)
-            planned_surprise_ += std::max(0.1, 1.0 / static_cast<double>(frames_ + 1)) * std::log2(bits / planned);
+            planned_surprise_ += std::max(0.05, 1.0 / static_cast<double>(frames_ + 5)) * std::log2(bits / planned);
     }
     learn(model_, {type, quality, bits});
     recent_[frames_ % recent_.size()] = type;
@@ -210,9 +229,14 @@ void RateController::coded(FrameType type, double quality, double bits) {
     buffer_ = std::max(0.0, buffer_ - per_frame_);
     ++frames_;
     calls_ = 0;
-    if (frames_ + 10 > plan_.size()) return;
-    const double step = frames_ < 15 ? options_.largest_step : options_.largest_step / 8;
-    correction_ += std::clamp(remaining_correction() - correction_, -step, step);
+    if (frames_ + 10 <= plan_.size()) correct_plan(type);
+}
+
+void RateController::correct_plan(FrameType type) {
+    const double change = remaining_correction() - correction_;
+    if (std::abs(change) < (is_intra(type) ? options_.stay / 4 : options_.stay)) return;
+    const double step = frames_ < 15 ? 4 * options_.largest_step : options_.largest_step;
+    correction_ += std::clamp(change, -step, step);
 }
 
 }  // namespace htvm

@@ -1,0 +1,79 @@
+#include "rate_report.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+namespace htvm::app {
+namespace {
+
+double rate_of(std::uint64_t bytes, double seconds) {
+    return seconds > 0 ? 8.0 * static_cast<double>(bytes) / seconds : 0;
+}
+
+double error_percent(const RateReport& report, std::uint64_t bytes, double seconds) {
+    return 100 * (rate_of(bytes, seconds) / report.bits_per_second - 1);
+}
+
+}  // namespace
+
+RateReport::RateReport(const EncoderOptions& options)
+    : bits_per_second(options.bits_per_second),
+      buffer_seconds(options.bits_per_second > 0 ? options.buffer_seconds : 0),
+      target_error(options.target_error),
+      buffer(options.bits_per_second > 0 ? options.bits_per_second : 1, options.buffer_seconds) {}
+
+void add_coded(RateReport& report, const FrameCost& cost) { report.costs.push_back(cost); }
+
+void add_dropped(RateReport& report) {
+    report.dropped.push_back(report.costs.size());
+    report.costs.push_back({FrameType::predicted, 0, 0});
+}
+
+QualityRange quality_range(const RateReport& report) {
+    QualityRange out;
+    std::size_t count = 0;
+    for (const auto& cost : report.costs) {
+        if (cost.type == FrameType::predicted) continue;
+        out.lowest = count == 0 ? cost.quality : std::min(out.lowest, cost.quality);
+        out.highest = count == 0 ? cost.quality : std::max(out.highest, cost.quality);
+        out.mean += cost.quality;
+        ++count;
+    }
+    if (count > 0) out.mean /= static_cast<double>(count);
+    return out;
+}
+
+std::string rate_summary(const RateReport& report, std::uint64_t bytes, double seconds) {
+    const auto quality = quality_range(report);
+    const std::string qualities =
+        fmt::format("quality {:.1f} to {:.1f}, {:.1f} on average", quality.lowest, quality.highest, quality.mean);
+    if (!report.rate_controlled())
+        return fmt::format("target error {:g} mm: {} (htvm compare --only m2 measures the errors)", report.target_error,
+                           qualities);
+    std::string out = fmt::format("target {:g} Mbit/s: {:+.1f} %; buffer of {:g} s at most {:.0f} % full; {}",
+                                  report.bits_per_second / 1e6, error_percent(report, bytes, seconds),
+                                  report.buffer_seconds, report.buffer.peak_percent(), qualities);
+    if (!report.dropped.empty())
+        out += fmt::format("; {} of {} frames dropped", report.dropped.size(), report.costs.size());
+    return out;
+}
+
+nlohmann::json rate_json(const RateReport& report, std::uint64_t bytes, double seconds) {
+    const auto quality = quality_range(report);
+    nlohmann::json out = {
+        {"quality", {{"lowest", quality.lowest}, {"mean", quality.mean}, {"highest", quality.highest}}}};
+    if (!report.rate_controlled()) {
+        out["target_error_mm"] = report.target_error;
+        return out;
+    }
+    out["target_megabits_per_second"] = report.bits_per_second / 1e6;
+    out["megabits_per_second"] = rate_of(bytes, seconds) / 1e6;
+    out["error_percent"] = error_percent(report, bytes, seconds);
+    out["buffer_seconds"] = report.buffer_seconds;
+    out["buffer_peak_percent"] = report.buffer.peak_percent();
+    out["dropped_frames"] = report.dropped;
+    return out;
+}
+
+}  // namespace htvm::app
