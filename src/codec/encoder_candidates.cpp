@@ -250,6 +250,7 @@ void adopt(State& state, const FrameCandidate& candidate) {
             group.tracked->last = candidate.motion;
             group.tracked->state = candidate.tracked;
             group.last_tracked = state.next_frame;
+            if (group.best_fit == 0 || candidate.fit < group.best_fit) group.best_fit = candidate.fit;
         } else {
             group.motion = candidate.motion;
             group.codebooks = candidate.codebooks;

@@ -83,15 +83,16 @@ Result<FrameCandidate> choose_by_motion(State& state, FrameUnderWay& frame, cons
 // A T-frame where it fits the capture: where a hand has left a pocket, or an arm was lost, the I-frame's mesh no longer
 // serves, and an I-frame is due; so it is where the T-frames since the last one have grown too dear.
 Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
-    constexpr double stray_in_edges = 2, most_strays = 0.004;
+    constexpr double stray_in_edges = 2, most_strays = 0.004, worst_to_best = 2.2;
     auto candidate = encode_tracked(state, frame, steps);
     if (!candidate) return candidate;
+    const auto& group = *state.group;
     StageClock clock(state.stages);
-    const auto fit =
-        measure_tracked_fit(frame.mesh, candidate->decoded, stray_in_edges * state.group->edge, state.threads);
+    const auto fit = measure_tracked_fit(frame.mesh, candidate->decoded, stray_in_edges * group.edge, state.threads);
+    candidate->fit = fit.rms;
     clock.done("fit of the tracking");
-    if (fit.stray_share <= most_strays && !intra_is_paid_for(state, *candidate)) return candidate;
-    return encode_intra(state, frame, steps);
+    const bool lost = fit.stray_share > most_strays || (group.best_fit > 0 && fit.rms > worst_to_best * group.best_fit);
+    return lost || intra_is_paid_for(state, *candidate) ? encode_intra(state, frame, steps) : std::move(candidate);
 }
 
 bool is_due(const State& state, const LatticeMesh& mesh) {
@@ -135,17 +136,33 @@ tl::unexpected<Error> does_not_fit(const State& state, double bits) {
     return fail(ErrorKind::limit, message);
 }
 
-// Rate control: coarser until the frame fits into the buffer; a P-frame at the last.
+FrameType expected_type(const State& state, const FrameUnderWay& frame, bool force_intra) {
+    if (force_intra || is_due(state, frame.mesh)) return FrameType::intra;
+    return state.options.tracked ? FrameType::tracked : FrameType::enhanced;
+}
+
+// Rate control: coarser until the frame fits into the buffer; a P-frame at the last. The first frames of a type are
+// coded up to three times, until their quality is what the rate allows.
 Result<FrameCandidate> code_within_buffer(State& state, FrameUnderWay& frame, bool force_intra) {
     const auto fits = [&](const FrameCandidate& candidate) { return bits_of(state, candidate) <= state.rate->room(); };
-    const bool intra = force_intra || is_due(state, frame.mesh);
-    double quality = state.rate->quality(intra ? FrameType::intra : FrameType::enhanced), bits = 0;
-    for (;;) {
+    double quality = state.rate->quality(expected_type(state, frame, force_intra)), bits = 0;
+    constexpr double far_off = 3;
+    for (int trials = 2;;) {
         auto candidate = choose(state, frame, steps_of(state, quality_steps(quality)), force_intra);
         if (!candidate) return candidate;
         candidate->quality = quality;
-        if (fits(*candidate)) return candidate;
         bits = bits_of(state, *candidate);
+        if (trials-- > 0 && state.rate->is_guess(candidate->type)) {
+            // The codebooks that come with the first frame are not in every one.
+            const auto own = static_cast<double>(candidate->packets.back().payload.size() + packet_overhead);
+            state.rate->tried(candidate->type, quality, 8 * own);
+            const double better = state.rate->quality(candidate->type);
+            if (std::abs(better - quality) > far_off) {
+                quality = better;
+                continue;
+            }
+        }
+        if (fits(*candidate)) return candidate;
         const double lower = state.rate->lower_quality(candidate->type, quality, bits);
         if (lower >= quality) break;
         quality = lower;
@@ -160,21 +177,24 @@ Result<FrameCandidate> code_within_buffer(State& state, FrameUnderWay& frame, bo
     return error;
 }
 
-// Error control: again with what was learnt where the error is off.
+// Error control: again with what was learnt where the error is off; of several attempts, the nearest.
 Result<FrameCandidate> code_to_error(State& state, FrameUnderWay& frame, bool force_intra) {
-    constexpr int attempts = 3;
-    const bool intra = force_intra || is_due(state, frame.mesh);
-    FrameType type = intra ? FrameType::intra : FrameType::enhanced;
-    for (int attempt = 1;; ++attempt) {
+    constexpr int attempts = 4;
+    FrameType type = expected_type(state, frame, force_intra);
+    std::optional<FrameCandidate> nearest;
+    double nearest_off = 0;
+    for (int attempt = 0; attempt < attempts; ++attempt) {
         const double quality = state.error->quality(type);
         auto candidate = choose(state, frame, steps_of(state, quality_steps(quality)), force_intra);
         if (!candidate) return candidate;
         candidate->quality = quality;
         type = candidate->type;
         const double error = errors_of(state, frame, candidate->decoded).geometry_rms * state.header.lattice.step();
-        if (state.error->accept(type, quality, error) || type == FrameType::predicted || attempt == attempts)
-            return candidate;
+        if (state.error->accept(type, quality, error) || type == FrameType::predicted) return candidate;
+        const double off = std::abs(std::log2(error / state.options.target_error));
+        if (!nearest || off < nearest_off) nearest_off = off, nearest = std::move(*candidate);
     }
+    return std::move(*nearest);
 }
 
 }  // namespace

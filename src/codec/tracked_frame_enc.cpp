@@ -163,7 +163,10 @@ TrackedFit one_way_fit(const TargetSurface& from, const TargetSurface& to, doubl
     double squares = 0;
     std::size_t near = 0;
     for (std::size_t i = 0; i < found.size(); ++i) {
-        if (!found[i].valid) continue;
+        if (!found[i].valid) {
+            squares += stray * stray;
+            continue;
+        }
         ++near;
         for (std::size_t axis = 0; axis < 3; ++axis) {
             const double d = static_cast<double>(found[i].point[axis]) - points[i][axis];
@@ -171,7 +174,7 @@ TrackedFit one_way_fit(const TargetSurface& from, const TargetSurface& to, doubl
         }
     }
     if (found.empty()) return {};
-    return {std::sqrt(squares / static_cast<double>(std::max<std::size_t>(near, 1))),
+    return {std::sqrt(squares / static_cast<double>(found.size())),
             static_cast<double>(found.size() - near) / static_cast<double>(found.size())};
 }
 

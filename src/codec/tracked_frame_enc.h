@@ -31,7 +31,7 @@ TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOpt
 
 // How well a tracked frame stands for the captured mesh, from a few thousand samples each way.
 struct TrackedFit {
-    double rms = 0;          // lattice units, the larger direction
+    double rms = 0;          // lattice units, the larger direction; strays count as `stray` away
     double stray_share = 0;  // of the samples that have no surface within `stray` facing the same way, likewise
 };
 // stray: lattice units.
