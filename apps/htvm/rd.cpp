@@ -279,6 +279,8 @@ void add_sweep_options(CLI::App& command, Options& o) {
                     "Comma between (default paper,htvm-ep,tfan,draco10); none for peers alone:\n"
                     "  paper    I- and EP-frames as in the paper (reference vertices by bone)\n"
                     "  htvm-ep  the same with reference vertices from the whole mesh, as htvm encode\n"
+                    "  htvm-motion  htvm-ep by motion-based coding: what fits the capture is animated, not coded\n"
+                    "  htvm-rd  I-, EP- and P-frames chosen by measured bits and errors (slow)\n"
                     "  tfan     our TFAN alone, every frame an I-frame\n"
                     "  draco10, draco7  libdraco at compression level 10, 7, every frame by itself")
         ->delimiter(',')

@@ -61,6 +61,18 @@ Result<FrameCoder> start_codec(EncoderOptions options, const SequenceFacts& fact
     });
 }
 
+const char* choice_name(FrameChoice choice) {
+    switch (choice) {
+        case FrameChoice::fixed:
+            return "fixed";
+        case FrameChoice::motion:
+            return "motion";
+        case FrameChoice::rate_distortion:
+            return "rd";
+    }
+    return "?";
+}
+
 }  // namespace
 
 QualityPoint quality_point(double quality) {
@@ -77,30 +89,49 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
     CoderUnderTest out;
     out.name = name;
     out.description = description;
-    out.settings = fmt::format("keyint {}, reference {}, registration {}, lambda {}, nearest {}", options.key_interval,
-                               options.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
-                               options.point_to_plane ? "plane" : "point", options.lambda, options.nearest_vertices);
+    out.settings = fmt::format(
+        "keyint {}, reference {}, registration {}, weights {}, lambda {}, nearest {}", options.key_interval,
+        options.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
+        options.point_to_plane ? "plane" : "point", options.weight_width, options.lambda, options.nearest_vertices);
+    out.settings +=
+        fmt::format(", {}, P below {}, I above {}, still below {}, animation error {}{}",
+                    choice_name(options.frame_choice), options.predicted_below, options.intra_above,
+                    options.still_below, options.animation_error, options.scene_changes ? "" : ", no scene changes");
     out.start = [options](const SequenceFacts& facts, const QualityPoint& quality) {
         return start_codec(options, facts, quality);
     };
     return out;
 }
 
+EncoderOptions paper_options(int key_interval) {
+    EncoderOptions out;
+    out.key_interval = key_interval;
+    out.reference_vertices = ReferenceVertices::bone;
+    out.point_to_plane = false;
+    out.weight_width = 0;
+    return out;
+}
+
 std::vector<CoderUnderTest> built_in_coders(int key_interval) {
     EncoderOptions ours;
     ours.key_interval = key_interval;
-    EncoderOptions paper = ours;
-    paper.reference_vertices = ReferenceVertices::bone;
-    paper.point_to_plane = false;
-    paper.weight_width = 0;
+    EncoderOptions motion = ours;
+    motion.still_below = default_still_below;
+    EncoderOptions chosen = ours;
+    chosen.frame_choice = FrameChoice::rate_distortion;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
     return {
-        codec_under_test(
-            "paper", "I- and EP-frames with the paper's choices: reference vertices by bone, point to point", paper),
+        codec_under_test("paper",
+                         "I- and EP-frames with the paper's choices: reference vertices by bone, point to point",
+                         paper_options(key_interval)),
         codec_under_test(
             "htvm-ep", "I- and EP-frames as htvm encode makes them: reference vertices anywhere, point to plane", ours),
-        codec_under_test("tfan", "our TFAN alone: every frame an I-frame", intra), draco_under_test("draco10", 10),
+        codec_under_test("htvm-motion",
+                         "htvm-ep with motion-based coding: what fits the capture is animated, not coded", motion),
+        codec_under_test("htvm-rd", "I-, EP- and P-frames chosen by measured bits and errors; slow", chosen),
+        codec_under_test("tfan", "our TFAN alone: every frame an I-frame", intra),
+        draco_under_test("draco10", 10),
         draco_under_test("draco7", 7)};
 }
 

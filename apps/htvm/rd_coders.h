@@ -79,7 +79,13 @@ CoderUnderTest draco_under_test(const std::string& name, int compression_level);
 // The bits whose cells over a side of `side` mm are nearest to step mm, by their ratio: 1..30.
 int draco_position_bits(double side, double step);
 
-// paper, htvm-ep, tfan, draco10, draco7.
+// The paper's own choices, as `--profile paper`.
+EncoderOptions paper_options(int key_interval);
+
+// still_below of htvm-motion, mm: bones that moved less are animated where they fit (EncoderOptions::animation_error).
+inline constexpr double default_still_below = 50;
+
+// paper, htvm-ep, htvm-motion, htvm-rd, tfan, draco10, draco7.
 std::vector<CoderUnderTest> built_in_coders(int key_interval);
 
 }  // namespace htvm::app

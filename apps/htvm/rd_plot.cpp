@@ -25,8 +25,10 @@ struct NamedLook {
     Look look;
 };
 // Known coders look the same in every picture.
-constexpr std::array<NamedLook, 5> named_looks = {{{"paper", {"#0072b2", 7}},
+constexpr std::array<NamedLook, 7> named_looks = {{{"paper", {"#0072b2", 7}},
                                                    {"htvm-ep", {"#009e73", 5}},
+                                                   {"htvm-motion", {"#56b4e9", 7}},
+                                                   {"htvm-rd", {"#000000", 5}},
                                                    {"tfan", {"#e69f00", 9}},
                                                    {"draco10", {"#d55e00", 13}},
                                                    {"draco7", {"#cc79a7", 11}}}};

@@ -14,6 +14,8 @@
 #include "reproduce_figures.h"
 #include "reproduce_gallery.h"
 #include "reproduce_machine.h"
+#include "reproduce_motion.h"
+#include "reproduce_motion_gallery.h"
 #include "reproduce_page.h"
 #include "reproduce_summary.h"
 #include "reproduce_sweeps.h"
@@ -38,7 +40,7 @@ struct Options {
 
 std::set<int> wanted_figures(const Options& options) {
     if (!options.figures.empty()) return {options.figures.begin(), options.figures.end()};
-    if (options.quick) return {6, 8, 10, 21, 22, 23, 24, 25};
+    if (options.quick) return {6, 7, 8, 10, 17, 18, 19, 21, 22, 23, 24, 25};
     std::set<int> all;
     for (int number = 6; number <= 25; ++number) all.insert(number);
     return all;
@@ -55,6 +57,9 @@ ExperimentPlan plan_of(const Options& options) {
         plan.qualities = {10, 20, 35, 50, 70};
         plan.surface_samples = 50000;
         plan.most_measured = 5;
+        plan.thresholds = 3;
+        plan.intervals = {1, 3, 10};
+        plan.interval_qualities = {60};
     }
     return plan;
 }
@@ -77,19 +82,23 @@ std::string true_skeleton_file(const Options& options) {
     return std::filesystem::exists(beside, error) ? beside.string() : std::string();
 }
 
+// One a frame; none without a skeleton.
+Result<std::vector<Pose>> tracked_poses(const SourceFrames& source) {
+    std::vector<Pose> out;
+    for (std::size_t i = 0; i < source.size(); ++i) {
+        const auto frame = source.frame(i);
+        if (!frame) return tl::unexpected(frame.error());
+        if ((*frame)->pose) out.push_back(*(*frame)->pose);
+    }
+    if (out.size() != source.size()) out.clear();
+    return out;
+}
+
 // Poses for the noise to be added to, one a frame; none without a skeleton.
 Result<std::vector<Pose>> poses_for_noise(const Options& options, const SourceFrames& source) {
-    std::vector<Pose> out;
     const auto truth = true_skeleton_file(options);
-    if (truth.empty()) {
-        for (std::size_t i = 0; i < source.size(); ++i) {
-            const auto frame = source.frame(i);
-            if (!frame) return tl::unexpected(frame.error());
-            if ((*frame)->pose) out.push_back(*(*frame)->pose);
-        }
-        if (out.size() != source.size()) out.clear();
-        return out;
-    }
+    if (truth.empty()) return tracked_poses(source);
+    std::vector<Pose> out;
     auto capture_options = options.capture;
     capture_options.skeleton = truth;
     auto capture = Capture::open(capture_options);
@@ -147,6 +156,40 @@ SweepOptions sweep_options(const Laboratory& laboratory, const ExperimentPlan& p
     return out;
 }
 
+// Figures 7, 17 and 18: what the thresholds on the skeleton's motion do; without a skeleton, intervals.
+Result<void> measure_choices(const Options& options, const Laboratory& laboratory, const ExperimentPlan& plan,
+                             const std::set<int>& wanted, Findings& findings) {
+    if (!any_of(wanted, {7, 17, 18, 19})) return {};
+    const auto frames = laboratory.source->size();
+    const auto poses = tracked_poses(*laboratory.source);
+    if (!poses) return tl::unexpected(poses.error());
+    findings.thresholds =
+        motion_thresholds(laboratory.source->facts().skeleton, *poses, plan.key_interval, plan.thresholds);
+    const auto none = sweep_options(laboratory, plan, frames, false, false);
+    if (!findings.thresholds)
+        return wanted.contains(7) ? measure_into(findings.intervals, laboratory, "figure 7: share of I-frames",
+                                                 interval_trials(plan), none)
+                                  : Result<void>();
+    const auto& thresholds = *findings.thresholds;
+    if (wanted.contains(7)) {
+        if (auto ok = measure_into(findings.intra_choice, laboratory, "figure 7: share of I-frames",
+                                   intra_choice_trials(plan, thresholds), none);
+            !ok)
+            return ok;
+        if (auto ok =
+                measure_into(findings.predicted_choice, laboratory, "figure 7: share of P-frames",
+                             predicted_trials(plan, thresholds, !options.quick),
+                             sweep_options(laboratory, plan, measure_every(frames, plan.most_measured), true, false));
+            !ok)
+            return ok;
+    }
+    if (!any_of(wanted, {17, 18, 19})) return {};
+    findings.motion_every = measure_every(frames, options.quick ? 3 : 10);
+    return measure_into(findings.motion, laboratory, "figures 17 and 18: motion-based coding",
+                        motion_trials(plan, thresholds),
+                        sweep_options(laboratory, plan, findings.motion_every, true, true));
+}
+
 Result<void> measure_curves(const Options& options, const Laboratory& laboratory, const ExperimentPlan& plan,
                             const std::set<int>& wanted, Findings& findings) {
     const auto frames = laboratory.source->size();
@@ -162,9 +205,7 @@ Result<void> measure_curves(const Options& options, const Laboratory& laboratory
                           findings.geometry_every, true);
             !ok)
             return ok;
-    if (wanted.contains(7))
-        if (auto ok = run(findings.intervals, "figure 7: share of I-frames", interval_trials(plan), frames); !ok)
-            return ok;
+    if (auto ok = measure_choices(options, laboratory, plan, wanted, findings); !ok) return ok;
     if (any_of(wanted, {11, 12, 13, 14, 15}) && findings.has_colour)
         if (auto ok = run(findings.colour, "figures 11 to 13: colours", colour_trials(plan), findings.colour_every);
             !ok)
@@ -225,22 +266,19 @@ std::vector<Figure> chart_figures(const Findings& findings, const ExperimentPlan
                                   Easel& easel) {
     std::vector<Figure> out;
     if (wanted.contains(6)) out.push_back(figure_6(findings, easel));
-    if (wanted.contains(7)) out.push_back(figure_7(findings, plan, easel));
+    if (wanted.contains(7)) {
+        out.push_back(findings.thresholds ? figure_7_by_motion(findings, plan, easel)
+                                          : figure_7(findings, plan, easel));
+        out.push_back(figure_7_predicted(findings, easel));
+    }
     if (wanted.contains(10)) out.push_back(figure_10(findings, easel));
     if (wanted.contains(11)) out.push_back(figure_11(findings, plan, easel));
     if (wanted.contains(12)) out.push_back(figure_12(findings, plan, easel));
     if (wanted.contains(13)) out.push_back(figure_13(findings, plan, easel));
     if (wanted.contains(16)) out.push_back(figure_16(findings, plan, easel));
     if (wanted.contains(20)) out.push_back(figure_20(findings, easel));
-    if (any_of(wanted, {17, 18, 19}))
-        out.push_back({"17",
-                       "motion-based coding (figures 17 to 19)",
-                       "Coding the moving parts alone saves time and bits, with some distortion.",
-                       {},
-                       {},
-                       {},
-                       {},
-                       "these figures join when motion-based coding does."});
+    if (wanted.contains(17)) out.push_back(figure_17(findings, easel));
+    if (wanted.contains(18)) out.push_back(figure_18(findings, easel));
     auto histograms = histogram_figures(findings, wanted, easel);
     std::move(histograms.begin(), histograms.end(), std::back_inserter(out));
     return out;
@@ -291,7 +329,7 @@ Result<FactList> capture_facts(const Options& options, const SourceFrames& sourc
 }
 
 Result<Report> make_report(const Options& options, const Laboratory& laboratory, const ExperimentPlan& plan,
-                           const FactList& facts, const Findings& findings) {
+                           const FactList& facts, Findings& findings) {
     const auto wanted = wanted_figures(options);
     const auto& source = *laboratory.source;
     Easel easel{path(options.output) / "figures", {}};
@@ -305,6 +343,9 @@ Result<Report> make_report(const Options& options, const Laboratory& laboratory,
     auto gallery = picture_figures(source, findings, wanted, gallery_options);
     if (!gallery) return tl::unexpected(gallery.error());
     std::move(gallery->figures.begin(), gallery->figures.end(), std::back_inserter(report.figures));
+    auto motion = motion_pictures(source, plan, wanted, gallery_options, findings);
+    if (!motion) return tl::unexpected(motion.error());
+    std::move(motion->begin(), motion->end(), std::back_inserter(report.figures));
     std::stable_sort(report.figures.begin(), report.figures.end(), [](const Figure& a, const Figure& b) {
         return std::atoi(a.number.c_str()) < std::atoi(b.number.c_str());
     });
@@ -379,15 +420,13 @@ void add_reproduce(CLI::App& app, Run& run) {
     Options& o = *options;
     add_capture_options(*command, o.capture);
     command->add_option("-o,--output", o.output, "Folder for report.html, figures and kept results")->required();
-    command
-        ->add_option("--figures", o.figures,
-                     "Figures of the paper, comma between, of 6 to 25 (default: all; 17 to 19 are yet to come)")
+    command->add_option("--figures", o.figures, "Figures of the paper, comma between, of 6 to 25 (default: all)")
         ->delimiter(',')
         ->check(CLI::Range(6, 25))
         ->option_text("LIST");
     command->add_flag("--quick", o.quick,
                       "A small report within a minute or two: 10 frames unless --frames says another number, fewer\n"
-                      "qualities, figures 6, 8, 10 and 21 to 25 unless --figures names others");
+                      "qualities, figures 6 to 8, 10, 17 to 19 and 21 to 25 unless --figures names others");
     command->add_option("--title", o.title, "The capture's name in the report (default: the folder's)");
     command->add_option("--keyint", o.key_interval, "Frames from one I-frame to the next (default 30)")
         ->check(CLI::Range(1, 1000000));

@@ -129,8 +129,8 @@ Figure figure_7(const Findings& findings, const ExperimentPlan& plan, Easel& eas
                   "The more frames are I-frames, the higher the rate; the paper chooses I-frames by a threshold on the "
                   "skeleton's motion, 400 to 500 mm.",
                   {},
-                  "The choice of frames by the skeleton's motion is not built yet: here an I-frame comes at fixed "
-                  "intervals, and the interval varies. Geometry alone, the same steps for all points of a line."};
+                  "The capture has no skeleton whose motion could choose: an I-frame comes at fixed intervals, and "
+                  "the interval varies. Geometry alone, the same steps for all points of a line."};
     Chart chart;
     chart.title = "Share of I-frames, by the interval between them";
     chart.x_label = rate_label;

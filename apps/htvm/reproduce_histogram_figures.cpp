@@ -237,6 +237,7 @@ std::vector<Claim> claims(const Findings& findings) {
     if (!findings.pictures.empty())
         out.push_back(contest_claim("Ahead of TFAN in M3 at low rates", "below 16 to 20 bpvf", 16,
                                     contest(findings.pictures, "paper", "tfan", "m3_foreground_db")));
+    if (auto claim = motion_claim(findings)) out.push_back(std::move(*claim));
     if (const auto effect = noise_effect(findings)) {
         Claim claim{
             "Noise on the skeleton costs bits, not quality", "points at almost the same error",

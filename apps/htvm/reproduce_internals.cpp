@@ -20,14 +20,11 @@ double now_ms() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-EncoderOptions paper_options(const SequenceFacts& facts, double quality, int key_interval, unsigned threads) {
+EncoderOptions internal_options(const SequenceFacts& facts, double quality, int key_interval, unsigned threads) {
     const auto point = quality_point(quality);
-    EncoderOptions options;
+    EncoderOptions options = paper_options(key_interval);
     options.geometry_step = point.geometry_step;
     options.colour_step = point.colour_step;
-    options.key_interval = key_interval;
-    options.reference_vertices = ReferenceVertices::bone;
-    options.point_to_plane = false;
     options.threads = threads;
     options.skeleton = facts.skeleton;
     options.radii = facts.radii;
@@ -58,7 +55,7 @@ Result<InternalFrame> run_frame(Encoder& encoder, Decoder& decoder, const Source
 Result<double> quality_near_rate(const SourceFrames& source, double rate, int key_interval, unsigned threads) {
     double best = 50, smallest = std::numeric_limits<double>::infinity();
     for (double quality = 20; quality <= 95; quality += 5) {
-        auto encoder = Encoder::create(paper_options(source.facts(), quality, key_interval, thread_count(threads)));
+        auto encoder = Encoder::create(internal_options(source.facts(), quality, key_interval, thread_count(threads)));
         if (!encoder) return tl::unexpected(encoder.error());
         LayerTotals sums;
         for (const std::size_t i : std::set<std::size_t>{0, source.size() / 2, source.size() - 1}) {
@@ -82,7 +79,7 @@ Result<InternalRun> run_internals(const SourceFrames& source, double quality, in
     InternalRun run;
     run.quality = quality;
     run.threads = thread_count(threads);
-    const auto options = paper_options(source.facts(), quality, key_interval, run.threads);
+    const auto options = internal_options(source.facts(), quality, key_interval, run.threads);
     run.geometry_step = options.geometry_step;
     run.colour_step = options.colour_step;
     auto encoder = Encoder::create(options);

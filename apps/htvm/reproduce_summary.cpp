@@ -7,6 +7,7 @@
 #include "layer_table.h"
 #include "rd_report.h"
 #include "reproduce_findings.h"
+#include "reproduce_motion_gallery.h"
 
 namespace htvm::app {
 namespace {
@@ -112,6 +113,26 @@ nlohmann::json internals_json(const InternalRun& run) {
             {"frames", std::move(frames)}};
 }
 
+nlohmann::json seams_json(const std::vector<SeamCounts>& seams) {
+    const std::pair<const char*, Topology SeamCounts::*> stages[] = {{"captured", &SeamCounts::original},
+                                                                     {"animated", &SeamCounts::animated},
+                                                                     {"overlapping", &SeamCounts::overlapping},
+                                                                     {"trimmed", &SeamCounts::trimmed},
+                                                                     {"zippered", &SeamCounts::zippered}};
+    auto list = nlohmann::json::array();
+    for (const auto& seam : seams) {
+        nlohmann::json entry = {{"frame", seam.frame}};
+        for (const auto& [name, stage] : stages) {
+            const auto& t = seam.*stage;
+            entry[name] = {{"open_edges", t.open_edges}, {"non_manifold_edges", t.non_manifold_edges},
+                           {"cracks", t.cracks},         {"crack_mm", t.crack_length},
+                           {"flaps", t.flaps},           {"flap_mm2", t.flap_area}};
+        }
+        list.push_back(std::move(entry));
+    }
+    return list;
+}
+
 nlohmann::json facts_json(const FactList& facts) {
     auto out = nlohmann::json::object();
     for (const auto& [name, value] : facts) out[name] = value;
@@ -139,7 +160,7 @@ std::vector<std::string> summary_paragraphs(const std::string& what, const Findi
         }
         out.push_back(text);
     } else {
-        out.push_back(what + ".");
+        out.push_back(what.substr(0, what.find_last_not_of(',') + 1) + ".");
     }
     const auto holding = std::count_if(claims.begin(), claims.end(), [](const Claim& claim) { return claim.holds; });
     if (!claims.empty())
@@ -159,6 +180,8 @@ std::vector<Table> result_tables(const Findings& findings) {
         out.push_back(rate_table_of(findings.colour, "Geometry and colour", {"m1_mm", "m1_colour"}));
     if (!findings.pictures.empty())
         out.push_back(rate_table_of(findings.pictures, "Pictures", {"m3_foreground_db", "m3_full_db", "m1_mm"}));
+    if (auto table = motion_table(findings)) out.push_back(std::move(*table));
+    if (auto table = seam_table(findings)) out.push_back(std::move(*table));
     return out;
 }
 
@@ -196,6 +219,10 @@ nlohmann::json report_json(const Report& report, const Findings& findings) {
                           {"figures", std::move(figures)},
                           {"geometry", points_json(findings.geometry)},
                           {"key_intervals", points_json(findings.intervals)},
+                          {"intra_choice", points_json(findings.intra_choice)},
+                          {"predicted_choice", points_json(findings.predicted_choice)},
+                          {"motion", points_json(findings.motion)},
+                          {"seams", seams_json(findings.seams)},
                           {"colour", points_json(findings.colour)},
                           {"pictures", points_json(findings.pictures)},
                           {"noise", std::move(noise)},

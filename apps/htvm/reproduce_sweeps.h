@@ -19,13 +19,16 @@ struct ExperimentPlan {
     std::vector<double> qualities{5, 15, 25, 40, 60, 80};  // figures 6 and 10
     std::vector<std::string> coders{"paper", "htvm-ep", "tfan", "draco10"};
     int key_interval = 30;
-    std::vector<int> intervals{1, 2, 3, 5, 10, 30};  // figure 7, with interval_qualities
+    std::vector<int> intervals{1, 2, 3, 5, 10, 30};  // figure 7 without a skeleton, with interval_qualities
     std::vector<double> interval_qualities{25, 60};
+    int thresholds = 5;                                   // on motion, of each kind: figures 7 and 17 to 19
+    double predicted_quality = 60;                        // figure 7, P-frames
+    double motion_step = 2.5;                             // mm; figures 17 to 19, with picture_colour_step
     std::vector<double> geometry_steps{4, 2.5, 1.6, 1};   // mm; figures 11 to 13 and 16
     std::vector<double> colour_columns{16, 6};            // colour steps that go with every geometry step
     std::vector<double> geometry_rows{2.5, 1};            // geometry steps that go with every colour step
     std::vector<double> colour_steps{32, 16, 6, 3};       // levels
-    double picture_colour_step = 6;                       // figure 16
+    double picture_colour_step = 6;                       // figures 16 to 19
     std::vector<double> noise_powers{0, 20, 40, 60, 80};  // mm^2; figure 20
     std::vector<double> noise_qualities{10, 30, 50, 70};
     std::uint64_t surface_samples = 100000;  // of M2, a direction
