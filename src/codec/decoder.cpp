@@ -26,6 +26,7 @@ struct Decoder::State {
     std::optional<TrackedReference> tracked;          // made when the first T-frame asks for it
     std::optional<TrackedState> tracked_state;        // of the last T-frame since the I-frame
     std::uint32_t tracked_frame = 0;                  // its number
+    LatticeMesh tracked_mesh;                         // as it was shown
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
@@ -67,6 +68,8 @@ Result<Frame> take_header(State& state, const Packet& packet) {
     // A repeated header changes nothing; another one begins another sequence.
     if (state.header_payload != packet.payload) {
         state.reference.reset();
+        state.tracked.reset();
+        state.tracked_state.reset();
         state.geometry_codebook.reset();
         state.colour_codebook.reset();
     }
@@ -164,6 +167,11 @@ Result<Frame> decode_enhanced(State& state, const Packet& packet) {
         named(state.colour_codebook, payload->header.colour_codebook), state.header->nearest_vertices, state.threads};
     auto decoded = decode_enhanced_frame(*payload, context);
     if (!decoded) return tl::unexpected(decoded.error());
+    // Zippered frames count only what they code in their headers.
+    if (decoded->mesh.positions.size() > state.options.max_vertices ||
+        decoded->mesh.triangles.size() > state.options.max_triangles)
+        return fail(ErrorKind::limit, "frame " + std::to_string(packet.frame) +
+                                          " has more vertices or triangles than this decoder accepts");
     DecodedFrame out;
     out.mesh = to_mesh(decoded->mesh, state.header->lattice);
     out.pose = moved_pose(state, decoded->transforms);
@@ -229,6 +237,7 @@ Result<Frame> decode_tracked(State& state, const Packet& packet) {
     out.mesh = to_mesh(decoded->mesh, state.header->lattice);
     out.pose = tracked_pose(state, *state.tracked, decoded->state.transforms);
     state.tracked_state = std::move(decoded->state);
+    state.tracked_mesh = std::move(decoded->mesh);
     state.tracked_frame = packet.frame;
     return Frame{std::move(out)};
 }
@@ -283,10 +292,15 @@ std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t t
     if (!state.reference) return std::nullopt;
     const auto& reference = *state.reference;
     DecodedFrame out;
-    out.mesh = to_mesh(
-        animate(reference, state.last_transforms, predict_positions(reference, state.last_transforms, state.threads)),
-        state.header->lattice);
-    out.pose = moved_pose(state, state.last_transforms);
+    const auto& transforms = state.last_transforms;
+    if (state.tracked_state) {
+        out.mesh = to_mesh(state.tracked_mesh, state.header->lattice);
+        out.pose = tracked_pose(state, *state.tracked, state.tracked_state->transforms);
+    } else {
+        out.mesh = to_mesh(animate(reference, transforms, predict_positions(reference, transforms, state.threads)),
+                           state.header->lattice);
+        out.pose = moved_pose(state, transforms);
+    }
     out.concealed = true;
     out.info.type = FrameType::predicted;
     out.info.frame = frame;

@@ -167,8 +167,12 @@ Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triang
 // Which vertices the nodes so far reach within the spacing, and the nodes' vertices.
 struct Cover {
     std::vector<Distance> distance;
+    std::vector<std::uint8_t> reached;  // how many nodes came nearer to each vertex than those before
     std::vector<std::uint32_t> nodes;
 };
+// On surfaces a few nodes do. A star whose rays are nodes, each a little nearer to the hub than the last, could make
+// every one of them search all that lies behind the hub.
+constexpr std::uint8_t most_reached = 16;
 
 // Dijkstra's algorithm from a new node, no further than spacing and only where it is nearer than the nodes before it.
 void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover& cover,
@@ -181,9 +185,11 @@ void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover
         const auto [distance, vertex] = heap.back();
         heap.pop_back();
         if (distance != cover.distance[vertex]) continue;
+        ++cover.reached[vertex];
         for (const Step& step : graph.from(vertex)) {
             const Distance there = distance + step.length;  // both are below 2^26
             if (there > spacing || there >= cover.distance[step.vertex]) continue;
+            if (cover.reached[step.vertex] == most_reached) continue;
             cover.distance[step.vertex] = there;
             heap.emplace_back(there, step.vertex);
             std::push_heap(heap.begin(), heap.end(), std::greater<>());
@@ -195,6 +201,7 @@ void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover
 bool cover_all(const Graph& graph, Distance spacing, std::size_t most_nodes, Cover& cover) {
     const std::size_t vertices = graph.first.size() - 1;
     cover.distance.assign(vertices, unreached);
+    cover.reached.assign(vertices, 0);
     cover.nodes.clear();
     std::vector<std::pair<Distance, std::uint32_t>> heap;
     for (std::uint32_t v = 0; v < vertices; ++v) {
@@ -235,14 +242,15 @@ struct Visit {
     NearNode near;
 };
 
-// A queue by distance for Dijkstra's algorithm, which never asks for less than it got last (Ahuja, Mehlhorn, Orlin,
-// Tarjan: Faster algorithms for the shortest path problem, 1990): visits wait by the highest bit in which their
-// distance differs from the last one, and move to lower bits when their turn comes near.
+// A queue by distance, then by node, for Dijkstra's algorithm, which never asks for less than it got last (Ahuja,
+// Mehlhorn, Orlin, Tarjan: Faster algorithms for the shortest path problem, 1990): visits wait by the highest bit in
+// which they differ from the last one, and move to lower bits when their turn comes near. By node too, as a vertex
+// would else be visited again for every lower node at the same distance.
 class RadixQueue {
 public:
     bool empty() const { return size_ == 0; }
     void push(const Visit& visit) {
-        waiting_[static_cast<std::size_t>(std::bit_width(visit.near.distance ^ last_))].push_back(visit);
+        waiting_[static_cast<std::size_t>(std::bit_width(key(visit) ^ last_))].push_back(visit);
         ++size_;
     }
     Visit pop() {
@@ -254,17 +262,18 @@ public:
     }
 
 private:
+    static std::uint64_t key(const Visit& visit) { return std::uint64_t{visit.near.distance} << 16 | visit.near.node; }
     void refill() {
         std::size_t bit = 1;
         while (waiting_[bit].empty()) ++bit;
-        last_ = unreached;
-        for (const Visit& visit : waiting_[bit]) last_ = std::min(last_, visit.near.distance);
+        last_ = std::numeric_limits<std::uint64_t>::max();
+        for (const Visit& visit : waiting_[bit]) last_ = std::min(last_, key(visit));
         for (const Visit& visit : waiting_[bit])
-            waiting_[static_cast<std::size_t>(std::bit_width(visit.near.distance ^ last_))].push_back(visit);
+            waiting_[static_cast<std::size_t>(std::bit_width(key(visit) ^ last_))].push_back(visit);
         waiting_[bit].clear();
     }
-    std::array<std::vector<Visit>, 33> waiting_;
-    Distance last_ = 0;
+    std::array<std::vector<Visit>, 49> waiting_;
+    std::uint64_t last_ = 0;
     std::size_t size_ = 0;
 };
 
