@@ -28,7 +28,24 @@ htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
     options.threads = threads;
     options.skeleton = htvm::synth_skeleton();
     options.key_interval = 1000;
+    options.scene_changes = false;
     return options;
+}
+
+// What every frame behind the first becomes.
+enum class Kind { intra, enhanced, motion, predicted };
+
+// Motion-based coding leaves some bones of frames so near to the I-frame out; P-frames are animated whatever the
+// motion.
+void choose(htvm::EncoderOptions& options, Kind kind) {
+    if (kind == Kind::enhanced || kind == Kind::intra) return;
+    options.animation_error = 0;
+    if (kind == Kind::motion) {
+        options.still_below = 60;
+    } else {
+        options.frame_choice = htvm::FrameChoice::motion;
+        options.predicted_below = 1e6;
+    }
 }
 
 const std::vector<htvm::SynthFrame>& capture() {
@@ -42,9 +59,11 @@ const std::vector<htvm::SynthFrame>& capture() {
     return made;
 }
 
-// An encoder behind its first frame, so that the next ones are EP-frames.
-htvm::Encoder primed(double quality, unsigned threads) {
-    auto encoder = htvm::Encoder::create(encoder_options(quality, threads));
+// An encoder behind its first frame, so that the next ones can refer to it.
+htvm::Encoder primed(Kind kind, double quality, unsigned threads) {
+    auto options = encoder_options(quality, threads);
+    choose(options, kind);
+    auto encoder = htvm::Encoder::create(options);
     if (!encoder->push(capture()[0].mesh, &capture()[0].pose, 0)) std::abort();
     return std::move(*encoder);
 }
@@ -55,26 +74,40 @@ void report(benchmark::State& state, const std::map<std::string, double>& stages
     for (const auto& [stage, milliseconds] : stages) state.counters[stage + ", ms"] = milliseconds / iterations;
 }
 
-void encode(benchmark::State& state, bool intra) {
+void check_kind(htvm::FrameType type, Kind kind) {
+    const auto wanted = kind == Kind::intra       ? htvm::FrameType::intra
+                        : kind == Kind::predicted ? htvm::FrameType::predicted
+                                                  : htvm::FrameType::enhanced;
+    if (type != wanted) std::abort();
+}
+
+void encode(benchmark::State& state, Kind kind) {
     const auto threads = static_cast<unsigned>(state.range(1));
-    auto encoder = primed(static_cast<double>(state.range(0)), threads);
+    auto encoder = primed(kind, static_cast<double>(state.range(0)), threads);
     std::map<std::string, double> stages;
     std::int64_t frame = 0;
+    double bits = 0;
     for (auto _ : state) {
         ++frame;
         const auto& input = capture()[static_cast<std::size_t>(1 + frame % (frames - 1))];
-        if (!encoder.push(input.mesh, &input.pose, frame, intra)) std::abort();
+        if (!encoder.push(input.mesh, &input.pose, frame, kind == Kind::intra)) std::abort();
         while (auto packet = encoder.pull()) benchmark::DoNotOptimize(packet->payload.data());
         for (const auto& stage : encoder.stage_times()) stages[stage.stage] += stage.milliseconds;
+        const auto& info = encoder.last_frame();
+        check_kind(info.type, kind);
+        bits += 8.0 * static_cast<double>(info.bytes.total()) / info.source_vertices;
     }
     report(state, stages);
+    state.counters["bpv"] = bits / static_cast<double>(state.iterations());
 }
 
-void encode_intra(benchmark::State& state) { encode(state, true); }
-void encode_enhanced(benchmark::State& state) { encode(state, false); }
+void encode_intra(benchmark::State& state) { encode(state, Kind::intra); }
+void encode_enhanced(benchmark::State& state) { encode(state, Kind::enhanced); }
+void encode_motion(benchmark::State& state) { encode(state, Kind::motion); }
+void encode_predicted(benchmark::State& state) { encode(state, Kind::predicted); }
 
-void decode(benchmark::State& state, htvm::PacketKind kind) {
-    auto encoder = primed(static_cast<double>(state.range(0)), 0);
+void decode(benchmark::State& state, Kind kind) {
+    auto encoder = primed(kind, static_cast<double>(state.range(0)), 0);
     const auto& input = capture()[2];
     if (!encoder.push(input.mesh, &input.pose, 1)) std::abort();
     htvm::DecoderOptions options;
@@ -83,8 +116,10 @@ void decode(benchmark::State& state, htvm::PacketKind kind) {
     htvm::Packet measured;
     while (auto packet = encoder.pull()) {
         if (!decoder.push(*packet)) std::abort();
-        if (packet->kind == kind) measured = *packet;
+        const auto type = htvm::frame_type(packet->kind);
+        if (type && (*type == htvm::FrameType::intra) == (kind == Kind::intra)) measured = *packet;
     }
+    check_kind(*htvm::frame_type(measured.kind), kind);
     for (auto _ : state) {
         auto frame = decoder.push(measured);
         if (!frame || !*frame) std::abort();
@@ -93,8 +128,10 @@ void decode(benchmark::State& state, htvm::PacketKind kind) {
     report(state, {});
 }
 
-void decode_intra(benchmark::State& state) { decode(state, htvm::PacketKind::intra); }
-void decode_enhanced(benchmark::State& state) { decode(state, htvm::PacketKind::enhanced); }
+void decode_intra(benchmark::State& state) { decode(state, Kind::intra); }
+void decode_enhanced(benchmark::State& state) { decode(state, Kind::enhanced); }
+void decode_motion(benchmark::State& state) { decode(state, Kind::motion); }
+void decode_predicted(benchmark::State& state) { decode(state, Kind::predicted); }
 
 void arguments(benchmark::internal::Benchmark* benchmark) {
     benchmark->ArgNames({"quality", "threads"});
@@ -105,7 +142,11 @@ void arguments(benchmark::internal::Benchmark* benchmark) {
 
 BENCHMARK(encode_intra)->Apply(arguments);
 BENCHMARK(encode_enhanced)->Apply(arguments);
+BENCHMARK(encode_motion)->Apply(arguments);
+BENCHMARK(encode_predicted)->Apply(arguments);
 BENCHMARK(decode_intra)->Apply(arguments);
 BENCHMARK(decode_enhanced)->Apply(arguments);
+BENCHMARK(decode_motion)->Apply(arguments);
+BENCHMARK(decode_predicted)->Apply(arguments);
 
 }  // namespace
