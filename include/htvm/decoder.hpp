@@ -61,7 +61,8 @@ public:
     // bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported, limit.
     Result<std::optional<DecodedFrame>> push(const Packet& packet);
     // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh moved as the last frame
-    // was, or, where that much of a frame could be read, as it is itself. Nothing before an I-frame.
+    // was, or, where that much of a frame could be read, as it is itself; after T-frames, the last of them again. Nothing
+    // before an I-frame.
     std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us) const;
     // Known once a sequence header was pushed.
     const std::optional<SequenceInfo>& sequence() const;

@@ -59,15 +59,23 @@ Packet codebook_packet(std::uint8_t purpose, const CodebookInUse& use) {
     return packet;
 }
 
+// New ones, and now and then the one in force: a lost packet costs the frames that name it, but not for long. Every
+// tenth frame it takes 0.2 to 0.4 % of the bits.
+void send_codebook(const State& state, std::uint8_t purpose, CodebookInUse& use, std::vector<Packet>& packets) {
+    constexpr std::uint32_t repeated_after = 10;  // frames
+    if (!use.codebook || (!use.is_new && state.next_frame - use.sent < repeated_after)) return;
+    use.sent = state.next_frame;
+    packets.push_back(codebook_packet(purpose, use));
+}
+
 FrameCandidate encode_residual_frame(State& state, const FrameUnderWay& frame, const EnhancedFrameSource& source,
                                      const FrameSteps& steps) {
     FrameCandidate out;
     out.type = FrameType::enhanced;
     out.codebooks = state.group->codebooks;
     auto encoded = encode_enhanced_frame(source, out.codebooks, enhanced_options(state, steps), state.stages);
-    if (out.codebooks.geometry.is_new)
-        out.packets.push_back(codebook_packet(codebook_for_geometry, out.codebooks.geometry));
-    if (out.codebooks.colour.is_new) out.packets.push_back(codebook_packet(codebook_for_colour, out.codebooks.colour));
+    send_codebook(state, codebook_for_geometry, out.codebooks.geometry, out.packets);
+    send_codebook(state, codebook_for_colour, out.codebooks.colour, out.packets);
     out.packets.push_back(frame_packet(PacketKind::enhanced, encoded.payload));
     out.decoded = std::move(encoded.mesh);
     out.motion = frame.motion->motion;

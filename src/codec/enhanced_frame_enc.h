@@ -20,6 +20,7 @@ struct CodebookInUse {
     std::uint32_t number = 0;
     double cost_when_new = 0;  // lagrangian a residual in the frame that it was trained on
     bool is_new = false;       // trained in this frame: it must be sent
+    std::uint32_t sent = 0;    // number of the frame that it was sent with last
 };
 
 struct EnhancedFrameOptions {

@@ -1,0 +1,250 @@
+// T-frames: the I-frame's mesh laid on the captured surface.
+#include "codec/tracked_frame.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "codec/hostile_bytes.h"
+#include "codec/test_sequences.h"
+#include "geometry/surface_distance.h"
+
+namespace htvm {
+namespace {
+
+using namespace test;
+
+EncoderOptions tracked(TrackedReferences references = TrackedReferences::previous) {
+    EncoderOptions options;
+    options.tracked = true;
+    options.tracked_references = references;
+    options.key_interval = 6;
+    return options;
+}
+
+// Frames a thirtieth of a second apart, with colours and normals.
+TestSequence walking(int frames, bool skeleton, int vertices = 1500) {
+    SynthOptions options;
+    options.vertices = vertices;
+    options.normals = true;
+    TestSequence out{"walking", {}, {}};
+    if (skeleton) out.skeleton = synth_skeleton();
+    for (int t = 0; t < frames; ++t) {
+        auto frame = synth_frame(options, 50 + t);
+        out.frames.push_back({std::move(frame.mesh), {}});
+        if (skeleton) out.frames.back().pose = std::move(frame.pose);
+    }
+    return out;
+}
+
+std::size_t frames_of(const CodedSequence& coded, FrameType type) {
+    return static_cast<std::size_t>(std::count_if(coded.infos.begin(), coded.infos.end(),
+                                                  [&](const FrameInfo& info) { return info.type == type; }));
+}
+
+double surface_error(const Mesh& a, const Mesh& b) {
+    return surface_errors({a.positions, a.triangles, {}}, {b.positions, b.triangles, {}}).geometry_rms;
+}
+
+TEST(TrackedFrames, KeepTheConnectivityOfTheirIntraFrame) {
+    const auto coded = encode(walking(5, true), tracked());
+    ASSERT_EQ(frames_of(coded, FrameType::tracked), 4u);
+    for (const auto& mesh : coded.reconstructions) EXPECT_EQ(mesh.triangles, coded.reconstructions[0].triangles);
+}
+
+TEST(TrackedFrames, TakeAFractionOfTheBitsForTheSameSurface) {
+    for (const bool skeleton : {false, true}) {
+        const auto sequence = walking(5, skeleton);
+        const auto coded = encode(sequence, tracked());
+        const auto enhanced = encode(sequence, {});
+        for (std::size_t t = 1; t < 5; ++t) {
+            EXPECT_EQ(coded.infos[t].type, FrameType::tracked);
+            EXPECT_LT(coded.infos[t].bytes.total() * 2, enhanced.infos[t].bytes.total());
+            // At 30 mm between vertices and 1.5 mm of noise in every frame; the frames are some 30 mm apart.
+            EXPECT_LT(surface_error(coded.reconstructions[t], sequence.frames[t].mesh), 4);
+            EXPECT_GT(surface_error(coded.reconstructions[0], sequence.frames[t].mesh), 4);
+        }
+    }
+}
+
+TEST(TrackedFrames, DecodeToWhatTheEncoderSaysForAnyNumberOfThreads) {
+    auto sequences = awkward_sequences();
+    sequences.push_back(walking(8, true));
+    sequences.push_back(walking(4, false));
+    for (const auto& sequence : sequences) {
+        SCOPED_TRACE(sequence.name);
+        for (const auto references : {TrackedReferences::intra, TrackedReferences::previous}) {
+            auto options = tracked(references);
+            options.threads = 1;
+            const auto coded = encode(sequence, options);
+            options.threads = 3;
+            EXPECT_EQ(encode(sequence, options).bytes, coded.bytes);
+            for (const unsigned threads : {1u, 4u}) {
+                DecoderOptions decoder;
+                decoder.threads = threads;
+                const auto decoded = decode_packets(read_packets(coded.bytes, 1237), decoder);
+                for (const auto& error : decoded.errors) ADD_FAILURE() << error.message;
+                ASSERT_EQ(decoded.frames.size(), coded.reconstructions.size());
+                for (std::size_t t = 0; t < decoded.frames.size(); ++t)
+                    expect_same_mesh(decoded.frames[t].mesh, coded.reconstructions[t]);
+            }
+        }
+    }
+}
+
+TEST(TrackedFrames, OfIntraReferencesMayAnyBeLost) {
+    const auto coded = encode(walking(4, true, 800), tracked(TrackedReferences::intra));
+    ASSERT_EQ(frames_of(coded, FrameType::tracked), 3u);
+    for (std::size_t lost = 0; lost < coded.packets.size(); ++lost) {
+        if (coded.packets[lost].kind != PacketKind::tracked) continue;
+        auto packets = coded.packets;
+        packets.erase(packets.begin() + static_cast<std::ptrdiff_t>(lost));
+        const auto decoded = decode_packets(packets);
+        EXPECT_TRUE(decoded.errors.empty());
+        ASSERT_EQ(decoded.frames.size(), 3u);
+        for (const auto& frame : decoded.frames) expect_same_mesh(frame.mesh, coded.reconstructions[frame.info.frame]);
+    }
+}
+
+TEST(TrackedFrames, OfTheFrameBeforeAreLostUntilTheNextIntraFrame) {
+    const auto coded = encode(walking(8, true, 800), tracked());
+    auto packets = coded.packets;
+    std::erase_if(packets,
+                  [](const Packet& packet) { return packet.kind == PacketKind::tracked && packet.frame == 2; });
+    const auto decoded = decode_packets(packets);
+    std::vector<std::uint32_t> shown;
+    for (const auto& frame : decoded.frames) {
+        shown.push_back(frame.info.frame);
+        expect_same_mesh(frame.mesh, coded.reconstructions[frame.info.frame]);
+    }
+    EXPECT_EQ(shown, (std::vector<std::uint32_t>{0, 1, 6, 7}));
+    ASSERT_EQ(decoded.errors.size(), 3u);
+    EXPECT_NE(decoded.errors[0].message.find("frame 2"), std::string::npos) << decoded.errors[0].message;
+}
+
+TEST(TrackedFrames, ThatAreLostAreConcealedByTheLastOne) {
+    const auto coded = encode(walking(3, true, 800), tracked());
+    Decoder decoder;
+    for (const auto& packet : coded.packets) ASSERT_TRUE(decoder.push(packet).has_value());
+    const auto stand_in = decoder.conceal(3, 0);
+    ASSERT_TRUE(stand_in.has_value());
+    EXPECT_TRUE(stand_in->concealed);
+    expect_same_mesh(stand_in->mesh, coded.reconstructions[2]);
+}
+
+TEST(TrackedFrames, GiveWayToAnIntraFrameWhereTheSurfaceIsAnother) {
+    auto sequence = walking(4, false);
+    for (std::size_t t = 2; t < 4; ++t) {  // another person stands beside the first
+        auto& mesh = sequence.frames[t].mesh;
+        const auto one = mesh;
+        for (const auto& p : one.positions) mesh.positions.push_back({p[0] + 1500, p[1], p[2]});
+        for (const auto& tri : one.triangles) {
+            const auto n = static_cast<std::uint32_t>(one.positions.size());
+            mesh.triangles.push_back({tri[0] + n, tri[1] + n, tri[2] + n});
+        }
+        mesh.colours.insert(mesh.colours.end(), one.colours.begin(), one.colours.end());
+        mesh.normals.insert(mesh.normals.end(), one.normals.begin(), one.normals.end());
+    }
+    const auto coded = encode(sequence, tracked());
+    std::vector<FrameType> types;
+    for (const auto& info : coded.infos) types.push_back(info.type);
+    EXPECT_EQ(types, (std::vector{FrameType::intra, FrameType::tracked, FrameType::intra, FrameType::tracked}));
+}
+
+TEST(TrackedFrames, WithDamagedLayersAreRefusedOrStayWithinTheLattice) {
+    const auto coded = encode(walking(3, true, 300), tracked());
+    for (const auto& packet : coded.packets) {
+        if (packet.kind != PacketKind::tracked || packet.reference != 0) continue;
+        std::mt19937 random(5);
+        for (int i = 0; i < 300; ++i) {
+            Decoder decoder;
+            for (std::size_t k = 0; k < 2; ++k) ASSERT_TRUE(decoder.push(coded.packets[k]).has_value());
+            auto damaged = packet;
+            auto& byte = damaged.payload[below(random, static_cast<std::uint32_t>(damaged.payload.size()))];
+            byte = static_cast<std::uint8_t>(byte ^ (1u << below(random, 8)));
+            if (i % 3 == 0) damaged.payload.resize(below(random, static_cast<std::uint32_t>(damaged.payload.size())));
+            const auto frame = decoder.push(damaged);
+            if (!frame || !*frame) continue;
+            EXPECT_EQ((*frame)->mesh.positions.size(), coded.reconstructions[0].positions.size());
+        }
+    }
+}
+
+TEST(SmoothedWithinCells, MovesNoCoordinateByMoreThanHalfAStep) {
+    const auto mesh = tfan_test::grid(8, 8);
+    std::mt19937 random(3);
+    std::vector<LatticePoint> positions;
+    for (int k = 0; k < 81; ++k)
+        positions.push_back({between(random, -900, 900), between(random, -900, 900), between(random, -900, 900)});
+    for (const int step : {1, 7, 64, 100000}) {
+        const auto smooth = smoothed_within_cells(positions, mesh.triangles, step);
+        ASSERT_EQ(smooth.size(), positions.size());
+        for (std::size_t v = 0; v < positions.size(); ++v) {
+            EXPECT_LE(std::abs(smooth[v].x - positions[v].x), step / 2);
+            EXPECT_LE(std::abs(smooth[v].y - positions[v].y), step / 2);
+            EXPECT_LE(std::abs(smooth[v].z - positions[v].z), step / 2);
+        }
+    }
+    EXPECT_EQ(smoothed_within_cells(positions, {}, 64), positions);
+}
+
+TEST(SmoothedWithinCells, TakesAVertexHalfwayToItsNeighbours) {
+    // The hub of four triangles stands 40 above its rim.
+    const std::vector<LatticePoint> positions = {{0, 0, 40}, {100, 0, 0}, {0, 100, 0}, {-100, 0, 0}, {0, -100, 0}};
+    const std::vector<Triangle> triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
+    EXPECT_EQ(smoothed_within_cells(positions, triangles, 64)[0], (LatticePoint{0, 0, 20}));
+    EXPECT_EQ(smoothed_within_cells(positions, triangles, 10)[0], (LatticePoint{0, 0, 35}));
+}
+
+TEST(NodeMotion, ComesBackWithinHalfAStepForAnyParents) {
+    for (unsigned seed = 0; seed < 20; ++seed) {
+        std::mt19937 random(seed);
+        const std::size_t nodes = below(random, 40);
+        std::vector<QuantisedTransform> wanted, before;
+        std::vector<std::uint32_t> parents;
+        std::vector<LatticePoint> pivots;
+        const auto transform = [&] {
+            QuantisedTransform out;
+            out.rotation.largest = static_cast<std::uint8_t>(below(random, 4));
+            for (auto& c : out.rotation.others) c = static_cast<std::int16_t>(between(random, -8192, 8192));
+            out.shift = {between(random, -90000, 90000), between(random, -9000, 9000), between(random, -9, 9)};
+            return out;
+        };
+        for (std::uint32_t i = 0; i < nodes; ++i) {
+            wanted.push_back(transform());
+            before.push_back(transform());
+            parents.push_back(i == 0 || below(random, 5) == 0 ? no_parent : below(random, i));
+            pivots.push_back(
+                {between(random, -9999, 9999), between(random, -9999, 9999), between(random, -9999, 9999)});
+        }
+        for (const bool temporal : {false, true}) {
+            const auto of_before =
+                temporal ? std::span<const QuantisedTransform>(before) : std::span<const QuantisedTransform>{};
+            const NodeMotionOptions options{3, 2};
+            const auto encoded = encode_node_motion(wanted, parents, pivots, of_before, options);
+            const auto decoded = decode_node_motion(encoded.bytes, parents, pivots, before);
+            ASSERT_TRUE(decoded.has_value());
+            EXPECT_EQ(*decoded, encoded.transforms);
+            for (std::size_t i = 0; i < nodes; ++i) {
+                EXPECT_EQ((*decoded)[i].rotation.largest, wanted[i].rotation.largest);
+                for (std::size_t c = 0; c < 3; ++c)
+                    EXPECT_LE(std::abs((*decoded)[i].rotation.others[c] - wanted[i].rotation.others[c]), 8);
+                EXPECT_LE(std::abs((*decoded)[i].shift.x - wanted[i].shift.x), 4);
+                EXPECT_LE(std::abs((*decoded)[i].shift.y - wanted[i].shift.y), 4);
+            }
+            if (temporal && nodes > 0) {
+                EXPECT_FALSE(decode_node_motion(encoded.bytes, parents, pivots, {}).has_value());
+            }
+        }
+    }
+}
+
+TEST(NodeMotion, ThatIsAsBeforeTakesNextToNothing) {
+    const std::vector<QuantisedTransform> before(300, {{0, {40, -3, 7}}, {100, 200, -300}});
+    const std::vector<std::uint32_t> parents(300, no_parent);
+    const std::vector<LatticePoint> pivots(300);
+    EXPECT_LT(encode_node_motion(before, parents, pivots, before, {}).bytes.size(), 20u);
+}
+
+}  // namespace
+}  // namespace htvm
