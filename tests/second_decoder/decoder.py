@@ -16,7 +16,9 @@ from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from intra import decode_intra_mesh
 from reference import Reference, decode_pose
-from stream import CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, packets, read_frame_payload, read_sequence_header
+from stream import (CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, TRACKED, packets, read_frame_payload,
+                    read_sequence_header)
+from tracked import TrackedReference, decode_tracked_mesh
 
 
 def digest(mesh):
@@ -29,16 +31,33 @@ def digest(mesh):
     return crc
 
 
+class Group:
+    """An I-frame and what T-frames make of it (8.11)."""
+
+    def __init__(self, mesh, geometry_step, frame):
+        self.mesh, self.geometry_step, self.frame = mesh, geometry_step, frame
+        self.reference = self.state = self.last = None
+
+    def decode(self, packet, spacing):
+        check(spacing > 0, "the header allows no tracked frames")
+        before = self.state if self.last == packet.reference else None
+        check(before or self.frame == packet.reference, "its reference is not there")
+        self.reference = self.reference or TrackedReference(self.mesh, self.geometry_step, spacing)
+        mesh, self.state = decode_tracked_mesh(read_frame_payload(packet.payload), self.reference, before)
+        self.last = packet.frame
+        return mesh
+
+
 def decode_stream(data):
     """Yields (packet, header, mesh) for each frame, or (packet, None, error) for a packet that is wrong."""
-    header = reference = None
+    header = reference = group = None
     books = [None, None]
     for packet in packets(data):
         try:
             if packet.kind == SEQUENCE:
                 new = read_sequence_header(packet.payload)
                 if header is None or packet.payload != header.bytes:
-                    reference, books = None, [None, None]
+                    reference, group, books = None, None, [None, None]
                 header = new
             elif packet.kind == CODEBOOK:
                 book = read_codebook(packet.payload)
@@ -50,7 +69,11 @@ def decode_stream(data):
                 joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
                 mesh = decode_intra_mesh(frame)
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
+                group = Group(mesh, frame.geometry_step, packet.frame)
                 yield packet, header, mesh
+            elif packet.kind == TRACKED:
+                check(group, "its I-frame is not there")
+                yield packet, header, group.decode(packet, header.node_spacing)
             elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
                 check(reference and reference.frame == packet.reference, "its I-frame is not there")
@@ -78,9 +101,9 @@ def main(arguments):
             failed = True
             continue
         attributes = [name for name in ("colours", "normals", "texcoords") if getattr(mesh, name)]
+        kind = {INTRA: "I", ENHANCED: "EP", PREDICTED: "P", TRACKED: "T"}[packet.kind]
         print("frame %d %s %d vertices %d triangles %s %08x" % (
-            packet.frame, {INTRA: "I", ENHANCED: "EP", PREDICTED: "P"}[packet.kind], len(mesh.positions), len(mesh.triangles),
-            "+".join(attributes) or "-", digest(mesh)))
+            packet.frame, kind, len(mesh.positions), len(mesh.triangles), "+".join(attributes) or "-", digest(mesh)))
     return 1 if failed else 0
 
 

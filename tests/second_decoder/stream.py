@@ -8,7 +8,7 @@ from conventions import Bytes, L, Unsupported, check
 
 # ---------------------------------------------------------------------------------------------- 2. packets
 
-SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED = 1, 2, 3, 4, 5, 6
+SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED = 1, 2, 3, 4, 5, 6, 7
 
 
 class Packet:
@@ -74,6 +74,8 @@ def read_sequence_header(payload):
         check(max(bone) < joints and radius <= L, "a bone is out of range")
         header.bones.append(bone)
         header.radii.append(radius)
+    header.node_spacing = read.field("I") if len(read.data) - read.at >= 4 else 0
+    check(header.node_spacing <= L, "the nodes' spacing is out of range")
     header.bytes = payload
     return header
 

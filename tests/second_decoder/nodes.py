@@ -1,0 +1,172 @@
+"""Chapter 8.12 of docs/bitstream.md: the reference mesh's smoothed positions, the nodes that move a T-frame, their
+weights and parents."""
+import heapq
+import math
+from collections import defaultdict
+
+from conventions import L, clamp, rdiv, squared_distance
+
+INFINITY = float("inf")
+MOST_NODES = 1024
+
+
+def smoothed(positions, triangles, step):
+    reach = step // 2
+    total, count = [[0, 0, 0] for _ in positions], [0] * len(positions)
+    for t in triangles:
+        for i in range(3):
+            count[t[i]] += 2
+            for k in range(3):
+                total[t[i]][k] += positions[t[(i + 1) % 3]][k] + positions[t[(i + 2) % 3]][k]
+    out = []
+    for p, s, n in zip(positions, total, count):
+        if n > 0:
+            changes = (clamp(rdiv(s[k] - n * p[k], 2 * n), -reach, reach) for k in range(3))
+            p = tuple(clamp(x + change, -L, L) for x, change in zip(p, changes))
+        out.append(p)
+    return out
+
+
+def pieces(count, links):
+    """What is connected: a name for each."""
+    name = list(range(count))
+
+    def find(v):
+        while name[v] != v:
+            name[v] = name[name[v]]
+            v = name[v]
+        return v
+
+    for a, b in links:
+        name[find(a)] = find(b)
+    return [find(v) for v in range(count)]
+
+
+def near_links(positions, piece, reach):
+    """Rule 3 of the steps."""
+    if len(set(piece)) < 2:
+        return []
+    cell = lambda v: tuple(c // reach for c in positions[v])
+    cells = defaultdict(list)
+    for v in range(len(positions)):
+        if len(cells[cell(v)]) < 24:
+            cells[cell(v)].append(v)
+    around = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
+    links = []
+    for v in range(len(positions)):
+        x, y, z = cell(v)
+        others = [u for i, j, k in around for u in cells.get((x + i, y + j, z + k), ()) if piece[u] != piece[v]]
+        if others:
+            d, u = min((squared_distance(positions[v], positions[u]), u) for u in others)
+            if d <= reach * reach:
+                links.append((v, u))
+    return links
+
+
+def steps_between(positions, triangles, spacing):
+    """Per vertex {the vertex at the other end: length}."""
+    links = [(t[i], t[(i + 1) % 3]) for t in triangles for i in range(3) if t[i] != t[(i + 1) % 3]]
+    order = sorted(range(len(positions)), key=lambda v: (positions[v], v))
+    links += [(a, b) for a, b in zip(order, order[1:]) if positions[a] == positions[b]]
+    links += near_links(positions, pieces(len(positions), links), max(spacing // 10, 1))
+    steps = [{} for _ in positions]
+    for a, b in links:
+        steps[a][b] = steps[b][a] = math.isqrt(squared_distance(positions[a], positions[b]))
+    return steps
+
+
+def find_nodes(steps, spacing):
+    """The nodes' vertices, and whether they are all that are needed."""
+    cover, reached, nodes = [INFINITY] * len(steps), [0] * len(steps), []
+    for start in range(len(steps)):
+        if cover[start] < INFINITY:
+            continue
+        if len(nodes) == MOST_NODES:
+            return nodes, False
+        nodes.append(start)
+        length, queue = {}, [(0, start)]
+        while queue:
+            d, v = heapq.heappop(queue)
+            if v in length:
+                continue
+            length[v] = d
+            for u, step in steps[v].items():
+                if d + step <= spacing and d + step < cover[u] and reached[u] < 16 and u not in length:
+                    heapq.heappush(queue, (d + step, u))
+        for v, d in length.items():
+            cover[v] = d
+            reached[v] += 1
+    return nodes, True
+
+
+def find_near(steps, positions, nodes):
+    """Per vertex the five least (distance, node)."""
+    near = [[] for _ in steps]
+    queue = [(0, n, v) for n, v in enumerate(nodes)]
+    while queue:
+        d, n, v = heapq.heappop(queue)
+        if len(near[v]) == 5 or any(n == other for _, other in near[v]):
+            continue
+        near[v].append((d, n))
+        if d < 1 << 31:
+            for u, step in steps[v].items():
+                heapq.heappush(queue, (d + step, n, u))
+    for v, entries in enumerate(near):
+        if not entries:
+            entries.append((0, min((squared_distance(positions[v], positions[u]), n) for n, u in enumerate(nodes))[1]))
+    return near
+
+
+def weights_of(near, spacing):
+    """A list of (weight, node), in 2^-12."""
+    d = [distance for distance, _ in near]
+    k = min(len(near), 4)
+    zero = max(d[4], 1) if len(d) == 5 else max(2 * spacing, d[k - 1] + spacing // 4 + 1)
+    share = [((zero - x) * 4096 // zero) ** 2 for x in d[:k]]
+    total = sum(share)
+    weight = [x * 4096 // total if total else 0 for x in share]
+    weight[0] = 4096 - sum(weight[1:])
+    return [(w, n) for w, (_, n) in zip(weight, near)]
+
+
+def parents_of(steps, owner, pivots):
+    count = len(pivots)
+    pairs = {(owner[v], owner[u]) for v in range(len(steps)) for u in steps[v] if owner[v] < owner[u]}
+    group = pieces(count, pairs)
+    inside, nearest, tie = [False] * count, [INFINITY] * count, [None] * count
+
+    def take(name):
+        members = [n for n in range(count) if group[n] == name]
+        for n in members:
+            inside[n] = True
+        for n in members:
+            for o in range(count):
+                d = squared_distance(pivots[n], pivots[o])
+                if not inside[o] and d < nearest[o]:
+                    nearest[o], tie[o] = d, n
+
+    take(group[0])
+    while not all(inside):
+        o = min((nearest[o], o) for o in range(count) if not inside[o])[1]
+        pairs.add((min(o, tie[o]), max(o, tie[o])))
+        take(group[o])
+    return [min((a for a, b in pairs if b == n), default=None) for n in range(count)]
+
+
+class Nodes:
+    """pivots and parents by node; weights by vertex."""
+
+    def __init__(self, positions, triangles, spacing):
+        self.pivots, self.parents, self.weights = [], [], []
+        if not positions:
+            return
+        steps = steps_between(positions, triangles, spacing)
+        nodes, covered = find_nodes(steps, spacing)
+        for _ in range(8):
+            if not covered:
+                spacing = min(spacing + spacing // 2 + 1, 2 * L)
+                nodes, covered = find_nodes(steps, spacing)
+        near = find_near(steps, positions, nodes)
+        self.pivots = [positions[v] for v in nodes]
+        self.weights = [weights_of(entries, spacing) for entries in near]
+        self.parents = parents_of(steps, [entries[0][1] for entries in near], self.pivots)
