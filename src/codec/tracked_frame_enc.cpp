@@ -185,7 +185,8 @@ TrackedFit measure_tracked_fit(const LatticeMesh& captured, const LatticeMesh& d
     constexpr std::size_t samples = 4000;
     const auto surface_of = [&](const LatticeMesh& mesh) {
         return make_target_surface(points_of(mesh.positions), mesh.triangles,
-                                   static_cast<float>(2 * std::max(mean_edge(mesh), 1.0)), samples, threads);
+                                   static_cast<float>(std::max({2 * mean_edge(mesh), stray / 24, 2.0})), samples,
+                                   threads);
     };
     const auto a = surface_of(captured), b = surface_of(decoded);
     const auto forth = one_way_fit(a, b, stray, threads), back = one_way_fit(b, a, stray, threads);
@@ -210,7 +211,9 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     const auto& reference = group.reference;
     const auto& triangles = reference.mesh.triangles;
     const auto captured_points = points_of(mesh.positions);
-    const double edge = std::max(mean_edge(mesh), 1.0);
+    // Cells no finer than the search can go through: of captures with tiny triangles, or none.
+    const double edge =
+        std::max({mean_edge(mesh), options.deformation.far_reach * options.deformation.millimetre / 48, 1.0});
     const auto target = make_target_surface(captured_points, mesh.triangles, static_cast<float>(2 * edge),
                                             options.deformation.back_samples, options.threads);
     clock.done("search structures");
