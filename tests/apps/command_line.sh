@@ -45,6 +45,18 @@ cat files/*.ply | cmp -s - piped.ply || { echo "FAILED: piped meshes differ from
 "$htvm" encode capture -s capture/skeleton.json --threads 3 -o three.htvm 2>/dev/null
 cmp -s one.htvm three.htvm || { echo "FAILED: the bytes depend on the threads"; failures=$((failures + 1)); }
 
+# A bitrate, or an error, instead of a quality; and a stream checked against a line and a buffer.
+expect 0 "target 2 Mbit/s" "$htvm" encode capture --bitrate 2 --buffer 0.5 -o rate.htvm
+expect 0 "a buffer of 0.5 s is at most" "$htvm" info rate.htvm --bitrate 2 --buffer 0.5
+expect 5 "overfills the buffer" "$htvm" info rate.htvm --bitrate 0.05 --buffer 0.1
+expect 0 '"buffer_peak_percent"' "$htvm" encode capture --bitrate 2 --passes 2 --json -o rate.htvm
+expect 5 "give a bitrate of at least" "$htvm" encode capture --bitrate 0.005 -o rate.htvm
+expect 1 "standard input" "$htvm" encode - --bitrate 2 --passes 2 -o rate.htvm
+expect 2 "excludes" "$htvm" encode capture --bitrate 2 -q 50 -o rate.htvm
+expect 2 "excludes" "$htvm" encode capture --bitrate 2 --target-error 1 -o rate.htvm
+expect 2 "--bitrate" "$htvm" encode capture --passes 2 -o rate.htvm
+expect 0 "target error 1 mm" "$htvm" encode capture --target-error 1 -o error.htvm
+
 # Draco's I-frames.
 expect 0 "external intra" "$htvm" encode capture --intra draco --keyint 2 -o draco.htvm
 expect 0 "3 frames to draco" "$htvm" decode draco.htvm -o draco

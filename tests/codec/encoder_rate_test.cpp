@@ -1,0 +1,232 @@
+// Rate and error control of the whole encoder, on small synthetic captures.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/moving_sequences.h"
+#include "geometry/surface_distance.h"
+
+namespace htvm {
+namespace {
+
+using test::TestSequence;
+
+constexpr double frames_per_second = 30;
+
+// The synthetic person walks ten frames forth and back, as often as need be.
+TestSequence walking(int frames) {
+    constexpr int there = 10;
+    TestSequence out{"walking", synth_skeleton(), {}};
+    SynthOptions options;
+    options.vertices = 500;
+    std::vector<test::SequenceFrame> made;
+    for (int t = 0; t < std::min(frames, there + 1); ++t) {
+        auto frame = synth_frame(options, 40 + 2 * t);
+        made.push_back({std::move(frame.mesh), std::move(frame.pose)});
+    }
+    for (int t = 0; t < frames; ++t) {
+        const int phase = t % (2 * there);
+        out.frames.push_back(made[static_cast<std::size_t>(std::min(phase, 2 * there - phase))]);
+    }
+    return out;
+}
+
+struct Run {
+    std::vector<FrameCost> costs;  // of 0 bits where the frame was dropped
+    std::vector<Packet> packets;
+    std::vector<Mesh> shown;
+    std::vector<std::string> errors;
+    double bits = 0;     // of all packets
+    double fullest = 0;  // the buffer's highest level over its capacity, from the packets
+    std::size_t frames_of(FrameType type) const {
+        return static_cast<std::size_t>(std::count_if(
+            costs.begin(), costs.end(), [&](const FrameCost& c) { return c.type == type && c.bits > 0; }));
+    }
+};
+
+Run coded_by(const TestSequence& sequence, EncoderOptions options) {
+    options.skeleton = sequence.skeleton;
+    auto encoder = Encoder::create(options);
+    Run run;
+    if (!encoder) {
+        ADD_FAILURE() << encoder.error().message;
+        return run;
+    }
+    const double per_frame = options.bits_per_second / frames_per_second;
+    double buffer = 0;
+    std::int64_t time = 0;
+    for (const auto& frame : sequence.frames) {
+        const auto ok = encoder->push(frame.mesh, frame.pose ? &*frame.pose : nullptr, time);
+        time += 33333;
+        if (!ok) {
+            EXPECT_EQ(ok.error().kind, ErrorKind::limit);
+            run.errors.push_back(ok.error().message);
+        }
+        run.costs.push_back(ok ? encoder->last_cost() : FrameCost{FrameType::predicted, 0, 0});
+        if (ok) run.shown.push_back(encoder->reconstruction());
+        double bits = 0;
+        while (auto packet = encoder->pull()) {
+            bits += 8.0 * static_cast<double>(packet->payload.size() + packet_overhead);
+            run.packets.push_back(std::move(*packet));
+        }
+        EXPECT_EQ(bits, run.costs.back().bits);
+        buffer += bits;
+        run.bits += bits;
+        if (per_frame > 0)
+            run.fullest = std::max(run.fullest, buffer / (options.bits_per_second * options.buffer_seconds));
+        buffer = std::max(0.0, buffer - per_frame);
+    }
+    return run;
+}
+
+EncoderOptions at_rate(double bits_per_second, double buffer_seconds = 0.5) {
+    EncoderOptions options;
+    options.bits_per_second = bits_per_second;
+    options.buffer_seconds = buffer_seconds;
+    options.key_interval = 10;
+    return options;
+}
+
+double off_target(const Run& run, const EncoderOptions& options) {
+    return run.bits / (options.bits_per_second / frames_per_second * static_cast<double>(run.costs.size())) - 1;
+}
+
+double quality_spread(const Run& run, std::size_t from) {
+    double lowest = 100, highest = 0;
+    for (std::size_t f = from; f < run.costs.size(); ++f)
+        lowest = std::min(lowest, run.costs[f].quality), highest = std::max(highest, run.costs[f].quality);
+    return highest - lowest;
+}
+
+TEST(EncoderRate, StaysWithinFivePercentAndWithinTheBuffer) {
+    const auto sequence = walking(90);
+    for (const double rate : {300e3, 450e3}) {
+        SCOPED_TRACE(rate);
+        const auto options = at_rate(rate);
+        const auto run = coded_by(sequence, options);
+        EXPECT_NEAR(off_target(run, options), 0, 0.05);
+        EXPECT_LE(run.fullest, 1);
+        EXPECT_TRUE(run.errors.empty());
+        EXPECT_EQ(run.frames_of(FrameType::predicted), 0u);
+    }
+}
+
+TEST(EncoderRate, TwoPassesAreNearerAndMoreEven) {
+    const auto sequence = walking(90);
+    auto options = at_rate(300e3);
+    const auto first = coded_by(sequence, options);
+    options.first_pass = first.costs;
+    const auto second = coded_by(sequence, options);
+    EXPECT_NEAR(off_target(second, options), 0, 0.02);
+    EXPECT_LE(second.fullest, 1);
+    EXPECT_LE(quality_spread(second, 0), quality_spread(first, 0));
+    EXPECT_LE(quality_spread(second, 15), 8);
+}
+
+TEST(EncoderRate, TheBytesAreTheSameForAnyNumberOfThreads) {
+    const auto sequence = walking(12);
+    auto options = at_rate(300e3);
+    options.threads = 1;
+    const auto one = coded_by(sequence, options);
+    options.threads = 3;
+    const auto three = coded_by(sequence, options);
+    ASSERT_EQ(one.packets.size(), three.packets.size());
+    for (std::size_t k = 0; k < one.packets.size(); ++k)
+        EXPECT_EQ(write_packet(one.packets[k]), write_packet(three.packets[k]));
+}
+
+TEST(EncoderRate, FramesBecomePredictedOnesWhereTheBufferIsNearlyFull) {
+    // The I-frames fit, but the line does not carry the EP-frames even at the lowest quality.
+    const auto sequence = walking(30);
+    const auto options = at_rate(80e3, 0.4);
+    const auto run = coded_by(sequence, options);
+    EXPECT_GT(run.frames_of(FrameType::predicted), 0u);
+    EXPECT_GT(run.frames_of(FrameType::intra), 0u);
+    EXPECT_LE(run.fullest, 1);
+}
+
+TEST(EncoderRate, AFirstFrameThatNeverFitsSaysWhatWouldDo) {
+    const auto sequence = walking(1);
+    const auto run = coded_by(sequence, at_rate(1e3, 1));
+    ASSERT_EQ(run.errors.size(), 1u);
+    const auto& message = run.errors[0];
+    const auto seconds_at = message.find("a buffer of at least ");
+    const auto bitrate_at = message.find("a bitrate of at least ");
+    ASSERT_NE(seconds_at, std::string::npos) << message;
+    ASSERT_NE(bitrate_at, std::string::npos) << message;
+    EXPECT_TRUE(coded_by(sequence, at_rate(1e3, std::stod(message.substr(seconds_at + 21)))).errors.empty()) << message;
+    EXPECT_TRUE(coded_by(sequence, at_rate(1e6 * std::stod(message.substr(bitrate_at + 22)), 1)).errors.empty())
+        << message;
+}
+
+TEST(EncoderRate, ADroppedFrameLeavesTheStreamSound) {
+    auto sequence = walking(6);
+    SynthOptions large;
+    large.vertices = 5000;
+    auto other = synth_frame(large, 43);
+    other.mesh.colours.clear();  // which cannot refer to the I-frame
+    sequence.frames[3] = {std::move(other.mesh), std::move(other.pose)};
+    const auto run = coded_by(sequence, at_rate(150e3, 0.3));
+    EXPECT_EQ(run.errors.size(), 1u);
+    EXPECT_EQ(run.costs[3].bits, 0);
+    EXPECT_LE(run.fullest, 1);
+    Decoder decoder;
+    std::size_t decoded = 0;
+    for (const auto& packet : run.packets) {
+        const auto frame = decoder.push(packet);
+        ASSERT_TRUE(frame);
+        if (*frame) ++decoded;
+    }
+    EXPECT_EQ(decoded, 5u);
+}
+
+TEST(EncoderRate, ASceneChangeInTheMiddleIsAbsorbed) {
+    // From the middle on, everything is twice as large, which the skeleton does not say.
+    auto sequence = walking(90);
+    const std::size_t middle = sequence.frames.size() / 2;
+    for (std::size_t f = middle; f < sequence.frames.size(); ++f)
+        for (auto& p : sequence.frames[f].mesh.positions) p = {2 * p[0], 2 * p[1], 2 * p[2]};
+    auto options = at_rate(450e3);
+    options.key_interval = 60;
+    const auto run = coded_by(sequence, options);
+    EXPECT_EQ(run.costs[middle].type, FrameType::intra);
+    EXPECT_NEAR(off_target(run, options), 0, 0.05);
+    EXPECT_LE(run.fullest, 1);
+    EXPECT_TRUE(run.errors.empty());
+}
+
+TEST(EncoderRate, AllChoicesOfFramesStayWithinTheBuffer) {
+    const auto sequence = walking(20);
+    for (const auto choice : {FrameChoice::motion, FrameChoice::rate_distortion}) {
+        auto options = at_rate(300e3);
+        options.frame_choice = choice;
+        options.predicted_below = 100;
+        options.still_below = 60;
+        const auto run = coded_by(sequence, options);
+        EXPECT_LE(run.fullest, 1);
+        EXPECT_TRUE(run.errors.empty());
+    }
+}
+
+double error_of(const Mesh& captured, const Mesh& shown) {
+    return surface_errors({captured.positions, captured.triangles, captured.colours},
+                          {shown.positions, shown.triangles, shown.colours}, {})
+        .geometry_rms;
+}
+
+TEST(EncoderError, EveryFrameComesNearTheTarget) {
+    const auto sequence = walking(8);
+    for (const double target : {0.4, 1.0}) {
+        EncoderOptions options;
+        options.target_error = target;
+        options.key_interval = 4;
+        const auto run = coded_by(sequence, options);
+        ASSERT_EQ(run.shown.size(), sequence.frames.size());
+        for (std::size_t f = 0; f < run.shown.size(); ++f)
+            EXPECT_NEAR(error_of(sequence.frames[f].mesh, run.shown[f]) / target, 1, 0.06) << target << " mm, " << f;
+    }
+}
+
+}  // namespace
+}  // namespace htvm
