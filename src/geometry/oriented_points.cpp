@@ -49,9 +49,8 @@ OrientedMatch OrientedPoints::nearest(const Point3f& query, const Point3f& norma
     if (entries_.empty() || !finite(query)) return best;
     best.squared_distance = reach * reach;
     const Cell middle = cell_of(query);
-    auto look_into = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-        const std::uint32_t bucket = bucket_of({x, y, z});
-        for (std::uint32_t e = first_[bucket]; e < first_[bucket + 1]; ++e) {
+    auto look_at = [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t e = begin; e < end; ++e) {
             const Entry& entry = entries_[e];
             const Point3f apart = {entry.point[0] - query[0], entry.point[1] - query[1], entry.point[2] - query[2]};
             const float d = product(apart, apart);
@@ -60,6 +59,10 @@ OrientedMatch OrientedPoints::nearest(const Point3f& query, const Point3f& norma
             if (entry.normal != Point3f{} && product(entry.normal, normal) < agreement) continue;
             best = {entry.index, d, true};
         }
+    };
+    auto look_into = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+        const std::uint32_t bucket = bucket_of({x, y, z});
+        look_at(first_[bucket], first_[bucket + 1]);
     };
     // Shells of cells around the query's own; cells that begin further away than the best so far are passed over.
     std::array<float, 3> low{};
@@ -77,6 +80,11 @@ OrientedMatch OrientedPoints::nearest(const Point3f& query, const Point3f& norma
     for (std::int32_t shell = 0;; ++shell) {
         const float bound = static_cast<float>(shell - 1) * side_ + inside;
         if (shell > 0 && bound > 0 && bound * bound > best.squared_distance) break;
+        const auto across = static_cast<std::uint64_t>(2 * shell + 1);
+        if (across * across * across > 8 * entries_.size()) {  // so far from everything, it is quicker to try them all
+            look_at(0, static_cast<std::uint32_t>(entries_.size()));
+            break;
+        }
         for (std::int32_t x = -shell; x <= shell; ++x) {
             const float gap_x = squared_gap(0, x);
             if (gap_x > best.squared_distance) continue;
