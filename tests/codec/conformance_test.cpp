@@ -13,6 +13,7 @@
 
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
+#include "codec/tracked_sequences.h"
 #include "core/bytes.h"
 #include "core/crc32.h"
 
@@ -136,9 +137,50 @@ void write_moving() {
     write_packets("moving", coded.packets);
 }
 
+// T-frames as the encoder writes them.
+void write_tracked() {
+    EncoderOptions options;
+    options.tracked = true;
+    options.key_interval = 4;
+    write_stream("tracked", walking(6, 300, 20), options);
+}
+
+// T-frames on every awkward connectivity and on a person, moved by chance; in the second sequence by nodes that are as
+// near to each other as may be, in the third by few and with fields of every kind.
+void write_tracked_by_chance() {
+    TestSequence awkward{"awkward", {}, {}};
+    unsigned attributes = 0;
+    for (const auto& shape : tfan_test::special_meshes())
+        if (shape.vertex_count <= 80) awkward.frames.push_back(sequence_of(shape, 1, attributes++ % 8).frames[0]);
+    awkward.frames.push_back(synthetic(false, 1, 150).frames[0]);
+    EncoderOptions options;
+    options.key_interval = 1;
+    options.merge_duplicates = false;
+    options.geometry_step = 6;
+    const auto intra = encode(awkward, options).packets;
+    std::vector<Packet> packets;
+    const auto add = [&](std::int32_t spacing, const ChanceMotion& motion) {
+        const auto first = static_cast<std::uint32_t>(std::count_if(packets.begin(), packets.end(), is_frame));
+        for (auto& packet : with_tracked_frames(intra, spacing, motion, first, first))
+            packets.push_back(std::move(packet));
+    };
+    ChanceMotion motion;
+    add(1500, motion);
+    motion.fields.step = {200, 40, 40};
+    motion.turn = 3000;
+    add(1, motion);
+    motion = {50, 1e6, 500000, 4000, {}};
+    motion.fields.step = {64, 0, 20};
+    motion.fields.turned = true;
+    add(20000, motion);
+    write_packets("tracked_by_chance", packets);
+}
+
 void write_all() {
     fs::create_directories(folder);
     write_moving();
+    write_tracked();
+    write_tracked_by_chance();
 
     TestSequence spokes{"awkward, moving", {}, {}};
     for (const auto& shape : tfan_test::special_meshes()) {
@@ -190,7 +232,7 @@ TEST(Conformance, StoredStreamsDecodeToTheirDigests) {
         ++streams;
         EXPECT_EQ(digests(stream_in(entry.path())), lines_in(fs::path(entry.path()).replace_extension(".digests")));
     }
-    EXPECT_GE(streams, 5);
+    EXPECT_GE(streams, 7);
 }
 
 }  // namespace

@@ -1,0 +1,103 @@
+// Streams of T-frames that no encoder would write: any mesh, moved, displaced and recoloured by chance.
+#pragma once
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "codec/intra_frame.h"
+#include "codec/sequence_header.h"
+#include "codec/test_sequences.h"
+#include "codec/tracked_frame.h"
+
+namespace htvm::test {
+
+struct ChanceMotion {
+    double turn = 300, shift = 400;  // of a node's transform beside the common one, in quanta and lattice units
+    double displacement = 60, colour = 20;
+    FieldOptions fields;
+};
+
+// before: of the frame that it refers to, or null.
+inline FramePayload tracked_by_chance(const TrackedReference& reference, const TrackedState* before,
+                                      const ChanceMotion& motion, std::mt19937& random) {
+    const auto number = [&](double size) {
+        std::uniform_real_distribution<double> any(-size, size);
+        return static_cast<std::int32_t>(any(random));
+    };
+    std::vector<QuantisedTransform> wanted;
+    for (std::size_t n = 0; n < reference.pivots.size(); ++n) {
+        QuantisedTransform transform;
+        if (random() % 16 == 0) transform.rotation.largest = static_cast<std::uint8_t>(random() % 4);
+        for (auto& c : transform.rotation.others)
+            c = static_cast<std::int16_t>(std::clamp(number(motion.turn) + 100, -8192, 8192));
+        transform.shift = {number(motion.shift), number(motion.shift) + 500, number(motion.shift)};
+        wanted.push_back(transform);
+    }
+    NodeMotionOptions steps;
+    steps.rotation_exponent = static_cast<int>(random() % 11);
+    steps.shift_exponent = static_cast<int>(random() % 9);
+    FramePayload out;
+    out.header.vertices = static_cast<std::uint32_t>(reference.mesh.positions.size());
+    out.header.triangles = static_cast<std::uint32_t>(reference.mesh.triangles.size());
+    const std::span<const QuantisedTransform> transforms_before =
+        before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{};
+    out.set(Layer::transforms,
+            encode_node_motion(wanted, reference.parents, reference.pivots, transforms_before, steps).bytes);
+    std::vector<std::int32_t> displacement, colour;
+    for (std::size_t v = 0; v < reference.mesh.positions.size(); ++v) {
+        displacement.push_back(number(motion.displacement) + 30);
+        for (int c = 0; c < 3; ++c) colour.push_back(number(motion.colour) + 5 * c);
+    }
+    auto fields = motion.fields;
+    fields.turned = false;
+    out.set(
+        Layer::geometry,
+        encode_field(reference.hierarchy, displacement, 1, fields, before ? &before->displacement : nullptr)->bytes);
+    fields.turned = motion.fields.turned;
+    if (!reference.mesh.colours.empty())
+        out.set(Layer::colour,
+                encode_field(reference.hierarchy, colour, 3, fields, before ? &before->colour : nullptr)->bytes);
+    return out;
+}
+
+// A stream of I-frames with a few T-frames after each: from the I-frame, twice from the frame before, once more from
+// the I-frame. node_spacing: lattice units. first: the number of the first frame.
+inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra, std::int32_t node_spacing,
+                                               const ChanceMotion& motion, std::uint32_t first, unsigned seed) {
+    std::mt19937 random(seed);
+    std::vector<Packet> out;
+    std::uint32_t frame = first;
+    const auto add = [&](Packet packet, std::uint32_t reference) {
+        packet.frame = frame;
+        packet.reference = reference;
+        packet.timestamp_us = std::int64_t{frame++} * 33333;
+        out.push_back(std::move(packet));
+    };
+    for (const auto& packet : intra) {
+        if (packet.kind == PacketKind::sequence) {
+            auto header = *read_sequence_header(packet.payload);
+            header.node_spacing = node_spacing;
+            out.push_back(packet);
+            out.back().payload = write_sequence_header(header);
+        }
+        if (packet.kind != PacketKind::intra) continue;
+        const auto payload = *read_frame_payload(packet.payload);
+        const auto reference = *make_tracked_reference(*decode_intra_frame(payload, nullptr), node_spacing,
+                                                       static_cast<std::int32_t>(payload.header.geometry_step));
+        const std::uint32_t key = frame;
+        add(packet, key);
+        TrackedState state;
+        for (const bool refers_to_last : {false, true, true, false}) {
+            const auto tracked = tracked_by_chance(reference, refers_to_last ? &state : nullptr, motion, random);
+            state = decode_tracked_frame(tracked, reference, refers_to_last ? &state : nullptr, 1)->state;
+            Packet next = packet;
+            next.kind = PacketKind::tracked;
+            next.payload = write_frame_payload(tracked);
+            add(std::move(next), refers_to_last ? frame - 1 : key);
+        }
+    }
+    return out;
+}
+
+}  // namespace htvm::test
