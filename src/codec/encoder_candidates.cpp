@@ -112,7 +112,9 @@ const AnimationFit& fit_of(State& state, FrameUnderWay& frame) {
     if (!frame.fit) {
         const auto& predicted = motion_of(state, frame).predicted;
         StageClock clock(state.stages);
-        frame.fit = measure_animation(frame.mesh, state.group->reference, predicted, state.threads);
+        const bool checked = state.options.animation_error > 0 || state.options.target_error > 0 ||
+                             state.options.frame_choice == FrameChoice::rate_distortion;
+        frame.fit = measure_animation(frame.mesh, state.group->reference, predicted, checked, state.threads);
         clock.done("fit of the animation");
     }
     return *frame.fit;
@@ -172,6 +174,7 @@ FrameCandidate encode_moving(State& state, FrameUnderWay& frame, const FrameStep
     auto source = source_of(state, frame);
     source.mesh = &part.mesh;
     source.bone_of_vertex = part.bone_of_vertex;
+    source.nearest = part.nearest;
     source.coded_bones = coded_bones;
     auto out = encode_residual_frame(state, frame, source, steps);
     out.in_part = true;

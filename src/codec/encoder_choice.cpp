@@ -56,6 +56,9 @@ FrameCandidate encode_what_moves(State& state, FrameUnderWay& frame, const Frame
     if (!(state.options.still_below > 0)) return encode_enhanced(state, frame, steps);
     const double units = 1.0 / state.header.lattice.step();
     const auto shifts = bone_shifts(group.reference, state.header.skeleton.bones, frame.pose);
+    if (std::all_of(shifts.begin(), shifts.end(),
+                    [&](double shift) { return shift >= state.options.still_below * units; }))
+        return encode_enhanced(state, frame, steps);
     const auto coded = choose_coded_bones(shifts, fit_of(state, frame), state.options.still_below * units,
                                           largest_animation_error(state));
     return encode_coded_bones(state, frame, steps, coded);
@@ -142,12 +145,12 @@ FrameType expected_type(const State& state, const FrameUnderWay& frame, bool for
 }
 
 // Rate control: coarser until the frame fits into the buffer; a P-frame at the last. The first frames of a type are
-// coded up to three times, until their quality is what the rate allows.
+// coded up to four times, until their quality is what the rate allows.
 Result<FrameCandidate> code_within_buffer(State& state, FrameUnderWay& frame, bool force_intra) {
     const auto fits = [&](const FrameCandidate& candidate) { return bits_of(state, candidate) <= state.rate->room(); };
     double quality = state.rate->quality(expected_type(state, frame, force_intra)), bits = 0;
     constexpr double far_off = 3;
-    for (int trials = 2;;) {
+    for (int trials = 3;;) {
         auto candidate = choose(state, frame, steps_of(state, quality_steps(quality)), force_intra);
         if (!candidate) return candidate;
         candidate->quality = quality;

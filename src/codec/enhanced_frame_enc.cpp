@@ -149,9 +149,9 @@ OrderedResiduals quantise_residuals(const EnhancedFrameSource& source, std::span
     const auto& mesh = *source.mesh;
     const auto& reference = *source.reference;
     const auto& predicted = source.motion->predicted;
-    const auto reference_of_vertex =
-        find_reference_vertices(reference, *source.search, predicted, source.motion->transforms, mesh.positions,
-                                source.bone_of_vertex, eligible, options.reference_choice, options.threads);
+    const auto reference_of_vertex = find_reference_vertices(
+        reference, *source.search, predicted, source.motion->transforms, mesh.positions, source.bone_of_vertex,
+        source.nearest, eligible, options.reference_choice, options.threads);
     OrderedResiduals out;
     out.order = order_residuals(reference_of_vertex, predicted.size());
     clock.done("reference vertices");

@@ -38,6 +38,8 @@ struct EnhancedFrameSource {
     const FrameMotion* motion = nullptr;        // of the whole frame
     const ReferenceMesh* reference = nullptr;
     const ReferenceSearch* search = nullptr;
+    std::span<const std::uint32_t>
+        nearest;                    // of each vertex the nearest of the predicted mesh, where known; else empty
     std::vector<bool> coded_bones;  // motion-based coding: one a bone; empty: all of the frame is coded
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
 };

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "geometry/surface_distance.h"
+#include "geometry/target_surface.h"
 
 namespace htvm {
 namespace {
@@ -16,52 +16,67 @@ std::vector<Point3f> points_of(std::span<const LatticePoint> positions) {
     return out;
 }
 
-// The corner that the closest point is nearest to; of a mesh without triangles, the point's own vertex.
-std::uint32_t nearest_corner(const SurfacePoint& point, std::span<const Triangle> triangles) {
-    if (triangles.empty()) return point.triangle;
-    const auto largest = std::max_element(point.barycentric.begin(), point.barycentric.end());
-    return triangles[point.triangle][static_cast<std::size_t>(largest - point.barycentric.begin())];
-}
+// Distances to the surface of a mesh by the plane through its nearest vertex: quick, and near enough to choose by.
+struct Planes {
+    NearestPoints tree;
+    std::vector<Point3f> normals;
+    float reach = 0;  // farther from the nearest vertex than this, the surface has ended
+
+    Planes(std::span<const Point3f> points, std::span<const Triangle> triangles, double edge, unsigned threads)
+        : tree(points), normals(vertex_normals(points, triangles, threads)), reach(static_cast<float>(3 * edge)) {}
+    float distance(const Point3f& query, const Neighbour& nearest) const {
+        const auto &point = tree.point(nearest.index), &normal = normals[nearest.index];
+        const float far = std::sqrt(nearest.squared_distance);
+        if (far > reach || normal == Point3f{}) return far;
+        return std::abs((query[0] - point[0]) * normal[0] + (query[1] - point[1]) * normal[1] +
+                        (query[2] - point[2]) * normal[2]);
+    }
+};
 
 struct Sums {
     double squares = 0;
     std::uint64_t count = 0;
+    void add(float distance) {
+        squares += double{distance} * distance;
+        ++count;
+    }
     double rms() const { return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0; }
 };
 
 }  // namespace
 
 AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& reference,
-                               std::span<const LatticePoint> predicted, unsigned threads) {
-    constexpr std::uint32_t stride = 4;  // the way back is sampled
+                               std::span<const LatticePoint> predicted, bool both_ways, unsigned threads) {
+    constexpr std::size_t stride = 4;  // the way back is sampled
     const auto captured_points = points_of(mesh.positions), predicted_points = points_of(predicted);
+    const double edge = mean_edge(reference.mesh);
     const std::size_t bones = reference.pivots.size();
     AnimationFit out;
     out.nearest.resize(captured_points.size());
     out.distance.resize(captured_points.size());
-    const SurfaceSearch surface(predicted_points, reference.mesh.triangles);
+    const Planes surface(predicted_points, reference.mesh.triangles, edge, threads);
     parallel_for(captured_points.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
-            const auto found = surface.closest(captured_points[k]);
-            out.nearest[k] = nearest_corner(found, reference.mesh.triangles);
-            out.distance[k] = std::sqrt(found.squared_distance);
+            const auto found = surface.tree.nearest(captured_points[k]);
+            out.nearest[k] = found.index;
+            out.distance[k] = surface.distance(captured_points[k], found);
         }
     });
-    std::vector<Sums> forth(bones);
-    for (std::size_t k = 0; k < captured_points.size(); ++k) {
-        auto& sum = forth[reference.bone_of_vertex[out.nearest[k]]];
-        sum.squares += double{out.distance[k]} * out.distance[k];
-        ++sum.count;
+    std::vector<Sums> forth(bones), back(bones);
+    for (std::size_t k = 0; k < captured_points.size(); ++k)
+        forth[reference.bone_of_vertex[out.nearest[k]]].add(out.distance[k]);
+    if (both_ways && !captured_points.empty()) {
+        const Planes captured(captured_points, mesh.triangles, edge, threads);
+        std::vector<float> distance((predicted_points.size() + stride - 1) / stride);
+        parallel_for(distance.size(), threads, 512, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t k = begin; k < end; ++k) {
+                const auto& query = predicted_points[k * stride];
+                distance[k] = captured.distance(query, captured.tree.nearest(query));
+            }
+        });
+        for (std::size_t k = 0; k < distance.size(); ++k) back[reference.bone_of_vertex[k * stride]].add(distance[k]);
     }
-    for (const auto& sum : forth) out.rms.push_back(sum.rms());
-    if (captured_points.empty()) return out;
-    const SurfaceSearch captured(captured_points, mesh.triangles);
-    const auto back = region_errors({predicted_points, reference.mesh.triangles, {}}, reference.bone_of_vertex, bones,
-                                    {captured_points, mesh.triangles, {}}, captured, {threads, stride});
-    for (std::size_t bone = 0; bone < bones; ++bone)
-        if (back[bone].samples > 0)
-            out.rms[bone] = std::max(out.rms[bone],
-                                     std::sqrt(back[bone].squared_distance / static_cast<double>(back[bone].samples)));
+    for (std::size_t bone = 0; bone < bones; ++bone) out.rms.push_back(std::max(forth[bone].rms(), back[bone].rms()));
     return out;
 }
 
@@ -97,6 +112,7 @@ MovingPart cut_moving_part(const LatticeMesh& mesh, std::span<const BoneIndex> b
         if (!mesh.normals.empty()) out.mesh.normals.push_back(mesh.normals[k]);
         if (!mesh.texcoords.empty()) out.mesh.texcoords.push_back(mesh.texcoords[k]);
         out.bone_of_vertex.push_back(bone_of_vertex[k]);
+        out.nearest.push_back(fit.nearest[k]);
     }
     for (auto& t : triangles)
         for (auto& v : t) v = number[v];

@@ -24,13 +24,11 @@ NearestPoints tree_of(std::span<const LatticePoint> positions, std::span<const s
 
 }  // namespace
 
-std::vector<std::uint32_t> find_reference_vertices(const ReferenceMesh& reference, const ReferenceSearch& search,
-                                                   std::span<const LatticePoint> predicted,
-                                                   std::span<const QuantisedTransform> transforms,
-                                                   std::span<const LatticePoint> frame,
-                                                   std::span<const BoneIndex> bone_of_vertex,
-                                                   std::span<const std::uint8_t> eligible, ReferenceChoice choice,
-                                                   unsigned threads) {
+std::vector<std::uint32_t> find_reference_vertices(
+    const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
+    std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
+    std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
+    std::span<const std::uint8_t> eligible, ReferenceChoice choice, unsigned threads) {
     std::vector<bool> own(transforms.size());  // bones whose vertices refer to the bone's own sub-mesh
     for (std::size_t bone = 0; bone < own.size(); ++bone)
         own[bone] = choice == ReferenceChoice::bone && is_eligible(reference, eligible, bone);
@@ -48,6 +46,10 @@ std::vector<std::uint32_t> find_reference_vertices(const ReferenceMesh& referenc
     parallel_for(frame.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const auto bone = bone_of_vertex[k];
+            if (!own[bone] && !nearest.empty() && (eligible.empty() || eligible[nearest[k]] != 0)) {
+                out[k] = nearest[k];
+                continue;
+            }
             if (!own[bone]) {
                 out[k] = candidates[all->nearest(point_of(frame[k])).index];
                 continue;

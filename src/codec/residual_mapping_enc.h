@@ -17,14 +17,12 @@ enum class ReferenceChoice : std::uint8_t {
 
 // The reference vertex of each vertex of the frame. The reference mesh must have a vertex; where A(b_P) is empty, the
 // nearest of all is taken. eligible: empty, or one a reference vertex: those with 0 are never chosen (motion-based
-// coding); at least one must be eligible.
-std::vector<std::uint32_t> find_reference_vertices(const ReferenceMesh& reference, const ReferenceSearch& search,
-                                                   std::span<const LatticePoint> predicted,
-                                                   std::span<const QuantisedTransform> transforms,
-                                                   std::span<const LatticePoint> frame,
-                                                   std::span<const BoneIndex> bone_of_vertex,
-                                                   std::span<const std::uint8_t> eligible, ReferenceChoice choice,
-                                                   unsigned threads);
+// coding); at least one must be eligible. nearest: empty, or of each frame vertex the nearest predicted one.
+std::vector<std::uint32_t> find_reference_vertices(
+    const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
+    std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
+    std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
+    std::span<const std::uint8_t> eligible, ReferenceChoice choice, unsigned threads);
 
 // E^ord: the frame's vertices by ascending reference vertex, and in their own order where that is the same.
 struct ResidualOrder {

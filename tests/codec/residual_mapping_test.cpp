@@ -51,7 +51,7 @@ double distance(LatticePoint a, LatticePoint b) { return std::sqrt(static_cast<d
 
 std::vector<std::uint32_t> find(const Case& c, ReferenceChoice choice, unsigned threads = 1) {
     return find_reference_vertices(c.reference, make_reference_search(c.reference), c.predicted, c.transforms, c.frame,
-                                   c.bone_of_vertex, {}, choice, threads);
+                                   c.bone_of_vertex, {}, {}, choice, threads);
 }
 
 TEST(ReferenceVertices, OfAnyBoneAreTheNearestPredictedVertices) {
