@@ -11,7 +11,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 checked=0
-# contains KIND: the stream compared last has frames of that kind, predicted or in_part.
+# contains KIND: the stream compared last has frames of that kind, predicted, in_part or tracked.
 contains() {
     grep -q " $1" "$work/kinds" || { echo "$name: no frame is $1"; cat "$work/kinds"; exit 1; }
 }
@@ -27,7 +27,16 @@ same() {
         { echo "$name: decode failed"; cat "$work/log"; exit 1; }
     python3 "$here/compare.py" "$work/stream.htvm" "$work/decoded" >"$work/kinds" ||
         { cat "$work/kinds"; echo "$name: $*"; exit 1; }
-    grep -o " in_part\| predicted" "$work/kinds" >>"$work/all_kinds" || true
+    grep -o " in_part\| predicted\| tracked" "$work/kinds" >>"$work/all_kinds" || true
+    checked=$((checked + 1))
+}
+# stored FILE: decodes a stream with both, compares.
+stored() {
+    rm -rf "$work/decoded"
+    "$htvm" decode "$1" -o "$work/decoded" --unit mm >"$work/log" 2>&1 ||
+        { echo "$1: decode failed"; cat "$work/log"; exit 1; }
+    python3 "$here/compare.py" "$1" "$work/decoded" >"$work/kinds" || { cat "$work/kinds"; exit 1; }
+    grep -o " in_part\| predicted\| tracked" "$work/kinds" >>"$work/all_kinds" || true
     checked=$((checked + 1))
 }
 
@@ -67,6 +76,18 @@ for name in moving moving_normals; do
     same $name "$moving" --skeleton "$moving/skeleton.json" --decide rd
 done
 same normals "$work/normals" --skeleton "$work/normals/skeleton.json" -q 60 --weights 60
+# T-frames: of the encoder; and moved by chance, on meshes that it would not track.
+for keyint in 2 30; do
+    for quality in 20 60 100; do
+        same person "$person" --profile tracked --keyint $keyint -q $quality
+        same normals "$work/normals" --profile tracked --keyint $keyint -q $quality
+    done
+done
+same moving "$work/moving" --profile tracked --skeleton "$work/moving/skeleton.json"
+contains tracked
+for stream in "$here"/../data/conformance/*.htvm; do
+    stored "$stream"
+done
 python3 "$here/awkward.py" "$work/awkward"
 for sequence in "$work"/awkward/*; do
     name=$(basename "$sequence")
@@ -80,6 +101,8 @@ for sequence in "$work"/awkward/*; do
         --keep-duplicates --no-scene-changes
     same "$name" "$sequence" --skeleton "$sequence/skeleton.json" --decide motion --predicted-below 500 \
         --animation-error 0 --no-scene-changes
+    same "$name" "$sequence" --profile tracked -q 60
 done
 echo "second decoder: $checked streams decode to the same meshes;" \
-    "$(grep -c predicted "$work/all_kinds") P-frames, $(grep -c in_part "$work/all_kinds") motion-based EP-frames"
+    "$(grep -c predicted "$work/all_kinds") P-frames, $(grep -c in_part "$work/all_kinds") motion-based EP-frames," \
+    "$(grep -c tracked "$work/all_kinds") T-frames"
