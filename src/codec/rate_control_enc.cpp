@@ -74,8 +74,10 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
         // The slope turns about the quality of now, where the sizes are known.
         const double again = std::log2(frame.bits / expected_bits(model, frame.type, frame.quality));
         const double believed = belief(model, again) * again;
-        model.content += is_intra(frame.type) ? believed / 2 : believed;
-        if (is_intra(frame.type)) model.intra_extra += believed;
+        // Of I-frames alone nobody can tell how much more they take than others.
+        const bool compared = is_intra(frame.type) && seen_like(model, FrameType::enhanced) > 0;
+        model.content += compared ? believed / 2 : believed;
+        if (compared) model.intra_extra += believed;
         model.last_surprise = again;
     }
     model.last[index_of(frame.type)] = frame;
@@ -128,7 +130,7 @@ double RateController::wanted_bits() const {
     const double phase = 1 - static_cast<double>(since_intra_) / options_.key_interval;
     const double of_intra = std::max(0.0, expected_bits(model_, FrameType::intra, level_) - per_frame_);
     const double before_intra = buffer_ - (since_intra_ > 0 ? of_intra * std::max(0.0, phase) : 0);
-    const double least = std::min(capacity_ / 5, 6 * per_frame_);
+    const double least = std::min(capacity_ / 5, 4 * per_frame_);
     const double most = std::max(least, std::min(capacity_ / 2, 0.85 * capacity_ - of_intra));
     const double wanted = std::clamp(idle_bits_, least, most);
     return std::clamp(per_frame_ + (wanted - before_intra) / horizon, per_frame_ / 4, per_frame_ * 1.06);

@@ -26,16 +26,16 @@ struct RateControlOptions {
     double buffer_seconds = 1;
     int key_interval = 30;                             // frames that an I-frame's bits are spread over
     double lowest_quality = 0, highest_quality = 100;  // of the quality knob
-    double largest_step = 2;   // most that the quality changes from frame to frame, unless the buffer is in danger
-    double stay = 1.5;         // least that it changes between I-frames: another quality needs other codebooks, and
-                               // those of 6,000 vertices take a tenth of the frame that brings them
-    double intra_extra = 0.4;  // log2: how much more an I-frame takes than others, before any is seen
+    double largest_step = 2;    // most that the quality changes from frame to frame, unless the buffer is in danger
+    double stay = 1.5;          // least that it changes between I-frames: another quality needs other codebooks, and
+                                // those of 6,000 vertices take a tenth of the frame that brings them
+    double intra_extra = 0.25;  // log2: how much more an I-frame takes than others, before any is seen
 };
 
 // What is known of the sizes of frames.
 struct FrameSizeModel {
     double content = 17;                       // log2(bits) of an EP-frame at quality 0, of the content as it is now
-    double intra_extra = 0.4;                  // how much more an I-frame's is
+    double intra_extra = 0.25;                 // how much more an I-frame's is
     double predicted_bits = 4e3;               // of a P-frame
     double slope = 0.04;                       // of log2(bits) over quality
     double slope_weight = 100, slope_sum = 4;  // squared quality steps seen and their products with those of log2(bits)
