@@ -43,16 +43,17 @@ void add_choice_options(CLI::App& command, EncodingOptions& options) {
             "--decide", options.decide,
             "Choice of frames: fixed (I every --keyint, EP between), motion (by how far the skeleton's bones\n"
             "are from the last I-frame: --predicted-below, --intra-above), or rd (by measured bits and errors;\n"
-            "slow). Default: by profile")
+            "slow). Default: fixed")
         ->check(CLI::IsMember({"fixed", "motion", "rd"}));
     command
         .add_option("--predicted-below", options.predicted_below,
                     "--decide motion: frames whose bones moved less than this in all, mm, are P-frames: the I-frame's\n"
-                    "mesh moved")
+                    "mesh moved (default 400; see --animation-error)")
         ->check(millimetres);
     command
         .add_option("--intra-above", options.intra_above,
-                    "--decide motion: frames whose bones moved more than this in all, mm, are I-frames; 0: never")
+                    "--decide motion: frames whose bones moved more than this in all, mm, are I-frames; 0: never\n"
+                    "(default)")
         ->check(millimetres);
     command
         .add_option("--still-below", options.still_below,
@@ -140,7 +141,9 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
         .add_option(
             "--profile", options.profile,
             "topology (default): keeps the capture's connectivity, with the choices that measured best; paper:\n"
-            "the published method's own choices (--reference bone, --registration point, --weights 0)")
+            "the published method's own choices (--reference bone, --registration point, --weights 0);\n"
+            "tracked: T-frames between the I-frames, which keep the I-frame's connectivity and lay it on each\n"
+            "frame's surface: the same surface for a fraction of the bits, with or without a skeleton")
         ->check(CLI::IsMember({"topology", "paper", "tracked"}));
     command
         .add_option("--reference", options.reference,
@@ -156,6 +159,15 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
                     "Width in mm of the borders between bones, over which their motions blend; 0: none, each vertex\n"
                     "moves with one bone (default: by profile)")
         ->check(CLI::Range(0.0, 1000.0));
+    command
+        .add_option("--tracked-from", options.tracked_references,
+                    "--profile tracked: previous (default), T-frames refer to the frame before; intra: to the I-frame\n"
+                    "alone, so that any of them may be lost, for a few more bits")
+        ->check(CLI::IsMember({"previous", "intra"}));
+    command
+        .add_option("--node-spacing", options.node_spacing,
+                    "--profile tracked: mm between the nodes that move the mesh (default 80)")
+        ->check(CLI::Range(1.0, 10000.0));
     command.add_flag("--keep-duplicates", options.keep_duplicates,
                      "Keep vertices that decode to the same point and attributes, and triangles that collapse: the\n"
                      "decoded triangle set is then exactly the input's");
@@ -187,6 +199,8 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     if (options.animation_error >= 0) out.animation_error = options.animation_error;
     out.scene_changes = !options.no_scene_changes;
     out.tracked = options.profile == "tracked";
+    if (options.tracked_references == "intra") out.tracked_references = TrackedReferences::intra;
+    if (options.node_spacing > 0) out.node_spacing = options.node_spacing;
     out.merge_duplicates = !options.keep_duplicates;
     out.nearest_vertices = options.nearest_vertices;
     const bool paper = options.profile == "paper";

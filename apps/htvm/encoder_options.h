@@ -23,6 +23,8 @@ struct EncodingOptions {
     double target_error = 0;                  // mm; 0: none
     std::string intra = "tfan";
     std::string profile = "topology";
+    std::string tracked_references;  // empty: the library's default
+    double node_spacing = 0;         // mm; 0: the library's default
     double weight_width = -1;             // mm; below 0: by profile
     std::string reference, registration;  // empty: by profile
     std::string radii_file;

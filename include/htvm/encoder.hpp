@@ -50,11 +50,11 @@ struct EncoderOptions {
     bool tracked = false;  // T-frames between I-frames, where they fit the capture: the I-frame's connectivity instead
                            // of the frame's own, for a fraction of the bits
     TrackedReferences tracked_references = TrackedReferences::previous;
-    double node_spacing = 80;    // mm, T-frames: between the nodes of the deformation graph
-    double predicted_below = 0;  // mm, choice by motion: with less skeletal motion since the I-frame, a P-frame
-    double intra_above = 0;      // mm, choice by motion: with more, an I-frame; 0: never
-    double still_below = 0;      // mm, motion-based coding (section V): bones that moved less since the I-frame are
-                                 // animated, not coded; 0: all are coded
+    double node_spacing = 80;      // mm, T-frames: between the nodes of the deformation graph
+    double predicted_below = 400;  // mm, choice by motion: with less skeletal motion since the I-frame, a P-frame
+    double intra_above = 0;        // mm, choice by motion: with more, an I-frame; 0: never
+    double still_below = 0;        // mm, motion-based coding (section V): bones that moved less since the I-frame are
+                                   // animated, not coded; 0: all are coded
     double animation_error = 2;  // mm: what is animated is coded after all where it is farther (root mean square, bone
                                  // by bone) from the capture's surface; 0: unchecked, as in the paper
     double bits_per_second = 0;  // > 0: quality follows from it, instead of from the steps
