@@ -1,0 +1,136 @@
+// Which kind of frame a frame becomes (paper, section III-B, and past it).
+#include <gtest/gtest.h>
+
+#include "codec/scene_change_enc.h"
+#include "codec/test_sequences.h"
+#include "geometry/surface_distance.h"
+
+namespace htvm {
+namespace {
+
+using namespace test;
+using enum FrameType;
+
+// One captured person, carried along x by so many millimetres in each frame, skeleton and all.
+TestSequence carried(const std::vector<double>& places) {
+    SynthOptions options;
+    options.vertices = 1200;
+    const auto person = synth_frame(options, 40);
+    TestSequence out{"carried", synth_skeleton(), {}};
+    for (const double x : places) {
+        SequenceFrame frame{person.mesh, person.pose};
+        for (auto& p : frame.mesh.positions) p[0] += static_cast<float>(x);
+        for (auto& joint : frame.pose->joints) joint[0] += x;
+        out.frames.push_back(std::move(frame));
+    }
+    return out;
+}
+
+std::vector<FrameType> types_of(const CodedSequence& coded) {
+    std::vector<FrameType> out;
+    for (const auto& info : coded.infos) out.push_back(info.type);
+    return out;
+}
+
+EncoderOptions by_motion() {
+    EncoderOptions options;
+    options.frame_choice = FrameChoice::motion;
+    options.predicted_below = 14 * 10;  // 14 bones that each moved 10 mm
+    options.intra_above = 14 * 40;
+    return options;
+}
+
+TEST(ChoiceByMotion, GoesByTheShiftsOfAllBonesSinceTheLastIntraFrame) {
+    const auto coded = encode(carried({0, 5, 9, 11, 39, 41, 45, 52, 82}), by_motion());
+    EXPECT_EQ(types_of(coded),
+              (std::vector{intra, predicted, predicted, enhanced, enhanced, intra, predicted, enhanced, intra}));
+    for (std::size_t t = 0; t < coded.infos.size(); ++t)
+        EXPECT_EQ(coded.infos[t].reference, t < 5 ? 0u : t < 8 ? 5u : 8u);
+}
+
+TEST(ChoiceByMotion, WaitsForTheLeastKeyInterval) {
+    auto options = by_motion();
+    options.least_key_interval = 3;
+    EXPECT_EQ(types_of(encode(carried({0, 100, 100, 100, 100}), options)),
+              (std::vector{intra, enhanced, enhanced, intra, predicted}));
+}
+
+TEST(ChoiceByMotion, CodesAfterAllWhatDoesNotFitTheCapture) {
+    auto sequence = carried({0, 0, 0});
+    for (auto& p : sequence.frames[1].mesh.positions)  // the skeleton stands still, the lower half does not
+        if (p[1] < 900) p[2] += 30;
+    EXPECT_EQ(types_of(encode(sequence, by_motion())), (std::vector{intra, enhanced, predicted}));
+    auto unchecked = by_motion();
+    unchecked.animation_error = 0;
+    EXPECT_EQ(types_of(encode(sequence, unchecked)), (std::vector{intra, predicted, predicted}));
+}
+
+TEST(PredictedFrames, TakeTransformsAndNothingElse) {
+    const auto coded = encode(carried({0, 5}), by_motion());
+    const auto& bytes = coded.infos[1].bytes;
+    EXPECT_EQ(bytes.total(), bytes.transforms + bytes.overhead);
+    EXPECT_LT(bytes.total(), 250u);
+    EXPECT_EQ(coded.infos[1].vertices, coded.infos[0].vertices);
+    EXPECT_EQ(coded.infos[1].source_vertices, coded.infos[0].source_vertices);
+    EXPECT_EQ(coded.reconstructions[1].triangles, coded.reconstructions[0].triangles);
+}
+
+TEST(SceneChanges, ForceAnIntraFrameUnlessSwitchedOff) {
+    auto sequence = carried({0, 0, 0});
+    auto& mesh = sequence.frames[2].mesh;  // another person enters
+    const auto one = mesh;
+    const auto n = static_cast<std::uint32_t>(one.positions.size());
+    for (const auto& p : one.positions) mesh.positions.push_back({p[0], p[1], p[2] + 1200});
+    for (const auto& t : one.triangles) mesh.triangles.push_back({t[0] + n, t[1] + n, t[2] + n});
+    mesh.colours.insert(mesh.colours.end(), one.colours.begin(), one.colours.end());
+    EncoderOptions options;
+    EXPECT_EQ(types_of(encode(sequence, options)), (std::vector{intra, enhanced, intra}));
+    options.scene_changes = false;
+    EXPECT_EQ(types_of(encode(sequence, options)), (std::vector{intra, enhanced, enhanced}));
+}
+
+TEST(SceneChanges, AreMoreThanATenthOfEitherSurfaceFarFromTheOther) {
+    std::vector<LatticePoint> near, more;
+    for (int i = 0; i < 1000; ++i) near.push_back({i, 0, 0});
+    more = near;
+    EXPECT_FALSE(scene_changed(near, more, 50));
+    for (int i = 0; i < 90; ++i) more.push_back({i, 5000, 0});
+    EXPECT_FALSE(scene_changed(near, more, 50));
+    for (int i = 0; i < 90; ++i) more.push_back({i, 6000, 0});
+    EXPECT_TRUE(scene_changed(near, more, 50));
+    EXPECT_TRUE(scene_changed(more, near, 50));
+}
+
+TEST(ChoiceByCost, TakesAPredictedFrameWhereNothingButThePlaceChanged) {
+    EncoderOptions options;
+    options.frame_choice = FrameChoice::rate_distortion;
+    options.geometry_step = 8;  // beside which the registration's own error is small
+    options.colour_step = 18;
+    EXPECT_EQ(types_of(encode(carried({0, 30, 60}), options)), (std::vector{intra, predicted, predicted}));
+}
+
+TEST(ChoiceByCost, IsNeverWorseThanIntraFramesAtTheSameQuality) {
+    const auto sequence = synthetic(true, 5);
+    const auto errors_of = [&](const CodedSequence& coded, std::size_t t) {
+        const auto &a = sequence.frames[t].mesh, &b = coded.reconstructions[t];
+        return surface_errors({a.positions, a.triangles, a.colours}, {b.positions, b.triangles, b.colours});
+    };
+    for (const double quality : {25.0, 50.0}) {
+        EncoderOptions options;
+        options.geometry_step = quality_steps(quality).geometry_step;
+        options.colour_step = quality_steps(quality).colour_step;
+        options.frame_choice = FrameChoice::rate_distortion;
+        const auto chosen = encode(sequence, options);
+        options.key_interval = 1;
+        const auto plain = encode(sequence, options);
+        ASSERT_EQ(chosen.reconstructions.size(), plain.reconstructions.size());
+        for (std::size_t t = 0; t < sequence.frames.size(); ++t) {
+            // 5 % is allowed, and the encoder looks at samples.
+            EXPECT_LT(errors_of(chosen, t).geometry_rms, 1.12 * errors_of(plain, t).geometry_rms) << "frame " << t;
+            EXPECT_LT(errors_of(chosen, t).colour_rms, 1.12 * errors_of(plain, t).colour_rms) << "frame " << t;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace htvm
