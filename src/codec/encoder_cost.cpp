@@ -48,6 +48,9 @@ std::optional<FrameCandidate> choose_animation(State& state, FrameUnderWay& fram
         animated += coded.back() ? 0 : 1;
     }
     if (animated == 0) return std::nullopt;
+    auto moved = encode_predicted(state, frame);
+    if (within(errors_of(state, frame, moved.decoded), allowed)) return moved;
+    if (animated == coded.size()) return std::nullopt;
     auto candidate = encode_coded_bones(state, frame, steps, coded);
     if (!within(errors_of(state, frame, candidate.decoded), allowed)) return std::nullopt;
     return candidate;
