@@ -75,12 +75,12 @@ void add_control_options(CLI::App& command, EncodingOptions& options) {
         command
             .add_option("--bitrate", options.megabits,
                         "Mbit/s that the stream keeps to, instead of a quality: the quality follows, and frames that\n"
-                        "do not fit into the buffer even at the lowest are dropped (exit code 5)")
+                        "do not fit into the buffer even at the lowest become P-frames or are dropped (exit code 5)")
             ->check(CLI::Range(1e-3, 1e6));
     command
         .add_option("--buffer", options.buffer_seconds,
                     "--bitrate: seconds of stream that the receiver's buffer holds, which is the delay that a live\n"
-                    "receiver needs (default 1)")
+                    "receiver needs (default 1). A short capture may exceed the bitrate by what it holds")
         ->check(CLI::Range(0.01, 3600.0))
         ->needs(bitrate);
     command
@@ -89,11 +89,13 @@ void add_control_options(CLI::App& command, EncodingOptions& options) {
                     "(default 1)")
         ->check(CLI::Range(1, 2))
         ->needs(bitrate);
-    auto* error = command
-                      .add_option("--target-error", options.target_error,
-                                  "Error that every frame comes near to, mm, instead of a quality: root mean square\n"
-                                  "between the surfaces (M2)")
-                      ->check(CLI::Range(1e-3, 1e3));
+    auto* error =
+        command
+            .add_option("--target-error", options.target_error,
+                        "Error that every frame comes near to, mm, instead of a quality: root mean square\n"
+                        "between the surfaces (M2). Where no quality reaches it, the nearest serves; T-frames may\n"
+                        "stay well above it")
+            ->check(CLI::Range(1e-3, 1e3));
     bitrate->excludes(error);
     for (const char* by_hand : {"--quality", "--geometry-step", "--colour-step"}) {
         bitrate->excludes(command.get_option(by_hand));
@@ -143,7 +145,8 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
             "topology (default): keeps the capture's connectivity, with the choices that measured best; paper:\n"
             "the published method's own choices (--reference bone, --registration point, --weights 0);\n"
             "tracked: T-frames between the I-frames, which keep the I-frame's connectivity and lay it on each\n"
-            "frame's surface: the same surface for a fraction of the bits, with or without a skeleton")
+            "frame's surface: less exact at the same quality, for a fraction of the bits, with or without a\n"
+            "skeleton; --decide, --still-below and --keep-duplicates do not touch T-frames")
         ->check(CLI::IsMember({"topology", "paper", "tracked"}));
     command
         .add_option("--reference", options.reference,
