@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <iostream>
 
+#include "io/mesh_file.h"
+
 namespace htvm::app {
 
 Result<StreamInput> StreamInput::open(const std::string& path) {
@@ -42,7 +44,11 @@ Result<StreamOutput> StreamOutput::open(const std::string& path) {
     output.path_ = path;
     output.standard_ = path == "-";
     if (output.standard_) return output;
-    output.file_.open(path, std::ios::binary | std::ios::trunc);
+    if (is_mesh_file_name(path))
+        return fail(ErrorKind::bad_input,
+                    path + " is the name of a mesh, but a stream would be written there; give one that ends in .htvm");
+    // What is there stays until there is something to put in its place.
+    output.file_.open(path, std::ios::binary | std::ios::app);
     if (!output.file_) {
         const std::string reason = std::strerror(errno);
         const auto folder = std::filesystem::path(path).parent_path();
@@ -57,6 +63,10 @@ Result<StreamOutput> StreamOutput::open(const std::string& path) {
 
 Result<void> StreamOutput::write(const Packet& packet) {
     const auto bytes = write_packet(packet);
+    if (bytes_ == 0 && !standard_) {
+        file_.close();
+        file_.open(path_, std::ios::binary | std::ios::trunc);
+    }
     std::ostream& out = standard_ ? std::cout : file_;
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     out.flush();

@@ -151,7 +151,7 @@ const Codebook* named(const std::optional<NumberedCodebook>& codebook, std::uint
 
 Result<void> check_reference(const State& state, const Packet& packet) {
     if (state.reference && state.reference->frame == packet.reference) return {};
-    return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " refers to I-frame " +
+    return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " refers to frame " +
                                                std::to_string(packet.reference) + ", which is not there");
 }
 

@@ -104,9 +104,10 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     adopt(state, *coded);
     state.cost = {coded->type, coded->quality, bits_of(state, *coded)};
     if (state.rate) state.rate->coded(state.cost.type, state.cost.quality, state.cost.bits);
-    if (!state.begun) {
+    if (brings_header(state, *coded)) {
         Packet header;
         header.payload = write_sequence_header(state.header);
+        header.frame = state.header_sent = state.next_frame;
         header.timestamp_us = timestamp_us;
         send(state, std::move(header));
         state.begun = true;

@@ -202,8 +202,15 @@ Result<FrameCandidate> code_to_error(State& state, FrameUnderWay& frame, bool fo
 
 }  // namespace
 
+bool brings_header(const State& state, const FrameCandidate& candidate) {
+    constexpr std::uint32_t repeated_after = 10;  // frames
+    return !state.begun ||
+           (candidate.type == FrameType::intra && state.next_frame - state.header_sent >= repeated_after);
+}
+
 double bits_of(const State& state, const FrameCandidate& candidate) {
-    const std::size_t header = state.begun ? 0 : write_sequence_header(state.header).size() + packet_overhead;
+    const std::size_t header =
+        brings_header(state, candidate) ? write_sequence_header(state.header).size() + packet_overhead : 0;
     return 8.0 * static_cast<double>(candidate.bytes() + header);
 }
 

@@ -8,7 +8,11 @@ namespace htvm {
 // The frame coded the way it is to be sent; nothing is adopted yet.
 Result<FrameCandidate> code_frame(Encoder::State& state, FrameUnderWay& frame, bool force_intra);
 
-// Of a candidate, were it sent next: with the sequence header where it is the first.
+// Whether the sequence header goes before the candidate: the first frame, and I-frames now and then, so that who joins
+// later, or lost it, can begin there.
+bool brings_header(const Encoder::State& state, const FrameCandidate& candidate);
+
+// Of a candidate, were it sent next: with the sequence header where it brings one.
 double bits_of(const Encoder::State& state, const FrameCandidate& candidate);
 
 }  // namespace htvm

@@ -76,6 +76,7 @@ struct Encoder::State {
     bool begun = false, finished = false;
     PoseTracker poses;
     std::uint32_t next_frame = 0;
+    std::uint32_t header_sent = 0;  // number of the frame that the sequence header came with last
     std::optional<std::int64_t> last_timestamp;
     std::optional<Group> group;
     std::optional<RateController> rate;

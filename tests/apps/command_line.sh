@@ -138,7 +138,7 @@ lost no_codebook.htvm 2 3
 expect 3 "codebook that it names did not arrive" "$htvm" decode no_codebook.htvm -o x
 without 2 4 >no_intra.htvm
 lost no_intra.htvm 4 5 6 7
-expect 3 "I-frame 4, which is not there" "$htvm" decode no_intra.htvm -o x
+expect 3 "refers to frame 4, which is not there" "$htvm" decode no_intra.htvm -o x
 expect 2 "conceal" "$htvm" decode walk.htvm -o x --conceal perhaps
 # A gap of a thousand million frames is not filled with as many files. (gzip ends with the CRC-32 of what it packed.)
 place=($(packet 6 5))

@@ -96,7 +96,8 @@ TEST(Loss, AMissingIntraFrameCostsEveryFrameUpToTheNext) {
         EXPECT_EQ(decoded.errors.size(), 4u);
         for (const auto& error : decoded.errors) {
             EXPECT_EQ(error.kind, ErrorKind::corrupt_stream);
-            EXPECT_NE(error.message.find("I-frame " + std::to_string(missing)), std::string::npos) << error.message;
+            EXPECT_NE(error.message.find("refers to frame " + std::to_string(missing)), std::string::npos)
+                << error.message;
         }
         const auto frames = by_number(decoded);
         EXPECT_EQ(frames.size(), 5u);
