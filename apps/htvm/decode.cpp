@@ -313,7 +313,8 @@ void add_decode(CLI::App& app, Run& run) {
     command->footer(
         "A damaged or shortened stream gives every frame that is whole, says what was lost, and exits with 3; so does\n"
         "one that frames are missing from. A lost P- or EP-frame costs no other one; a lost T-frame those up to the\n"
-        "next I-frame, unless encoded with --tracked-from intra; a damaged sequence header the whole stream.\n"
+        "next I-frame, unless encoded with --tracked-from intra; a damaged sequence header all up to where it\n"
+        "comes again, with an I-frame ten frames later or more.\n"
         "Examples:\n"
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"
