@@ -33,12 +33,17 @@ htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
 }
 
 // What every frame behind the first becomes.
-enum class Kind { intra, enhanced, motion, predicted };
+enum class Kind { intra, enhanced, motion, predicted, tracked };
 
 // Motion-based coding leaves some bones of frames so near to the I-frame out; P-frames are animated whatever the
 // motion.
 void choose(htvm::EncoderOptions& options, Kind kind) {
     if (kind == Kind::enhanced || kind == Kind::intra) return;
+    if (kind == Kind::tracked) {
+        options.tracked = true;
+        options.least_key_interval = options.key_interval;
+        return;
+    }
     options.animation_error = 0;
     if (kind == Kind::motion) {
         options.still_below = 60;
@@ -77,8 +82,15 @@ void report(benchmark::State& state, const std::map<std::string, double>& stages
 void check_kind(htvm::FrameType type, Kind kind) {
     const auto wanted = kind == Kind::intra       ? htvm::FrameType::intra
                         : kind == Kind::predicted ? htvm::FrameType::predicted
+                        : kind == Kind::tracked   ? htvm::FrameType::tracked
                                                   : htvm::FrameType::enhanced;
     if (type != wanted) std::abort();
+}
+
+// To and fro, so that the person never jumps.
+const htvm::SynthFrame& input_of(std::int64_t frame) {
+    const auto step = static_cast<std::size_t>(frame % (2 * (frames - 1)));
+    return capture()[step < frames ? step : 2 * (frames - 1) - step];
 }
 
 void encode(benchmark::State& state, Kind kind) {
@@ -89,7 +101,7 @@ void encode(benchmark::State& state, Kind kind) {
     double bits = 0;
     for (auto _ : state) {
         ++frame;
-        const auto& input = capture()[static_cast<std::size_t>(1 + frame % (frames - 1))];
+        const auto& input = input_of(frame);
         if (!encoder.push(input.mesh, &input.pose, frame, kind == Kind::intra)) std::abort();
         while (auto packet = encoder.pull()) benchmark::DoNotOptimize(packet->payload.data());
         for (const auto& stage : encoder.stage_times()) stages[stage.stage] += stage.milliseconds;
@@ -105,6 +117,7 @@ void encode_intra(benchmark::State& state) { encode(state, Kind::intra); }
 void encode_enhanced(benchmark::State& state) { encode(state, Kind::enhanced); }
 void encode_motion(benchmark::State& state) { encode(state, Kind::motion); }
 void encode_predicted(benchmark::State& state) { encode(state, Kind::predicted); }
+void encode_tracked(benchmark::State& state) { encode(state, Kind::tracked); }
 
 void decode(benchmark::State& state, Kind kind) {
     auto encoder = primed(kind, static_cast<double>(state.range(0)), 0);
@@ -132,6 +145,7 @@ void decode_intra(benchmark::State& state) { decode(state, Kind::intra); }
 void decode_enhanced(benchmark::State& state) { decode(state, Kind::enhanced); }
 void decode_motion(benchmark::State& state) { decode(state, Kind::motion); }
 void decode_predicted(benchmark::State& state) { decode(state, Kind::predicted); }
+void decode_tracked(benchmark::State& state) { decode(state, Kind::tracked); }
 
 void arguments(benchmark::internal::Benchmark* benchmark) {
     benchmark->ArgNames({"quality", "threads"});
@@ -144,9 +158,11 @@ BENCHMARK(encode_intra)->Apply(arguments);
 BENCHMARK(encode_enhanced)->Apply(arguments);
 BENCHMARK(encode_motion)->Apply(arguments);
 BENCHMARK(encode_predicted)->Apply(arguments);
+BENCHMARK(encode_tracked)->Apply(arguments);
 BENCHMARK(decode_intra)->Apply(arguments);
 BENCHMARK(decode_enhanced)->Apply(arguments);
 BENCHMARK(decode_motion)->Apply(arguments);
 BENCHMARK(decode_predicted)->Apply(arguments);
+BENCHMARK(decode_tracked)->Apply(arguments);
 
 }  // namespace

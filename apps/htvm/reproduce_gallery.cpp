@@ -101,17 +101,6 @@ Result<std::vector<Match>> match_rates(const SourceFrames& source, const std::ve
     return matches;
 }
 
-Result<std::vector<Tile>> save_tiles(const std::vector<Picture>& pictures, const std::vector<std::string>& labels,
-                                     const std::filesystem::path& folder, const std::string& name) {
-    std::vector<Tile> out;
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-        const auto path = folder / fmt::format("{}_{}.png", name, i);
-        if (auto written = write_png(pictures[i], path.string()); !written) return tl::unexpected(written.error());
-        out.push_back({path, labels[i]});
-    }
-    return out;
-}
-
 // A row: the original, then the coder's meshes at rising rates.
 Result<std::vector<Tile>> coder_row(const Mesh& original, const std::vector<const Match*>& matches, std::size_t coder,
                                     std::size_t frame, const TileView& view, const RenderOptions& render_options,

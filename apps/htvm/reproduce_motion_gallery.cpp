@@ -67,17 +67,6 @@ std::vector<std::size_t> spread(const std::vector<std::size_t>& frames, std::siz
     return out;
 }
 
-Result<std::vector<Tile>> saved(const std::vector<Picture>& pictures, const std::vector<std::string>& labels,
-                                const std::filesystem::path& folder, const std::string& name) {
-    std::vector<Tile> out;
-    for (std::size_t i = 0; i < pictures.size(); ++i) {
-        const auto path = folder / fmt::format("{}_{}.png", name, i);
-        if (auto written = write_png(pictures[i], path.string()); !written) return tl::unexpected(written.error());
-        out.push_back({path, labels[i]});
-    }
-    return out;
-}
-
 Result<double> surface_error(const Mesh& original, const Mesh& decoded, unsigned threads) {
     CompareOptions options;
     options.points = options.cloud = options.pictures = options.topology = false;
@@ -135,7 +124,7 @@ Result<Figure> figure_19(const SourceFrames& source, const ExperimentPlan& plan,
         const auto pictures =
             draw_tiles(meshes, {azimuth, close_up, close_up ? 300 : 440}, render_options, options.threads);
         if (!pictures) return tl::unexpected(pictures.error());
-        auto row = saved(*pictures, labels, options.folder, close_up ? "figure_19_close" : "figure_19");
+        auto row = save_tiles(*pictures, labels, options.folder, close_up ? "figure_19_close" : "figure_19");
         if (!row) return tl::unexpected(row.error());
         figure.tiles.push_back(std::move(*row));
     }
@@ -231,8 +220,8 @@ Result<Figure> zippering_figure(const Mesh& original, const SeamStages& stages, 
     const auto whole =
         draw_tiles({&original, &overlapping, &zippered, &stages.zippered}, {azimuth, false, 440}, {}, options.threads);
     if (!whole) return tl::unexpected(whole.error());
-    auto row = saved(*whole, {"original", "coded and animated parts", "zippered", "zippered, as it is shown"},
-                     options.folder, "figure_19b");
+    auto row = save_tiles(*whole, {"original", "coded and animated parts", "zippered", "zippered, as it is shown"},
+                          options.folder, "figure_19b");
     if (!row) return tl::unexpected(row.error());
     figure.tiles.push_back(std::move(*row));
     std::vector<Picture> strip(whole->begin(), whole->end());
@@ -241,8 +230,8 @@ Result<Figure> zippering_figure(const Mesh& original, const SeamStages& stages, 
         const auto close =
             draw_spot({overlapping, trimmed, zippered, stages.zippered}, *spot, radius, 440, options.threads);
         if (!close) return tl::unexpected(close.error());
-        row = saved(*close, {"overlapping", "trimmed", "zippered", "zippered, as it is shown"}, options.folder,
-                    "figure_19b_close");
+        row = save_tiles(*close, {"overlapping", "trimmed", "zippered", "zippered, as it is shown"}, options.folder,
+                         "figure_19b_close");
         if (!row) return tl::unexpected(row.error());
         figure.tiles.push_back(std::move(*row));
         strip = {(*whole)[0], (*whole)[1], (*whole)[2], (*close)[0], (*close)[1], (*close)[2]};

@@ -1,5 +1,7 @@
 #include "reproduce_pictures.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -174,6 +176,17 @@ Result<std::vector<Picture>> draw_tiles(const std::vector<const Mesh*>& meshes, 
         const Picture picture = render(*mesh, cameras->front(), options, threads);
         if (!crop) crop = view.close_up ? Crop{0, 0, picture.width, picture.height} : covered_part(picture);
         out.push_back(halved(cropped(picture, *crop)));
+    }
+    return out;
+}
+
+Result<std::vector<Tile>> save_tiles(const std::vector<Picture>& pictures, const std::vector<std::string>& labels,
+                                     const std::filesystem::path& folder, const std::string& name) {
+    std::vector<Tile> out;
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+        const auto path = folder / fmt::format("{}_{}.png", name, i);
+        if (auto written = write_png(pictures[i], path.string()); !written) return tl::unexpected(written.error());
+        out.push_back({path, labels[i]});
     }
     return out;
 }

@@ -10,6 +10,7 @@
 #include "metrics/render.h"
 #include "rd_coders.h"
 #include "rd_source.h"
+#include "reproduce_figure.h"
 
 namespace htvm::app {
 
@@ -48,5 +49,9 @@ struct TileView {
 // Pictures of the original and of other meshes of the same frame, all cut alike.
 Result<std::vector<Picture>> draw_tiles(const std::vector<const Mesh*>& meshes, const TileView& view,
                                         const RenderOptions& options, unsigned threads);
+
+// Writes the pictures as PNG files NAME_0.png, NAME_1.png ... in the folder; one label each.
+Result<std::vector<Tile>> save_tiles(const std::vector<Picture>& pictures, const std::vector<std::string>& labels,
+                                     const std::filesystem::path& folder, const std::string& name);
 
 }  // namespace htvm::app

@@ -5,11 +5,6 @@
 namespace htvm {
 namespace {
 
-std::int32_t within_lattice(std::int64_t c) {
-    return static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(c, -std::int64_t{lattice_limit}, std::int64_t{lattice_limit}));
-}
-
 // A sum of weighted vectors, in 2^-(matrix_bits + weight_bits) lattice units. The weights sum to 2^12, so that sums of
 // turned vectors stay below sqrt(3) * 2^25 * 2^36 and those of points that are moved below 2^63.
 using WeightedSum = std::array<std::int64_t, 3>;

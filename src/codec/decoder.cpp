@@ -159,14 +159,17 @@ Result<Frame> decode_enhanced(State& state, const Packet& packet) {
     const auto payload = read_frame(state, packet);
     if (!payload) return tl::unexpected(payload.error());
     if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
-    // Should the rest fail, this much serves to conceal the frame.
-    if (auto moved = decode_transforms(payload->of(Layer::transforms), state.reference->pivots.size()))
-        state.last_transforms = std::move(*moved);
     const EnhancedFrameContext context{
         *state.reference, named(state.geometry_codebook, payload->header.geometry_codebook),
         named(state.colour_codebook, payload->header.colour_codebook), state.header->nearest_vertices, state.threads};
     auto decoded = decode_enhanced_frame(*payload, context);
-    if (!decoded) return tl::unexpected(decoded.error());
+    if (!decoded) {
+        // This much may still serve to conceal the frame.
+        if (auto moved = decode_transforms(payload->of(Layer::transforms), state.reference->pivots.size()))
+            state.last_transforms = std::move(*moved);
+        return tl::unexpected(decoded.error());
+    }
+    state.last_transforms = std::move(decoded->transforms);
     // Zippered frames count only what they code in their headers.
     if (decoded->mesh.positions.size() > state.options.max_vertices ||
         decoded->mesh.triangles.size() > state.options.max_triangles)
@@ -174,7 +177,7 @@ Result<Frame> decode_enhanced(State& state, const Packet& packet) {
                                           " has more vertices or triangles than this decoder accepts");
     DecodedFrame out;
     out.mesh = to_mesh(decoded->mesh, state.header->lattice);
-    out.pose = moved_pose(state, decoded->transforms);
+    out.pose = moved_pose(state, state.last_transforms);
     return Frame{std::move(out)};
 }
 

@@ -89,9 +89,26 @@ EnhancedFrameSource source_of(const State& state, const FrameUnderWay& frame) {
     out.bone_of_vertex = frame.motion->bone_of_vertex;
     out.motion = &*frame.motion;
     out.reference = &state.group->reference;
-    out.search = &state.group->search;
+    out.search = &*state.group->search;
     out.source_vertices = static_cast<std::uint32_t>(frame.mesh.positions.size());
     out.source_triangles = static_cast<std::uint32_t>(frame.mesh.triangles.size());
+    return out;
+}
+
+DeformationOptions deformation_options(const State& state) {
+    DeformationOptions out;
+    out.millimetre = 1.0 / state.header.lattice.step();
+    out.threads = state.threads;
+    return out;
+}
+
+// Where the skeleton moves each node: with the bone of the vertex that it sits on.
+std::vector<RigidMotion> skeletal_node_motion(const State& state, const FrameUnderWay& frame) {
+    if (!state.header.skeleton_tracked) return {};
+    const auto& group = *state.group;
+    const auto bones = skeletal_motion(group.reference, state.header.skeleton.bones, frame.pose);
+    std::vector<RigidMotion> out;
+    for (const auto v : group.tracked->reference.nodes.vertex) out.push_back(bones[group.reference.bone_of_vertex[v]]);
     return out;
 }
 
@@ -99,9 +116,10 @@ EnhancedFrameSource source_of(const State& state, const FrameUnderWay& frame) {
 
 const FrameMotion& motion_of(State& state, FrameUnderWay& frame) {
     if (!frame.motion) {
-        const auto& group = *state.group;
-        const MotionReference against{&group.reference, &group.search, &state.header.skeleton.bones, state.header.radii,
-                                      group.motion};
+        auto& group = *state.group;
+        if (!group.search) group.search = make_reference_search(group.reference);
+        const MotionReference against{&group.reference, &*group.search, &state.header.skeleton.bones,
+                                      state.header.radii, group.motion};
         frame.motion = find_frame_motion(frame.mesh.positions, frame.pose, against, registration_options(state),
                                          state.threads, state.stages);
     }
@@ -193,23 +211,6 @@ FrameCandidate encode_coded_bones(State& state, FrameUnderWay& frame, const Fram
     return everything || !something ? encode_enhanced(state, frame, steps) : encode_moving(state, frame, steps, coded);
 }
 
-DeformationOptions deformation_options(const State& state) {
-    DeformationOptions out;
-    out.millimetre = 1.0 / state.header.lattice.step();
-    out.threads = state.threads;
-    return out;
-}
-
-// Where the skeleton moves each node: with the bone of the vertex that it sits on.
-std::vector<RigidMotion> skeletal_node_motion(const State& state, const FrameUnderWay& frame) {
-    if (!state.header.skeleton_tracked) return {};
-    const auto& group = *state.group;
-    const auto bones = skeletal_motion(group.reference, state.header.skeleton.bones, frame.pose);
-    std::vector<RigidMotion> out;
-    for (const auto v : group.tracked->reference.nodes.vertex) out.push_back(bones[group.reference.bone_of_vertex[v]]);
-    return out;
-}
-
 Result<FrameCandidate> encode_tracked(State& state, const FrameUnderWay& frame, const FrameSteps& steps) {
     auto& group = *state.group;
     TrackedFrameOptions options;
@@ -249,7 +250,6 @@ void adopt(State& state, const FrameCandidate& candidate) {
         group.reference = make_reference(candidate.decoded, state.header.skeleton.bones, candidate.pose.joints,
                                          candidate.pose.orientations, state.header.radii, state.header.weight_width,
                                          state.next_frame, state.threads);
-        group.search = make_reference_search(group.reference);
         group.edge = candidate.edge;
         group.intra_step = candidate.intra_step;
         group.plain_intra = candidate.plain_intra;

@@ -6,12 +6,19 @@
 
 namespace htvm {
 
+// The captured surface, ready for measuring decoded ones against it.
+struct CapturedSurface {
+    std::vector<Point3f> points;
+    SurfaceSearch search;
+};
+
 // A frame on its way through the encoder; what several candidates need is found once.
 struct FrameUnderWay {
     const LatticeMesh& mesh;
     const CodedPose& pose;
     std::optional<FrameMotion> motion;
     std::optional<AnimationFit> fit;
+    std::optional<CapturedSurface> surface;
 };
 
 // Needs state.group, and the attributes of its reference.

@@ -11,13 +11,6 @@ namespace {
 
 using State = Encoder::State;
 
-std::vector<Point3f> points_of(const LatticeMesh& mesh) {
-    std::vector<Point3f> out;
-    out.reserve(mesh.positions.size());
-    for (const auto p : mesh.positions) out.push_back(point_of(p));
-    return out;
-}
-
 // What a frame's errors may be: the I-frame's at the same quality, and a little for the estimate.
 SurfaceErrors allowed_errors(const Group& group, const FrameSteps& steps) {
     constexpr double tolerance = 1.05;
@@ -66,16 +59,21 @@ bool intra_is_paid_for(const State& state, const FrameCandidate& candidate) {
            group.excess_bytes + bytes - least > group.intra_bytes - least;
 }
 
-SurfaceErrors errors_of(const State& state, const FrameUnderWay& frame, const LatticeMesh& decoded) {
+SurfaceErrors errors_of(const State& state, FrameUnderWay& frame, const LatticeMesh& decoded) {
     SurfaceDistanceOptions options;
     options.threads = state.threads;
     options.every = 4;
-    const auto captured = points_of(frame.mesh), shown = points_of(decoded);
-    return surface_errors({captured, frame.mesh.triangles, frame.mesh.colours},
+    if (!frame.surface) {
+        auto points = points_of(frame.mesh.positions);
+        SurfaceSearch search(points, frame.mesh.triangles);
+        frame.surface = CapturedSurface{std::move(points), std::move(search)};
+    }
+    const auto shown = points_of(decoded.positions);
+    return surface_errors({frame.surface->points, frame.mesh.triangles, frame.mesh.colours}, frame.surface->search,
                           {shown, decoded.triangles, decoded.colours}, options);
 }
 
-Result<FrameCandidate> encode_measured_intra(State& state, const FrameUnderWay& frame, const FrameSteps& steps) {
+Result<FrameCandidate> encode_measured_intra(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
     auto out = encode_intra(state, frame, steps);
     if (!out) return out;
     StageClock clock(state.stages);

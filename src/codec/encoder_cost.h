@@ -7,11 +7,10 @@
 namespace htvm {
 
 // Surface and colour errors of a decoded frame against the captured mesh, estimated; lattice units, levels.
-SurfaceErrors errors_of(const Encoder::State& state, const FrameUnderWay& frame, const LatticeMesh& decoded);
+SurfaceErrors errors_of(const Encoder::State& state, FrameUnderWay& frame, const LatticeMesh& decoded);
 
 // An I-frame that knows the errors that the frames of its group are held against.
-Result<FrameCandidate> encode_measured_intra(Encoder::State& state, const FrameUnderWay& frame,
-                                             const FrameSteps& steps);
+Result<FrameCandidate> encode_measured_intra(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps);
 
 // P, EP by motion-based coding, EP or I. state.group was begun by encode_measured_intra(). An I-frame is also due where
 // the frames since the last one have cost more above the cheapest of them than a new one would.

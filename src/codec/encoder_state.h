@@ -54,9 +54,9 @@ struct FrameCandidate {
 // What the frames since the last I-frame refer to.
 struct Group {
     ReferenceMesh reference;
-    ReferenceSearch search;
-    double edge = 0;                  // mean edge of the I-frame's captured mesh, lattice units
-    std::vector<RigidMotion> motion;  // of each bone in the frame before; empty behind the I-frame
+    std::optional<ReferenceSearch> search;  // made when the first frame is registered bone by bone
+    double edge = 0;                        // mean edge of the I-frame's captured mesh, lattice units
+    std::vector<RigidMotion> motion;        // of each bone in the frame before; empty behind the I-frame
     Codebooks codebooks;
     std::optional<TrackedGroup> tracked;        // made when the first T-frame asks for it
     std::optional<std::uint32_t> last_tracked;  // number of the last T-frame

@@ -89,12 +89,9 @@ std::vector<std::uint32_t> references_of_residuals(std::span<const std::uint32_t
 }
 
 LatticePoint add_residual(LatticePoint predicted, const std::array<std::int32_t, 3>& residual) {
-    auto within = [](std::int64_t c) {
-        return static_cast<std::int32_t>(
-            std::clamp<std::int64_t>(c, -std::int64_t{lattice_limit}, std::int64_t{lattice_limit}));
-    };
-    return {within(std::int64_t{predicted.x} + residual[0]), within(std::int64_t{predicted.y} + residual[1]),
-            within(std::int64_t{predicted.z} + residual[2])};
+    return {within_lattice(std::int64_t{predicted.x} + residual[0]),
+            within_lattice(std::int64_t{predicted.y} + residual[1]),
+            within_lattice(std::int64_t{predicted.z} + residual[2])};
 }
 
 Colour add_colour(Colour reference, const std::array<std::int32_t, 3>& residual) {

@@ -9,13 +9,6 @@
 namespace htvm {
 namespace {
 
-std::vector<Point3f> points_of(std::span<const LatticePoint> positions) {
-    std::vector<Point3f> out;
-    out.reserve(positions.size());
-    for (const auto p : positions) out.push_back(point_of(p));
-    return out;
-}
-
 // Distances to the surface of a mesh by the plane through its nearest vertex: quick, and near enough to choose by.
 struct Planes {
     NearestPoints tree;

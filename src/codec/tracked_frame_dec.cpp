@@ -8,11 +8,6 @@
 namespace htvm {
 namespace {
 
-std::int32_t within_lattice(std::int64_t c) {
-    return static_cast<std::int32_t>(
-        std::clamp<std::int64_t>(c, -std::int64_t{lattice_limit}, std::int64_t{lattice_limit}));
-}
-
 std::vector<std::uint32_t> parents_of(const DeformationNodes& nodes) {
     std::vector<std::uint32_t> out(nodes.vertex.size(), no_parent);
     for (const auto& pair : nodes.neighbours)

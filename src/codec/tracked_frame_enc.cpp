@@ -10,13 +10,6 @@
 namespace htvm {
 namespace {
 
-std::vector<Point3f> points_of(std::span<const LatticePoint> positions) {
-    std::vector<Point3f> out;
-    out.reserve(positions.size());
-    for (const auto p : positions) out.push_back(point_of(p));
-    return out;
-}
-
 std::vector<HandlePair> pairs_of(const TrackedReference& reference) {
     std::vector<HandlePair> out;
     for (const auto& pair : reference.nodes.neighbours) {

@@ -10,29 +10,21 @@ namespace htvm {
 
 namespace {
 
-struct FieldWriter {
-    RangeEncoder encoder;
+// What the walk codes with: bytes, or the bits that they would take.
+template <class Coder>
+struct FieldCoder {
+    Coder coder;
     bool bit(BinaryModel& model, bool wanted) {
-        encoder.bit(model, wanted);
+        coder.bit(model, wanted);
         return wanted;
     }
     std::uint32_t raw(std::uint32_t wanted, int n) {
-        encoder.raw(wanted, n);
+        coder.raw(wanted, n);
         return wanted;
     }
 };
-
-struct FieldCounter {
-    CostCounter counter;
-    bool bit(BinaryModel& model, bool wanted) {
-        counter.bit(model, wanted);
-        return wanted;
-    }
-    std::uint32_t raw(std::uint32_t wanted, int n) {
-        counter.raw(wanted, n);
-        return wanted;
-    }
-};
+using FieldWriter = FieldCoder<RangeEncoder>;
+using FieldCounter = FieldCoder<CostCounter>;
 
 // The bits of a decision predicted from several contexts, without adapting them.
 template <std::size_t N>
@@ -189,7 +181,7 @@ LevelMode plan_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<co
     };
     code_level(coder, models, level, k, walk.prediction, mode, walk.header.step[c], walk.magnitudes(k, c),
                walk.rests[c], walk.planes[c].magnitude[k], choose);
-    if (gained <= lambda * coder.counter.bits()) {
+    if (gained <= lambda * coder.coder.bits()) {
         models = models_before;
         mode.coded = false;
         std::fill(walk.rests[c].begin(), walk.rests[c].end(), 0);
@@ -268,7 +260,7 @@ Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<co
             plan_field(trial, means_of(hierarchy, values, components, options.turned), options.lambda);
         FieldWriter coder;
         walk_field(walk, coder, plan);
-        writer.bytes(coder.encoder.finish());
+        writer.bytes(coder.coder.finish());
     }
     EncodedField out;
     out.bytes = writer.take();

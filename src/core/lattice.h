@@ -1,6 +1,7 @@
 // The integer lattice on which every decoded position lives (design, section 5): exact on every machine.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <compare>
 #include <cstdint>
@@ -23,6 +24,12 @@ inline LatticePoint operator-(LatticePoint a, LatticePoint b) { return {a.x - b.
 inline bool on_lattice(LatticePoint p) {
     auto inside = [](std::int32_t c) { return c >= -lattice_limit && c <= lattice_limit; };
     return inside(p.x) && inside(p.y) && inside(p.z);
+}
+
+// The nearest coordinate that is on the lattice.
+inline std::int32_t within_lattice(std::int64_t c) {
+    return static_cast<std::int32_t>(
+        std::clamp<std::int64_t>(c, -std::int64_t{lattice_limit}, std::int64_t{lattice_limit}));
 }
 
 // Squared Euclidean distance in lattice units, exact.

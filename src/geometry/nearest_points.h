@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "core/lattice.h"
 
@@ -15,6 +16,13 @@ using Point3f = std::array<float, 3>;
 // A lattice point as the searches take it.
 inline Point3f point_of(LatticePoint p) {
     return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+}
+
+inline std::vector<Point3f> points_of(std::span<const LatticePoint> positions) {
+    std::vector<Point3f> out;
+    out.reserve(positions.size());
+    for (const auto p : positions) out.push_back(point_of(p));
+    return out;
 }
 
 struct Neighbour {

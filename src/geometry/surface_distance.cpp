@@ -159,7 +159,12 @@ OneSidedErrors one_sided_errors(const SurfaceView& from, const SurfaceView& to, 
 }
 
 SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceView& b, const SurfaceDistanceOptions& options) {
-    const SurfaceSearch search_a(a.positions, a.triangles), search_b(b.positions, b.triangles);
+    return surface_errors(a, SurfaceSearch(a.positions, a.triangles), b, options);
+}
+
+SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceSearch& search_a, const SurfaceView& b,
+                             const SurfaceDistanceOptions& options) {
+    const SurfaceSearch search_b(b.positions, b.triangles);
     const auto forward = one_sided_errors(a, b, search_b, options);
     const auto backward = one_sided_errors(b, a, search_a, options);
     return {std::sqrt(std::max(forward.squared_distance, backward.squared_distance)),

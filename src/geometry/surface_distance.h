@@ -51,6 +51,9 @@ struct SurfaceErrors {
 
 // Both ways between two meshes. Two empty meshes are equal; one empty mesh is infinitely far away.
 SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceView& b, const SurfaceDistanceOptions& options = {});
+// The same with a search of `a` that is there already, for comparing one mesh with several.
+SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceSearch& search_a, const SurfaceView& b,
+                             const SurfaceDistanceOptions& options = {});
 
 // What the samples of one region are away; sums of several frames add up.
 struct RegionErrors {

@@ -17,9 +17,10 @@ Mesh triangle() {
 
 // Runs a peer's command on one frame in a folder of its own.
 Result<CodedFrame> run(const std::string& command) {
-    const auto folder = std::filesystem::path(testing::TempDir()) / "rd peer's";
-    std::filesystem::remove_all(folder);
-    std::filesystem::create_directories(folder);
+    // A name of its own: tests run beside each other. With a space and a quote, which the shell must not see.
+    std::string name = (std::filesystem::path(testing::TempDir()) / "rd peer's XXXXXX").string();
+    if (!mkdtemp(name.data())) return fail(ErrorKind::bad_input, "no temporary folder");
+    const std::filesystem::path folder = name;
     const auto coder = peer_under_test("peer=" + command);
     if (!coder) return tl::unexpected(coder.error());
     auto quality = quality_point(50);
@@ -29,7 +30,9 @@ Result<CodedFrame> run(const std::string& command) {
     const auto start = coder->start(facts, quality);
     SourceFrame frame;
     frame.mesh = triangle();
-    return (*start)(frame);
+    auto coded = (*start)(frame);
+    std::filesystem::remove_all(folder);
+    return coded;
 }
 
 TEST(Substitute, replaces_every_known_key) {
