@@ -3,7 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
+#include <exception>
 #include <thread>
 #include <vector>
 
@@ -14,8 +16,40 @@ inline unsigned thread_count(unsigned requested) {
     return requested > 0 ? requested : std::max(1u, std::thread::hardware_concurrency());
 }
 
+// The exception of whichever thread failed first. A thread that an exception leaves would end the process.
+struct FirstFailure {
+    std::atomic_flag taken = ATOMIC_FLAG_INIT;
+    std::exception_ptr exception;
+
+    // Calls work(); an exception stays here.
+    template <class Work>
+    void guard(const Work& work) noexcept {
+        try {
+            work();
+        } catch (...) {
+            if (!taken.test_and_set()) exception = std::current_exception();
+        }
+    }
+    // Throws it, if any. Call when the threads are joined.
+    void rethrow() const {
+        if (exception) std::rethrow_exception(exception);
+    }
+};
+
+// A thread that calls work(), which must not throw; where none can be started, work() has been called here.
+template <class Work>
+std::thread start_or_run(const Work& work) {
+    try {
+        return std::thread(work);
+    } catch (const std::exception&) {  // system_error: no thread to be had; bad_alloc: no memory for one
+        work();
+        return {};
+    }
+}
+
 // Calls body(begin, end) on disjoint pieces that cover [0, count), on up to `threads` threads; none is empty, and where
-// there are several, each is at least half a `grain` long. Returns when all are done. body must not throw.
+// there are several, each is at least half a `grain` long. Returns when all are done; where calls threw, all the others
+// are done too, and the first exception is thrown here.
 template <class Body>
 void parallel_for(std::size_t count, unsigned threads, std::size_t grain, const Body& body) {
     if (count == 0) return;
@@ -25,15 +59,19 @@ void parallel_for(std::size_t count, unsigned threads, std::size_t grain, const 
         body(std::size_t{0}, count);
         return;
     }
+    FirstFailure failure;
+    auto run = [&](std::size_t p) { failure.guard([&] { body(count * p / pieces, count * (p + 1) / pieces); }); };
     std::vector<std::thread> workers;
     workers.reserve(pieces - 1);
-    for (std::size_t p = 1; p < pieces; ++p)
-        workers.emplace_back([&, p] { body(count * p / pieces, count * (p + 1) / pieces); });
-    body(std::size_t{0}, count / pieces);  // piece 0: [0, count * 1 / pieces)
-    for (auto& worker : workers) worker.join();
+    for (std::size_t p = 1; p < pieces; ++p) workers.push_back(start_or_run([&run, p] { run(p); }));
+    run(0);
+    for (auto& worker : workers)
+        if (worker.joinable()) worker.join();
+    failure.rethrow();
 }
 
-// Runs the given functions, the last on this thread and the others beside it where threads > 1.
+// Runs the given functions, the last on this thread and the others beside it where threads > 1. Where one throws, the
+// other is done too, and the exception is thrown here; with one thread, what comes after it is not run.
 template <class First, class Second>
 void parallel_invoke(unsigned threads, const First& first, const Second& second) {
     if (threads <= 1) {
@@ -41,9 +79,11 @@ void parallel_invoke(unsigned threads, const First& first, const Second& second)
         second();
         return;
     }
-    std::thread worker([&] { first(); });
-    second();
-    worker.join();
+    FirstFailure failure;
+    auto worker = start_or_run([&] { failure.guard(first); });
+    failure.guard(second);
+    if (worker.joinable()) worker.join();
+    failure.rethrow();
 }
 
 }  // namespace htvm

@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <mutex>
+#include <new>
+#include <stdexcept>
 #include <utility>
 
 namespace htvm {
@@ -48,6 +50,34 @@ TEST(ParallelInvoke, RunsBothOnce) {
             threads, [&] { ++first; }, [&] { ++second; });
         EXPECT_EQ(first, 1);
         EXPECT_EQ(second, 1);
+    }
+}
+
+TEST(ParallelFor, AnExceptionOfAnyPieceReachesTheCallerWhenAllPiecesAreDone) {
+    for (const unsigned threads : {1u, 2u, 4u})
+        for (std::size_t failing = 0; failing < 4; ++failing) {
+            std::atomic<std::size_t> done = 0;
+            auto body = [&](std::size_t begin, std::size_t end) {
+                done += end - begin;
+                if (begin <= failing * 25 && failing * 25 < end) throw std::bad_alloc();
+            };
+            EXPECT_THROW(parallel_for(100, threads, 1, body), std::bad_alloc);
+            EXPECT_EQ(done, 100u);
+        }
+}
+
+TEST(ParallelFor, WhereAllPiecesThrowOneExceptionReachesTheCaller) {
+    auto body = [](std::size_t, std::size_t) { throw std::length_error("too long"); };
+    EXPECT_THROW(parallel_for(1000, 8, 1, body), std::length_error);
+}
+
+TEST(ParallelInvoke, AnExceptionOfEitherReachesTheCaller) {
+    auto nothing = [] {};
+    auto failing = [] { throw std::bad_alloc(); };
+    for (const unsigned threads : {1u, 2u}) {
+        EXPECT_THROW(parallel_invoke(threads, failing, nothing), std::bad_alloc);
+        EXPECT_THROW(parallel_invoke(threads, nothing, failing), std::bad_alloc);
+        EXPECT_THROW(parallel_invoke(threads, failing, failing), std::bad_alloc);
     }
 }
 
