@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/parallel.h"
+#include "core/thread.h"
 
 namespace htvm {
 namespace {
@@ -76,7 +76,7 @@ UnvisitedNear::UnvisitedNear(std::span<const LatticePoint> positions, int m, uns
     constexpr std::size_t worth_threads = 4096;
     if (thread_count(threads) < 2 || positions.size() < worth_threads || m_ < first_look) return;
     first_nearest_.resize(positions.size() * first_look);
-    ahead_ = std::thread([this] { search_ahead(); });
+    ahead_ = Thread([this] { search_ahead(); });
 }
 
 UnvisitedNear::~UnvisitedNear() {

@@ -9,13 +9,13 @@
 #include <cmath>
 #include <cstdint>
 #include <span>
-#include <thread>
 #include <vector>
 
 #include "codec/mtfan.h"
 #include "codec/nearest_order.h"
 #include "codec/tfan_syntax.h"
 #include "core/lattice.h"
+#include "core/thread.h"
 
 namespace htvm {
 
@@ -87,7 +87,7 @@ private:
     std::vector<std::uint32_t> first_nearest_;  // by vertex, first_look each, of the vertices below searched_
     std::atomic<std::size_t> searched_ = 0;
     std::atomic<bool> stop_ = false;
-    std::thread ahead_;
+    Thread ahead_;
     std::vector<bool> visited_;
     std::uint32_t focus_;  // whose nearest vertices `nearest_` holds
     std::size_t found_ = 0, looked_ = 0, count_ = 0;

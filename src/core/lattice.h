@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/exact_arithmetic.h"
+
 namespace htvm {
 
 // Lattice coordinates. The lattice step is 2^-lattice_bits mm. |x|, |y|, |z| <= lattice_limit for every decoded

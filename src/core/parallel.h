@@ -6,19 +6,15 @@
 #include <atomic>
 #include <cstddef>
 #include <exception>
-#include <thread>
 #include <vector>
+
+#include "core/thread.h"
 
 namespace htvm {
 
-// Threads to use for a requested count; 0 asks for one per core.
-inline unsigned thread_count(unsigned requested) {
-    return requested > 0 ? requested : std::max(1u, std::thread::hardware_concurrency());
-}
-
 // The exception of whichever thread failed first. A thread that an exception leaves would end the process.
 struct FirstFailure {
-    std::atomic_flag taken = ATOMIC_FLAG_INIT;
+    std::atomic_flag taken;
     std::exception_ptr exception;
 
     // Calls work(); an exception stays here.
@@ -38,9 +34,9 @@ struct FirstFailure {
 
 // A thread that calls work(), which must not throw; where none can be started, work() has been called here.
 template <class Work>
-std::thread start_or_run(const Work& work) {
+Thread start_or_run(const Work& work) {
     try {
-        return std::thread(work);
+        return Thread(work);
     } catch (const std::exception&) {  // system_error: no thread to be had; bad_alloc: no memory for one
         work();
         return {};
@@ -61,7 +57,7 @@ void parallel_for(std::size_t count, unsigned threads, std::size_t grain, const 
     }
     FirstFailure failure;
     auto run = [&](std::size_t p) { failure.guard([&] { body(count * p / pieces, count * (p + 1) / pieces); }); };
-    std::vector<std::thread> workers;
+    std::vector<Thread> workers;
     workers.reserve(pieces - 1);
     for (std::size_t p = 1; p < pieces; ++p) workers.push_back(start_or_run([&run, p] { run(p); }));
     run(0);
