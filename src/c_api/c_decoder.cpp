@@ -1,0 +1,299 @@
+// The decoder's part of the C interface, over htvm::Decoder.
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "c_api/c_status.h"
+#include "codec/lattice_mesh.h"  // libc++ wants it whole where DecoderOptions are moved
+#include "htvm/decoder.hpp"
+
+using htvm::c_api::check_struct;
+using htvm::c_api::guarded;
+using htvm::c_api::LastError;
+
+struct htvm_decoder {
+    enum class Sent { nothing, packets, bytes };
+
+    htvm_allocator allocator;
+    std::size_t max_packet_bytes;
+    htvm::Decoder decoder;
+    htvm::PacketReader reader;           // of what is sent as bytes
+    std::optional<htvm::Packet> packet;  // sent as such, not yet received
+    std::optional<htvm::DecodedFrame> current;
+    LastError error;
+    Sent sent = Sent::nothing;
+
+    htvm_decoder(const htvm_allocator& memory, const htvm::DecoderOptions& options)
+        : allocator(memory),
+          max_packet_bytes(static_cast<std::size_t>(
+              std::min<std::uint64_t>(options.max_packet_bytes, std::numeric_limits<std::size_t>::max() / 2))),
+          decoder(options),
+          reader(max_packet_bytes) {}
+};
+
+namespace {
+
+htvm_decoder_options default_options() {
+    const htvm::DecoderOptions cpp;
+    htvm_decoder_options out{};
+    out.struct_size = sizeof out;
+    out.threads = cpp.threads;
+    out.max_vertices = cpp.max_vertices;
+    out.max_triangles = cpp.max_triangles;
+    out.max_joints = cpp.max_joints;
+    out.max_bones = cpp.max_bones;
+    out.max_packet_bytes = cpp.max_packet_bytes;
+    out.max_memory = cpp.max_memory;
+    return out;
+}
+
+htvm::DecoderOptions cpp_options(const htvm_decoder_options& options) {
+    htvm::DecoderOptions out;
+    out.threads = options.threads;
+    out.max_vertices = options.max_vertices;
+    out.max_triangles = options.max_triangles;
+    out.max_joints = options.max_joints;
+    out.max_bones = options.max_bones;
+    out.max_packet_bytes = options.max_packet_bytes;
+    out.max_memory = options.max_memory;
+    return out;
+}
+
+htvm_status no_frame(LastError& error) {
+    return error.set(HTVM_BAD_INPUT, "there is no current frame: receive one first");
+}
+
+htvm_status describe_current(htvm_decoder& decoder, htvm_frame_info* info, std::size_t info_size) {
+    const auto& frame = *decoder.current;
+    auto out = htvm::c_api::describe(frame.info, htvm::c_api::attributes_of(frame.mesh));
+    out.joints = static_cast<std::uint32_t>(frame.pose.joints.size());
+    out.bones = static_cast<std::uint32_t>(frame.pose.orientations.size());
+    out.concealed = frame.concealed;
+    if (!info) return HTVM_OK;
+    const auto written = htvm::c_api::write_struct(out, info, info_size);
+    return written == HTVM_OK ? HTVM_OK : decoder.error.set(written, "info_size is not sizeof(htvm_frame_info)");
+}
+
+// The next packet to decode, or nothing.
+std::optional<htvm::Packet> next_packet(htvm_decoder& decoder) {
+    if (decoder.sent == htvm_decoder::Sent::bytes) return decoder.reader.pull();
+    return std::exchange(decoder.packet, std::nullopt);
+}
+
+// Copies elements, each N numbers, to the caller's array.
+template <class Element>
+htvm_status copy(LastError& error, const std::vector<Element>& elements, const std::string& name,
+                 typename Element::value_type* out, std::size_t capacity) {
+    const std::size_t count = elements.size() * std::tuple_size_v<Element>;
+    if (capacity < count)
+        return error.set(
+            HTVM_BUFFER_TOO_SMALL,
+            (name + " need room for " + std::to_string(count) + " numbers, not " + std::to_string(capacity)).c_str());
+    if (count == 0) return HTVM_OK;
+    if (!out) return error.set(HTVM_BAD_INPUT, ("the array for the " + name + " is NULL").c_str());
+    std::memcpy(out, elements.data(), count * sizeof(typename Element::value_type));
+    return HTVM_OK;
+}
+
+// The same for an attribute of the current frame's vertices, which it may not have.
+template <class Element>
+htvm_status copy_attribute(htvm_decoder* decoder, std::vector<Element> htvm::Mesh::*attribute, const char* name,
+                           typename Element::value_type* out, std::size_t capacity) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        if (!decoder->current) return no_frame(decoder->error);
+        const auto& mesh = decoder->current->mesh;
+        const auto& elements = mesh.*attribute;
+        if (elements.size() != mesh.positions.size())
+            return decoder->error.set(HTVM_BAD_INPUT, (std::string("the frame has no ") + name).c_str());
+        return copy(decoder->error, elements, name, out, capacity);
+    });
+}
+
+template <class Element>
+htvm_status copy_pose(htvm_decoder* decoder, std::vector<Element> htvm::Pose::*part, const char* name, double* out,
+                      std::size_t capacity) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        if (!decoder->current) return no_frame(decoder->error);
+        return copy(decoder->error, decoder->current->pose.*part, name, out, capacity);
+    });
+}
+
+// Only one way of sending suits a decoder.
+htvm_status check_sent(htvm_decoder& decoder, htvm_decoder::Sent way) {
+    if (decoder.sent != htvm_decoder::Sent::nothing && decoder.sent != way)
+        return decoder.error.set(HTVM_BAD_INPUT, "this decoder is sent packets and bytes: use one or the other");
+    decoder.sent = way;
+    return HTVM_OK;
+}
+
+}  // namespace
+
+htvm_status htvm_decoder_options_init(htvm_decoder_options* options, size_t struct_size) {
+    return htvm::c_api::init_struct(default_options(), options, struct_size);
+}
+
+htvm_status htvm_decoder_create(const htvm_decoder_options* options, htvm_decoder** decoder) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    *decoder = nullptr;
+    LastError error;  // there is no handle yet to keep it in
+    return guarded(error, [&] {
+        auto all = default_options();
+        if (options) {
+            const auto read = check_struct(error, htvm::c_api::read_struct(options, all), "htvm_decoder_options");
+            if (read != HTVM_OK) return read;
+        }
+        if (!htvm::c_api::complete(all.allocator)) return htvm_status{HTVM_BAD_INPUT};
+        *decoder = htvm::c_api::make_handle<htvm_decoder>(all.allocator, all.allocator, cpp_options(all));
+        return *decoder ? htvm_status{HTVM_OK} : htvm_status{HTVM_OUT_OF_MEMORY};
+    });
+}
+
+void htvm_decoder_destroy(htvm_decoder* decoder) {
+    if (decoder) htvm::c_api::destroy_handle(decoder, decoder->allocator);
+}
+
+const char* htvm_decoder_last_error(const htvm_decoder* decoder) { return decoder ? decoder->error.text.data() : ""; }
+
+htvm_status htvm_decoder_send_packet(htvm_decoder* decoder, const uint8_t* packet, size_t size) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        auto& error = decoder->error;
+        if (!packet) return error.set(HTVM_BAD_INPUT, "the packet is NULL");
+        if (const auto ok = check_sent(*decoder, htvm_decoder::Sent::packets); ok != HTVM_OK) return ok;
+        if (decoder->packet) return htvm_status{HTVM_AGAIN};
+        htvm::PacketReader one(decoder->max_packet_bytes);
+        one.push({packet, size});
+        auto whole = one.pull();
+        if (!whole || one.damaged_bytes() > 0 || one.pending_bytes() > 0)
+            return error.set(HTVM_CORRUPT_STREAM,
+                             "what was sent is not one whole, undamaged packet of a size accepted");
+        decoder->packet = std::move(whole);
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_decoder_send_bytes(htvm_decoder* decoder, const uint8_t* bytes, size_t size) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        if (!bytes && size > 0) return decoder->error.set(HTVM_BAD_INPUT, "the bytes are NULL");
+        if (const auto ok = check_sent(*decoder, htvm_decoder::Sent::bytes); ok != HTVM_OK) return ok;
+        if (size > 0) decoder->reader.push({bytes, size});
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* info, size_t info_size) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        decoder->current.reset();
+        while (const auto packet = next_packet(*decoder)) {
+            auto frame = decoder->decoder.push(*packet);
+            if (!frame) return decoder->error.set(frame.error());
+            if (!*frame) continue;
+            decoder->current = std::move(*frame);
+            return describe_current(*decoder, info, info_size);
+        }
+        return htvm_status{HTVM_AGAIN};
+    });
+}
+
+htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t timestamp_us, htvm_frame_info* info,
+                                 size_t info_size) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        decoder->current = decoder->decoder.conceal(frame, timestamp_us);
+        return decoder->current ? describe_current(*decoder, info, info_size) : htvm_status{HTVM_AGAIN};
+    });
+}
+
+htvm_status htvm_decoder_discard(htvm_decoder* decoder) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        decoder->packet.reset();
+        decoder->reader = htvm::PacketReader(decoder->max_packet_bytes);
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* damaged, uint64_t* pending) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    if (damaged) *damaged = decoder->reader.damaged_bytes();
+    if (pending) *pending = decoder->reader.pending_bytes();
+    return HTVM_OK;
+}
+
+htvm_status htvm_decoder_copy_positions(htvm_decoder* decoder, float* positions, size_t capacity) {
+    return copy_attribute(decoder, &htvm::Mesh::positions, "positions", positions, capacity);
+}
+
+htvm_status htvm_decoder_copy_colours(htvm_decoder* decoder, uint8_t* rgb, size_t capacity) {
+    return copy_attribute(decoder, &htvm::Mesh::colours, "colours", rgb, capacity);
+}
+
+htvm_status htvm_decoder_copy_normals(htvm_decoder* decoder, float* normals, size_t capacity) {
+    return copy_attribute(decoder, &htvm::Mesh::normals, "normals", normals, capacity);
+}
+
+htvm_status htvm_decoder_copy_texcoords(htvm_decoder* decoder, float* texcoords, size_t capacity) {
+    return copy_attribute(decoder, &htvm::Mesh::texcoords, "texcoords", texcoords, capacity);
+}
+
+htvm_status htvm_decoder_copy_triangles(htvm_decoder* decoder, uint32_t* indices, size_t capacity) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    return guarded(decoder->error, [&] {
+        if (!decoder->current) return no_frame(decoder->error);
+        return copy(decoder->error, decoder->current->mesh.triangles, "triangles", indices, capacity);
+    });
+}
+
+htvm_status htvm_decoder_copy_joints(htvm_decoder* decoder, double* joints, size_t capacity) {
+    return copy_pose(decoder, &htvm::Pose::joints, "joints", joints, capacity);
+}
+
+htvm_status htvm_decoder_copy_orientations(htvm_decoder* decoder, double* rotations, size_t capacity) {
+    return copy_pose(decoder, &htvm::Pose::orientations, "orientations", rotations, capacity);
+}
+
+htvm_status htvm_decoder_sequence(htvm_decoder* decoder, htvm_sequence_info* info, size_t info_size) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    const auto& sequence = decoder->decoder.sequence();
+    if (!sequence) return HTVM_AGAIN;
+    htvm_sequence_info out{};
+    out.joints = static_cast<std::uint32_t>(sequence->skeleton.joint_names.size());
+    out.bones = static_cast<std::uint32_t>(sequence->skeleton.bones.size());
+    out.skeleton_tracked = sequence->skeleton_tracked;
+    out.fps_numerator = sequence->fps_numerator;
+    out.fps_denominator = sequence->fps_denominator;
+    out.unit_micrometres = sequence->unit_micrometres;
+    out.nearest_vertices = static_cast<std::uint32_t>(sequence->nearest_vertices);
+    out.lattice_step = sequence->lattice_step;
+    const auto written = htvm::c_api::write_struct(out, info, info_size);
+    return written == HTVM_OK ? HTVM_OK : decoder->error.set(written, "info is NULL or info_size not its sizeof");
+}
+
+htvm_status htvm_decoder_joint_name(htvm_decoder* decoder, uint32_t joint, char* name, size_t capacity) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    const auto& sequence = decoder->decoder.sequence();
+    if (!sequence) return HTVM_AGAIN;
+    const auto& names = sequence->skeleton.joint_names;
+    if (joint >= names.size() || !name) return decoder->error.set(HTVM_BAD_INPUT, "no such joint, or name is NULL");
+    if (capacity < names[joint].size() + 1)
+        return decoder->error.set(HTVM_BUFFER_TOO_SMALL, "the joint's name is longer than its array");
+    std::memcpy(name, names[joint].c_str(), names[joint].size() + 1);
+    return HTVM_OK;
+}
+
+htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* first, uint32_t* second, double* radius) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    const auto& sequence = decoder->decoder.sequence();
+    if (!sequence) return HTVM_AGAIN;
+    if (bone >= sequence->skeleton.bones.size()) return decoder->error.set(HTVM_BAD_INPUT, "there is no such bone");
+    if (first) *first = sequence->skeleton.bones[bone].first;
+    if (second) *second = sequence->skeleton.bones[bone].second;
+    if (radius) *radius = sequence->radii[bone];
+    return HTVM_OK;
+}

@@ -1,0 +1,130 @@
+#include "c_api/c_status.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "codec/sequence_header.h"
+
+namespace htvm::c_api {
+namespace {
+
+void* allocate_by_malloc(void*, std::size_t bytes) { return std::malloc(bytes); }
+void release_by_free(void*, void* memory) { std::free(memory); }
+
+}  // namespace
+
+htvm_status status_of(ErrorKind kind) {
+    switch (kind) {
+        case ErrorKind::bad_input:
+            return HTVM_BAD_INPUT;
+        case ErrorKind::corrupt_stream:
+            return HTVM_CORRUPT_STREAM;
+        case ErrorKind::unsupported:
+            return HTVM_UNSUPPORTED;
+        case ErrorKind::limit:
+            return HTVM_LIMIT;
+    }
+    return HTVM_INTERNAL;
+}
+
+htvm_status LastError::set(htvm_status status, const char* message) {
+    const std::string_view words = message;
+    const std::size_t length = std::min(words.size(), text.size() - 1);
+    std::copy_n(words.begin(), length, text.begin());
+    text[length] = '\0';
+    return status;
+}
+
+bool complete(htvm_allocator& allocator) {
+    if (!allocator.allocate && !allocator.release) {
+        allocator.allocate = allocate_by_malloc;
+        allocator.release = release_by_free;
+    }
+    return allocator.allocate && allocator.release;
+}
+
+htvm_status check_struct(LastError& error, StructSize size, const char* name) {
+    switch (size) {
+        case StructSize::good:
+            return HTVM_OK;
+        case StructSize::never_set:
+            return error.set(HTVM_BAD_INPUT, (std::string(name) + ".struct_size was not set by its _init").c_str());
+        case StructSize::from_a_later_version:
+            return error.set(HTVM_UNSUPPORTED,
+                             (std::string(name) + " has a member set that only a later version knows").c_str());
+    }
+    return HTVM_INTERNAL;
+}
+
+std::uint32_t attributes_of(const Mesh& mesh) {
+    std::uint32_t out = 0;
+    if (!mesh.colours.empty()) out |= HTVM_COLOURS;
+    if (!mesh.normals.empty()) out |= HTVM_NORMALS;
+    if (!mesh.texcoords.empty()) out |= HTVM_TEXCOORDS;
+    return out;
+}
+
+htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes) {
+    htvm_frame_info out{};
+    out.attributes = attributes;
+    switch (info.type) {
+        case FrameType::intra:
+            out.type = HTVM_FRAME_INTRA;
+            break;
+        case FrameType::enhanced:
+            out.type = HTVM_FRAME_ENHANCED;
+            break;
+        case FrameType::predicted:
+            out.type = HTVM_FRAME_PREDICTED;
+            break;
+        case FrameType::tracked:
+            out.type = HTVM_FRAME_TRACKED;
+            break;
+    }
+    out.frame = info.frame;
+    out.reference = info.reference;
+    out.timestamp_us = info.timestamp_us;
+    out.source_vertices = info.source_vertices;
+    out.source_triangles = info.source_triangles;
+    out.vertices = info.vertices;
+    out.triangles = info.triangles;
+    out.bytes = info.bytes.total();
+    return out;
+}
+
+}  // namespace htvm::c_api
+
+uint32_t htvm_version() { return HTVM_VERSION_MAJOR << 16 | HTVM_VERSION_MINOR << 8 | HTVM_VERSION_PATCH; }
+
+const char* htvm_version_string() { return "0.1.0"; }
+
+uint32_t htvm_stream_version() { return htvm::stream_version; }
+
+const char* htvm_status_text(htvm_status status) {
+    switch (status) {
+        case HTVM_OK:
+            return "success";
+        case HTVM_AGAIN:
+            return "nothing to receive until more is sent";
+        case HTVM_END:
+            return "nothing to receive any more";
+        case HTVM_BAD_INPUT:
+            return "the call or what it was given is wrong";
+        case HTVM_CORRUPT_STREAM:
+            return "the stream is corrupt";
+        case HTVM_UNSUPPORTED:
+            return "not supported by this version";
+        case HTVM_LIMIT:
+            return "larger than a configured limit";
+        case HTVM_OUT_OF_MEMORY:
+            return "there is not enough memory";
+        case HTVM_BUFFER_TOO_SMALL:
+            return "the caller's array is too short";
+        case HTVM_INTERNAL:
+            return "a fault of the library";
+        default:
+            return "no status of this version";
+    }
+}

@@ -1,0 +1,86 @@
+#!/usr/bin/env bash
+# Same bits everywhere: builds the decoder by several compilers and for several machines, decodes the conformance
+# streams with each and holds every frame against the digests stored. Prints a table; fails unless all agree.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+
+streams=tests/data/conformance
+out=build/digests
+failures=0
+digests=()
+
+seconds() { awk -v from="$1" -v to="$(date +%s.%N)" 'BEGIN { printf "%.1f", to - from }'; }
+
+row() { printf '%-24s %8s %10s %8s %8s  %s\n' "$@"; }
+
+# run NAME BUILD_SECONDS THREADS COMMAND...: one row of the table.
+run() {
+    local name=$1 built=$2 threads=$3 begin said
+    shift 3
+    begin=$(date +%s.%N)
+    if said=$("$@" 2>&1); then
+        read -r _ frames _ digest <<<"$(tail -1 <<<"$said")"
+        row "$name" "$built" "$(seconds "$begin")" "$threads" "$frames" "$digest"
+        digests+=("$digest")
+    else
+        row "$name" "$built" "$(seconds "$begin")" "$threads" "" "FAILED"
+        printf '%s\n' "$said"
+        failures=$((failures + 1))
+    fi
+}
+
+# build TARGET: prints how long it took.
+build() {
+    local begin
+    begin=$(date +%s.%N)
+    ninja -f $out/build.ninja "$1" >$out/log || { cat $out/log >&2; return 1; }
+    seconds "$begin"
+}
+
+# refused NAME COMMAND...: a build that must not succeed, because it would decode to other bits.
+refused() {
+    local name=$1 words=$2 begin said
+    shift 2
+    begin=$(date +%s.%N)
+    if ! said=$("$@" 2>&1) && grep -q "$words" <<<"$said"; then
+        row "$name" "$(seconds "$begin")" "" "" "" "refused"
+    else
+        row "$name" "$(seconds "$begin")" "" "" "" "FAILED: not refused"
+        failures=$((failures + 1))
+    fi
+}
+
+mkdir -p $out/include
+ln -sfn /usr/include/tl $out/include/tl # the one header of others, for the machine that is not this one
+tests/digests/ninja_file.sh >$out/build.ninja
+
+row build "build, s" "decode, s" threads frames "digest of all"
+for name in gcc-O0 gcc-O3-native clang-O2 gcc-O2-32bit; do
+    if built=$(build $out/$name/digests); then
+        run $name "$built" 1 $out/$name/digests 1 $streams/*.htvm
+        run $name "" 4 $out/$name/digests 4 $streams/*.htvm
+    else
+        row $name "" "" "" "" "FAILED to build"
+        failures=$((failures + 1))
+    fi
+done
+if built=$(build $out/wasm-O2/digests); then
+    run wasm-O2 "$built" none node --no-warnings tests/wasm/digests.mjs $out/wasm-O2/digests $streams \
+        $(cd $streams && ls ./*.htvm)
+else
+    row wasm-O2 "" "" "" "" "FAILED to build"
+    failures=$((failures + 1))
+fi
+source=src/core/crc32.cpp
+compile=(g++ -std=c++20 -Iinclude -Isrc -fsyntax-only -include src/core/exact_arithmetic.h $source)
+refused "-ffast-math" "must be compiled without" "${compile[@]}" -ffast-math
+refused "-m32, no SSE" "no extended precision" "${compile[@]}" -m32
+refused "-ffp-contract=fast" "CMAKE_CXX_FLAGS has -ffp-contract=fast" cmake -S . -B $out/refused "-DCMAKE_CXX_FLAGS=-ffp-contract=fast"
+
+echo
+$out/gcc-O0/digests 1 $streams/*.htvm || true
+if [ "$(printf '%s\n' "${digests[@]}" | sort -u | wc -l)" -ne 1 ] || [ $failures -gt 0 ]; then
+    echo "FAILED: the builds do not agree"
+    exit 1
+fi
+echo "All ${#digests[@]} runs agree with each other and with the digests stored."
