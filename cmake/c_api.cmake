@@ -1,3 +1,14 @@
 # The C interface (htvm/htvm.h): the decoder's part, which needs the standard library alone, and with it the encoder's.
 htvm_floor(c_decoder SOURCES src/c_api/c_status.cpp src/c_api/c_decoder.cpp LINKS htvm_decoder)
 htvm_floor(c SOURCES src/c_api/c_encoder.cpp LINKS htvm_c_decoder htvm_encoder)
+
+# The examples, in C99: the header must be C, and its library be linked by a C program.
+if(HTVM_BUILD_TESTS)
+  enable_language(C)
+  foreach(example encode decode)
+    add_executable(example_${example} examples/${example}.c)
+    set_target_properties(example_${example} PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+  endforeach()
+  target_link_libraries(example_encode PRIVATE htvm_c)
+  target_link_libraries(example_decode PRIVATE htvm_c_decoder)
+endif()

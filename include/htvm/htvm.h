@@ -49,7 +49,7 @@ extern "C" {
 
 /* Of the library that is linked: major * 65536 + minor * 256 + patch, and as text, "0.1.0". */
 uint32_t htvm_version(void);
-const char *htvm_version_string(void);
+const char* htvm_version_string(void);
 /* Of the stream that it writes and reads (docs/bitstream.md). */
 uint32_t htvm_stream_version(void);
 
@@ -58,44 +58,44 @@ uint32_t htvm_stream_version(void);
 typedef int32_t htvm_status; /* one of: */
 enum {
     HTVM_OK = 0,
-    HTVM_AGAIN = 1,            /* nothing to receive until more is sent; to send: receive first */
-    HTVM_END = 2,              /* nothing to receive any more */
-    HTVM_BAD_INPUT = -1,       /* the call is wrong: NULL, an option or mesh out of its range, calls in wrong order */
-    HTVM_CORRUPT_STREAM = -2,  /* the stream's bytes contradict themselves or end too early */
-    HTVM_UNSUPPORTED = -3,     /* valid, but this version cannot do it */
-    HTVM_LIMIT = -4,           /* larger than a configured limit */
-    HTVM_OUT_OF_MEMORY = -5,   /* an allocation failed */
+    HTVM_AGAIN = 1,             /* nothing to receive until more is sent; to send: receive first */
+    HTVM_END = 2,               /* nothing to receive any more */
+    HTVM_BAD_INPUT = -1,        /* the call is wrong: NULL, an option or mesh out of its range, calls in wrong order */
+    HTVM_CORRUPT_STREAM = -2,   /* the stream's bytes contradict themselves or end too early */
+    HTVM_UNSUPPORTED = -3,      /* valid, but this version cannot do it */
+    HTVM_LIMIT = -4,            /* larger than a configured limit */
+    HTVM_OUT_OF_MEMORY = -5,    /* an allocation failed */
     HTVM_BUFFER_TOO_SMALL = -6, /* the caller's array is too short; nothing was written to it */
-    HTVM_INTERNAL = -7         /* a fault of the library: please report it */
+    HTVM_INTERNAL = -7          /* a fault of the library: please report it */
 };
 
 /* The status in a few words, never NULL. */
-const char *htvm_status_text(htvm_status status);
+const char* htvm_status_text(htvm_status status);
 
 /* ---- memory --------------------------------------------------------------------------------------------------- */
 
-/* Where a handle is kept: that is all that this interface allocates itself. Both functions NULL: malloc and free. It does
- * not cover what the codec below works with (meshes, tables, packets under way): that comes from C++'s operator new,
- * which a program may replace, and for a decoder is bounded by htvm_decoder_options.max_memory. */
+/* Where a handle is kept: that is all that this interface allocates itself. Both functions NULL: malloc and free. It
+ * does not cover what the codec below works with (meshes, tables, packets under way): that comes from C++'s operator
+ * new, which a program may replace, and for a decoder is bounded by htvm_decoder_options.max_memory. */
 typedef struct htvm_allocator {
-    void *user;                                  /* handed to the functions as it is */
-    void *(*allocate)(void *user, size_t bytes); /* aligned as malloc's; NULL: there is none */
-    void (*release)(void *user, void *memory);   /* memory is never NULL */
+    void* user;                                  /* handed to the functions as it is */
+    void* (*allocate)(void* user, size_t bytes); /* aligned as malloc's; NULL: there is none */
+    void (*release)(void* user, void* memory);   /* memory is never NULL */
 } htvm_allocator;
 
 /* ---- frames --------------------------------------------------------------------------------------------------- */
 
-enum { /* type of a frame */
-    HTVM_FRAME_INTRA = 0,     /* by itself */
-    HTVM_FRAME_ENHANCED = 1,  /* against the last I-frame, with connectivity of its own */
-    HTVM_FRAME_PREDICTED = 2, /* the last I-frame's mesh moved */
-    HTVM_FRAME_TRACKED = 3    /* the last I-frame's mesh laid on the captured surface */
+enum {                           /* type of a frame */
+       HTVM_FRAME_INTRA = 0,     /* by itself */
+       HTVM_FRAME_ENHANCED = 1,  /* against the last I-frame, with connectivity of its own */
+       HTVM_FRAME_PREDICTED = 2, /* the last I-frame's mesh moved */
+       HTVM_FRAME_TRACKED = 3    /* the last I-frame's mesh laid on the captured surface */
 };
 
 enum { /* attributes of a mesh beside positions: bits */
-    HTVM_COLOURS = 1,
-    HTVM_NORMALS = 2,
-    HTVM_TEXCOORDS = 4
+       HTVM_COLOURS = 1,
+       HTVM_NORMALS = 2,
+       HTVM_TEXCOORDS = 4
 };
 
 typedef struct htvm_frame_info {
@@ -117,8 +117,8 @@ typedef struct htvm_frame_info {
 typedef struct htvm_decoder htvm_decoder;
 
 typedef struct htvm_decoder_options {
-    uint32_t struct_size;   /* set by htvm_decoder_options_init() */
-    uint32_t threads;       /* 0: one a core; the meshes are the same for any number. 0 */
+    uint32_t struct_size; /* set by htvm_decoder_options_init() */
+    uint32_t threads;     /* 0: one a core; the meshes are the same for any number. 0 */
     /* What is larger is refused with HTVM_LIMIT before memory is taken for it. */
     uint32_t max_vertices;     /* of a frame. 2^22 */
     uint32_t max_triangles;    /* of a frame. 2^23 */
@@ -129,55 +129,57 @@ typedef struct htvm_decoder_options {
     htvm_allocator allocator;  /* malloc and free */
 } htvm_decoder_options;
 
-/* Sets the first struct_size bytes of options to the defaults above. HTVM_BAD_INPUT where struct_size is less than 8. */
-htvm_status htvm_decoder_options_init(htvm_decoder_options *options, size_t struct_size);
+/* Sets the first struct_size bytes of options to the defaults above. HTVM_BAD_INPUT where struct_size is less than 8.
+ */
+htvm_status htvm_decoder_options_init(htvm_decoder_options* options, size_t struct_size);
 
 /* Makes a decoder. options: NULL for the defaults. *decoder is set to NULL unless the status is HTVM_OK: HTVM_BAD_INPUT
  * (one allocator function without the other, a struct_size that no init gave), HTVM_UNSUPPORTED (an option that only a
  * later version knows), HTVM_OUT_OF_MEMORY. */
-htvm_status htvm_decoder_create(const htvm_decoder_options *options, htvm_decoder **decoder);
-void htvm_decoder_destroy(htvm_decoder *decoder);
+htvm_status htvm_decoder_create(const htvm_decoder_options* options, htvm_decoder** decoder);
+void htvm_decoder_destroy(htvm_decoder* decoder);
 
 /* What the last call on this handle that failed had to say: one sentence, "" before any did. Valid until the next call
  * on it. Of a NULL handle: "". */
-const char *htvm_decoder_last_error(const htvm_decoder *decoder);
+const char* htvm_decoder_last_error(const htvm_decoder* decoder);
 
 /* Sends one whole packet (header, payload and checksums, as the encoder gives it); the bytes are copied. For transports
  * that keep packets apart. HTVM_AGAIN: the packet before is still to be received, and this one was not taken.
  * HTVM_CORRUPT_STREAM: not one whole, undamaged packet, or beyond max_packet_bytes. HTVM_BAD_INPUT also after
  * htvm_decoder_send_bytes(): a decoder takes one or the other. */
-htvm_status htvm_decoder_send_packet(htvm_decoder *decoder, const uint8_t *packet, size_t size);
+htvm_status htvm_decoder_send_packet(htvm_decoder* decoder, const uint8_t* packet, size_t size);
 
 /* Sends the next piece, of any size, of a .htvm stream; the bytes are copied. Damage costs the packets that it touches:
  * the decoder goes on at the next whole one. Receive all frames after each call, or the bytes pile up. */
-htvm_status htvm_decoder_send_bytes(htvm_decoder *decoder, const uint8_t *bytes, size_t size);
+htvm_status htvm_decoder_send_bytes(htvm_decoder* decoder, const uint8_t* bytes, size_t size);
 
 /* Decodes up to the next frame, which is then the current one, and says of what size it is. HTVM_AGAIN: none until more
  * is sent. HTVM_CORRUPT_STREAM, HTVM_UNSUPPORTED, HTVM_LIMIT, HTVM_OUT_OF_MEMORY: a packet could not be decoded and is
  * done with; call again for those after it. After any failure there is no current frame. info: may be NULL. */
-htvm_status htvm_decoder_receive_frame(htvm_decoder *decoder, htvm_frame_info *info, size_t info_size);
+htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* info, size_t info_size);
 
 /* Makes the current frame a stand-in for one that did not arrive or could not be decoded: the last I-frame's mesh moved
  * as the last frame was. frame, timestamp_us: the missing one's. HTVM_AGAIN before any I-frame. */
-htvm_status htvm_decoder_conceal(htvm_decoder *decoder, uint32_t frame, int64_t timestamp_us, htvm_frame_info *info,
+htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t timestamp_us, htvm_frame_info* info,
                                  size_t info_size);
 
 /* Forgets what was sent and not received, as for a seek. The sequence header and the last I-frame stay known. */
-htvm_status htvm_decoder_discard(htvm_decoder *decoder);
+htvm_status htvm_decoder_discard(htvm_decoder* decoder);
 
 /* Bytes that were passed over as damage so far, and bytes that are not part of a whole packet yet: at the end of a
  * stream, a packet cut short. Either may be NULL. Both 0 with htvm_decoder_send_packet(). */
-htvm_status htvm_decoder_unused_bytes(const htvm_decoder *decoder, uint64_t *damaged, uint64_t *pending);
+htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* damaged, uint64_t* pending);
 
 /* The current frame's arrays, copied into the caller's. HTVM_BAD_INPUT: there is no current frame, or it has no such
- * attribute. HTVM_BUFFER_TOO_SMALL: capacity is below what is said behind. A NULL array with nothing to copy is fine. */
-htvm_status htvm_decoder_copy_positions(htvm_decoder *decoder, float *positions, size_t capacity);     /* 3 a vertex */
-htvm_status htvm_decoder_copy_triangles(htvm_decoder *decoder, uint32_t *indices, size_t capacity);    /* 3 a triangle */
-htvm_status htvm_decoder_copy_colours(htvm_decoder *decoder, uint8_t *rgb, size_t capacity);           /* 3 a vertex */
-htvm_status htvm_decoder_copy_normals(htvm_decoder *decoder, float *normals, size_t capacity);         /* 3 a vertex */
-htvm_status htvm_decoder_copy_texcoords(htvm_decoder *decoder, float *texcoords, size_t capacity);     /* 2 a vertex */
-htvm_status htvm_decoder_copy_joints(htvm_decoder *decoder, double *joints, size_t capacity);          /* 3 a joint */
-htvm_status htvm_decoder_copy_orientations(htvm_decoder *decoder, double *rotations, size_t capacity); /* 9 a bone */
+ * attribute. HTVM_BUFFER_TOO_SMALL: capacity is below what is said behind. A NULL array with nothing to copy is fine.
+ */
+htvm_status htvm_decoder_copy_positions(htvm_decoder* decoder, float* positions, size_t capacity);  /* 3 a vertex */
+htvm_status htvm_decoder_copy_triangles(htvm_decoder* decoder, uint32_t* indices, size_t capacity); /* 3 a triangle */
+htvm_status htvm_decoder_copy_colours(htvm_decoder* decoder, uint8_t* rgb, size_t capacity);        /* 3 a vertex */
+htvm_status htvm_decoder_copy_normals(htvm_decoder* decoder, float* normals, size_t capacity);      /* 3 a vertex */
+htvm_status htvm_decoder_copy_texcoords(htvm_decoder* decoder, float* texcoords, size_t capacity);  /* 2 a vertex */
+htvm_status htvm_decoder_copy_joints(htvm_decoder* decoder, double* joints, size_t capacity);       /* 3 a joint */
+htvm_status htvm_decoder_copy_orientations(htvm_decoder* decoder, double* rotations, size_t capacity); /* 9 a bone */
 
 typedef struct htvm_sequence_info {
     uint32_t struct_size; /* bytes of this struct that were filled */
@@ -186,35 +188,35 @@ typedef struct htvm_sequence_info {
     uint32_t fps_numerator, fps_denominator; /* frames a second */
     uint32_t unit_micrometres;               /* the unit that the capture came in */
     uint32_t nearest_vertices;               /* m of the distance order */
-    double lattice_step; /* mm: decoded positions are multiples of it from the origin */
+    double lattice_step;                     /* mm: decoded positions are multiples of it from the origin */
 } htvm_sequence_info;
 
 /* What the sequence header says. HTVM_AGAIN until one was decoded. */
-htvm_status htvm_decoder_sequence(htvm_decoder *decoder, htvm_sequence_info *info, size_t info_size);
+htvm_status htvm_decoder_sequence(htvm_decoder* decoder, htvm_sequence_info* info, size_t info_size);
 
 /* The joint's name in UTF-8, ended by a 0. HTVM_BUFFER_TOO_SMALL below its length + 1; 256 are always enough. */
-htvm_status htvm_decoder_joint_name(htvm_decoder *decoder, uint32_t joint, char *name, size_t capacity);
+htvm_status htvm_decoder_joint_name(htvm_decoder* decoder, uint32_t joint, char* name, size_t capacity);
 
 /* The bone's two joints, first the one that it turns about, and its radius, mm. Each may be NULL. */
-htvm_status htvm_decoder_bone(htvm_decoder *decoder, uint32_t bone, uint32_t *first, uint32_t *second, double *radius);
+htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* first, uint32_t* second, double* radius);
 
 /* ---- encoder -------------------------------------------------------------------------------------------------- */
 
 typedef struct htvm_encoder htvm_encoder;
 
-enum { /* frame_choice */
-    HTVM_CHOICE_FIXED = 0,          /* an I-frame every key_interval frames, EP-frames between */
-    HTVM_CHOICE_MOTION = 1,         /* by skeletal motion since the last I-frame */
-    HTVM_CHOICE_RATE_DISTORTION = 2 /* by measured bits and errors */
+enum {                                 /* frame_choice */
+       HTVM_CHOICE_FIXED = 0,          /* an I-frame every key_interval frames, EP-frames between */
+       HTVM_CHOICE_MOTION = 1,         /* by skeletal motion since the last I-frame */
+       HTVM_CHOICE_RATE_DISTORTION = 2 /* by measured bits and errors */
 };
 
 /* The skeleton of the sequence: constant over it. All arrays are copied by htvm_encoder_create(). */
 typedef struct htvm_skeleton {
     uint32_t struct_size;           /* set by htvm_skeleton_init() */
     uint32_t joints, bones;         /* 0, 0: the capture has no skeleton */
-    const uint16_t *bone_joints;    /* 2 a bone: the joint that it turns about, and the other */
-    const char *const *joint_names; /* one a joint, UTF-8, or NULL */
-    const double *radii;            /* mm, one a bone, or NULL: calibrated on the first frame */
+    const uint16_t* bone_joints;    /* 2 a bone: the joint that it turns about, and the other */
+    const char* const* joint_names; /* one a joint, UTF-8, or NULL */
+    const double* radii;            /* mm, one a bone, or NULL: calibrated on the first frame */
 } htvm_skeleton;
 
 /* What each option means in full, with measurements: include/htvm/encoder.hpp, docs/algorithm.md. */
@@ -246,7 +248,7 @@ typedef struct htvm_encoder_options {
     int32_t lattice_bits;        /* positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is. 0 */
     uint32_t unit_micrometres;   /* the capture's own unit, for the decoder. 1000 */
     uint32_t fps_numerator, fps_denominator; /* 30, 1 */
-    const htvm_skeleton *skeleton;           /* NULL: the capture has none */
+    const htvm_skeleton* skeleton;           /* NULL: the capture has none */
     htvm_allocator allocator;                /* malloc and free */
 } htvm_encoder_options;
 
@@ -255,60 +257,61 @@ typedef struct htvm_encoder_options {
 typedef struct htvm_mesh {
     uint32_t struct_size; /* set by htvm_mesh_init() */
     uint32_t vertices, triangles;
-    uint32_t reserved;         /* 0 */
-    const float *positions;    /* mm, 3 a vertex */
-    const uint32_t *indices;   /* 3 a triangle, counter-clockwise seen from outside */
-    const uint8_t *colours;    /* red, green, blue a vertex */
-    const float *normals;      /* 3 a vertex, unit length */
-    const float *texcoords;    /* 2 a vertex */
+    uint32_t reserved;       /* 0 */
+    const float* positions;  /* mm, 3 a vertex */
+    const uint32_t* indices; /* 3 a triangle, counter-clockwise seen from outside */
+    const uint8_t* colours;  /* red, green, blue a vertex */
+    const float* normals;    /* 3 a vertex, unit length */
+    const float* texcoords;  /* 2 a vertex */
 } htvm_mesh;
 
 /* The skeleton in this frame. */
 typedef struct htvm_pose {
     uint32_t struct_size;       /* set by htvm_pose_init() */
     uint32_t reserved;          /* 0 */
-    const double *joints;       /* mm, 3 a joint of the skeleton */
-    const double *orientations; /* 9 a bone, or NULL: derived from the joints */
-    const uint8_t *tracked;     /* one a joint, 0: the position is a guess; NULL: all tracked */
+    const double* joints;       /* mm, 3 a joint of the skeleton */
+    const double* orientations; /* 9 a bone, or NULL: derived from the joints */
+    const uint8_t* tracked;     /* one a joint, 0: the position is a guess; NULL: all tracked */
 } htvm_pose;
 
 /* Set the first struct_size bytes to the defaults: of options, those above; of the others, all 0. */
-htvm_status htvm_encoder_options_init(htvm_encoder_options *options, size_t struct_size);
-htvm_status htvm_skeleton_init(htvm_skeleton *skeleton, size_t struct_size);
-htvm_status htvm_mesh_init(htvm_mesh *mesh, size_t struct_size);
-htvm_status htvm_pose_init(htvm_pose *pose, size_t struct_size);
+htvm_status htvm_encoder_options_init(htvm_encoder_options* options, size_t struct_size);
+htvm_status htvm_skeleton_init(htvm_skeleton* skeleton, size_t struct_size);
+htvm_status htvm_mesh_init(htvm_mesh* mesh, size_t struct_size);
+htvm_status htvm_pose_init(htvm_pose* pose, size_t struct_size);
 
 /* The steps of a quality of 0..100 that means the same error whatever the capture: 16 mm at 0, 2 mm at 50, 0.25 mm at
  * 100. Either may be NULL. */
-void htvm_quality_steps(double quality, double *geometry_step, double *colour_step);
+void htvm_quality_steps(double quality, double* geometry_step, double* colour_step);
 
 /* Makes an encoder. options: NULL for the defaults. *encoder is set to NULL unless the status is HTVM_OK:
  * HTVM_BAD_INPUT (an option out of its range or at odds with another; text, where not NULL, is set to a
- * sentence about it of up to text_capacity characters, the closing 0 included), HTVM_UNSUPPORTED, HTVM_OUT_OF_MEMORY. */
-htvm_status htvm_encoder_create(const htvm_encoder_options *options, htvm_encoder **encoder, char *text,
+ * sentence about it of up to text_capacity characters, the closing 0 included), HTVM_UNSUPPORTED, HTVM_OUT_OF_MEMORY.
+ */
+htvm_status htvm_encoder_create(const htvm_encoder_options* options, htvm_encoder** encoder, char* text,
                                 size_t text_capacity);
-void htvm_encoder_destroy(htvm_encoder *encoder);
+void htvm_encoder_destroy(htvm_encoder* encoder);
 
 /* As htvm_decoder_last_error(). */
-const char *htvm_encoder_last_error(const htvm_encoder *encoder);
+const char* htvm_encoder_last_error(const htvm_encoder* encoder);
 
-/* Codes one frame; the arrays are read during the call only. pose: of the options' skeleton; NULL where the tracker lost
- * it, or there is none. Timestamps must ascend. force_intra: 1 for an I-frame. HTVM_BAD_INPUT: the mesh or pose is wrong;
- * HTVM_LIMIT: under rate control, a frame that the buffer cannot hold. After an error the frame is not part of the
- * stream, and the next may be sent. */
-htvm_status htvm_encoder_send_mesh(htvm_encoder *encoder, const htvm_mesh *mesh, const htvm_pose *pose,
+/* Codes one frame; the arrays are read during the call only. pose: of the options' skeleton; NULL where the tracker
+ * lost it, or there is none. Timestamps must ascend. force_intra: 1 for an I-frame. HTVM_BAD_INPUT: the mesh or pose is
+ * wrong; HTVM_LIMIT: under rate control, a frame that the buffer cannot hold. After an error the frame is not part of
+ * the stream, and the next may be sent. */
+htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh, const htvm_pose* pose,
                                    int64_t timestamp_us, int force_intra);
 
 /* Ends the sequence. No mesh may be sent after it. */
-htvm_status htvm_encoder_finish(htvm_encoder *encoder);
+htvm_status htvm_encoder_finish(htvm_encoder* encoder);
 
 /* Copies the next packet, ready to store or send. *size is set to its bytes; HTVM_BUFFER_TOO_SMALL where capacity is
- * less, and the packet stays to be received (so a capacity of 0 asks for the size). HTVM_AGAIN: none until more is sent;
- * HTVM_END: none any more. A stream in a file is its packets one behind the other. */
-htvm_status htvm_encoder_receive_packet(htvm_encoder *encoder, uint8_t *buffer, size_t capacity, size_t *size);
+ * less, and the packet stays to be received (so a capacity of 0 asks for the size). HTVM_AGAIN: none until more is
+ * sent; HTVM_END: none any more. A stream in a file is its packets one behind the other. */
+htvm_status htvm_encoder_receive_packet(htvm_encoder* encoder, uint8_t* buffer, size_t capacity, size_t* size);
 
 /* Of the last frame sent: what it is and how many bytes it took. HTVM_AGAIN before any. */
-htvm_status htvm_encoder_last_frame(htvm_encoder *encoder, htvm_frame_info *info, size_t info_size);
+htvm_status htvm_encoder_last_frame(htvm_encoder* encoder, htvm_frame_info* info, size_t info_size);
 
 #ifdef __cplusplus
 }

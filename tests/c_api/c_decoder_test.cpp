@@ -1,0 +1,343 @@
+// The C interface's decoder gives what the C++ one gives, and survives callers who do as they should not.
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "c_api/c_test_streams.h"
+
+namespace htvm {
+namespace {
+
+using namespace test;
+
+using Handle = std::unique_ptr<htvm_decoder, decltype(&htvm_decoder_destroy)>;
+
+Handle make_decoder(const htvm_decoder_options* options = nullptr) {
+    htvm_decoder* decoder = nullptr;
+    EXPECT_EQ(htvm_decoder_create(options, &decoder), HTVM_OK);
+    return {decoder, htvm_decoder_destroy};
+}
+
+htvm_decoder_options default_options() {
+    htvm_decoder_options options;
+    EXPECT_EQ(htvm_decoder_options_init(&options, sizeof options), HTVM_OK);
+    return options;
+}
+
+void expect_same_frame(htvm_decoder* decoder, const htvm_frame_info& info, const DecodedFrame& expected) {
+    EXPECT_EQ(info.struct_size, sizeof info);
+    EXPECT_EQ(info.type, static_cast<std::uint32_t>(expected.info.type));
+    EXPECT_EQ(info.frame, expected.info.frame);
+    EXPECT_EQ(info.reference, expected.info.reference);
+    EXPECT_EQ(info.timestamp_us, expected.info.timestamp_us);
+    EXPECT_EQ(info.source_vertices, expected.info.source_vertices);
+    EXPECT_EQ(info.source_triangles, expected.info.source_triangles);
+    EXPECT_EQ(info.bytes, expected.info.bytes.total());
+    EXPECT_EQ(info.concealed, expected.concealed ? 1u : 0u);
+    expect_same_mesh(copied_mesh(decoder, info), expected.mesh);
+    const auto pose = copied_pose(decoder, info);
+    EXPECT_EQ(pose.joints, expected.pose.joints);
+    EXPECT_EQ(pose.orientations, expected.pose.orientations);
+}
+
+// Every frame that is whole so far, against those expected from `next` on.
+void receive_all(htvm_decoder* decoder, const std::vector<DecodedFrame>& expected, std::size_t& next) {
+    htvm_frame_info info;
+    htvm_status status;
+    while ((status = htvm_decoder_receive_frame(decoder, &info, sizeof info)) != HTVM_AGAIN) {
+        ASSERT_EQ(status, HTVM_OK) << htvm_decoder_last_error(decoder);
+        ASSERT_LT(next, expected.size());
+        expect_same_frame(decoder, info, expected[next++]);
+    }
+}
+
+TEST(CDecoder, BytesInPiecesGiveTheFramesOfTheCppDecoder) {
+    for (const auto* coded : {&coded_person(), &coded_grid()}) {
+        const auto expected = decode_packets(coded->packets).frames;
+        for (const std::size_t chunk : {std::size_t{1}, std::size_t{997}, coded->bytes.size()}) {
+            const auto decoder = make_decoder();
+            std::size_t next = 0;
+            for (std::size_t at = 0; at < coded->bytes.size(); at += chunk) {
+                const std::size_t count = std::min(chunk, coded->bytes.size() - at);
+                ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded->bytes.data() + at, count), HTVM_OK);
+                receive_all(decoder.get(), expected, next);
+            }
+            EXPECT_EQ(next, expected.size());
+            std::uint64_t damaged = 1, pending = 1;
+            EXPECT_EQ(htvm_decoder_unused_bytes(decoder.get(), &damaged, &pending), HTVM_OK);
+            EXPECT_EQ(damaged + pending, 0u);
+        }
+    }
+}
+
+TEST(CDecoder, PacketsGiveTheFramesOfTheCppDecoder) {
+    const auto expected = decode_packets(coded_person().packets).frames;
+    auto options = default_options();
+    options.threads = 2;
+    const auto decoder = make_decoder(&options);
+    std::size_t next = 0;
+    for (const auto& packet : coded_person().packets) {
+        const auto bytes = write_packet(packet);
+        ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
+        EXPECT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_AGAIN);
+        receive_all(decoder.get(), expected, next);
+    }
+    EXPECT_EQ(next, expected.size());
+}
+
+TEST(CDecoder, TellsWhatTheSequenceHeaderSays) {
+    const auto decoder = make_decoder();
+    htvm_sequence_info info;
+    EXPECT_EQ(htvm_decoder_sequence(decoder.get(), &info, sizeof info), HTVM_AGAIN);
+    Decoder cpp;
+    ASSERT_TRUE(cpp.push(coded_person().packets[0]).has_value());
+    const auto bytes = write_packet(coded_person().packets[0]);
+    ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
+    ASSERT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_AGAIN);
+    ASSERT_EQ(htvm_decoder_sequence(decoder.get(), &info, sizeof info), HTVM_OK);
+    const auto& expected = *cpp.sequence();
+    EXPECT_EQ(info.joints, expected.skeleton.joint_names.size());
+    EXPECT_EQ(info.bones, expected.skeleton.bones.size());
+    EXPECT_EQ(info.skeleton_tracked, 1u);
+    EXPECT_EQ(info.fps_numerator, expected.fps_numerator);
+    EXPECT_EQ(info.fps_denominator, expected.fps_denominator);
+    EXPECT_EQ(info.unit_micrometres, expected.unit_micrometres);
+    EXPECT_EQ(info.nearest_vertices, 16u);
+    EXPECT_EQ(info.lattice_step, expected.lattice_step);
+    for (std::uint32_t j = 0; j < info.joints; ++j) {
+        char name[256];
+        EXPECT_EQ(htvm_decoder_joint_name(decoder.get(), j, name, sizeof name), HTVM_OK);
+        EXPECT_EQ(name, expected.skeleton.joint_names[j]);
+        EXPECT_EQ(htvm_decoder_joint_name(decoder.get(), j, name, std::strlen(name)), HTVM_BUFFER_TOO_SMALL);
+    }
+    for (std::uint32_t b = 0; b < info.bones; ++b) {
+        std::uint32_t first = 0, second = 0;
+        double radius = -1;
+        EXPECT_EQ(htvm_decoder_bone(decoder.get(), b, &first, &second, &radius), HTVM_OK);
+        EXPECT_EQ(first, expected.skeleton.bones[b].first);
+        EXPECT_EQ(second, expected.skeleton.bones[b].second);
+        EXPECT_EQ(radius, expected.radii[b]);
+    }
+    EXPECT_EQ(htvm_decoder_bone(decoder.get(), info.bones, nullptr, nullptr, nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_joint_name(decoder.get(), 0, nullptr, 0), HTVM_BAD_INPUT);
+}
+
+TEST(CDecoder, ConcealsAsTheCppDecoder) {
+    Decoder cpp;
+    const auto decoder = make_decoder();
+    htvm_frame_info info;
+    EXPECT_EQ(htvm_decoder_conceal(decoder.get(), 1, 5, &info, sizeof info), HTVM_AGAIN);
+    for (const auto& packet : {coded_person().packets[0], coded_person().packets[1]}) {
+        ASSERT_TRUE(cpp.push(packet).has_value());
+        const auto bytes = write_packet(packet);
+        ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
+        (void)htvm_decoder_receive_frame(decoder.get(), nullptr, 0);
+    }
+    ASSERT_EQ(htvm_decoder_conceal(decoder.get(), 9, 300000, &info, sizeof info), HTVM_OK);
+    EXPECT_EQ(info.frame, 9u);
+    EXPECT_EQ(info.concealed, 1u);
+    expect_same_frame(decoder.get(), info, *cpp.conceal(9, 300000));
+}
+
+TEST(CDecoder, DamagedPacketsAreErrorsWithASentenceAndCostThemselvesOnly) {
+    const auto decoder = make_decoder();
+    auto bytes = write_packet(coded_grid().packets[0]);
+    bytes[40] ^= 1;
+    EXPECT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_CORRUPT_STREAM);
+    EXPECT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), 10), HTVM_CORRUPT_STREAM);
+    EXPECT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), 0), HTVM_CORRUPT_STREAM);
+    std::size_t frames = 0, errors = 0;
+    for (const auto& packet : coded_grid().packets) {
+        auto broken = packet;
+        if (packet.kind == PacketKind::enhanced && errors == 0) broken.payload.resize(broken.payload.size() / 3);  // with a good checksum
+        const auto sent = write_packet(broken);
+        ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), sent.data(), sent.size()), HTVM_OK);
+        const auto status = htvm_decoder_receive_frame(decoder.get(), nullptr, 0);
+        frames += status == HTVM_OK;
+        if (status < 0) {
+            ++errors;
+            EXPECT_EQ(status, HTVM_CORRUPT_STREAM);
+            EXPECT_GT(std::strlen(htvm_decoder_last_error(decoder.get())), 10u);
+            EXPECT_EQ(htvm_decoder_copy_positions(decoder.get(), nullptr, 0), HTVM_BAD_INPUT) << "no current frame";
+        }
+    }
+    EXPECT_EQ(errors, 1u);
+    EXPECT_EQ(frames, decode_packets(coded_grid().packets).frames.size() - 1);
+}
+
+TEST(CDecoder, HoldsTheLimitsOfItsOptions) {
+    auto options = default_options();
+    options.max_vertices = 20;
+    auto decoder = make_decoder(&options);
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_LIMIT);
+    options = default_options();
+    options.max_bones = 3;
+    decoder = make_decoder(&options);
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_person().bytes.data(), 2000), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_LIMIT);
+    options = default_options();
+    options.max_memory = 1000;
+    decoder = make_decoder(&options);
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_LIMIT);
+    options = default_options();
+    options.max_packet_bytes = 10;
+    decoder = make_decoder(&options);
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_AGAIN);
+    std::uint64_t damaged = 0;
+    EXPECT_EQ(htvm_decoder_unused_bytes(decoder.get(), &damaged, nullptr), HTVM_OK);
+    EXPECT_GT(damaged, 0u);
+}
+
+TEST(CDecoder, WritesToArraysThatAreLargeEnoughOnly) {
+    const auto decoder = make_decoder();
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
+    htvm_frame_info info;
+    ASSERT_EQ(htvm_decoder_receive_frame(decoder.get(), &info, sizeof info), HTVM_OK);
+    std::vector<float> numbers(3 * info.vertices + 1, -7.f);
+    EXPECT_EQ(htvm_decoder_copy_positions(decoder.get(), numbers.data(), 3 * info.vertices - 1), HTVM_BUFFER_TOO_SMALL);
+    EXPECT_EQ(numbers, std::vector<float>(numbers.size(), -7.f)) << "nothing is written to an array too short";
+    EXPECT_EQ(htvm_decoder_copy_positions(decoder.get(), nullptr, numbers.size()), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_copy_positions(decoder.get(), numbers.data(), numbers.size()), HTVM_OK);
+    EXPECT_EQ(numbers.back(), -7.f);
+    EXPECT_EQ(htvm_decoder_copy_texcoords(decoder.get(), numbers.data(), 2 * info.vertices - 1), HTVM_BUFFER_TOO_SMALL);
+    EXPECT_EQ(htvm_decoder_copy_joints(decoder.get(), nullptr, 0), HTVM_BUFFER_TOO_SMALL);
+}
+
+TEST(CDecoder, SaysWhichAttributesAFrameHas) {
+    EncoderOptions options;
+    const auto coded = encode(sequence_of(tfan_test::grid(4, 4), 1, none), options);
+    const auto decoder = make_decoder();
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded.bytes.data(), coded.bytes.size()), HTVM_OK);
+    htvm_frame_info info;
+    ASSERT_EQ(htvm_decoder_receive_frame(decoder.get(), &info, sizeof info), HTVM_OK);
+    EXPECT_EQ(info.attributes, 0u);
+    std::vector<std::uint8_t> colours(1000);
+    EXPECT_EQ(htvm_decoder_copy_colours(decoder.get(), colours.data(), colours.size()), HTVM_BAD_INPUT);
+    EXPECT_STREQ(htvm_decoder_last_error(decoder.get()), "the frame has no colours");
+}
+
+TEST(CDecoder, DiscardForgetsWhatWasSent) {
+    const auto decoder = make_decoder();
+    const auto& bytes = coded_grid().bytes;
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), bytes.data(), bytes.size() / 2), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_discard(decoder.get()), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_AGAIN);
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
+    std::size_t next = 0;
+    receive_all(decoder.get(), decode_packets(coded_grid().packets).frames, next);
+    EXPECT_EQ(next, 4u);
+}
+
+TEST(CDecoder, SurvivesMisuse) {
+    htvm_frame_info info;
+    EXPECT_EQ(htvm_decoder_create(nullptr, nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_send_packet(nullptr, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_send_bytes(nullptr, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_receive_frame(nullptr, &info, sizeof info), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_conceal(nullptr, 0, 0, &info, sizeof info), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_discard(nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_unused_bytes(nullptr, nullptr, nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_copy_positions(nullptr, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_copy_triangles(nullptr, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_copy_joints(nullptr, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_sequence(nullptr, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_joint_name(nullptr, 0, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_bone(nullptr, 0, nullptr, nullptr, nullptr), HTVM_BAD_INPUT);
+    EXPECT_STREQ(htvm_decoder_last_error(nullptr), "");
+    htvm_decoder_destroy(nullptr);
+
+    const auto decoder = make_decoder();
+    EXPECT_STREQ(htvm_decoder_last_error(decoder.get()), "");
+    EXPECT_EQ(htvm_decoder_copy_positions(decoder.get(), nullptr, 0), HTVM_BAD_INPUT) << "nothing was received yet";
+    EXPECT_EQ(htvm_decoder_copy_triangles(decoder.get(), nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_copy_orientations(decoder.get(), nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_send_packet(decoder.get(), nullptr, 5), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_send_bytes(decoder.get(), nullptr, 5), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_send_bytes(decoder.get(), nullptr, 0), HTVM_OK);
+    const auto packet = write_packet(coded_grid().packets[0]);
+    EXPECT_EQ(htvm_decoder_send_packet(decoder.get(), packet.data(), packet.size()), HTVM_BAD_INPUT)
+        << "bytes were sent before";
+    ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), &info, 3), HTVM_BAD_INPUT) << "a struct of 3 bytes";
+}
+
+TEST(CDecoder, StructsOfOtherVersionsAreRead) {
+    // As an older program: a struct of the first 16 bytes only.
+    unsigned char older[16 + 8];
+    std::memset(older, 0xAB, sizeof older);
+    ASSERT_EQ(htvm_decoder_options_init(reinterpret_cast<htvm_decoder_options*>(older), 16), HTVM_OK);
+    for (std::size_t i = 16; i < sizeof older; ++i) EXPECT_EQ(older[i], 0xAB) << "beyond the caller's struct";
+    EXPECT_NE(make_decoder(reinterpret_cast<htvm_decoder_options*>(older)), nullptr);
+
+    // As a newer program: longer, and 0 where this version knows nothing.
+    struct Newer {
+        htvm_decoder_options options;
+        std::uint64_t more[3];
+    } newer;
+    ASSERT_EQ(htvm_decoder_options_init(&newer.options, sizeof newer), HTVM_OK);
+    EXPECT_EQ(newer.options.struct_size, sizeof newer);
+    EXPECT_NE(make_decoder(&newer.options), nullptr);
+    newer.more[2] = 1;
+    htvm_decoder* decoder = nullptr;
+    EXPECT_EQ(htvm_decoder_create(&newer.options, &decoder), HTVM_UNSUPPORTED);
+    EXPECT_EQ(decoder, nullptr);
+
+    htvm_decoder_options unset{};
+    EXPECT_EQ(htvm_decoder_create(&unset, &decoder), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_options_init(nullptr, 100), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_options_init(&unset, 4), HTVM_BAD_INPUT);
+
+    // What the library fills, too: the first 12 bytes, and no more.
+    const auto receiver = make_decoder();
+    ASSERT_EQ(htvm_decoder_send_bytes(receiver.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
+    unsigned char info[20];
+    std::memset(info, 0xAB, sizeof info);
+    ASSERT_EQ(htvm_decoder_receive_frame(receiver.get(), reinterpret_cast<htvm_frame_info*>(info), 12), HTVM_OK);
+    EXPECT_EQ(info[0], 12);
+    EXPECT_EQ(info[12], 0xAB);
+}
+
+TEST(CDecoder, LivesInTheCallersMemory) {
+    CountingMemory memory;
+    auto options = default_options();
+    options.allocator = memory.allocator();
+    {
+        const auto decoder = make_decoder(&options);
+        EXPECT_GE(memory.made, 1);
+        ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded_grid().bytes.data(), coded_grid().bytes.size()),
+                  HTVM_OK);
+        EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_OK);
+    }
+    EXPECT_EQ(memory.released, memory.made);
+
+    memory = {};
+    memory.fails_from = 0;
+    htvm_decoder* decoder = nullptr;
+    EXPECT_EQ(htvm_decoder_create(&options, &decoder), HTVM_OUT_OF_MEMORY);
+    EXPECT_EQ(decoder, nullptr);
+    options.allocator.release = nullptr;
+    EXPECT_EQ(htvm_decoder_create(&options, &decoder), HTVM_BAD_INPUT) << "one function without the other";
+}
+
+TEST(CInterface, TellsItsVersion) {
+    const std::string text = std::to_string(HTVM_VERSION_MAJOR) + "." + std::to_string(HTVM_VERSION_MINOR) + "." +
+                             std::to_string(HTVM_VERSION_PATCH);
+    EXPECT_EQ(htvm_version_string(), text);
+    EXPECT_EQ(text, HTVM_PROJECT_VERSION);
+    EXPECT_EQ(htvm_version(), std::uint32_t{HTVM_VERSION_MAJOR} << 16 | HTVM_VERSION_MINOR << 8 | HTVM_VERSION_PATCH);
+    EXPECT_EQ(htvm_stream_version(), 1u);
+}
+
+TEST(CInterface, HasWordsForEveryStatus) {
+    for (htvm_status status = HTVM_INTERNAL; status <= HTVM_END; ++status)
+        EXPECT_STRNE(htvm_status_text(status), htvm_status_text(99)) << status;
+    EXPECT_STRNE(htvm_status_text(99), "");
+}
+
+}  // namespace
+}  // namespace htvm
