@@ -85,18 +85,16 @@ typedef struct htvm_allocator {
 
 /* ---- frames --------------------------------------------------------------------------------------------------- */
 
-enum {                           /* type of a frame */
-       HTVM_FRAME_INTRA = 0,     /* by itself */
-       HTVM_FRAME_ENHANCED = 1,  /* against the last I-frame, with connectivity of its own */
-       HTVM_FRAME_PREDICTED = 2, /* the last I-frame's mesh moved */
-       HTVM_FRAME_TRACKED = 3    /* the last I-frame's mesh laid on the captured surface */
+/* type of a frame */
+enum {
+    HTVM_FRAME_INTRA = 0,     /* by itself */
+    HTVM_FRAME_ENHANCED = 1,  /* against the last I-frame, with connectivity of its own */
+    HTVM_FRAME_PREDICTED = 2, /* the last I-frame's mesh moved */
+    HTVM_FRAME_TRACKED = 3    /* the last I-frame's mesh laid on the captured surface */
 };
 
-enum { /* attributes of a mesh beside positions: bits */
-       HTVM_COLOURS = 1,
-       HTVM_NORMALS = 2,
-       HTVM_TEXCOORDS = 4
-};
+/* attributes of a mesh beside positions: bits */
+enum { HTVM_COLOURS = 1, HTVM_NORMALS = 2, HTVM_TEXCOORDS = 4 };
 
 typedef struct htvm_frame_info {
     uint32_t struct_size; /* bytes of this struct that were filled */
@@ -204,10 +202,11 @@ htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* fi
 
 typedef struct htvm_encoder htvm_encoder;
 
-enum {                                 /* frame_choice */
-       HTVM_CHOICE_FIXED = 0,          /* an I-frame every key_interval frames, EP-frames between */
-       HTVM_CHOICE_MOTION = 1,         /* by skeletal motion since the last I-frame */
-       HTVM_CHOICE_RATE_DISTORTION = 2 /* by measured bits and errors */
+/* frame_choice */
+enum {
+    HTVM_CHOICE_FIXED = 0,          /* an I-frame every key_interval frames, EP-frames between */
+    HTVM_CHOICE_MOTION = 1,         /* by skeletal motion since the last I-frame */
+    HTVM_CHOICE_RATE_DISTORTION = 2 /* by measured bits and errors */
 };
 
 /* The skeleton of the sequence: constant over it. All arrays are copied by htvm_encoder_create(). */
