@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "codec/motion_enc.h"
 #include "codec/stage_clock_enc.h"
@@ -62,12 +63,14 @@ NodeMotionOptions motion_options(double geometry_step) {
 void fill_gaps(std::vector<std::int32_t>& values, std::size_t components, std::vector<bool> known,
                std::span<const Triangle> triangles) {
     constexpr int rounds = 24;
+    if (std::find(known.begin(), known.end(), false) == known.end()) return;
+    std::vector<Triangle> open;
+    for (const auto& t : triangles)
+        if (!known[t[0]] || !known[t[1]] || !known[t[2]]) open.push_back(t);
     std::vector<std::int64_t> sum(values.size(), 0);
     std::vector<std::uint32_t> count(known.size(), 0);
     for (int round = 0; round < rounds; ++round) {
-        std::fill(sum.begin(), sum.end(), 0);
-        std::fill(count.begin(), count.end(), 0);
-        for (const auto& t : triangles)
+        for (const auto& t : open)
             for (const auto to : t) {
                 if (known[to]) continue;
                 for (const auto from : t) {
@@ -78,13 +81,15 @@ void fill_gaps(std::vector<std::int32_t>& values, std::size_t components, std::v
                 }
             }
         bool any = false;
-        for (std::size_t v = 0; v < known.size(); ++v) {
-            if (known[v] || count[v] == 0) continue;
-            for (std::size_t c = 0; c < components; ++c)
-                values[v * components + c] = static_cast<std::int32_t>(sum[v * components + c] / count[v]);
-            known[v] = any = true;
-        }
+        for (const auto& t : open)
+            for (const auto v : t) {
+                if (known[v] || count[v] == 0) continue;
+                for (std::size_t c = 0; c < components; ++c)
+                    values[v * components + c] = static_cast<std::int32_t>(sum[v * components + c] / count[v]);
+                known[v] = any = true;
+            }
         if (!any) break;
+        std::erase_if(open, [&](const Triangle& t) { return known[t[0]] && known[t[1]] && known[t[2]]; });
     }
 }
 
@@ -141,6 +146,20 @@ std::vector<std::int32_t> colour_changes(const LatticeMesh& captured, const std:
     return out;
 }
 
+// About the mean length of a mesh's sides, from some of them; 0 without triangles.
+double about_edge(const LatticeMesh& mesh) {
+    constexpr std::size_t every = 8;
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); i += every) {
+        const auto& t = mesh.triangles[i];
+        sum +=
+            std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i % 3]], mesh.positions[t[(i + 1) % 3]])));
+        ++count;
+    }
+    return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
 // From samples of one surface to the other.
 TrackedFit one_way_fit(const TargetSurface& from, const TargetSurface& to, double stray, unsigned threads) {
     std::vector<Point3f> points, normals;
@@ -178,11 +197,12 @@ TrackedFit measure_tracked_fit(const LatticeMesh& captured, const LatticeMesh& d
     constexpr std::size_t samples = 4000;
     const auto surface_of = [&](const LatticeMesh& mesh) {
         return make_target_surface(points_of(mesh.positions), mesh.triangles,
-                                   static_cast<float>(std::max({2 * mean_edge(mesh), stray / 24, 2.0})), samples,
-                                   threads);
+                                   static_cast<float>(std::max({2 * about_edge(mesh), stray / 24, 2.0})), samples, 1);
     };
-    const auto a = surface_of(captured), b = surface_of(decoded);
-    const auto forth = one_way_fit(a, b, stray, threads), back = one_way_fit(b, a, stray, threads);
+    std::optional<TargetSurface> a, b;
+    parallel_invoke(
+        threads, [&] { a = surface_of(captured); }, [&] { b = surface_of(decoded); });
+    const auto forth = one_way_fit(*a, *b, stray, threads), back = one_way_fit(*b, *a, stray, threads);
     return {std::max(forth.rms, back.rms), std::max(forth.stray_share, back.stray_share)};
 }
 
@@ -206,7 +226,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     const auto captured_points = points_of(mesh.positions);
     // Cells no finer than the search can go through: of captures with tiny triangles, or none.
     const double edge =
-        std::max({mean_edge(mesh), options.deformation.far_reach * options.deformation.millimetre / 48, 1.0});
+        std::max({about_edge(mesh), options.deformation.far_reach * options.deformation.millimetre / 48, 1.0});
     const auto target = make_target_surface(captured_points, mesh.triangles, static_cast<float>(2 * edge),
                                             options.deformation.back_samples, options.threads);
     clock.done("search structures");

@@ -63,12 +63,18 @@ struct Match {
     float gap = 0;             // between the points searched
 };
 
+// Where the searches of the last round ended, which is where those of the next begin.
+struct Guesses {
+    std::vector<std::uint32_t> forward, back;  // by sample, and by the target's sample
+};
+
 struct Round {
     double reach = 0;  // positions' units
     double stiffness = 0;
     double point_share = 0;
-    float gap = 0;     // between samples of the reference
-    bool far = false;  // search among the target's samples; distant matches still count
+    float gap = 0;          // between samples of the reference
+    bool far = false;       // search among the target's samples; distant matches still count
+    std::size_t every = 1;  // only each so many of the samples
 };
 
 // Near matches count fully and fade out at the reach; far ones all pull alike, however far they are.
@@ -82,27 +88,42 @@ float match_weight(const OrientedMatch& match, const Round& round) {
 
 // Both ways: each sample to the target, and each of the target's samples to the nearest moved sample.
 std::vector<Match> find_matches(const Moved& moved, const TargetSurface& target, const Round& round, float cell,
-                                const DeformationOptions& options) {
-    const std::size_t skip = round.far ? 2 : 1;
-    const std::size_t forward = moved.points.size(), back = target.samples.size() / skip;
+                                const DeformationOptions& options, Guesses& guesses) {
+    const std::size_t skip = round.every * (round.far ? 2 : 1);
+    const std::size_t forward = moved.points.size() / round.every, back = target.samples.size() / skip;
     const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
     const OrientedPoints reference(moved.points, moved.normals, cell);
-    const float gap = (round.far ? target.coarse_gap : target.fine_gap);
+    const auto& search = round.far ? target.coarse : target.fine;
+    const float gap = round.far ? target.coarse_gap : target.fine_gap;
+    guesses.forward.resize(forward, OrientedPoints::no_point);
+    guesses.back.resize(back, OrientedPoints::no_point);
     std::vector<Match> out(forward + back);
-    parallel_for(out.size(), options.threads, 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-            if (i < forward) {
-                const auto& search = round.far ? target.coarse : target.fine;
-                const auto match = search.nearest(moved.points[i], moved.normals[i], reach, agreement);
-                const auto vertex = round.far && match.found ? target.samples[match.index] : match.index;
-                out[i] = {static_cast<std::uint32_t>(i), vertex, match_weight(match, round), gap};
-            } else {
-                const std::uint32_t vertex = target.samples[(i - forward) * skip];
-                const auto match =
-                    reference.nearest(target.positions[vertex], target.normals[vertex], reach, agreement);
-                out[i] = {match.index, vertex, match_weight(match, round), round.gap};
-            }
-        }
+    const auto go_forward = [&](std::size_t i, std::uint32_t last) {
+        const std::size_t sample = i * round.every;
+        std::uint32_t& guess = guesses.forward[i];
+        const auto match = search.nearest(moved.points[sample], moved.normals[sample], reach, agreement,
+                                          guess == OrientedPoints::no_point ? last : guess);
+        if (match.found) guess = match.index;
+        const auto vertex = round.far && match.found ? target.samples[match.index] : match.index;
+        out[i] = {static_cast<std::uint32_t>(sample), vertex, match_weight(match, round), gap};
+        return guess;
+    };
+    const auto go_back = [&](std::size_t i, std::uint32_t last) {
+        const std::uint32_t vertex = target.samples[i * skip];
+        std::uint32_t& guess = guesses.back[i];
+        const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], reach, agreement,
+                                             guess == OrientedPoints::no_point ? last : guess);
+        if (match.found) guess = match.index;
+        out[forward + i] = {match.index, vertex, match_weight(match, round), round.gap};
+        return guess;
+    };
+    // Slices of both, so that threads have the same to do.
+    constexpr std::size_t slices = 64;
+    parallel_for(slices, options.threads, 4, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t last = OrientedPoints::no_point;
+        for (std::size_t i = begin * forward / slices; i < end * forward / slices; ++i) last = go_forward(i, last);
+        last = OrientedPoints::no_point;
+        for (std::size_t i = begin * back / slices; i < end * back / slices; ++i) last = go_back(i, last);
     });
     std::erase_if(out, [](const Match& m) { return !(m.weight > 0); });
     return out;
@@ -219,9 +240,9 @@ void apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>& c
 }
 
 void run_round(Stage& stage, const TargetSurface& target, const Round& round, float cell, BlockSystem (&systems)[2],
-               const DeformationOptions& options) {
+               Guesses& guesses, const DeformationOptions& options) {
     const Moved moved = move_samples(stage, options.threads);
-    const auto matches = find_matches(moved, target, round, cell, options);
+    const auto matches = find_matches(moved, target, round, cell, options, guesses);
     const auto pulls = sum_pulls(matches, moved, target, round.point_share);
     std::vector<Vector3d> centres(stage.centre.size());
     for (std::size_t h = 0; h < centres.size(); ++h) centres[h] = stage.motion[h](stage.centre[h]);
@@ -313,21 +334,23 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     if (options.coarse_rounds > 0) {
         Stage coarse = coarse_stage(mesh, fine, options.threads);
         BlockSystem systems[2] = {BlockSystem(mesh.coarse.pattern), BlockSystem(mesh.coarse.pattern)};
+        Guesses guesses;
         for (int i = 0; i < options.coarse_rounds; ++i) {
             const double reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
-            run_round(coarse, target, round, cell, systems, options);
+            run_round(coarse, target, round, cell, systems, guesses, options);
         }
         follow_groups(mesh, coarse, fine.motion);
     }
     BlockSystem systems[2] = {BlockSystem(mesh.fine.pattern), BlockSystem(mesh.fine.pattern)};
+    Guesses guesses;
     for (int i = 0; i < options.fine_rounds; ++i) {
         auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
         const Round round = {value(options.middle_reach, options.near_reach) * unit,
                              value(options.first_stiffness, options.last_stiffness),
                              value(options.first_point_share, options.last_point_share), 0.5f * mesh.sample_gap, false};
-        run_round(fine, target, round, cell, systems, options);
+        run_round(fine, target, round, cell, systems, guesses, options);
     }
     return fine.motion;
 }
@@ -349,13 +372,16 @@ double deformation_error(const DeformableMesh& mesh, const TargetSurface& target
     const Stage stage = fine_stage(mesh, {motions.begin(), motions.end()});
     const Moved moved = move_samples(stage, options.threads);
     const double reach = options.near_reach * options.millimetre;
-    const auto matches = find_matches(moved, target, {reach, 0, 0, 0, false}, static_cast<float>(reach), options);
+    const std::size_t every = mesh.samples.size() + target.samples.size() < 2000 ? 1 : 4;
+    const Round round{.reach = reach, .stiffness = 0, .point_share = 0, .gap = 0, .far = false, .every = every};
+    Guesses guesses;
+    const auto matches = find_matches(moved, target, round, static_cast<float>(reach / 2), options, guesses);
     double near = 0;
     for (const Match& match : matches) {
         const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
         near += reach - std::min(reach, std::abs(apart.dot(vector_of(target.normals[match.vertex]))));
     }
-    return reach - near / static_cast<double>(mesh.samples.size() + target.samples.size());
+    return reach - near / static_cast<double>(mesh.samples.size() / every + target.samples.size() / every);
 }
 
 std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, unsigned threads) {

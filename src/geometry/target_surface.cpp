@@ -32,45 +32,90 @@ Around triangles_around(std::size_t vertices, std::span<const Triangle> triangle
     return out;
 }
 
-// Closest point of a segment.
-Vector closest_on_side(const Vector& p, const Vector& a, const Vector& b) {
-    const Vector side = b - a;
-    const float length = side.squaredNorm();
-    return length > 0 ? Vector(a + std::clamp((p - a).dot(side) / length, 0.0f, 1.0f) * side) : a;
+// The closest point of a triangle, by the region that the point is in: beyond a corner, a side, or above the inside.
+Vector closest_on_triangle(const Vector& p, const Vector& a, const Vector& b, const Vector& c) {
+    const Vector ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+    const float ab_a = ab.dot(ap), ac_a = ac.dot(ap), ab_b = ab.dot(bp), ac_b = ac.dot(bp), ab_c = ab.dot(cp),
+                ac_c = ac.dot(cp);
+    if (ab_a <= 0 && ac_a <= 0) return a;
+    if (ab_b >= 0 && ac_b <= ab_b) return b;
+    if (ac_c >= 0 && ab_c <= ac_c) return c;
+    // The shares of the corners, but for a common factor.
+    const float of_c = ab_a * ac_b - ab_b * ac_a;
+    if (of_c <= 0 && ab_a >= 0 && ab_b <= 0) return a + ab * (ab_a / (ab_a - ab_b));
+    const float of_b = ab_c * ac_a - ab_a * ac_c;
+    if (of_b <= 0 && ac_a >= 0 && ac_c <= 0) return a + ac * (ac_a / (ac_a - ac_c));
+    const float of_a = ab_b * ac_c - ab_c * ac_b, to_c = ac_b - ab_b, to_b = ab_c - ac_c;
+    if (of_a <= 0 && to_c >= 0 && to_b >= 0) return b + (c - b) * (to_c / (to_c + to_b));
+    const float sum = of_a + of_b + of_c;
+    return sum > 0 ? Vector(a + ab * (of_b / sum) + ac * (of_c / sum)) : a;
 }
 
-// The foot of the perpendicular where it falls inside the triangle, else the closest point of the sides.
-Vector closest_on_triangle(const Vector& p, const Vector& a, const Vector& b, const Vector& c, const Vector& across) {
-    const float area = across.squaredNorm();
-    const bool inside = area > 0 && across.dot((b - a).cross(p - a)) >= 0 && across.dot((c - b).cross(p - b)) >= 0 &&
-                        across.dot((a - c).cross(p - c)) >= 0;
-    if (inside) return p - across * (across.dot(p - a) / area);
-    const Vector on[3] = {closest_on_side(p, a, b), closest_on_side(p, b, c), closest_on_side(p, c, a)};
-    return *std::min_element(
-        on, on + 3, [&](const Vector& x, const Vector& y) { return (x - p).squaredNorm() < (y - p).squaredNorm(); });
-}
-
+// guess: the vertex to begin with, OrientedPoints::no_point for none; becomes the one that was found.
 SurfaceTarget target_of(const Point3f& moved, const Point3f& normal, const TargetSurface& target,
-                        const SurfaceTargetOptions& options) {
+                        const SurfaceTargetOptions& options, std::uint32_t& guess) {
     SurfaceTarget out;
-    const auto match = target.fine.nearest(moved, normal, options.reach, options.agreement);
+    const auto match = target.fine.nearest(moved, normal, options.reach, options.agreement, guess);
     if (!match.found) return out;
+    guess = match.index;
     const Vector p = vector_of(moved), n = vector_of(normal);
     float best = std::numeric_limits<float>::max();
     for (std::uint32_t i = target.first_around[match.index]; i < target.first_around[match.index + 1]; ++i) {
-        const auto& t = target.triangles[target.around[i]];
-        const Vector a = vector_of(target.positions[t[0]]), b = vector_of(target.positions[t[1]]),
-                     c = vector_of(target.positions[t[2]]);
-        const Vector across = (b - a).cross(c - a);
-        const float area = across.norm();
-        if (!(area > 0) || across.dot(n) < options.agreement * area) continue;
-        const Vector q = closest_on_triangle(p, a, b, c, across);
+        const std::uint32_t triangle = target.around[i];
+        const Vector across = vector_of(target.triangle_normals[triangle]);
+        if (across.dot(n) < options.agreement || across == Vector::Zero()) continue;
+        const auto& t = target.triangles[triangle];
+        const Vector a = vector_of(target.positions[t[0]]);
+        const float height = across.dot(p - a);
+        if (height * height > best) continue;
+        const Vector q =
+            closest_on_triangle(p, a, vector_of(target.positions[t[1]]), vector_of(target.positions[t[2]]));
         const float d = (q - p).squaredNorm();
-        if (d >= best) continue;
+        if (!(d < best)) continue;
         best = d;
-        out = {point_of(q), point_of(across / area), target.around[i], true};
+        out = {point_of(q), target.triangle_normals[triangle], triangle, true};
     }
     return out;
+}
+
+// Of all triangles.
+struct TriangleNormals {
+    std::vector<Point3f> normals;  // unit length; zero where there is no area
+    std::vector<Vector> sum;       // by vertex, weighted by twice the area
+    double area = 0;               // of all together
+};
+
+TriangleNormals normals_of_triangles(std::span<const Point3f> positions, std::span<const Triangle> triangles) {
+    TriangleNormals out;
+    out.normals.resize(triangles.size());
+    out.sum.assign(positions.size(), Vector::Zero());
+    double doubled = 0;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        const auto& t = triangles[i];
+        const Vector a = vector_of(positions[t[0]]);
+        const Vector across = (vector_of(positions[t[1]]) - a).cross(vector_of(positions[t[2]]) - a);
+        const float length = across.norm();
+        if (length > 0) out.normals[i] = point_of(Vector(across / length));
+        doubled += static_cast<double>(length);
+        for (const std::uint32_t v : t) out.sum[v] += across;
+    }
+    out.area = 0.5 * doubled;
+    return out;
+}
+
+std::vector<Point3f> unit_vectors(const std::vector<Vector>& vectors) {
+    std::vector<Point3f> out(vectors.size());
+    for (std::size_t v = 0; v < vectors.size(); ++v) {
+        const float length = vectors[v].norm();
+        if (length > 0 && std::isfinite(length)) out[v] = point_of(Vector(vectors[v] / length));
+    }
+    return out;
+}
+
+// Between so many points that are spread over so much surface.
+float gap_of(double area, std::size_t count) {
+    const double gap = count > 0 ? std::sqrt(area / static_cast<double>(count)) : 0;
+    return std::isfinite(gap) ? static_cast<float>(gap) : 0.0f;
 }
 
 }  // namespace
@@ -99,17 +144,20 @@ float point_gap(std::span<const Point3f> positions, std::span<const Triangle> tr
         const Vector a = vector_of(positions[t[0]]);
         area += 0.5 * (vector_of(positions[t[1]]) - a).cross(vector_of(positions[t[2]]) - a).norm();
     }
-    const double gap = count > 0 ? std::sqrt(area / static_cast<double>(count)) : 0;
-    return std::isfinite(gap) ? static_cast<float>(gap) : 0.0f;
+    return gap_of(area, count);
 }
 
 TargetSurface make_target_surface(std::span<const Point3f> positions, std::span<const Triangle> triangles, float cell,
                                   std::size_t samples, unsigned threads) {
+    TriangleNormals of_triangles;
     std::vector<Point3f> normals;
     Around around;
     parallel_invoke(
         threads, [&] { around = triangles_around(positions.size(), triangles); },
-        [&] { normals = vertex_normals(positions, triangles); });
+        [&] {
+            of_triangles = normals_of_triangles(positions, triangles);
+            normals = unit_vectors(of_triangles.sum);
+        });
     const std::size_t count = std::min(samples, positions.size());
     std::vector<std::uint32_t> chosen(count);
     std::vector<Point3f> chosen_points(count), chosen_normals(count);
@@ -125,11 +173,12 @@ TargetSurface make_target_surface(std::span<const Point3f> positions, std::span<
     return {{positions.begin(), positions.end()},
             std::move(normals),
             {triangles.begin(), triangles.end()},
+            std::move(of_triangles.normals),
             std::move(around.first),
             std::move(around.triangles),
             std::move(chosen),
-            point_gap(positions, triangles, positions.size()),
-            point_gap(positions, triangles, count),
+            gap_of(of_triangles.area, positions.size()),
+            gap_of(of_triangles.area, count),
             std::move(fine),
             std::move(coarse)};
 }
@@ -138,7 +187,8 @@ std::vector<SurfaceTarget> surface_targets(std::span<const Point3f> moved, std::
                                            const TargetSurface& target, const SurfaceTargetOptions& options) {
     std::vector<SurfaceTarget> out(moved.size());
     parallel_for(moved.size(), options.threads, 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) out[v] = target_of(moved[v], normals[v], target, options);
+        std::uint32_t guess = OrientedPoints::no_point;  // neighbours in order are mostly neighbours in space
+        for (std::size_t v = begin; v < end; ++v) out[v] = target_of(moved[v], normals[v], target, options, guess);
     });
     return out;
 }

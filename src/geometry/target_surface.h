@@ -22,6 +22,7 @@ float point_gap(std::span<const Point3f> positions, std::span<const Triangle> tr
 struct TargetSurface {
     std::vector<Point3f> positions, normals;
     std::vector<Triangle> triangles;
+    std::vector<Point3f> triangle_normals;            // unit length; zero where a triangle has no area
     std::vector<std::uint32_t> first_around, around;  // triangles around each vertex, in compressed rows
     std::vector<std::uint32_t> samples;  // every so many vertices, for searches far away and for the way back
     float fine_gap, coarse_gap;          // between vertices, and between samples
