@@ -29,29 +29,15 @@ void predict_splits(const HierarchyLevel& level, std::span<const std::int32_t> m
     }
 }
 
-void predict_level(const VertexHierarchy& hierarchy, std::size_t k, std::span<const std::int32_t> means,
-                   const FieldPlane* before, LevelPrediction& out) {
-    const HierarchyLevel& level = hierarchy.levels[k];
-    predict_splits(level, means, out.now);
-    out.before.clear();
-    out.slope_before.clear();
-    if (!before) return;
-    predict_splits(level, before->mean[k + 1], out.slope_before);
-    out.before.assign(level.size(), 0);
-    for (std::size_t p = 0; p < level.size(); ++p)
-        if (level.second[p] != no_node)
-            out.before[p] = before->mean[k][level.first[p]] - before->mean[k][level.second[p]];
-}
-
-void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means, const LevelPrediction& prediction,
-                 const LevelMode& mode, std::uint32_t step, std::span<const std::int32_t> rests,
+void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means,
+                 std::span<const std::int32_t> predicted, std::uint32_t step, std::span<const std::int32_t> rests,
                  std::vector<std::int32_t>& finer) {
     for (std::size_t p = 0; p < level.size(); ++p) {
         if (level.second[p] == no_node) {
             finer[level.first[p]] = means[p];
             continue;
         }
-        std::int64_t difference = prediction.of(p, mode);
+        std::int64_t difference = predicted[p];
         if (rests[p] != 0) difference += rests[p] * split_step(step, level.split_scale[p]);
         const SplitMeans children = split_mean(means[p], difference, level.second_share[p]);
         finer[level.first[p]] = children.first;
@@ -59,6 +45,10 @@ void split_level(const HierarchyLevel& level, std::span<const std::int32_t> mean
     }
 }
 
+namespace {
+
+// The magnitudes of `above` by node of the finer level, from those of the coarser: a node that was joined to none takes
+// over what is above it.
 void pass_down(const HierarchyLevel& coarser, std::span<const std::uint8_t> own, std::span<const std::uint8_t> above,
                std::vector<std::uint8_t>& below) {
     for (std::size_t p = 0; p < coarser.size(); ++p) {
@@ -68,50 +58,75 @@ void pass_down(const HierarchyLevel& coarser, std::span<const std::uint8_t> own,
     }
 }
 
-FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldHeader& head, std::size_t components,
-                     const FieldHistory* frame_before)
-    : hierarchy(mesh), header(head), before(frame_before), planes(components), above(components), rests(components) {
-    for (FieldPlane& plane : planes) {
-        plane.mean.resize(hierarchy.levels.size() + 1);
+}  // namespace
+
+FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldHeader& header, std::size_t count,
+                     const FieldHistory* before)
+    : hierarchy(mesh), has_history(before != nullptr), components(count) {
+    const std::size_t levels = hierarchy.levels.size();
+    for (std::size_t c = 0; c < count; ++c) {
+        ComponentWalk& component = components[c];
+        component.before = before ? &before->planes[c] : nullptr;
+        component.step = header.step[c];
+        component.last = first_mode(has_history);
+        component.above.assign(1, 0);
+        FieldPlane& plane = component.plane;
+        plane.mean.resize(levels + 1);
         plane.mean[0].resize(hierarchy.vertex_count);
-        plane.magnitude.resize(hierarchy.levels.size());
-        for (std::size_t k = 0; k < hierarchy.levels.size(); ++k) {
-            plane.mean[k + 1].resize(hierarchy.levels[k].size());
-            plane.magnitude[k].resize(hierarchy.levels[k].size());
+        plane.slope.resize(levels);
+        plane.magnitude.resize(levels);
+        component.rests.resize(levels);
+        for (std::size_t k = 0; k < levels; ++k) {
+            const std::size_t nodes = hierarchy.levels[k].size();
+            plane.mean[k + 1].resize(nodes);
+            plane.slope[k].resize(nodes);
+            plane.magnitude[k].resize(nodes);
+            component.rests[k].resize(nodes);
         }
     }
-    for (auto& top : above) top.assign(1, 0);
-    models.last.fill({.coded = true, .slope = 4, .before = before ? 4u : 0u});
 }
 
-void FieldWalk::begin_level(std::size_t k) {
-    for (auto& level : rests) level.assign(hierarchy.levels[k].size(), 0);
+void FieldWalk::begin_level(std::size_t k, std::size_t c) {
+    const HierarchyLevel& level = hierarchy.levels[k];
+    ComponentWalk& component = components[c];
+    component.active.resize(level.size());
+    predict_splits(level, component.plane.mean[k + 1], component.plane.slope[k]);
+    LevelPrediction& prediction = component.prediction;
+    prediction.now = component.plane.slope[k];
+    if (!component.before) return;
+    prediction.slope_before = component.before->slope[k];
+    const auto& means = component.before->mean[k];
+    prediction.before.assign(level.size(), 0);
+    for (std::size_t p = 0; p < level.size(); ++p)
+        if (level.second[p] != no_node) prediction.before[p] = means[level.first[p]] - means[level.second[p]];
 }
 
-void FieldWalk::begin_component(std::size_t k, std::size_t c) {
-    predict_level(hierarchy, k, planes[c].mean[k + 1], plane_before(c), prediction);
-}
-
-void FieldWalk::end_component(std::size_t k, std::size_t c, const LevelMode& mode) {
-    split_level(hierarchy.levels[k], planes[c].mean[k + 1], prediction, mode, header.step[c], rests[c],
-                planes[c].mean[k]);
+void FieldWalk::end_level(std::size_t k, std::size_t c, const LevelMode& mode) {
+    const HierarchyLevel& level = hierarchy.levels[k];
+    ComponentWalk& component = components[c];
+    FieldPlane& plane = component.plane;
+    if (!mode.coded) component.prediction.choose(mode);
+    split_level(level, plane.mean[k + 1], component.prediction.chosen, component.step, component.rests[k],
+                plane.mean[k]);
+    if (k == 0) return;
+    std::vector<std::uint8_t> below(hierarchy.levels[k - 1].size(), 0);
+    pass_down(level, plane.magnitude[k], component.above, below);
+    component.above = std::move(below);
 }
 
 LevelMagnitudes FieldWalk::magnitudes(std::size_t k, std::size_t c) const {
-    LevelMagnitudes out{.above = above[c], .before = {}, .other = {}, .third = {}, .own = planes[c].magnitude[k]};
-    if (before) out.before = before->planes[c].magnitude[k];
-    if (c > 0) out.other = rests[c - 1];
-    if (c > 1) out.third = rests[c - 2];
+    const ComponentWalk& component = components[c];
+    LevelMagnitudes out{.above = component.above, .before = {}, .other = {}, .third = {}};
+    if (component.before) out.before = component.before->magnitude[k];
+    if (c > 0) out.other = components[c - 1].rests[k];
+    if (c > 1) out.third = components[c - 2].rests[k];
     return out;
 }
 
-void FieldWalk::end_level(std::size_t k) {
-    if (k == 0) return;
-    for (std::size_t c = 0; c < planes.size(); ++c) {
-        std::vector<std::uint8_t> below(hierarchy.levels[k - 1].size(), 0);
-        pass_down(hierarchy.levels[k], planes[c].magnitude[k], above[c], below);
-        above[c] = std::move(below);
-    }
+FieldHistory history_of(FieldWalk& walk, bool turned) {
+    FieldHistory out{.turned = turned, .planes = {}};
+    for (auto& component : walk.components) out.planes.push_back(std::move(component.plane));
+    return out;
 }
 
 std::vector<std::int32_t> field_values(const std::vector<FieldPlane>& planes, std::size_t vertex_count, bool turned) {
@@ -139,10 +154,12 @@ bool history_fits(const FieldHistory& history, const VertexHierarchy& hierarchy,
     if (history.planes.size() != components || history.turned != turned) return false;
     const std::size_t levels = hierarchy.levels.size();
     for (const FieldPlane& plane : history.planes) {
-        if (plane.mean.size() != levels + 1 || plane.magnitude.size() != levels) return false;
+        if (plane.mean.size() != levels + 1 || plane.slope.size() != levels || plane.magnitude.size() != levels)
+            return false;
         if (plane.mean[0].size() != hierarchy.vertex_count) return false;
         for (std::size_t k = 0; k < levels; ++k)
             if (plane.mean[k + 1].size() != hierarchy.levels[k].size() ||
+                plane.slope[k].size() != hierarchy.levels[k].size() ||
                 plane.magnitude[k].size() != hierarchy.levels[k].size())
                 return false;
     }

@@ -14,6 +14,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -40,6 +41,7 @@ struct FieldOptions {
 // One component of a decoded field in 1/256 of the values' unit, with what predicts the next frame.
 struct FieldPlane {
     std::vector<std::vector<std::int32_t>> mean;       // [0]: by vertex, [1 + k]: by node of level k
+    std::vector<std::vector<std::int32_t>> slope;      // [k]: by node of level k, the difference that the means predict
     std::vector<std::vector<std::uint8_t>> magnitude;  // [k]: by node of level k, of the quantised rest, at most 255
 };
 
@@ -63,9 +65,12 @@ struct DecodedField {
 // values: vertices x components, the components of a vertex side by side. before: the history of a frame on the same
 // hierarchy, or null; it is used where it predicts better. Errors: bad_input where sizes do not fit, a value is beyond
 // field_limit, a step or lambda out of range, or a field other than of three components is to be turned.
+// threads: two at most serve, three components side by side; any number gives the same bytes. beside: other work for
+// the second of them, done when the call returns, but for one that fails.
 Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values,
                                   std::size_t components, const FieldOptions& options = {},
-                                  const FieldHistory* before = nullptr);
+                                  const FieldHistory* before = nullptr, unsigned threads = 1,
+                                  const std::function<void()>& beside = {});
 
 // `before`: as given to the encoder; needed where the layer says so. Errors: corrupt_stream where the bytes end too
 // early, or name steps or a history that cannot be; bad_input where `before` is of another mesh.

@@ -12,11 +12,18 @@ struct FieldReader {
     std::uint32_t raw(std::uint32_t, int n) { return decoder.raw(n); }
 };
 
-struct NothingWanted {
-    std::int32_t root(std::size_t) const { return 0; }
-    LevelMode mode(std::size_t, std::size_t) const { return {}; }
-    std::int32_t rest(std::size_t, std::size_t, std::size_t) const { return 0; }
-};
+void read_field(FieldWalk& walk, FieldReader& reader) {
+    for (auto& component : walk.components)
+        if (component.step != 0) code_root(reader, component, walk.hierarchy.vertex_count, 0);
+    for (std::size_t k = walk.hierarchy.levels.size(); k-- > 0;)
+        for (std::size_t c = 0; c < walk.components.size(); ++c) {
+            if (walk.components[c].step == 0) continue;
+            walk.begin_level(k, c);
+            const LevelMode mode = code_mode(reader, walk, walk.components[c].last, {});
+            if (mode.coded) code_level(reader, walk, k, c, mode, [](auto, auto, auto, const auto&) { return 0; });
+            walk.end_level(k, c, mode);
+        }
+}
 
 }  // namespace
 
@@ -43,11 +50,11 @@ Result<DecodedField> decode_field(std::span<const std::uint8_t> bytes, const Ver
         return fail(ErrorKind::bad_input, "vertex field: the frame before is of another mesh or another kind of field");
     FieldWalk walk(hierarchy, header, components, header.has_history ? before : nullptr);
     FieldReader coder{RangeDecoder(reader.bytes(reader.remaining()))};
-    if (hierarchy.vertex_count > 0) walk_field(walk, coder, NothingWanted{});
+    if (hierarchy.vertex_count > 0) read_field(walk, coder);
     if (coder.decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "vertex field: the layer ends too early");
     DecodedField out;
-    out.values = field_values(walk.planes, hierarchy.vertex_count, header.turned);
-    out.history = {.turned = header.turned, .planes = std::move(walk.planes)};
+    out.history = history_of(walk, header.turned);
+    out.values = field_values(out.history.planes, hierarchy.vertex_count, header.turned);
     return out;
 }
 

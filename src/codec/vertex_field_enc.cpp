@@ -1,8 +1,11 @@
+#include <atomic>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "codec/vertex_field_walk.h"
 #include "core/bytes.h"
+#include "core/parallel.h"
 #include "entropy/cost.h"
 #include "entropy/range_encoder.h"
 
@@ -10,21 +13,54 @@ namespace htvm {
 
 namespace {
 
-// What the walk codes with: bytes, or the bits that they would take.
-template <class Coder>
-struct FieldCoder {
-    Coder coder;
+// Decisions in the order of a stream and what they cost, to be written when it is known what comes before them.
+class DecisionLog {
+public:
     bool bit(BinaryModel& model, bool wanted) {
-        coder.bit(model, wanted);
+        bits_ += decision_cost(model, wanted);
+        decisions_.push_back({wanted, model.one, 0});
+        model.update(wanted);
         return wanted;
     }
     std::uint32_t raw(std::uint32_t wanted, int n) {
-        coder.raw(wanted, n);
+        bits_ += n;
+        if (n > 0) decisions_.push_back({wanted, 0, static_cast<std::uint8_t>(n)});
+        return wanted;
+    }
+    double bits() const { return bits_; }
+    void clear() { decisions_.clear(), bits_ = 0; }
+    void write(RangeEncoder& encoder) const {
+        for (const auto& decision : decisions_) {
+            BinaryModel model{decision.one, model_seen_limit};
+            if (decision.width > 0)
+                encoder.raw(decision.value, decision.width);
+            else
+                encoder.bit(model, decision.value != 0);
+        }
+    }
+
+private:
+    struct Decision {
+        std::uint32_t value;
+        std::uint16_t one;   // of the model
+        std::uint8_t width;  // 0: under a model
+    };
+    std::vector<Decision> decisions_;
+    double bits_ = 0;
+};
+
+// What a walk writes with.
+struct FieldWriter {
+    RangeEncoder encoder;
+    bool bit(BinaryModel& model, bool wanted) {
+        encoder.bit(model, wanted);
+        return wanted;
+    }
+    std::uint32_t raw(std::uint32_t wanted, int n) {
+        encoder.raw(wanted, n);
         return wanted;
     }
 };
-using FieldWriter = FieldCoder<RangeEncoder>;
-using FieldCounter = FieldCoder<CostCounter>;
 
 // The bits of a decision predicted from several contexts, without adapting them.
 template <std::size_t N>
@@ -60,15 +96,11 @@ private:
     std::array<double, 2> nonzero_, negative_;
 };
 
-// What is to be coded.
-struct FieldPlan {
-    std::vector<std::int32_t> roots;                            // by component
-    std::vector<std::vector<LevelMode>> modes;                  // by level and component
-    std::vector<std::vector<std::vector<std::int32_t>>> rests;  // likewise, by node
-
-    std::int32_t root(std::size_t c) const { return roots[c]; }
-    LevelMode mode(std::size_t k, std::size_t c) const { return modes[k][c]; }
-    std::int32_t rest(std::size_t k, std::size_t c, std::size_t p) const { return rests[k][c][p]; }
+// What is coded of one component.
+struct ComponentPlan {
+    DecisionLog root;
+    std::vector<LevelMode> modes;    // by level
+    std::vector<DecisionLog> rests;  // likewise
 };
 
 using Means = std::vector<std::vector<std::int32_t>>;  // as FieldPlane::mean, of the field to be coded
@@ -93,26 +125,25 @@ void fill_means(const VertexHierarchy& hierarchy, Means& means) {
     }
 }
 
-std::vector<Means> means_of(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values,
-                            std::size_t components, bool turned) {
-    std::vector<Means> means(components);
-    for (std::size_t c = 0; c < components; ++c) {
-        means[c].resize(1);
-        auto& of_vertices = means[c][0];
-        of_vertices.resize(hierarchy.vertex_count);
-        for (std::size_t v = 0; v < hierarchy.vertex_count; ++v) {
-            if (!turned) {
-                of_vertices[v] = values[v * components + c] * field_one;
-                continue;
-            }
-            const double red = values[v * 3], green = values[v * 3 + 1], blue = values[v * 3 + 2];
-            const double along = c == 0   ? (red + green + blue) / std::sqrt(3.0)
-                                 : c == 1 ? (red - blue) / std::sqrt(2.0)
-                                          : (2 * green - red - blue) / std::sqrt(6.0);
-            of_vertices[v] = static_cast<std::int32_t>(std::lround(along * field_one));
+// Of component c.
+Means means_of(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values, std::size_t components,
+               std::size_t c, bool turned) {
+    Means means(1);
+    auto& of_vertices = means[0];
+    of_vertices.resize(hierarchy.vertex_count);
+    for (std::size_t v = 0; v < hierarchy.vertex_count; ++v) {
+        if (!turned) {
+            of_vertices[v] = values[v * components + c] * field_one;
+            continue;
         }
-        fill_means(hierarchy, means[c]);
+        const double red = values[v * 3], green = values[v * 3 + 1], blue = values[v * 3 + 2];
+        const double along = c == 0   ? (red + green + blue) / std::sqrt(3.0)
+                             : c == 1 ? (red - blue) / std::sqrt(2.0)
+                                      : (2 * green - red - blue) / std::sqrt(6.0);
+        const double scaled = along * field_one;  // to the nearest, halves away from zero
+        of_vertices[v] = static_cast<std::int32_t>(scaled + (scaled < 0 ? -0.5 : 0.5));
     }
+    fill_means(hierarchy, means);
     return means;
 }
 
@@ -150,25 +181,21 @@ LevelMode choose_mode(const HierarchyLevel& level, std::span<const std::int32_t>
     return best;
 }
 
-// Quantises one level of one component, weighing squared error against bits as the models stand.
-LevelMode plan_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<const std::int32_t> finer,
-                     double lambda) {
+// Quantises one level of one component, weighing squared error against bits as the models stand. The mode must have
+// been chosen. False where nothing is worth its bits.
+bool quantise_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<const std::int32_t> finer,
+                    const LevelMode& mode, double lambda, DecisionLog& log) {
     const HierarchyLevel& level = walk.hierarchy.levels[k];
-    walk.begin_component(k, c);
-    LevelMode mode = choose_mode(level, finer, walk.prediction, walk.models.last[c], walk.header.step[c], lambda);
-    SplitModels& models = walk.models.splits[c];
-    const SplitModels models_before = models;
+    ComponentWalk& component = walk.components[c];
+    const SplitModels models_before = component.models;
     double gained = 0;  // squared steps that the rests spare
-    FieldCounter coder;
     auto choose = [&](std::size_t p, std::int32_t predicted, std::int64_t step, const SplitContext& context) {
-        const double off =
-            static_cast<double>(std::int64_t{finer[level.first[p]]} - finer[level.second[p]] - predicted) /
-            static_cast<double>(step);
-        const double near = std::round(off);
-        if (near == 0) return 0;
-        auto best = static_cast<std::int32_t>(near);
+        const std::int64_t difference = std::int64_t{finer[level.first[p]]} - finer[level.second[p]] - predicted;
+        if (2 * std::abs(difference) < step) return 0;
+        const double off = static_cast<double>(difference) / static_cast<double>(step);
+        auto best = static_cast<std::int32_t>(std::round(off));
         if (lambda > 0) {
-            const SplitCost cost(models, context);
+            const SplitCost cost(component.models, context);
             const std::int32_t inner = best + (best < 0 ? 1 : -1);
             double least = (off - best) * (off - best) + lambda * cost.of(best);
             for (const std::int32_t candidate : {inner, 0}) {
@@ -179,41 +206,101 @@ LevelMode plan_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<co
         gained += off * off - (off - best) * (off - best);
         return best;
     };
-    code_level(coder, models, level, k, walk.prediction, mode, walk.header.step[c], walk.magnitudes(k, c),
-               walk.rests[c], walk.planes[c].magnitude[k], choose);
-    if (gained <= lambda * coder.coder.bits()) {
-        models = models_before;
-        mode.coded = false;
-        std::fill(walk.rests[c].begin(), walk.rests[c].end(), 0);
-        std::fill(walk.planes[c].magnitude[k].begin(), walk.planes[c].magnitude[k].end(), std::uint8_t{0});
-    }
-    code_mode(coder, walk.models, c, walk.before != nullptr, mode);  // so that the next level knows
-    walk.end_component(k, c, mode);
-    return mode;
+    code_level(log, walk, k, c, mode, choose);
+    if (gained > lambda * log.bits()) return true;
+    component.models = models_before;
+    std::fill(component.rests[k].begin(), component.rests[k].end(), 0);
+    std::fill(component.plane.magnitude[k].begin(), component.plane.magnitude[k].end(), std::uint8_t{0});
+    log.clear();
+    return false;
 }
 
-FieldPlan plan_field(FieldWalk& walk, const std::vector<Means>& means, double lambda) {
-    const std::size_t components = walk.planes.size();
-    const std::size_t levels = walk.hierarchy.levels.size();
-    FieldPlan plan{.roots = std::vector<std::int32_t>(components, 0),
-                   .modes = std::vector(levels, std::vector<LevelMode>(components)),
-                   .rests = std::vector(levels, std::vector<std::vector<std::int32_t>>(components))};
-    FieldCounter coder;
-    for (std::size_t c = 0; c < components; ++c) {
-        if (walk.header.step[c] == 0) continue;
-        const std::int64_t from = walk.before ? walk.before->planes[c].mean.back()[0] : 0;
-        plan.roots[c] = static_cast<std::int32_t>(
-            divide_rounded(means[c].back()[0] - from, root_step(walk.header.step[c], walk.hierarchy.vertex_count)));
-        code_root(walk, coder, c, plan.roots[c]);
+// How far the planning of a component is, for the one that looks at its rests.
+class Progress {
+public:
+    static constexpr std::size_t everything = std::numeric_limits<std::size_t>::max();
+    void reach(std::size_t levels) {
+        levels_.store(levels, std::memory_order_release);
+        levels_.notify_all();
     }
+    void await(std::size_t levels) const {
+        for (std::size_t now = levels_.load(std::memory_order_acquire); now < levels;
+             now = levels_.load(std::memory_order_acquire))
+            levels_.wait(now, std::memory_order_acquire);
+    }
+
+private:
+    std::atomic<std::size_t> levels_{0};
+};
+
+// Lets those who wait go on, however a component's planning ends.
+struct ProgressEnd {
+    Progress& progress;
+    ~ProgressEnd() { progress.reach(Progress::everything); }
+};
+
+// Plans component c; where its rests are needed before those of a level can be chosen, waits for `awaited`.
+ComponentPlan plan_component(FieldWalk& walk, std::size_t c, const Means& means, double lambda, Progress& progress,
+                             const Progress* awaited) {
+    const ProgressEnd end{progress};
+    ComponentWalk& component = walk.components[c];
+    const std::size_t levels = walk.hierarchy.levels.size();
+    ComponentPlan plan{.root = {}, .modes = std::vector<LevelMode>(levels), .rests = std::vector<DecisionLog>(levels)};
+    if (component.step == 0) return plan;
+    const std::int64_t from = component.before ? component.before->mean.back()[0] : 0;
+    const std::int64_t unit = root_step(component.step, walk.hierarchy.vertex_count);
+    code_root(plan.root, component, walk.hierarchy.vertex_count,
+              static_cast<std::int32_t>(divide_rounded(means.back()[0] - from, unit)));
     for (std::size_t k = levels; k-- > 0;) {
-        walk.begin_level(k);
-        for (std::size_t c = 0; c < components; ++c)
-            if (walk.header.step[c] != 0) plan.modes[k][c] = plan_level(walk, k, c, means[c][k], lambda);
-        plan.rests[k] = walk.rests;
-        walk.end_level(k);
+        walk.begin_level(k, c);
+        LevelMode mode = choose_mode(walk.hierarchy.levels[k], means[k], component.prediction, component.last,
+                                     component.step, lambda);
+        if (awaited) awaited->await(levels - k);
+        mode.coded = quantise_level(walk, k, c, means[k], mode, lambda, plan.rests[k]);
+        component.last = plan.modes[k] = mode;
+        walk.end_level(k, c, mode);
+        progress.reach(levels - k);
     }
     return plan;
+}
+
+// Plans all components, the first two on this thread and the third, behind `beside`, on another.
+std::vector<ComponentPlan> plan_field(FieldWalk& walk, std::span<const std::int32_t> values, bool turned, double lambda,
+                                      unsigned threads, const std::function<void()>& beside) {
+    const std::size_t components = walk.components.size();
+    std::vector<ComponentPlan> plans(components);
+    std::array<Progress, most_field_components> progress;
+    auto plan = [&](std::size_t c) {
+        plans[c] = plan_component(walk, c, means_of(walk.hierarchy, values, components, c, turned), lambda, progress[c],
+                                  c > 0 ? &progress[c - 1] : nullptr);
+    };
+    // The first of the two depends on nothing that the second does: it may as well run before it.
+    parallel_invoke(
+        threads,
+        [&] {
+            const ProgressEnd end{progress[1]};
+            for (std::size_t c = 0; c < std::min<std::size_t>(components, 2); ++c) plan(c);
+        },
+        [&] {
+            if (beside) beside();
+            if (components > 2) plan(2);
+        });
+    return plans;
+}
+
+// Writes what was planned: level by level, component by component.
+std::vector<std::uint8_t> written(FieldWalk& walk, const std::vector<ComponentPlan>& plans) {
+    FieldWriter writer;
+    for (const auto& plan : plans) plan.root.write(writer.encoder);
+    std::vector<LevelMode> last;
+    for (const auto& component : walk.components) last.push_back(first_mode(component.before != nullptr));
+    for (std::size_t k = walk.hierarchy.levels.size(); k-- > 0;)
+        for (std::size_t c = 0; c < plans.size(); ++c) {
+            if (walk.components[c].step == 0) continue;
+            code_mode(writer, walk, last[c], plans[c].modes[k]);
+            plans[c].rests[k].write(writer.encoder);
+        }
+    return writer.encoder.finish();
 }
 
 Result<FieldHeader> header_of(std::span<const std::int32_t> values, std::size_t components,
@@ -236,7 +323,8 @@ Result<FieldHeader> header_of(std::span<const std::int32_t> values, std::size_t 
 }  // namespace
 
 Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values,
-                                  std::size_t components, const FieldOptions& options, const FieldHistory* before) {
+                                  std::size_t components, const FieldOptions& options, const FieldHistory* before,
+                                  unsigned threads, const std::function<void()>& beside) {
     if (components == 0 || components > most_field_components)
         return fail(ErrorKind::bad_input, "vertex field: there must be one to three components");
     if (values.size() != hierarchy.vertex_count * components)
@@ -255,17 +343,15 @@ Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<co
     for (std::size_t c = 0; c < components; ++c) writer.varint(header->step[c]);
     FieldWalk walk(hierarchy, *header, components, before);
     if (hierarchy.vertex_count > 0) {
-        FieldWalk trial(hierarchy, *header, components, before);
-        const FieldPlan plan =
-            plan_field(trial, means_of(hierarchy, values, components, options.turned), options.lambda);
-        FieldWriter coder;
-        walk_field(walk, coder, plan);
-        writer.bytes(coder.coder.finish());
+        const auto plans = plan_field(walk, values, options.turned, options.lambda, threads, beside);
+        writer.bytes(written(walk, plans));
+    } else if (beside) {
+        beside();
     }
     EncodedField out;
     out.bytes = writer.take();
-    out.values = field_values(walk.planes, hierarchy.vertex_count, header->turned);
-    out.history = {.turned = header->turned, .planes = std::move(walk.planes)};
+    out.history = history_of(walk, header->turned);
+    out.values = field_values(out.history.planes, hierarchy.vertex_count, header->turned);
     return out;
 }
 
