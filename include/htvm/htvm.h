@@ -148,12 +148,17 @@ const char* htvm_decoder_last_error(const htvm_decoder* decoder);
 htvm_status htvm_decoder_send_packet(htvm_decoder* decoder, const uint8_t* packet, size_t size);
 
 /* Sends the next piece, of any size, of a .htvm stream; the bytes are copied. Damage costs the packets that it touches:
- * the decoder goes on at the next whole one. Receive all frames after each call, or the bytes pile up. */
+ * the decoder goes on at the next whole one. Receive all frames after each call, or the bytes pile up.
+ * HTVM_OUT_OF_MEMORY: none of the bytes was taken. */
 htvm_status htvm_decoder_send_bytes(htvm_decoder* decoder, const uint8_t* bytes, size_t size);
 
-/* Decodes up to the next frame, which is then the current one, and says of what size it is. HTVM_AGAIN: none until more
- * is sent. HTVM_CORRUPT_STREAM, HTVM_UNSUPPORTED, HTVM_LIMIT, HTVM_OUT_OF_MEMORY: a packet could not be decoded and is
- * done with; call again for those after it. After any failure there is no current frame. info: may be NULL. */
+/* Decodes up to the next frame, which is then the current one, and says of what size it is. info: may be NULL.
+ * HTVM_AGAIN: none until more is sent.
+ * HTVM_CORRUPT_STREAM, HTVM_UNSUPPORTED, HTVM_LIMIT (also where decoding it ran out of memory): a packet could not be
+ * decoded and is done with; call again for those after it.
+ * HTVM_OUT_OF_MEMORY: not even a packet could be read; what was sent and not received is forgotten.
+ * After any failure there is no current frame. Every call but one that gives HTVM_BAD_INPUT uses up some of what was
+ * sent, so that a loop that ends with HTVM_AGAIN does end. */
 htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* info, size_t info_size);
 
 /* Makes the current frame a stand-in for one that did not arrive or could not be decoded: the last I-frame's mesh moved

@@ -23,6 +23,7 @@ struct htvm_decoder {
     std::optional<htvm::Packet> packet;  // sent as such, not yet received
     std::optional<htvm::DecodedFrame> current;
     LastError error;
+    std::uint64_t damaged_before = 0;  // bytes, by readers that were discarded
     Sent sent = Sent::nothing;
 
     htvm_decoder(const htvm_allocator& memory, const htvm::DecoderOptions& options)
@@ -74,6 +75,12 @@ htvm_status describe_current(htvm_decoder& decoder, htvm_frame_info* info, std::
     if (!info) return HTVM_OK;
     const auto written = htvm::c_api::write_struct(out, info, info_size);
     return written == HTVM_OK ? HTVM_OK : decoder.error.set(written, "info_size is not sizeof(htvm_frame_info)");
+}
+
+void discard(htvm_decoder& decoder) {
+    decoder.packet.reset();
+    decoder.damaged_before += decoder.reader.damaged_bytes();
+    decoder.reader = htvm::PacketReader(decoder.max_packet_bytes);
 }
 
 // The next packet to decode, or nothing.
@@ -188,7 +195,7 @@ htvm_status htvm_decoder_send_bytes(htvm_decoder* decoder, const uint8_t* bytes,
 
 htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* info, size_t info_size) {
     if (!decoder) return HTVM_BAD_INPUT;
-    return guarded(decoder->error, [&] {
+    const auto status = guarded(decoder->error, [&] {
         decoder->current.reset();
         while (const auto packet = next_packet(*decoder)) {
             auto frame = decoder->decoder.push(*packet);
@@ -199,6 +206,9 @@ htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* i
         }
         return htvm_status{HTVM_AGAIN};
     });
+    // Else the same bytes would be read again and again, and a caller who goes on until HTVM_AGAIN never come to it.
+    if (status == HTVM_OUT_OF_MEMORY) discard(*decoder);
+    return status;
 }
 
 htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t timestamp_us, htvm_frame_info* info,
@@ -213,15 +223,14 @@ htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t 
 htvm_status htvm_decoder_discard(htvm_decoder* decoder) {
     if (!decoder) return HTVM_BAD_INPUT;
     return guarded(decoder->error, [&] {
-        decoder->packet.reset();
-        decoder->reader = htvm::PacketReader(decoder->max_packet_bytes);
+        discard(*decoder);
         return htvm_status{HTVM_OK};
     });
 }
 
 htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* damaged, uint64_t* pending) {
     if (!decoder) return HTVM_BAD_INPUT;
-    if (damaged) *damaged = decoder->reader.damaged_bytes();
+    if (damaged) *damaged = decoder->damaged_before + decoder->reader.damaged_bytes();
     if (pending) *pending = decoder->reader.pending_bytes();
     return HTVM_OK;
 }
