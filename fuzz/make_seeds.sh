@@ -1,0 +1,170 @@
+#!/usr/bin/env bash
+# Makes the seeds of the fuzz targets that read files and streams, from tiny synthetic captures:
+#   fuzz/make_seeds.sh HTVM [FOLDER]      HTVM: the command line's program; FOLDER: fuzz/seeds unless given
+# The targets of single layers make sense of any bytes; their seeds are what fuzzing found worth keeping.
+set -euo pipefail
+htvm=$(realpath "$1")
+out=$(realpath -m "${2:-$(dirname "$0")/seeds}")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$out"/{decode_file,decode_stream,import_{ply,obj,drc,bvh,json,azure}}
+
+"$htvm" synth "$work/capture" --first-frame 30 --frames 5 --vertices 150 >/dev/null 2>&1
+"$htvm" synth "$work/normals" --first-frame 60 --frames 3 --vertices 150 --normals >/dev/null 2>&1
+skeleton="$work/capture/skeleton.json"
+
+# stream NAME CAPTURE OPTIONS...: to decode_file as it is, to decode_stream behind a few changes of its packets
+stream() {
+    local name=$1 capture=$2
+    shift 2
+    "$htvm" encode "$work/$capture" -o "$work/$name.htvm" "$@" >/dev/null 2>&1
+    cp "$work/$name.htvm" "$out/decode_file/$name"
+    {
+        printf '\x04\x00\x03\x00\x00\x01\x02\x05\x00\x02\x01\x04\x00\x0f\x04\x05\x09'
+        cat "$work/$name.htvm"
+    } >"$out/decode_stream/$name"
+}
+stream enhanced capture -q 20 --keyint 3 -s "$skeleton"
+stream no_skeleton normals -q 30 --keyint 2
+stream predicted capture -q 10 --decide motion --predicted-below 5000 --animation-error 0 --keyint 3 -s "$skeleton"
+stream in_part capture -q 20 --still-below 60 --animation-error 0 --keyint 4 -s "$skeleton"
+stream tracked capture -q 30 --profile tracked -s "$skeleton"
+stream tracked_intra normals -q 30 --profile tracked --tracked-from intra
+stream paper capture -q 10 --profile paper --keyint 5 -s "$skeleton"
+
+head -c 100 "$work/normals/frame_00060.ply" >"$out/import_ply/cut_off"
+cp "$work/normals/frame_00060.ply" "$out/import_ply/binary"
+cat >"$out/import_ply/text" <<'PLY'
+ply
+format ascii 1.0
+comment a square with everything
+element vertex 4
+property float x
+property float y
+property double z
+property float nx
+property float ny
+property float nz
+property float s
+property float t
+property uchar red
+property uchar green
+property uchar blue
+element face 2
+property list uchar int vertex_indices
+property int flags
+element edge 1
+property int a
+end_header
+0 0 0 0 0 1 0 0 255 0 0
+1 0 0 0 0 1 1 0 0 255 0
+1 1 0 0 0 1 1 1 0 0 255
+0 1e-3 nan 0 0 1 0 1 9 9 9
+3 0 1 2 7
+4 0 1 2 3 7
+3
+PLY
+printf 'ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty short x\nproperty float y\nproperty float z\nproperty ushort red\nproperty float green\nproperty char blue\nelement face 1\nproperty list ushort uint vertex_index\nend_header\n\x00\x01\x3f\x80\x00\x00\x40\x00\x00\x00\xff\xff\x3f\x00\x00\x00\x40\x00\x02\x40\x80\x00\x00\x40\x00\x00\x00\x00\xff\x3f\x80\x00\x00\x11\x00\x03\x3f\x80\x00\x00\x40\xa0\x00\x00\x00\x00\x00\x00\x00\x00\x01\x00\x03\x00\x00\x00\x00\x00\x00\x00\x01\x00\x00\x00\x02' >"$out/import_ply/big_endian"
+cat "$out/import_ply/big_endian" "$out/import_ply/big_endian" >"$out/import_ply/two"
+
+cat >"$out/import_obj/square" <<'OBJ'
+# a square, every form of a corner
+mtllib none.mtl
+o square
+v 0 0 0 1 0 0
+v 1 0 0 0 1 0
+v 1 1 0 0 0 255
+v 0 1.5e-3 0
+vt 0 0
+vt 1 0
+vt 1 1
+vn 0 0 1
+vn 0 0 -1
+g front
+f 1 2 3
+f 1/1 2/2 3/3 4/1
+f 1//1 2//1 \
+  3//2
+f -4/1/1 -3/2/1 -2/3/2
+l 1 2
+OBJ
+
+cat >"$work/square.obj" <<'OBJ'
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+vt 0 0
+vt 1 0
+vt 1 1
+vn 0 0 1
+f 1/1/1 2/2/1 3/3/1
+f 1/1/1 3/3/1 4/1/1
+OBJ
+if command -v draco_encoder >/dev/null; then
+    draco_encoder -i "$work/square.obj" -o "$out/import_drc/square" >/dev/null
+    draco_encoder -i "$work/square.obj" -o "$out/import_drc/sequential" -cl 0 >/dev/null
+    draco_encoder -i "$work/normals/frame_00060.ply" -o "$out/import_drc/person" -qp 8 >/dev/null
+    draco_encoder -point_cloud -i "$work/normals/frame_00060.ply" -o "$out/import_drc/cloud" -qp 8 >/dev/null
+fi
+
+cat >"$out/import_bvh/person" <<'BVH'
+HIERARCHY
+ROOT Hips
+{
+  OFFSET 0.0 90.0 0.0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  JOINT Spine
+  {
+    OFFSET 0.0 20.0 0.0
+    CHANNELS 3 Zrotation Xrotation Yrotation
+    End Site
+    {
+      OFFSET 0.0 30.0 0.0
+    }
+  }
+  JOINT Leg
+  {
+    OFFSET 10.0 -5.0 0.0
+    CHANNELS 3 Yrotation Xrotation Zrotation
+    End Site
+    {
+      OFFSET 0.0 -80.0 0.0
+    }
+  }
+}
+MOTION
+Frames: 3
+Frame Time: 0.0333333
+0 90 0 0 0 0 10 0 0 0 20 0
+1 90 0 5 0 0 10 0 0 0 25 0
+2 91 0 9 1 0 -1e1 0 0 0 30 0
+BVH
+
+cat >"$out/import_json/everything" <<'JSON'
+{"units": "cm", "fps": 30, "joints": ["hip", "knee", "foot"], "bones": [[0, 1], ["knee", "foot"]],
+ "frames": [[[0, 90, 0], [0, 48, 2], null], null, [[0, 91, 0], [1, 48, 2], [1, 5, 0]]],
+ "timestamps": [0, 0.0333, 0.07],
+ "orientations": [[[[1, 0, 0], [0, 1, 0], [0, 0, 1]], null], null, [[1, 0, 0, 0, 1, 0, 0, 0, 1], null]],
+ "radii": [80, 60]}
+JSON
+cat >"$out/import_json/small" <<'JSON'
+{"joints": ["a", "b"], "bones": [["a", 1]], "frames": [[[0, 1, 2], [3, 4, 5e2]]]}
+JSON
+python3 - "$out/import_azure" <<'PYTHON'
+import json
+import sys
+
+joints = 32
+body = {"body_id": 1, "joint_positions": [[j, 10 * j, 2000.5] for j in range(joints)],
+        "joint_orientations": [[1, 0, 0, 0]] * joints}
+plain = {"frames": [{"timestamp_usec": 33333 * t, "frame_id": t, "num_bodies": 1, "bodies": [body]} for t in range(2)]}
+open(sys.argv[1] + "/sensor", "w").write(json.dumps(plain))
+small = {"joint_names": ["PELVIS", "HEAD", "NOSE"], "bone_list": [["HEAD", "PELVIS"], ["HEAD", "NOSE"]],
+         "frames": [{"timestamp_usec": 1, "bodies": [{"body_id": 3, "joint_positions": [[0, 1, 2], [3, 4, 5], [6, 7, 8]]}]},
+                    {"timestamp_usec": 40000, "bodies": []}]}
+open(sys.argv[1] + "/named", "w").write(json.dumps(small))
+PYTHON
+cp "$out"/import_bvh/person "$out"/import_azure/bvh
+cp "$out"/import_json/small "$out"/import_azure/own
+du -sh "$out"

@@ -1,0 +1,89 @@
+// The encoder on any meshes, poses and options: an error, or packets that decode to just what it promised.
+#include "htvm/encoder.hpp"
+
+#include <array>
+#include <cstring>
+#include <limits>
+
+#include "any_capture.h"
+#include "import_mesh.h"
+#include "whole_decoder.h"
+
+namespace {
+
+using namespace htvm;
+using fuzz::require;
+
+EncoderOptions any_options(fuzz::FuzzInput& input) {
+    EncoderOptions out;
+    out.threads = 1;
+    const std::uint8_t what = input.u8();
+    constexpr std::array steps = {2.0, 0.05, 0.5, 8.0, 30.0, 1000.0, 1.0 / 65536, -1.0};
+    constexpr std::array colour_steps = {6.0, 1.0, 20.0, 255.0};
+    constexpr std::array lambdas = {0.12, 0.0, 2.0, 1000.0};
+    out.geometry_step = steps[input.below(8)];
+    out.colour_step = colour_steps[input.below(4)];
+    out.lambda = lambdas[input.below(4)];
+    out.key_interval = static_cast<int>(input.below(6));
+    out.least_key_interval = 1 + (what & 1);
+    out.scene_changes = (what & 2) != 0;
+    out.merge_duplicates = (what & 4) != 0;
+    out.tracked = (what & 8) != 0;
+    out.point_to_plane = (what & 16) != 0;
+    if (what & 32) out.tracked_references = TrackedReferences::intra;
+    if (what & 64) out.reference_vertices = ReferenceVertices::bone;
+    out.frame_choice = static_cast<FrameChoice>(input.below(3));
+    out.node_spacing = 1 + 20 * input.u8();
+    out.still_below = input.below(3) * 100;
+    out.animation_error = input.below(3) * 5;
+    out.predicted_below = input.below(4) * 400;
+    out.intra_above = input.below(3) * 800;
+    out.nearest_vertices = static_cast<int>(input.below(66));
+    out.weight_width = input.below(4) * 25;
+    out.lattice_bits = static_cast<int>(input.below(18));
+    const std::uint8_t control = input.u8();
+    if (control > 220) out.bits_per_second = 1000.0 * control * input.u8();
+    if (control < 20) out.target_error = 0.1 * input.u8();
+    return out;
+}
+
+void check_options(EncoderOptions options, const fuzz::AnyCapture& capture) {
+    options.skeleton = capture.skeleton;
+    auto encoder = Encoder::create(options);
+    if (!encoder) return;
+    DecoderOptions limits;
+    limits.threads = 1;
+    Decoder decoder(limits);
+    const auto decode = [&](const Mesh& promised, bool of_frame) {
+        std::size_t frames = 0;
+        while (const auto packet = encoder->pull()) {
+            const auto packets = fuzz::read_packets(write_packet(*packet), 1 << 20);
+            require(packets.size() == 1, "a written packet can be read");
+            const auto frame = decoder.push(packets[0]);
+            require(frame.has_value(), "what the encoder sends can be decoded");
+            if (!*frame) continue;
+            ++frames;
+            fuzz::require_sound((*frame)->mesh, limits);
+            require(fuzz::same((*frame)->mesh, promised), "the decoded mesh is the one that the encoder promised");
+        }
+        require(frames == (of_frame ? 1 : 0), "one packet a frame");
+    };
+    std::int64_t time = 0;
+    for (const auto& frame : capture.frames) {
+        const auto pushed = encoder->push(frame.mesh, frame.pose ? &*frame.pose : nullptr, time += 33333);
+        if (!pushed) require(!pushed.error().message.empty(), "an error says what is wrong");
+        if (pushed) require(check_mesh(frame.mesh).has_value(), "a mesh that is none is refused");
+        decode(pushed ? encoder->reconstruction() : Mesh{}, pushed.has_value());
+    }
+    encoder->finish();
+    decode({}, false);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    fuzz::FuzzInput input(data, size);
+    const auto options = any_options(input);
+    check_options(options, fuzz::any_capture(input));
+    return 0;
+}

@@ -1,0 +1,95 @@
+// Transforms of bones, the pose of an I-frame, and the motion of nodes: layers come back; damage stays in range.
+#include "codec/transforms.h"
+
+#include "codec/node_motion.h"
+#include "small_mesh.h"
+
+namespace {
+
+using namespace htvm;
+using fuzz::require;
+
+QuantisedRotation any_rotation(fuzz::FuzzInput& input) {
+    QuantisedRotation out;
+    out.largest = input.u8() % 4;
+    for (auto& c : out.others) c = static_cast<std::int16_t>(input.number(1 << rotation_bits));
+    return out;
+}
+
+QuantisedTransform any_transform(fuzz::FuzzInput& input) {
+    if (!input.flag()) return {};
+    const auto rotation = any_rotation(input);
+    const auto coordinate = [&] { return input.number(2 * lattice_limit); };
+    return {rotation, {coordinate(), coordinate(), coordinate()}};
+}
+
+void check_transforms(const std::vector<QuantisedTransform>& wanted, fuzz::FuzzInput& input) {
+    const auto bytes = encode_transforms(wanted);
+    const auto again = decode_transforms(bytes, wanted.size());
+    require(again && *again == wanted, "transforms come back as they were encoded");
+    const auto bad = decode_transforms(fuzz::damaged(bytes, input), wanted.size());
+    if (!bad) return;
+    const auto rest = encode_transforms(*bad);
+    const auto bad_again = decode_transforms(rest, wanted.size());
+    require(bad_again && *bad_again == *bad, "what any bytes decode to can be encoded");
+    for (const auto& transform : *bad) {
+        const auto matrix = rotation_matrix(transform.rotation);
+        rotate(matrix, fuzz::any_point(input));
+    }
+}
+
+void check_pose(fuzz::FuzzInput& input) {
+    CodedPose pose;
+    for (std::uint32_t n = input.below(20); n > 0; --n) pose.joints.push_back(fuzz::any_point(input));
+    for (std::uint32_t n = input.below(20); n > 0; --n) pose.orientations.push_back(any_rotation(input));
+    const auto bytes = encode_pose(pose);
+    const auto again = decode_pose(bytes, pose.joints.size(), pose.orientations.size());
+    require(again && again->joints == pose.joints && again->orientations == pose.orientations, "a pose comes back");
+    const auto bad = decode_pose(fuzz::damaged(bytes, input), pose.joints.size(), pose.orientations.size());
+    if (bad) require(fuzz::all_on_lattice(bad->joints), "joints are on the lattice");
+}
+
+void check_node_motion(const std::vector<QuantisedTransform>& wanted, fuzz::FuzzInput& input) {
+    std::vector<std::uint32_t> parents;
+    std::vector<LatticePoint> pivots;
+    std::vector<QuantisedTransform> before;
+    const bool temporal = input.flag();
+    for (std::uint32_t n = 0; n < wanted.size(); ++n) {
+        parents.push_back(n > 0 && input.flag() ? input.below(n) : no_parent);
+        pivots.push_back(fuzz::any_point(input));
+        if (temporal) before.push_back(any_transform(input));
+    }
+    NodeMotionOptions options;
+    options.rotation_exponent = static_cast<int>(input.below(11));
+    options.shift_exponent = static_cast<int>(input.below(21));
+    const auto encoded = encode_node_motion(wanted, parents, pivots, before, options);
+    const auto again = decode_node_motion(encoded.bytes, parents, pivots, before);
+    require(again && *again == encoded.transforms, "the motion that the encoder promised");
+    const auto bad = decode_node_motion(fuzz::damaged(encoded.bytes, input), parents, pivots, before);
+    if (!bad) return;
+    for (const auto& transform : *bad) {
+        for (const auto c : transform.rotation.others)
+            require(std::abs(c) <= 1 << rotation_bits, "a rotation in range");
+        for (const auto c : {transform.shift.x, transform.shift.y, transform.shift.z})
+            require(std::abs(c) <= 2 * lattice_limit, "a shift in range");
+    }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    fuzz::FuzzInput input(data, size);
+    const std::uint8_t what = input.u8() % 4;
+    std::vector<QuantisedTransform> wanted;
+    if (what == 0) {
+        const std::size_t bones = input.u8();
+        const auto decoded = decode_transforms(input.rest(), bones);
+        if (decoded) wanted = *decoded;
+    } else {
+        for (std::uint32_t n = input.below(24); n > 0; --n) wanted.push_back(any_transform(input));
+    }
+    if (what < 2) check_transforms(wanted, input);
+    if (what == 2) check_pose(input);
+    if (what == 3) check_node_motion(wanted, input);
+    return 0;
+}

@@ -1,0 +1,89 @@
+// Streams of bytes through the reader of packets and the whole decoder, with what must hold of every frame.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/crc32.h"
+#include "fuzz_input.h"
+#include "htvm/decoder.hpp"
+
+namespace htvm::fuzz {
+
+inline std::vector<Packet> read_packets(std::span<const std::uint8_t> bytes, std::size_t piece) {
+    PacketReader reader;
+    std::vector<Packet> out;
+    std::size_t of_packets = 0;
+    for (std::size_t at = 0; at < bytes.size(); at += piece) {
+        reader.push(bytes.subspan(at, std::min(piece, bytes.size() - at)));
+        while (auto packet = reader.pull()) {
+            of_packets += packet_overhead + packet->payload.size();
+            out.push_back(std::move(*packet));
+        }
+    }
+    require(of_packets + reader.damaged_bytes() + reader.pending_bytes() == bytes.size(),
+            "every byte is part of a packet, damage, or pending");
+    return out;
+}
+
+// A mesh as include/htvm/mesh.hpp promises it.
+inline void require_sound(const Mesh& mesh, const DecoderOptions& limits) {
+    const std::size_t vertices = mesh.positions.size();
+    require(vertices <= limits.max_vertices && mesh.triangles.size() <= limits.max_triangles, "no more than allowed");
+    for (const std::size_t size : {mesh.colours.size(), mesh.normals.size(), mesh.texcoords.size()})
+        require(size == 0 || size == vertices, "attributes of every vertex or of none");
+    for (const auto& p : mesh.positions)
+        for (const float c : p) require(std::isfinite(c), "positions are finite");
+    for (const auto& n : mesh.normals)
+        for (const float c : n) require(std::isfinite(c), "normals are finite");
+    for (const auto& t : mesh.triangles)
+        for (const auto v : t) require(v < vertices, "triangles name vertices that are there");
+}
+
+inline void decode_all(const std::vector<Packet>& packets, const DecoderOptions& options) {
+    Decoder decoder(options);
+    for (const auto& packet : packets) {
+        const auto frame = decoder.push(packet);
+        if (!frame) {
+            require(!frame.error().message.empty(), "an error says what is wrong");
+            if (const auto stand_in = decoder.conceal(packet.frame, packet.timestamp_us)) {
+                require_sound(stand_in->mesh, options);
+                require(stand_in->concealed, "a stand-in says that it is one");
+            }
+            continue;
+        }
+        require(frame->has_value() == frame_type(packet.kind).has_value(), "frames and nothing else give frames");
+        if (!*frame) continue;
+        require_sound((*frame)->mesh, options);
+        const auto& skeleton = decoder.sequence()->skeleton;
+        require((*frame)->pose.joints.size() == skeleton.joint_names.size(), "one position a joint");
+        require(inspect(packet).has_value(), "a frame that was decoded can be inspected");
+    }
+}
+
+// Puts right the CRCs of whatever begins like a packet, so that what they would have caught reaches the decoder.
+inline void repair_checksums(std::vector<std::uint8_t>& bytes) {
+    const std::string sync = "HTVP";
+    const auto put = [&](std::size_t at, std::uint32_t value) {
+        for (std::size_t i = 0; i < 4; ++i) bytes[at + i] = static_cast<std::uint8_t>(value >> (8 * i));
+    };
+    for (std::size_t at = 0; at + packet_overhead <= bytes.size();) {
+        const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+        const auto found = std::search(begin, bytes.end(), sync.begin(), sync.end());
+        at += static_cast<std::size_t>(found - begin);
+        if (at + packet_overhead > bytes.size()) return;
+        std::uint32_t size = 0;
+        for (std::size_t i = 0; i < 4; ++i) size |= std::uint32_t{bytes[at + 24 + i]} << (8 * i);
+        // A size that leads past the end is cut to what there is: most inputs would hold no packet otherwise.
+        const auto most = static_cast<std::uint32_t>(bytes.size() - at - packet_overhead);
+        if (size > most) put(at + 24, size = most);
+        put(at + 28, crc32(std::span(bytes).subspan(at + 4, 24)));
+        put(at + 32 + size, crc32(std::span(bytes).subspan(at + 32, size)));
+        at += packet_overhead + size;
+    }
+}
+
+}  // namespace htvm::fuzz
