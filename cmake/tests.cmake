@@ -15,6 +15,8 @@ htvm_tests(core htvm_core)
 htvm_tests(entropy htvm_entropy)
 htvm_tests(geometry htvm_geometry)
 htvm_tests(codec htvm_encoder htvm_decoder htvm_draco htvm_synth)
+# Replaces operator new, hence a program of its own.
+htvm_tests(memory htvm_encoder htvm_decoder htvm_synth)
 htvm_tests(io htvm_io)
 htvm_tests(synth htvm_synth)
 htvm_tests(metrics htvm_metrics)

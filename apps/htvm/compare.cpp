@@ -17,6 +17,7 @@
 #include "io/sequence.h"
 #include "mesh_source.h"
 #include "metrics/compare.h"
+#include "stream_limits.h"
 #include "terminal.h"
 
 namespace htvm::app {
@@ -27,6 +28,7 @@ struct Options {
     std::size_t frames = 0;  // 0: all
     std::vector<std::string> only;
     CompareOptions compare;
+    DecoderOptions limits;  // of streams
     bool grey = false, follow_sequence = false, json = false;
     double peak_mm = 0;
     std::string csv, pictures;
@@ -83,7 +85,7 @@ Result<std::vector<FramePair>> pairs_of(const Options& options) {
 
 // The box round all originals, for cameras that stand still.
 Result<Box> sequence_box(const Options& options) {
-    auto source = open_meshes(options.original, options.unit);
+    auto source = open_meshes(options.original, options.unit, options.limits);
     if (!source) return tl::unexpected(source.error());
     Box box;
     Progress progress("bounding box", options.frames > 0 ? std::min(options.frames, source->frames) : source->frames);
@@ -152,9 +154,9 @@ Result<std::optional<Mesh>> mesh_at(MeshSource& source, std::size_t place, std::
 }
 
 Result<Measured> measure(const Options& options) {
-    auto original = open_meshes(options.original, options.unit);
+    auto original = open_meshes(options.original, options.unit, options.limits);
     if (!original) return tl::unexpected(original.error());
-    auto decoded = open_meshes(options.decoded, options.unit);
+    auto decoded = open_meshes(options.decoded, options.unit, options.limits);
     if (!decoded) return tl::unexpected(decoded.error());
     const auto pairs = pairs_of(options);
     if (!pairs) return tl::unexpected(pairs.error());
@@ -316,6 +318,7 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("--threads", o.compare.threads,
                         "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
+    add_decoder_limits(*command, o.limits);
     command->add_option("--csv", o.csv,
                         "A line a frame to this file, or - for standard output; an infinite PSNR is inf");
     command->footer(

@@ -20,6 +20,7 @@
 #include "io/sequence.h"
 #include "layer_table.h"
 #include "stream_file.h"
+#include "stream_limits.h"
 #include "terminal.h"
 
 namespace htvm::app {
@@ -30,6 +31,7 @@ struct Options {
     std::size_t frames = 0;
     unsigned threads = 0;
     bool json = false;
+    DecoderOptions limits;
 };
 
 struct Summary {
@@ -241,6 +243,10 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
 // An error where the stream is not all there.
 Result<void> judge(const Options& options, const MeshOutput& output, const StreamInput& input, const Summary& summary) {
     const auto lost = summary.undecodable + summary.missing;
+    if (input.oversized_packets() > 0)
+        return fail(ErrorKind::limit,
+                    fmt::format("{} has {} packets of more than {} bytes; raise --max-packet to decode them",
+                                options.input, input.oversized_packets(), options.limits.max_packet_bytes));
     if (input.damaged_bytes() > 0)
         return fail(ErrorKind::corrupt_stream,
                     fmt::format("{} is damaged: {} bytes were no sound packet; {} frames were decoded, {} lost besides",
@@ -262,11 +268,11 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
 Result<void> decode(const Options& options) {
     if (options.output == "-" && options.json)
         return fail(ErrorKind::bad_input, "--json prints on standard output, where -o - puts the meshes; choose one");
-    auto input = StreamInput::open(options.input);
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
     auto output = MeshOutput::open(options);
     if (!output) return tl::unexpected(output.error());
-    DecoderOptions settings;
+    DecoderOptions settings = options.limits;
     settings.threads = options.threads;
     settings.intra_coder = draco_intra_coder();
     Decoder decoder(settings);
@@ -310,6 +316,7 @@ void add_decode(CLI::App& app, Run& run) {
     command->add_option("--frames", options->frames, "Decode at most this many frames (default: all)");
     command->add_option("--threads", options->threads, "Threads (default: one a core); the meshes do not depend on it");
     command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output");
+    add_decoder_limits(*command, options->limits);
     command->footer(
         "A damaged or shortened stream gives every frame that is whole, says what was lost, and exits with 3; so does\n"
         "one that frames are missing from. A lost P- or EP-frame costs no other one; a lost T-frame those up to the\n"

@@ -9,6 +9,7 @@
 #include "htvm/decoder.hpp"
 #include "layer_table.h"
 #include "stream_file.h"
+#include "stream_limits.h"
 #include "terminal.h"
 
 namespace htvm::app {
@@ -17,6 +18,7 @@ namespace {
 struct Options {
     std::string input;
     bool json = false, summary = false;
+    DecoderOptions limits;
     double megabits = 0, buffer_seconds = 1;  // of the line and the receiver's buffer to check against; 0: none
 };
 
@@ -81,9 +83,9 @@ nlohmann::json buffer_json(const Options& options, const BufferModel& buffer) {
 }
 
 Result<void> info(const Options& options) {
-    auto input = StreamInput::open(options.input);
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
-    Decoder headers;  // for the sequence header alone: frames are inspected, not decoded
+    Decoder headers(options.limits);  // for the sequence header alone: frames are inspected, not decoded
     TotalsByType totals;
     std::size_t count = 0;
     LayerBytes codebooks;
@@ -141,6 +143,8 @@ Result<void> info(const Options& options) {
         fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), count, seconds, bytes,
                    megabits, index ? ", with an index for seeking" : "");
     }
+    if (input->oversized_packets() > 0)
+        return fail(ErrorKind::limit, options.input + " has packets larger than --max-packet");
     if (input->damaged_bytes() > 0)
         return fail(ErrorKind::corrupt_stream,
                     fmt::format("{}: {} bytes are no sound packet", options.input, input->damaged_bytes()));
@@ -158,6 +162,7 @@ void add_info(CLI::App& app, Run& run) {
     command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
     command->add_flag("--summary", options->summary, "The totals only, no line a frame");
     command->add_flag("--json", options->json, "Everything as JSON");
+    add_packet_limits(*command, options->limits);
     auto* bitrate =
         command->add_option("--bitrate", options->megabits,
                             "Check that the stream plays without a pause over a line of so many Mbit/s, by\n"

@@ -21,12 +21,11 @@ Result<std::optional<LengthUnit>> unit_named(const std::string& name) {
     return fail(ErrorKind::bad_input, "There is no unit '" + name + "': give mm, cm, m or auto.");
 }
 
-Result<MeshSource> open_stream(const std::string& path) {
-    auto input = StreamInput::open(path);
+Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) {
+    auto input = StreamInput::open(path, options.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
     MeshSource source;
     source.name = path;
-    DecoderOptions options;
     options.intra_coder = draco_intra_coder();
     source.next = [input = std::make_shared<StreamInput>(std::move(*input)),
                    decoder = std::make_shared<Decoder>(options),
@@ -45,6 +44,8 @@ Result<MeshSource> open_stream(const std::string& path) {
             ++expected;
             return std::optional(std::move((*frame)->mesh));
         }
+        if (input->oversized_packets() > 0)
+            return fail(ErrorKind::limit, self.name + " has packets larger than --max-packet");
         if (input->damaged_bytes() > 0 || input->cut_short_bytes() > 0 || !decoder->sequence())
             return fail(ErrorKind::corrupt_stream,
                         self.name + " is damaged, cut short, or not an htvm stream; 'htvm info' tells more");
@@ -55,10 +56,10 @@ Result<MeshSource> open_stream(const std::string& path) {
 
 }  // namespace
 
-Result<MeshSource> open_meshes(const std::string& name, const std::string& unit) {
+Result<MeshSource> open_meshes(const std::string& name, const std::string& unit, const DecoderOptions& limits) {
     if (name == "-")
         return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
-    if (name.ends_with(".htvm")) return open_stream(name);
+    if (name.ends_with(".htvm")) return open_stream(name, limits);
     const auto chosen = unit_named(unit);
     if (!chosen) return tl::unexpected(chosen.error());
     const auto files = find_sequence(name);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "htvm/decoder.hpp"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 
@@ -22,7 +23,7 @@ struct MeshSource {
 };
 
 // An .htvm stream, decoded frame by frame, or the files that `name` means (io/sequence.h). unit, of files: mm, cm, m,
-// or auto, which guesses from the first frame's size.
-Result<MeshSource> open_meshes(const std::string& name, const std::string& unit);
+// or auto, which guesses from the first frame's size. limits: of what a stream may hold.
+Result<MeshSource> open_meshes(const std::string& name, const std::string& unit, const DecoderOptions& limits = {});
 
 }  // namespace htvm::app

@@ -1,17 +1,21 @@
 #include "stream_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 
 #include "io/mesh_file.h"
 
 namespace htvm::app {
 
-Result<StreamInput> StreamInput::open(const std::string& path) {
+Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max_packet_bytes) {
     StreamInput input;
+    input.reader_ = PacketReader(
+        static_cast<std::size_t>(std::min<std::uint64_t>(max_packet_bytes, std::numeric_limits<std::size_t>::max())));
     input.standard_ = path == "-";
     if (input.standard_) return input;
     if (std::filesystem::is_directory(path))

@@ -13,10 +13,12 @@ namespace htvm::app {
 
 class StreamInput {
 public:
-    static Result<StreamInput> open(const std::string& path);  // - is standard input
+    // - is standard input. Larger packets are passed over.
+    static Result<StreamInput> open(const std::string& path, std::uint64_t max_packet_bytes);
     // The next packet, or nothing at the end.
     std::optional<Packet> next();
     std::uint64_t damaged_bytes() const { return reader_.damaged_bytes(); }
+    std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
     std::size_t cut_short_bytes() const { return reader_.pending_bytes(); }  // at the end: of a packet without its end
 
 private:

@@ -1,4 +1,4 @@
-// The decoder: push packets, pull meshes. It depends on the standard library alone and never throws.
+// The decoder: push packets, pull meshes. It depends on the standard library alone. Once made, it never throws.
 //
 //   htvm::Decoder decoder;
 //   for each packet:  auto frame = decoder.push(packet);   // Result<std::optional<DecodedFrame>>
@@ -24,8 +24,16 @@
 namespace htvm {
 
 struct DecoderOptions {
-    std::uint32_t max_vertices = 1u << 22;          // of a frame; larger frames are refused (ErrorKind::limit)
-    std::uint32_t max_triangles = 1u << 23;         // likewise
+    // What is larger is refused (ErrorKind::limit) before memory is taken for it.
+    std::uint32_t max_vertices = 1u << 22;   // of a frame
+    std::uint32_t max_triangles = 1u << 23;  // of a frame
+    std::uint32_t max_joints = 1024;         // of the skeleton; the format has no more
+    std::uint32_t max_bones = 1024;          // likewise
+    std::uint64_t max_packet_bytes = std::uint64_t{1} << 28;
+    // Bytes that the decoder may take for what it keeps and the frame under way together, by an upper bound from the
+    // counts of vertices and triangles: about 1 KB a vertex of an ordinary mesh. A coder of I-frames that is plugged in
+    // takes its own besides.
+    std::uint64_t max_memory = std::uint64_t{1} << 32;
     unsigned threads = 0;                           // 0: one a core; the meshes are the same for any number
     std::optional<ExternalIntraCoder> intra_coder;  // for I-frames of another coder; none: they are unsupported
 };
@@ -58,11 +66,12 @@ public:
     ~Decoder();
 
     // Takes one packet; gives a frame where the packet is one. Errors cost that packet only: corrupt_stream where its
-    // bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported, limit.
+    // bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported; limit where
+    // it is beyond the options, or memory ran out. What came before a packet that is refused stays in force.
     Result<std::optional<DecodedFrame>> push(const Packet& packet);
     // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh moved as the last frame
-    // was, or, where that much of a frame could be read, as it is itself; after T-frames, the last of them again. Nothing
-    // before an I-frame.
+    // was, or, where that much of a frame could be read, as it is itself; after T-frames, the last of them again.
+    // Nothing before an I-frame, or where memory ran out.
     std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us) const;
     // Known once a sequence header was pushed.
     const std::optional<SequenceInfo>& sequence() const;

@@ -36,7 +36,8 @@ inline constexpr std::size_t packet_overhead = 36;  // bytes around the payload:
 std::vector<std::uint8_t> write_packet(const Packet& packet);
 
 // Cuts a stream of bytes into packets. Push bytes as they come, in pieces of any size, and pull packets until there is
-// none. Damage costs the packets it touches: the reader goes on at the next packet that is whole.
+// none. Damage costs the packets it touches: the reader goes on at the next packet that is whole. Memory is taken for
+// what was pushed, not for what a header claims; where it runs out, std::bad_alloc leaves the reader as it was.
 class PacketReader {
 public:
     // Packets whose payload is larger count as damage.
@@ -46,6 +47,8 @@ public:
     std::optional<Packet> pull();
     // Bytes that had to be skipped so far because they are no packet, or one with a wrong CRC.
     std::uint64_t damaged_bytes() const { return damaged_; }
+    // Packets passed over because their payload is larger than allowed, though their header is sound; damage too.
+    std::uint64_t oversized_packets() const { return oversized_; }
     // Bytes pushed that are not part of a packet yet. At the end of a stream they are a packet cut short.
     std::size_t pending_bytes() const { return buffer_.size() - position_; }
 
@@ -56,6 +59,7 @@ private:
     std::vector<std::uint8_t> buffer_;
     std::size_t position_ = 0;
     std::uint64_t damaged_ = 0;
+    std::uint64_t oversized_ = 0;
     std::uint64_t checked_in_vain_ = 0;  // payload bytes whose CRC was wrong
 };
 

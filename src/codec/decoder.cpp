@@ -2,8 +2,10 @@
 #include "htvm/decoder.hpp"
 
 #include <new>
+#include <stdexcept>
 
 #include "codec/animated_frame.h"
+#include "codec/decoder_limits.h"
 #include "codec/enhanced_frame.h"
 #include "codec/intra_frame.h"
 #include "codec/sequence_header.h"
@@ -62,20 +64,29 @@ SequenceInfo describe(const SequenceHeader& header) {
     return info;
 }
 
+// What came behind the I-frame in force.
+void forget_frames(State& state) {
+    state.tracked.reset();
+    state.tracked_state.reset();
+    state.tracked_mesh = {};
+    state.geometry_codebook.reset();
+    state.colour_codebook.reset();
+}
+
+// Whatever can fail, or find no memory, comes first: then nothing of the state has changed.
 Result<Frame> take_header(State& state, const Packet& packet) {
     auto header = read_sequence_header(packet.payload);
     if (!header) return tl::unexpected(header.error());
+    if (auto ok = check_limits(*header, state.options); !ok) return tl::unexpected(ok.error());
     // A repeated header changes nothing; another one begins another sequence.
-    if (state.header_payload != packet.payload) {
-        state.reference.reset();
-        state.tracked.reset();
-        state.tracked_state.reset();
-        state.geometry_codebook.reset();
-        state.colour_codebook.reset();
-    }
-    state.info = describe(*header);
+    if (state.header && state.header_payload == packet.payload) return Frame{};
+    auto info = describe(*header);
+    auto payload = packet.payload;
+    state.reference.reset();
+    forget_frames(state);
+    state.info = std::move(info);
     state.header = std::move(*header);
-    state.header_payload = packet.payload;
+    state.header_payload = std::move(payload);
     return Frame{};
 }
 
@@ -88,20 +99,36 @@ Result<Frame> take_codebook(State& state, const Packet& packet) {
     return Frame{};
 }
 
-Result<FramePayload> read_frame(const State& state, const Packet& packet) {
+MeshCounts counts(const LatticeMesh& mesh) { return {mesh.positions.size(), mesh.triangles.size()}; }
+
+std::uint64_t kept_memory(const State& state) {
+    if (!state.reference) return 0;
+    const auto mesh = counts(state.reference->mesh);
+    return memory_of_reference(mesh) + (state.tracked ? memory_of_tracking(mesh) : 0);
+}
+
+// The payload of a frame that this decoder may decode, as far as its header tells.
+Result<FramePayload> read_frame(const State& state, const Packet& packet, FrameType type) {
     if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
     auto payload = read_frame_payload(packet.payload);
     if (!payload) return payload;
-    const auto& h = payload->header;
-    if (h.vertices > state.options.max_vertices || h.triangles > state.options.max_triangles)
-        return fail(ErrorKind::limit, "frame " + std::to_string(packet.frame) + " has " + std::to_string(h.vertices) +
-                                          " vertices and " + std::to_string(h.triangles) +
-                                          " triangles, more than this decoder accepts");
+    const auto& header = payload->header;
+    const bool by_itself = type == FrameType::intra || type == FrameType::enhanced;
+    if (by_itself && packet.payload.size() < least_payload(header.vertices, header.triangles))
+        return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " claims " +
+                                                   std::to_string(header.vertices) + " vertices and " +
+                                                   std::to_string(header.triangles) + " triangles in " +
+                                                   std::to_string(packet.payload.size()) + " bytes");
+    const auto reference = type != FrameType::intra && state.reference ? counts(state.reference->mesh) : MeshCounts{};
+    auto kept = kept_memory(state);
+    if (type == FrameType::tracked && !state.tracked) kept += memory_of_tracking(reference);
+    if (auto ok = check_limits(type, header, reference, kept, state.options); !ok)
+        return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
     return payload;
 }
 
 Result<Frame> decode_intra(State& state, const Packet& packet) {
-    const auto payload = read_frame(state, packet);
+    const auto payload = read_frame(state, packet, FrameType::intra);
     if (!payload) return tl::unexpected(payload.error());
     const auto& skeleton = state.header->skeleton;
     const auto pose = decode_pose(payload->of(Layer::pose), skeleton.joint_names.size(), skeleton.bones.size());
@@ -114,14 +141,14 @@ Result<Frame> decode_intra(State& state, const Packet& packet) {
     for (const auto joint : pose->joints) out.pose.joints.push_back(to_millimetres(joint, state.header->lattice));
     for (const auto& rotation : pose->orientations)
         out.pose.orientations.push_back(matrix_of(rotation_matrix(rotation)));
-    state.reference = make_reference(std::move(*mesh), skeleton.bones, pose->joints, pose->orientations,
-                                     state.header->radii, state.header->weight_width, packet.frame, state.threads);
-    state.last_transforms.assign(skeleton.bones.size(), {});
+    auto reference = make_reference(std::move(*mesh), skeleton.bones, pose->joints, pose->orientations,
+                                    state.header->radii, state.header->weight_width, packet.frame, state.threads);
+    std::vector<QuantisedTransform> still(skeleton.bones.size());
+    // From here on nothing can fail.
+    state.reference = std::move(reference);
+    state.last_transforms = std::move(still);
     state.reference_step = static_cast<std::int32_t>(payload->header.geometry_step);
-    state.tracked.reset();
-    state.tracked_state.reset();
-    state.geometry_codebook.reset();
-    state.colour_codebook.reset();
+    forget_frames(state);
     return Frame{std::move(out)};
 }
 
@@ -156,7 +183,7 @@ Result<void> check_reference(const State& state, const Packet& packet) {
 }
 
 Result<Frame> decode_enhanced(State& state, const Packet& packet) {
-    const auto payload = read_frame(state, packet);
+    const auto payload = read_frame(state, packet, FrameType::enhanced);
     if (!payload) return tl::unexpected(payload.error());
     if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
     const EnhancedFrameContext context{
@@ -174,7 +201,8 @@ Result<Frame> decode_enhanced(State& state, const Packet& packet) {
     if (decoded->mesh.positions.size() > state.options.max_vertices ||
         decoded->mesh.triangles.size() > state.options.max_triangles)
         return fail(ErrorKind::limit, "frame " + std::to_string(packet.frame) +
-                                          " has more vertices or triangles than this decoder accepts");
+                                          " has more vertices or triangles than this decoder accepts; raise its "
+                                          "max_vertices or max_triangles");
     DecodedFrame out;
     out.mesh = to_mesh(decoded->mesh, state.header->lattice);
     out.pose = moved_pose(state, state.last_transforms);
@@ -182,7 +210,7 @@ Result<Frame> decode_enhanced(State& state, const Packet& packet) {
 }
 
 Result<Frame> decode_predicted(State& state, const Packet& packet) {
-    const auto payload = read_frame(state, packet);
+    const auto payload = read_frame(state, packet, FrameType::predicted);
     if (!payload) return tl::unexpected(payload.error());
     if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
     auto decoded = decode_predicted_frame(*payload, *state.reference, state.threads);
@@ -221,7 +249,7 @@ Pose tracked_pose(const State& state, const TrackedReference& tracked, std::span
 }
 
 Result<Frame> decode_tracked(State& state, const Packet& packet) {
-    const auto payload = read_frame(state, packet);
+    const auto payload = read_frame(state, packet, FrameType::tracked);
     if (!payload) return tl::unexpected(payload.error());
     if (state.header->node_spacing == 0)
         return fail(ErrorKind::corrupt_stream, "a tracked frame in a stream whose header says that it has none");
@@ -246,6 +274,7 @@ Result<Frame> decode_tracked(State& state, const Packet& packet) {
 }
 
 Result<Frame> take(State& state, const Packet& packet) {
+    if (auto ok = check_limits(packet, state.options); !ok) return tl::unexpected(ok.error());
     switch (packet.kind) {
         case PacketKind::sequence:
             return take_header(state, packet);
@@ -263,6 +292,14 @@ Result<Frame> take(State& state, const Packet& packet) {
             break;
     }
     return Frame{};  // what this version does not know is skipped
+}
+
+Result<Frame> out_of_memory(const Packet& packet) {
+    try {
+        return fail(ErrorKind::limit, "out of memory at frame " + std::to_string(packet.frame));
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorKind::limit, "out of memory");  // short enough to need none
+    }
 }
 
 }  // namespace
@@ -286,7 +323,9 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
         }
         return frame;
     } catch (const std::bad_alloc&) {
-        return fail(ErrorKind::limit, "there is not enough memory for frame " + std::to_string(packet.frame));
+        return out_of_memory(packet);
+    } catch (const std::length_error&) {
+        return out_of_memory(packet);
     }
 }
 
@@ -313,6 +352,8 @@ std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t t
     out.info.triangles = static_cast<std::uint32_t>(out.mesh.triangles.size());
     return out;
 } catch (const std::bad_alloc&) {
+    return std::nullopt;
+} catch (const std::length_error&) {
     return std::nullopt;
 }
 

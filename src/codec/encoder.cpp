@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
+#include <stdexcept>
 
 #include "codec/encoder_check.h"
 #include "codec/encoder_choice.h"
@@ -26,6 +28,9 @@ int lattice_bits(const EncoderOptions& options) {
     const int needed = static_cast<int>(std::ceil(3 - std::log2(finest)));
     return std::clamp(needed, 4, 16);
 }
+
+// Short enough to need no memory itself.
+tl::unexpected<Error> out_of_memory() { return fail(ErrorKind::limit, "out of memory"); }
 
 void send(State& state, Packet packet) {
     state.stream_bytes += packet.payload.size() + packet_overhead;
@@ -118,6 +123,29 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     return {};
 }
 
+// Where a frame's packets begin: what is queued from there on can be taken back.
+struct Queued {
+    std::size_t packets, index;
+    std::uint64_t stream_bytes;
+    std::uint32_t header_sent;
+    bool begun;
+};
+
+Queued queued(const State& state) {
+    return {state.packets.size(), state.index.size(), state.stream_bytes, state.header_sent, state.begun};
+}
+
+// Memory ran out within a frame: it is not part of the stream, and nothing may refer to it, so the next is an I-frame.
+tl::unexpected<Error> take_back(State& state, const Queued& before) {
+    state.packets.resize(before.packets);
+    state.index.resize(before.index);
+    state.stream_bytes = before.stream_bytes;
+    state.header_sent = before.header_sent;
+    state.begun = before.begun;
+    state.group.reset();
+    return out_of_memory();
+}
+
 RateControlOptions rate_options(const EncoderOptions& options) {
     RateControlOptions out;
     out.bits_per_second = options.bits_per_second;
@@ -135,7 +163,7 @@ QualitySteps quality_steps(double quality) {
     return {16 * std::exp2(-6 * q), 32 * std::exp2(-5 * q)};
 }
 
-Result<Encoder> Encoder::create(const EncoderOptions& options) {
+Result<Encoder> Encoder::create(const EncoderOptions& options) try {
     if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
     auto state = std::make_unique<State>();
     state->options = options;
@@ -143,6 +171,10 @@ Result<Encoder> Encoder::create(const EncoderOptions& options) {
     if (options.bits_per_second > 0) state->rate.emplace(rate_options(options), options.first_pass);
     if (options.target_error > 0) state->error.emplace(options.target_error);
     return Encoder(std::move(state));
+} catch (const std::bad_alloc&) {
+    return out_of_memory();
+} catch (const std::length_error&) {
+    return out_of_memory();
 }
 
 Encoder::Encoder(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -153,15 +185,22 @@ Encoder::~Encoder() = default;
 Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
     auto& state = *state_;
     state.stages.clear();
-    if (state.finished) return fail(ErrorKind::bad_input, "the sequence was finished; start a new encoder");
-    if (state.last_timestamp && timestamp_us <= *state.last_timestamp)
-        return fail(ErrorKind::bad_input, "timestamps must ascend");
-    if (!state.begun)
-        if (auto ok = begin(state, mesh, pose); !ok) return ok;
-    return push_frame(state, mesh, pose, timestamp_us, force_intra);
+    const auto before = queued(state);
+    try {
+        if (state.finished) return fail(ErrorKind::bad_input, "the sequence was finished; start a new encoder");
+        if (state.last_timestamp && timestamp_us <= *state.last_timestamp)
+            return fail(ErrorKind::bad_input, "timestamps must ascend");
+        if (!state.begun)
+            if (auto ok = begin(state, mesh, pose); !ok) return ok;
+        return push_frame(state, mesh, pose, timestamp_us, force_intra);
+    } catch (const std::bad_alloc&) {
+        return take_back(state, before);
+    } catch (const std::length_error&) {
+        return take_back(state, before);
+    }
 }
 
-void Encoder::finish() {
+void Encoder::finish() try {
     auto& state = *state_;
     if (state.finished || !state.begun) return;
     state.finished = true;
@@ -171,6 +210,8 @@ void Encoder::finish() {
     packet.timestamp_us = *state.last_timestamp;
     packet.payload = write_sequence_index(state.index);
     send(state, std::move(packet));
+} catch (const std::bad_alloc&) {
+    // A stream may end without an index.
 }
 
 std::optional<Packet> Encoder::pull() {

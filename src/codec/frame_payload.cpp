@@ -20,7 +20,11 @@ std::vector<std::uint8_t> write_frame_payload(const FramePayload& payload) {
     }
     for (std::size_t i = 0; i < layer_count; ++i)
         if (payload.present[i]) out.bytes(payload.layers[i]);
-    return out.take();
+    auto bytes = out.take();
+    if (payload.has(Layer::pose) || payload.has(Layer::mapping))
+        bytes.resize(
+            std::max<std::size_t>(bytes.size(), static_cast<std::size_t>(least_payload(h.vertices, h.triangles))), 0);
+    return bytes;
 }
 
 Result<FramePayload> read_frame_payload(std::span<const std::uint8_t> bytes) {

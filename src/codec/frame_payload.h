@@ -1,6 +1,7 @@
 // The payload of a frame packet: a few numbers, then layers that can each be decoded, or skipped, by themselves.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -49,6 +50,13 @@ struct FramePayload {
     const std::vector<std::uint8_t>& of(Layer layer) const { return layers[static_cast<std::size_t>(layer)]; }
 };
 
+// The fewest bytes that the payload of an I- or EP-frame of so many vertices and triangles may have: it bounds what a
+// few bytes can make a decoder do.
+inline std::uint64_t least_payload(std::uint64_t vertices, std::uint64_t triangles) {
+    return std::max((vertices + 63) / 64, (triangles + 127) / 128);
+}
+
+// An I- or EP-frame (known by its pose or mapping) that came out shorter than it may be gets zeros behind its layers.
 std::vector<std::uint8_t> write_frame_payload(const FramePayload& payload);
 // Layers of a number that is not known are skipped.
 Result<FramePayload> read_frame_payload(std::span<const std::uint8_t> bytes);

@@ -6,6 +6,7 @@
 #include <draco/compression/encode.h>
 
 #include <exception>
+#include <new>
 #include <string>
 
 #include "codec/frame_payload.h"
@@ -114,6 +115,8 @@ Result<LatticeMesh> decode(std::span<const std::uint8_t> bytes) {
                                                      : take(*cloud, attribute, 2, draco::DT_INT32, mesh.texcoords);
         }
         if (!sound) return corrupt;
+    } catch (const std::bad_alloc&) {
+        throw;  // the decoder says so
     } catch (const std::exception&) {
         return corrupt;
     }

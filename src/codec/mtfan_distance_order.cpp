@@ -1,6 +1,7 @@
 #include "codec/mtfan_distance_order.h"
 
 #include <algorithm>
+#include <exception>
 
 #include "core/thread.h"
 
@@ -76,7 +77,11 @@ UnvisitedNear::UnvisitedNear(std::span<const LatticePoint> positions, int m, uns
     constexpr std::size_t worth_threads = 4096;
     if (thread_count(threads) < 2 || positions.size() < worth_threads || m_ < first_look) return;
     first_nearest_.resize(positions.size() * first_look);
-    ahead_ = Thread([this] { search_ahead(); });
+    try {
+        ahead_ = Thread([this] { search_ahead(); });
+    } catch (const std::exception&) {
+        // No thread to be had: the traversal searches for itself.
+    }
 }
 
 UnvisitedNear::~UnvisitedNear() {

@@ -83,8 +83,9 @@ std::optional<Packet> PacketReader::pull() {
         packet.reference = reader.u32();
         packet.timestamp_us = static_cast<std::int64_t>(reader.u64());
         const std::size_t size = reader.u32();
-        const bool sound = reader.u32() == crc32(bytes.subspan(4, header_size - 8)) && size <= max_payload_;
-        if (!sound) {
+        const bool sound = reader.u32() == crc32(bytes.subspan(4, header_size - 8));
+        if (!sound || size > max_payload_) {
+            oversized_ += sound;
             skip(1);
             continue;
         }

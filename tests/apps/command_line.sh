@@ -57,6 +57,18 @@ expect 2 "excludes" "$htvm" encode capture --bitrate 2 --target-error 1 -o rate.
 expect 2 "--bitrate" "$htvm" encode capture --passes 2 -o rate.htvm
 expect 0 "target error 1 mm" "$htvm" encode capture --target-error 1 -o error.htvm
 
+# Limits: what is beyond them is refused, with the option's name.
+expect 5 "max_memory" "$htvm" decode a.htvm -o limited -M 1M
+expect 5 "max_memory" "$htvm" compare capture a.htvm --only m1 --max-memory 1000000
+expect 5 "max_vertices" "$htvm" decode a.htvm -o limited --max-vertices 100
+expect 5 "max_triangles" "$htvm" decode a.htvm -o limited --max-triangles 100
+expect 5 "max_bones" "$htvm" decode a.htvm -o limited --max-bones 13
+expect 5 "max_bones" "$htvm" info a.htvm --max-bones 13
+expect 5 "--max-packet" "$htvm" decode a.htvm -o limited --max-packet 1K
+expect 5 "--max-packet" "$htvm" info a.htvm --max-packet 1K
+expect 0 "3 frames to limited" "$htvm" decode a.htvm -o limited -M 64M --max-packet 1M --max-bones 14
+expect 0 "default 4G" "$htvm" decode --help
+
 # Draco's I-frames.
 expect 0 "external intra" "$htvm" encode capture --intra draco --keyint 2 -o draco.htvm
 expect 0 "3 frames to draco" "$htvm" decode draco.htvm -o draco

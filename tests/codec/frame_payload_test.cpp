@@ -12,7 +12,7 @@ FramePayload full_payload() {
     FramePayload payload;
     payload.header = {100000, 200000, 90000, 180000, 1u << 24, 255, intra_coder_draco, 17, 0x7FFFFFFF};
     payload.set(Layer::pose, {1, 2, 3});
-    payload.set(Layer::geometry, std::vector<std::uint8_t>(1000, 7));
+    payload.set(Layer::geometry, std::vector<std::uint8_t>(1500, 7));
     payload.set(Layer::mapping, {});
     payload.set(Layer::external_intra, {9});
     return payload;

@@ -16,8 +16,8 @@ from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from intra import decode_intra_mesh
 from reference import Reference, decode_pose
-from stream import (CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, TRACKED, packets, read_frame_payload,
-                    read_sequence_header)
+from stream import (CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, TRACKED, packets, read_coded_frame,
+                    read_frame_payload, read_sequence_header)
 from tracked import TrackedReference, decode_tracked_mesh
 
 
@@ -65,7 +65,7 @@ def decode_stream(data):
                     books[book.purpose] = book
             elif packet.kind == INTRA:
                 check(header, "a frame came before any sequence header")
-                frame = read_frame_payload(packet.payload)
+                frame = read_coded_frame(packet)
                 joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
                 mesh = decode_intra_mesh(frame)
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
@@ -77,10 +77,11 @@ def decode_stream(data):
             elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
                 check(reference and reference.frame == packet.reference, "its I-frame is not there")
-                frame = read_frame_payload(packet.payload)
                 if packet.kind == PREDICTED:
+                    frame = read_frame_payload(packet.payload)
                     yield packet, header, decode_predicted_mesh(frame, reference)
                 else:
+                    frame = read_coded_frame(packet)
                     yield packet, header, decode_enhanced_mesh(frame, reference, books, header.m)
         except (Corrupt, Unsupported) as error:
             yield packet, None, error

@@ -109,3 +109,11 @@ def read_frame_payload(payload):
             check(number not in frame.layers, "a layer comes twice")
             frame.layers[number] = layer
     return frame
+
+
+def read_coded_frame(packet):
+    """That of an I- or EP-frame, which has a least size."""
+    frame = read_frame_payload(packet.payload)
+    least = max(-(-frame.vertices // 64), -(-frame.triangles // 128))
+    check(len(packet.payload) >= least, "the payload is too short for so many vertices or triangles")
+    return frame

@@ -1,0 +1,145 @@
+// What a decoder refuses as too large, and that no mesh, however regular, falls below the least size of a payload.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "codec/frame_payload.h"
+#include "codec/moving_sequences.h"
+#include "codec/sequence_header.h"
+#include "htvm/decoder.hpp"
+
+namespace htvm {
+namespace {
+
+using namespace test;
+
+const CodedSequence& stream() {
+    static const auto coded = encode(walking(3, 200), motion_based(0, 3));
+    return coded;
+}
+
+// The errors that the stream meets under these options, all of kind limit.
+std::vector<std::string> refusals(const DecoderOptions& options) {
+    std::vector<std::string> out;
+    Decoder decoder(options);
+    for (const auto& packet : stream().packets) {
+        const auto frame = decoder.push(packet);
+        if (frame || frame.error().kind == ErrorKind::corrupt_stream) continue;  // for want of what was refused
+        EXPECT_EQ(frame.error().kind, ErrorKind::limit);
+        out.push_back(frame.error().message);
+    }
+    return out;
+}
+
+void expect_refusals(const DecoderOptions& options, std::size_t count, const std::string& option) {
+    const auto messages = refusals(options);
+    EXPECT_EQ(messages.size(), count) << option;
+    for (const auto& message : messages) EXPECT_NE(message.find(option), std::string::npos) << message;
+}
+
+TEST(Limits, TheDefaultsRefuseNothingOrdinary) { EXPECT_TRUE(refusals({}).empty()); }
+
+TEST(Limits, EachIsHeldAgainstWhatHeadersClaim) {
+    DecoderOptions options;
+    options.max_vertices = 20;
+    expect_refusals(options, 3, "max_vertices");
+    options = {};
+    options.max_triangles = 20;
+    expect_refusals(options, 3, "max_triangles");
+    options = {};
+    options.max_joints = 14;
+    expect_refusals(options, 1, "max_joints");
+    options = {};
+    options.max_bones = 13;
+    expect_refusals(options, 1, "max_bones");
+    options = {};
+    options.max_packet_bytes = 0;
+    expect_refusals(options, stream().packets.size(), "max_packet_bytes");
+    options = {};
+    options.max_memory = std::uint64_t{4} << 20;
+    expect_refusals(options, 3, "max_memory");
+}
+
+TEST(Limits, ExactlyAsLargeAsAllowedIsAccepted) {
+    DecoderOptions options;
+    for (const auto& info : stream().infos) {
+        options.max_vertices = std::max(info.vertices, options.max_vertices == 1u << 22 ? 0 : options.max_vertices);
+        options.max_triangles = std::max(info.triangles, options.max_triangles == 1u << 23 ? 0 : options.max_triangles);
+    }
+    options.max_joints = 15;
+    options.max_bones = 14;
+    EXPECT_TRUE(refusals(options).empty());
+}
+
+TEST(Limits, WhatWasRefusedChangesNothing) {
+    DecoderOptions options;
+    options.max_joints = 15;
+    Decoder decoder(options);
+    const auto& packets = stream().packets;
+    ASSERT_TRUE(decoder.push(packets[0]).has_value());
+    ASSERT_TRUE(decoder.push(packets[1]).has_value());
+    auto header = *read_sequence_header(packets[0].payload);
+    header.skeleton.joint_names.push_back("one too many");
+    Packet large = packets[0];
+    large.payload = write_sequence_header(header);
+    EXPECT_FALSE(decoder.push(large).has_value());
+    for (std::size_t i = 2; i < packets.size(); ++i) EXPECT_TRUE(decoder.push(packets[i]).has_value());
+}
+
+// A sheet of squares, still: next to nothing is to be said of it.
+TestSequence flat_sheet(std::uint32_t side, int frames) {
+    TestSequence out{"flat sheet", {}, {}};
+    const auto shape = tfan_test::grid(side, side);
+    for (int t = 0; t < frames; ++t) {
+        Mesh mesh;
+        for (const auto p : shape.positions)
+            mesh.positions.push_back({static_cast<float>(p.x), static_cast<float>(p.y), 0});
+        mesh.triangles = shape.triangles;
+        mesh.colours.assign(mesh.positions.size(), {100, 100, 100});
+        out.frames.push_back({std::move(mesh), {}});
+    }
+    return out;
+}
+
+TEST(LeastPayload, NoMeshIsCodedInLess) {
+    EncoderOptions options;
+    options.geometry_step = 50;
+    const auto coded = encode(flat_sheet(200, 2), options);
+    for (const auto& packet : coded.packets) {
+        if (!is_frame(packet)) continue;
+        EXPECT_GE(packet.payload.size(), 40000u / 64);
+        EXPECT_LE(packet.payload.size(), 800u) << "this is as little as the coder needs, or nearly";
+    }
+    const auto decoded = decode_packets(coded.packets);
+    EXPECT_TRUE(decoded.errors.empty());
+    ASSERT_EQ(decoded.frames.size(), 2u);
+    for (std::size_t t = 0; t < 2; ++t) expect_same_mesh(decoded.frames[t].mesh, coded.reconstructions[t]);
+}
+
+TEST(LeastPayload, AFrameInLessIsCorrupt) {
+    for (const auto kind : {PacketKind::intra, PacketKind::enhanced}) {
+        Decoder decoder;
+        bool found = false;
+        for (const auto& packet : stream().packets) {
+            if (packet.kind == kind && !found) {
+                found = true;
+                auto payload = *read_frame_payload(packet.payload);
+                payload.header.vertices = 4000000;
+                payload.header.triangles = 8000000;
+                auto claims = packet;
+                claims.payload = write_frame_payload(payload);
+                ASSERT_EQ(claims.payload.size(), 62500u);
+                claims.payload.resize(62499);
+                const auto frame = decoder.push(claims);
+                ASSERT_FALSE(frame.has_value());
+                EXPECT_EQ(frame.error().kind, ErrorKind::corrupt_stream);
+                EXPECT_NE(frame.error().message.find("62499 bytes"), std::string::npos) << frame.error().message;
+            }
+            EXPECT_TRUE(decoder.push(packet).has_value());
+        }
+        EXPECT_TRUE(found);
+    }
+}
+
+}  // namespace
+}  // namespace htvm

@@ -1,0 +1,201 @@
+// Memory is bounded: by what the limits are computed from, by what was received, and whatever the stream's length.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "codec/decoder_limits.h"
+#include "core/crc32.h"
+#include "memory/counted_allocations.h"
+#include "memory/memory_streams.h"
+
+namespace htvm {
+namespace {
+
+using namespace test;
+
+// Triangles of their own three vertices each, or among all vertices by chance.
+TestSequence soup(std::uint32_t vertices, std::uint32_t triangles, bool apart, int frames) {
+    TestSequence out{"soup", {}, {}};
+    std::mt19937 random(1);
+    Mesh mesh;
+    for (std::uint32_t v = 0; v < vertices; ++v)
+        mesh.positions.push_back({static_cast<float>(below(random, 1700)), static_cast<float>(below(random, 1700)),
+                                  static_cast<float>(below(random, 1700))});
+    for (std::uint32_t t = 0; t < triangles; ++t)
+        mesh.triangles.push_back(
+            apart ? Triangle{3 * t, 3 * t + 1, 3 * t + 2}
+                  : Triangle{below(random, vertices), below(random, vertices), below(random, vertices)});
+    give_attributes(mesh, all, 1);
+    for (int t = 0; t < frames; ++t) out.frames.push_back({mesh, {}});
+    return out;
+}
+
+EncoderOptions nothing_merged() {
+    EncoderOptions options;
+    options.merge_duplicates = false;
+    options.nearest_vertices = 64;
+    options.weight_width = 1000;
+    return options;
+}
+
+// What the decoder takes at any time is what the limits take it for, or less.
+void expect_within_estimate(const std::vector<Packet>& packets, const std::string& name) {
+    SCOPED_TRACE(name);
+    DecoderOptions options;
+    options.threads = 2;
+    Decoder decoder(options);
+    const auto live = allocations().live;
+    MeshCounts reference;
+    bool tracking = false;
+    for (const auto& packet : packets) {
+        reset_allocations();
+        {
+            const auto frame = decoder.push(packet);
+            ASSERT_TRUE(frame.has_value()) << frame.error().message;
+        }
+        const auto type = frame_type(packet.kind);
+        if (!type) continue;
+        const auto header = read_frame_payload(packet.payload)->header;
+        const MeshCounts coded{header.vertices, header.triangles};
+        tracking = tracking || *type == FrameType::tracked;
+        const auto kept = memory_of_reference(reference) + (tracking ? memory_of_tracking(reference) : 0);
+        const auto estimate =
+            kept + memory_of_frame(*type, coded, *type == FrameType::intra ? MeshCounts{} : reference);
+        const auto taken = static_cast<std::uint64_t>(allocations().most_live - live);
+        EXPECT_LE(taken, estimate) << "frame " << packet.frame << ", kind " << static_cast<int>(packet.kind);
+        EXPECT_GE(taken, estimate / 20) << "frame " << packet.frame << ", kind " << static_cast<int>(packet.kind);
+        if (*type == FrameType::intra) {
+            reference = coded;
+            tracking = false;
+        }
+    }
+}
+
+TEST(DecoderMemory, IsWithinWhatTheLimitsTakeItFor) {
+    expect_within_estimate(animated_stream(12000), "animated");
+    expect_within_estimate(tracked_stream(12000), "tracked");
+    expect_within_estimate(encode(soup(20000, 0, false, 2), nothing_merged()).packets, "points");
+    expect_within_estimate(encode(soup(30000, 10000, true, 2), nothing_merged()).packets, "triangles apart");
+    expect_within_estimate(encode(soup(2500, 40000, false, 2), nothing_merged()).packets, "many triangles");
+    const auto tracked = [](const CodedSequence& coded) {
+        ChanceMotion motion;
+        motion.fields.turned = true;
+        return with_tracked_frames(coded.packets, 1500, motion, 0, 1);
+    };
+    auto options = nothing_merged();
+    options.key_interval = 1;
+    expect_within_estimate(tracked(encode(soup(20000, 0, false, 2), options)), "points, tracked");
+    expect_within_estimate(tracked(encode(soup(30000, 10000, true, 2), options)), "triangles apart, tracked");
+    expect_within_estimate(tracked(encode(soup(2500, 40000, false, 2), options)), "many triangles, tracked");
+}
+
+TEST(DecoderMemory, IsNotTakenForWhatAHeaderClaims) {
+    const auto packets = animated_stream(150);
+    for (const auto& packet : packets) {
+        if (!is_frame(packet)) continue;
+        Decoder decoder;
+        for (const auto& before : packets) {
+            if (before.frame == packet.frame && before.kind == packet.kind) break;
+            ASSERT_TRUE(decoder.push(before).has_value());
+        }
+        auto payload = *read_frame_payload(packet.payload);
+        payload.header.vertices = 1u << 22;
+        payload.header.triangles = 1u << 23;
+        auto claims = packet;
+        claims.payload = write_frame_payload(payload);
+        claims.payload.resize(std::min<std::size_t>(claims.payload.size(), 1000));
+        reset_allocations();
+        const auto live = allocations().live;
+        EXPECT_FALSE(decoder.push(claims).has_value());
+        EXPECT_LT(allocations().most_live - live, 100000) << "kind " << static_cast<int>(packet.kind);
+    }
+}
+
+TEST(DecoderMemory, IsRefusedBeforeItIsTaken) {
+    const auto packets = animated_stream(1000);
+    DecoderOptions options;
+    options.max_memory = 1000000;
+    Decoder decoder(options);
+    for (const auto& packet : packets) {
+        reset_allocations();
+        const auto live = allocations().live;
+        (void)decoder.push(packet);
+        EXPECT_LT(allocations().most_live - live, 1000000);
+    }
+}
+
+TEST(PacketReaderMemory, IsTakenForWhatWasPushedAlone) {
+    Packet packet;
+    packet.payload.assign(100, 1);
+    auto bytes = write_packet(packet);
+    bytes[24 + 3] = 0x0F;  // the size becomes a quarter of a gigabyte
+    const auto crc = crc32(std::span(bytes).subspan(4, 24));
+    for (std::size_t i = 0; i < 4; ++i) bytes[28 + i] = static_cast<std::uint8_t>(crc >> (8 * i));
+    PacketReader reader;
+    reset_allocations();
+    const auto live = allocations().live;
+    reader.push(bytes);
+    EXPECT_FALSE(reader.pull().has_value());
+    EXPECT_EQ(reader.pending_bytes(), bytes.size());
+    EXPECT_LT(allocations().most_live - live, 1000);
+}
+
+// The packets of a stream, over and over, as one longer stream.
+std::vector<Packet> repeated(const std::vector<Packet>& packets, std::uint32_t times) {
+    std::vector<Packet> out;
+    std::uint32_t frames = 0;
+    for (const auto& packet : packets)
+        if (is_frame(packet)) frames = packet.frame + 1;
+    for (std::uint32_t i = 0; i < times; ++i)
+        for (auto packet : packets) {
+            if (packet.kind == PacketKind::index) continue;
+            packet.frame += i * frames;
+            packet.reference += i * frames;
+            packet.timestamp_us += std::int64_t{i} * frames * 33333;
+            out.push_back(std::move(packet));
+        }
+    return out;
+}
+
+std::int64_t most_memory_of_decoding(const std::vector<Packet>& packets) {
+    DecoderOptions options;
+    options.threads = 1;
+    reset_allocations();
+    const auto live = allocations().live;
+    Decoder decoder(options);
+    for (const auto& packet : packets) EXPECT_TRUE(decoder.push(packet).has_value());
+    return allocations().most_live - live;
+}
+
+TEST(DecoderMemory, DoesNotGrowWithTheStream) {
+    for (const auto& packets : {animated_stream(600), tracked_stream(600)}) {
+        const auto twice = repeated(packets, 2), long_stream = repeated(packets, 30);
+        EXPECT_EQ(most_memory_of_decoding(long_stream), most_memory_of_decoding(twice));
+    }
+}
+
+TEST(EncoderMemory, GrowsWithTheIndexAlone) {
+    const auto sequence = walking(6, 300);
+    const auto most = [&](int times) {
+        EncoderOptions options;
+        options.skeleton = sequence.skeleton;
+        options.key_interval = 3;
+        options.threads = 1;
+        auto encoder = *Encoder::create(options);
+        reset_allocations();
+        const auto live = allocations().live;
+        std::int64_t time = 0;
+        for (int i = 0; i < times; ++i)
+            for (const auto& frame : sequence.frames) {
+                EXPECT_TRUE(encoder.push(frame.mesh, &*frame.pose, time += 33333).has_value());
+                while (encoder.pull()) {
+                }
+            }
+        return allocations().most_live - live;
+    };
+    const auto few = most(2);
+    EXPECT_LT(most(12), few + few / 20);
+}
+
+}  // namespace
+}  // namespace htvm
