@@ -143,10 +143,12 @@ struct Pull {
     Vector3d force = Vector3d::Zero();
 };
 
+// Of the samples from `begin` to before `end`.
 std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& moved, const TargetSurface& target,
-                            double point_share) {
-    std::vector<Pull> pulls(moved.points.size());
+                            double point_share, std::size_t begin, std::size_t end) {
+    std::vector<Pull> pulls(end - begin);
     for (const Match& match : matches) {
+        if (match.sample < begin || match.sample >= end) continue;
         const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
         // The mean of the two normals: across it, points of one round surface are no distance apart.
         const Vector3d sum = vector_of(target.normals[match.vertex]) + vector_of(moved.normals[match.sample]);
@@ -158,7 +160,7 @@ std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& move
         const double weight = static_cast<double>(match.weight);
         const double slide = along.norm();
         const double share = slide > match.gap ? weight * point_share * (1 - match.gap / slide) : 0;
-        Pull& pull = pulls[match.sample];
+        Pull& pull = pulls[match.sample - begin];
         pull.metric.noalias() += (weight - share) * normal * normal.transpose();
         pull.metric.diagonal().array() += share;
         pull.force += weight * across * normal + share * along;
@@ -177,21 +179,34 @@ Matrix3d cross_matrix(const Vector3d& r) {
 void add_pull(const Stage& stage, const std::vector<Vector3d>& centres, std::size_t sample, const Pull& pull,
               BlockSystem& system) {
     const SampleBlend& blend = stage.level.blends[sample];
-    std::array<Matrix3d, handles_a_vertex> arm, pressed;
+    std::array<Vector3d, handles_a_vertex> arm;
+    std::array<Matrix3d, handles_a_vertex> pressed;  // metric * transposed cross matrix of the arm
     auto add = [&](std::size_t a, std::size_t b, Matrix6& block) {
         const double weight_a = static_cast<double>(blend.weight[a]), weight_b = static_cast<double>(blend.weight[b]);
-        block.topLeftCorner<3, 3>().noalias() += arm[a] * pressed[b];
-        block.topRightCorner<3, 3>() += weight_b * pressed[a].transpose();
-        block.bottomLeftCorner<3, 3>() += weight_a * pressed[b];
-        block.bottomRightCorner<3, 3>() += (weight_a * weight_b) * pull.metric;
+        const double both = weight_a * weight_b;
+        const Vector3d& r = arm[a];
+        for (int column = 0; column < 3; ++column) {
+            const double x = pressed[b](0, column), y = pressed[b](1, column), z = pressed[b](2, column);
+            block(0, column) += r.y() * z - r.z() * y;
+            block(1, column) += r.z() * x - r.x() * z;
+            block(2, column) += r.x() * y - r.y() * x;
+            block(3, column) += weight_a * x;
+            block(4, column) += weight_a * y;
+            block(5, column) += weight_a * z;
+        }
+        for (int column = 0; column < 3; ++column)
+            for (int row = 0; row < 3; ++row) {
+                block(row, 3 + column) += weight_b * pressed[a](column, row);
+                block(3 + row, 3 + column) += both * pull.metric(row, column);
+            }
     };
     for (std::size_t k = 0; k < blend.count; ++k) {
         const std::size_t h = blend.handle[k];
         const double weight = static_cast<double>(blend.weight[k]);
-        arm[k] = cross_matrix(weight * (stage.motion[h](stage.rest[sample]) - centres[h]));
-        pressed[k].noalias() = pull.metric * arm[k].transpose();
+        arm[k] = weight * (stage.motion[h](stage.rest[sample]) - centres[h]);
+        pressed[k].noalias() = pull.metric * cross_matrix(arm[k]).transpose();
         add(k, k, system.diagonal[h]);
-        system.right[h].head<3>() += arm[k] * pull.force;
+        system.right[h].head<3>() += arm[k].cross(pull.force);
         system.right[h].tail<3>() += weight * pull.force;
     }
     std::size_t slot = 0;
@@ -226,31 +241,38 @@ void add_pairs(const Stage& stage, const std::vector<Vector3d>& centres, double 
     }
 }
 
-void apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>& centres, Stage& stage) {
+// Gives how far the handle that goes farthest goes, its turn counted a hand's breadth from it.
+double apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>& centres, double breadth,
+                  Stage& stage) {
+    double farthest = 0;
     for (std::size_t h = 0; h < step.size(); ++h) {
         if (!step[h].allFinite()) continue;
         const Vector3d turn = step[h].head<3>();
         const double angle = turn.norm();
+        farthest = std::max(farthest, step[h].tail<3>().norm() + breadth * angle);
         RigidMotion& motion = stage.motion[h];
         if (angle > 1e-12)
             motion.rotation =
                 Eigen::AngleAxisd(std::min(angle, 0.6), turn / angle).toRotationMatrix() * motion.rotation;
         motion.shift = centres[h] + step[h].tail<3>() - motion.rotation * stage.centre[h];
     }
+    return farthest;
 }
 
-void run_round(Stage& stage, const TargetSurface& target, const Round& round, float cell, BlockSystem (&systems)[2],
-               Guesses& guesses, const DeformationOptions& options) {
+// Gives how far it moved the handles, see apply_step.
+double run_round(Stage& stage, const TargetSurface& target, const Round& round, float cell, BlockSystem (&systems)[2],
+                 Guesses& guesses, const DeformationOptions& options) {
     const Moved moved = move_samples(stage, options.threads);
     const auto matches = find_matches(moved, target, round, cell, options, guesses);
-    const auto pulls = sum_pulls(matches, moved, target, round.point_share);
     std::vector<Vector3d> centres(stage.centre.size());
     for (std::size_t h = 0; h < centres.size(); ++h) centres[h] = stage.motion[h](stage.centre[h]);
     // Always in two halves, so that the sums do not depend on the number of threads.
     auto add_half = [&](std::size_t half) {
         systems[half].clear();
-        for (std::size_t i = half * pulls.size() / 2; i < (half + 1) * pulls.size() / 2; ++i)
-            if (pulls[i].metric(0, 0) > 0) add_pull(stage, centres, i, pulls[i], systems[half]);
+        const std::size_t begin = half * stage.rest.size() / 2, end = (half + 1) * stage.rest.size() / 2;
+        const auto pulls = sum_pulls(matches, moved, target, round.point_share, begin, end);
+        for (std::size_t i = begin; i < end; ++i)
+            if (pulls[i - begin].metric(0, 0) > 0) add_pull(stage, centres, i, pulls[i - begin], systems[half]);
     };
     parallel_invoke(
         options.threads, [&] { add_half(1); }, [&] { add_half(0); });
@@ -263,7 +285,8 @@ void run_round(Stage& stage, const TargetSurface& target, const Round& round, fl
         diagonal.topLeftCorner<3, 3>().diagonal().array() += 10 * load * unit;
         diagonal.bottomRightCorner<3, 3>().diagonal().array() += 0.01 * load;
     }
-    apply_step(solve(stage.level.pattern, systems[0], options.solver_iterations, 1e-3), centres, stage);
+    return apply_step(solve(stage.level.pattern, systems[0], options.solver_iterations, 1e-3), centres,
+                      100 * options.millimetre, stage);
 }
 
 Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
@@ -316,6 +339,7 @@ DeformationOptions thorough_deformation() {
     DeformationOptions options;
     options.coarse_rounds = 12;
     options.fine_rounds = 6;
+    options.settled = 0.5;
     options.far_reach = 400;
     options.samples = 9000;
     options.back_samples = 7000;
@@ -339,7 +363,8 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
             const double reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
-            run_round(coarse, target, round, cell, systems, guesses, options);
+            const double moved = run_round(coarse, target, round, cell, systems, guesses, options);
+            if (moved < options.settled * unit) i = std::max(i, options.coarse_rounds - 2);  // the last one is next
         }
         follow_groups(mesh, coarse, fine.motion);
     }

@@ -31,7 +31,8 @@ struct HandlePair {
 
 struct DeformationOptions {
     double millimetre = 1;            // one millimetre in the positions' units: 16 on a lattice of 1/16 mm
-    int coarse_rounds = 6;            // with groups of handles that move together, for far motion
+    int coarse_rounds = 6;            // with groups of handles that move together, for far motion; at most,
+    double settled = 2;               // mm: where no group moves farther in a round, the next is the last
     int fine_rounds = 4;              // with all handles
     double coarse_spacing = 180;      // mm between the groups' middles
     double far_reach = 250;           // mm: how far the first coarse round looks for the other surface
