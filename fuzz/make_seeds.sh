@@ -12,6 +12,38 @@ mkdir -p "$out"/{decode_file,decode_stream,import_{ply,obj,drc,bvh,json,azure}}
 "$htvm" synth "$work/capture" --first-frame 30 --frames 5 --vertices 150 >/dev/null 2>&1
 "$htvm" synth "$work/normals" --first-frame 60 --frames 3 --vertices 150 --normals >/dev/null 2>&1
 skeleton="$work/capture/skeleton.json"
+# A bent tube of a few rings: streams of a few hundred bytes, which fuzz ten times as fast.
+python3 - "$work/tiny" <<'PYTHON'
+import json
+import math
+import os
+import sys
+
+rings, around, frames = 6, 5, 4
+os.makedirs(sys.argv[1])
+poses = []
+for t in range(frames):
+    vertices, faces = [], []
+    for r in range(rings):
+        for a in range(around):
+            turn = 2 * math.pi * a / around + 0.1 * t
+            bend = 0.02 * t * max(0, r - 2) ** 2
+            n = (math.cos(turn), math.sin(turn), 0)
+            vertices.append((80 * n[0] + 40 * bend * 10, 80 * n[1], 60 * r, *n, a / around, r / rings, 40 * r, 50 * a, 9 * t))
+            if r + 1 < rings:
+                v, w = r * around + a, r * around + (a + 1) % around
+                faces += [(v, w, v + around)] + ([(w, w + around, v + around)] if (r, a) != (t, 1) else [])
+    with open(f"{sys.argv[1]}/{t}.ply", "w") as ply:
+        names = ["float " + c for c in ("x", "y", "z", "nx", "ny", "nz", "s", "t")] + ["uchar red", "uchar green", "uchar blue"]
+        ply.write("ply\nformat ascii 1.0\nelement vertex %d\n" % len(vertices))
+        ply.writelines("property %s\n" % name for name in names)
+        ply.write("element face %d\nproperty list uchar int vertex_indices\nend_header\n" % len(faces))
+        ply.writelines(" ".join("%g" % x for x in v) + "\n" for v in vertices)
+        ply.writelines("3 %d %d %d\n" % f for f in faces)
+    poses.append([[0, 0, 0], [0, 0, 150], [100 * t, 0, 300]])
+json.dump({"joints": ["a", "b", "c"], "bones": [[0, 1], [1, 2]], "frames": poses}, open(sys.argv[1] + "/skeleton.json", "w"))
+PYTHON
+tiny="$work/tiny/skeleton.json"
 
 # stream NAME CAPTURE OPTIONS...: to decode_file as it is, to decode_stream behind a few changes of its packets
 stream() {
@@ -24,13 +56,16 @@ stream() {
         cat "$work/$name.htvm"
     } >"$out/decode_stream/$name"
 }
-stream enhanced capture -q 20 --keyint 3 -s "$skeleton"
-stream no_skeleton normals -q 30 --keyint 2
-stream predicted capture -q 10 --decide motion --predicted-below 5000 --animation-error 0 --keyint 3 -s "$skeleton"
-stream in_part capture -q 20 --still-below 60 --animation-error 0 --keyint 4 -s "$skeleton"
-stream tracked capture -q 30 --profile tracked -s "$skeleton"
-stream tracked_intra normals -q 30 --profile tracked --tracked-from intra
-stream paper capture -q 10 --profile paper --keyint 5 -s "$skeleton"
+stream enhanced capture -q 10 --keyint 3 --frames 3 -s "$skeleton"
+stream tracked capture -q 30 --profile tracked --frames 2 -s "$skeleton"
+stream in_part capture -q 20 --still-below 60 --animation-error 0 --keyint 4 --frames 3 -s "$skeleton"
+stream tiny_enhanced tiny --unit mm -q 40 --keyint 2 -s "$tiny"
+stream tiny_no_skeleton tiny --unit mm -q 10 --frames 2
+stream tiny_predicted tiny --unit mm -q 10 --decide motion --predicted-below 5000 --animation-error 0 --keyint 3 -s "$tiny"
+stream tiny_in_part tiny --unit mm -q 20 --still-below 60 --animation-error 0 --keyint 4 -s "$tiny"
+stream tiny_tracked tiny --unit mm -q 30 --profile tracked -s "$tiny"
+stream tiny_tracked_intra tiny --unit mm -q 30 --profile tracked --tracked-from intra
+stream tiny_paper tiny --unit mm -q 10 --profile paper -s "$tiny"
 
 head -c 100 "$work/normals/frame_00060.ply" >"$out/import_ply/cut_off"
 cp "$work/normals/frame_00060.ply" "$out/import_ply/binary"
