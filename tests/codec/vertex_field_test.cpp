@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 
 #include "codec/hostile_bytes.h"
 #include "codec/intra_test_meshes.h"
@@ -45,6 +46,7 @@ void expect_same(const FieldHistory& a, const FieldHistory& b) {
     ASSERT_EQ(a.planes.size(), b.planes.size());
     for (std::size_t c = 0; c < a.planes.size(); ++c) {
         EXPECT_EQ(a.planes[c].mean, b.planes[c].mean);
+        EXPECT_EQ(a.planes[c].slope, b.planes[c].slope);
         EXPECT_EQ(a.planes[c].magnitude, b.planes[c].magnitude);
     }
 }
@@ -140,6 +142,36 @@ TEST(VertexField, ARepeatedFrameCostsNextToNothing) {
     const auto first = encode_field(hierarchy, values, 1, options_of(8, 0.1));
     const auto second = encode_field(hierarchy, values, 1, options_of(8, 0.1), &first->history);
     EXPECT_LT(second->bytes.size() * 10, first->bytes.size());
+}
+
+TEST(VertexField, HasTheSameBytesFromTwoThreadsAndDoesTheOtherWorkBesideOnce) {
+    const auto mesh = intra_test::grid(40);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    for (std::size_t components = 1; components <= 3; ++components)
+        for (const double middle : {6.0, 0.0}) {
+            const FieldOptions options{.step = {6, middle, 6}};
+            const auto first = encode_field(hierarchy, field(mesh.vertex_count, components, 1), components, options);
+            const auto values = field(mesh.vertex_count, components, 3);
+            const auto alone = encode_field(hierarchy, values, components, options, &first->history);
+            for (const unsigned threads : {1u, 2u, 4u}) {
+                int beside = 0;
+                const auto both =
+                    encode_field(hierarchy, values, components, options, &first->history, threads, [&] { ++beside; });
+                EXPECT_EQ(both->bytes, alone->bytes);
+                expect_same(both->history, alone->history);
+                EXPECT_EQ(beside, 1);
+            }
+        }
+}
+
+TEST(VertexField, HandsOnWhatTheOtherWorkThrows) {
+    const auto mesh = intra_test::grid(10);
+    const VertexHierarchy hierarchy = hierarchy_of(mesh);
+    const auto values = field(mesh.vertex_count, 3, 1);
+    for (const unsigned threads : {1u, 2u})
+        EXPECT_THROW(static_cast<void>(encode_field(hierarchy, values, 3, {}, nullptr, threads,
+                                                    [] { throw std::runtime_error("other work"); })),
+                     std::runtime_error);
 }
 
 TEST(VertexField, AComponentOfStepZeroIsNotCoded) {

@@ -264,7 +264,7 @@ TEST(SurfaceTargets, AreTheClosestPointsThatFaceTheSameWay) {
     EXPECT_FALSE(found[3].valid);
 }
 
-TEST(OrientedPoints, AgreeWithASearchThroughAll) {
+TEST(OrientedPoints, AgreeWithASearchThroughAllWhateverTheGuess) {
     std::uint32_t state = 7;
     auto next = [&] { return state = state * 1664525 + 1013904223, static_cast<float>(state >> 8) / (1 << 24); };
     std::vector<Point3f> points, normals;
@@ -282,10 +282,13 @@ TEST(OrientedPoints, AgreeWithASearchThroughAll) {
             const float d = static_cast<float>((vector(points[i]) - vector(query)).squaredNorm());
             if (vector(normals[i]).dot(vector(normal)) >= 0.3 && d < best.squared_distance) best = {i, d, true};
         }
-        const auto found = search.nearest(query, normal, reach, 0.3f);
-        EXPECT_EQ(found.found, best.found);
-        if (best.found) {
-            EXPECT_EQ(found.index, best.index);
+        const auto guess = static_cast<std::uint32_t>(next() * 400);
+        for (const std::uint32_t first : {OrientedPoints::no_point, guess, 4000u}) {
+            const auto found = search.nearest(query, normal, reach, 0.3f, first);
+            EXPECT_EQ(found.found, best.found);
+            if (best.found) {
+                EXPECT_EQ(found.index, best.index);
+            }
         }
     }
 }
