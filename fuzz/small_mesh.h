@@ -49,7 +49,7 @@ inline SmallMesh small_mesh(FuzzInput& input) {
         const std::uint8_t change = input.u8();
         if (change < 128) {
             auto& p = out.positions[input.below(vertices)];
-            p = change < 64 ? any_point(input) : LatticePoint{p.x, p.y, p.z + input.between(-128, 127)};
+            p = change < 64 ? any_point(input) : LatticePoint{p.x, p.y, within_lattice(p.z + input.between(-128, 127))};
             continue;
         }
         if (out.triangles.empty()) continue;
