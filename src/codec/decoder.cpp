@@ -29,6 +29,7 @@ struct Decoder::State {
     std::optional<TrackedState> tracked_state;        // of the last T-frame since the I-frame
     std::uint32_t tracked_frame = 0;                  // its number
     LatticeMesh tracked_mesh;                         // as it was shown
+    Pose tracked_pose;                                // likewise
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
@@ -133,6 +134,9 @@ Result<Frame> decode_intra(State& state, const Packet& packet) {
     const auto& skeleton = state.header->skeleton;
     const auto pose = decode_pose(payload->of(Layer::pose), skeleton.joint_names.size(), skeleton.bones.size());
     if (!pose) return tl::unexpected(pose.error());
+    // It follows from the reference mesh: should this frame prove bad, the next T-frame has it made again. The memory
+    // is worth more, or streams of many I-frames would take half as much again as those of one.
+    state.tracked.reset();
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(*payload, external ? &*external : nullptr);
     if (!mesh) return tl::unexpected(mesh.error());
@@ -267,6 +271,8 @@ Result<Frame> decode_tracked(State& state, const Packet& packet) {
     DecodedFrame out;
     out.mesh = to_mesh(decoded->mesh, state.header->lattice);
     out.pose = tracked_pose(state, *state.tracked, decoded->state.transforms);
+    auto pose = out.pose;
+    state.tracked_pose = std::move(pose);
     state.tracked_state = std::move(decoded->state);
     state.tracked_mesh = std::move(decoded->mesh);
     state.tracked_frame = packet.frame;
@@ -337,7 +343,7 @@ std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t t
     const auto& transforms = state.last_transforms;
     if (state.tracked_state) {
         out.mesh = to_mesh(state.tracked_mesh, state.header->lattice);
-        out.pose = tracked_pose(state, *state.tracked, state.tracked_state->transforms);
+        out.pose = state.tracked_pose;
     } else {
         out.mesh = to_mesh(animate(reference, transforms, predict_positions(reference, transforms, state.threads)),
                            state.header->lattice);

@@ -5,12 +5,14 @@
 #include <draco/compression/decode.h>
 #include <draco/compression/encode.h>
 
+#include <algorithm>
 #include <exception>
 #include <new>
 #include <string>
 
 #include "codec/frame_payload.h"
 #include "codec/lattice_mesh.h"
+#include "core/bytes.h"
 #include "htvm/intra_coder.hpp"
 
 namespace htvm {
@@ -123,8 +125,33 @@ Result<LatticeMesh> decode(std::span<const std::uint8_t> bytes) {
     return mesh;
 }
 
+// The counts at the beginning of Draco's bytes. Left to itself, its decoder takes memory and time for whatever they
+// say.
+Result<ClaimedCounts> claims(std::span<const std::uint8_t> bytes) {
+    ClaimedCounts out;
+    if (bytes.empty()) return out;
+    ByteReader in(bytes);
+    const auto name = in.bytes(5);
+    const unsigned major = in.u8(), minor = in.u8(), type = in.u8(), method = in.u8(), flags = in.u16();
+    const bool known = in.ok() && std::equal(name.begin(), name.end(), "DRACO") && major == 2 && minor >= 2 &&
+                       type <= draco::TRIANGULAR_MESH && method <= 1 && flags == 0;
+    if (!known) return fail(ErrorKind::corrupt_stream, "I-frame: its Draco data is damaged or of an older version");
+    if (type == draco::POINT_CLOUD) {
+        out.vertices = in.u32();
+    } else if (method == draco::MESH_SEQUENTIAL_ENCODING) {
+        out.triangles = in.varint();
+        out.vertices = in.varint();
+    } else {
+        in.u8();  // the kind of traversal
+        out.vertices = in.varint();
+        out.triangles = in.varint();
+    }
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "I-frame: its Draco data ends too early");
+    return out;
+}
+
 }  // namespace
 
-ExternalIntraCoder draco_intra_coder() { return {intra_coder_draco, "draco", encode, decode}; }
+ExternalIntraCoder draco_intra_coder() { return {intra_coder_draco, "draco", encode, decode, claims}; }
 
 }  // namespace htvm

@@ -50,6 +50,12 @@ bool within_attribute_limit(const auto& values) {
 
 // What another coder gives back is not trusted: sizes as announced, indices and attributes in range.
 Result<LatticeMesh> decode_by(const ExternalIntraCoder& coder, const FramePayload& payload) {
+    if (coder.claims) {
+        const auto claimed = coder.claims(payload.of(Layer::external_intra));
+        if (!claimed) return tl::unexpected(claimed.error());
+        if (claimed->vertices > payload.header.vertices || claimed->triangles > payload.header.triangles)
+            return fail(ErrorKind::corrupt_stream, "I-frame: its mesh is larger than its header says");
+    }
     auto mesh = coder.decode(payload.of(Layer::external_intra));
     if (!mesh) return mesh;
     const auto n = mesh->positions.size();

@@ -156,6 +156,27 @@ TEST(Damage, FlippedBitsBehindARightCrcGiveAnErrorOrAFrameAndDoNotLast) {
     expect_harmless(tracked(), 6000 / static_cast<int>(tracked().size()));
 }
 
+TEST(Damage, ABadIntraFrameLeavesTrackedFramesTheirReference) {
+    const auto whole = decode_packets(tracked());
+    Decoder decoder;
+    std::size_t frames = 0;
+    for (const auto& packet : tracked()) {
+        if (packet.kind == PacketKind::tracked) {
+            Packet bad = tracked()[1];
+            bad.payload.resize(bad.payload.size() / 2);
+            ASSERT_FALSE(decoder.push(bad).has_value());
+            const auto instead = decoder.conceal(packet.frame, 0);
+            ASSERT_TRUE(instead.has_value());
+            expect_same_mesh(instead->mesh, whole.frames[frames - 1].mesh);
+            EXPECT_EQ(instead->pose.joints, whole.frames[frames - 1].pose.joints);
+        }
+        const auto frame = decoder.push(packet);
+        ASSERT_TRUE(frame.has_value()) << frame.error().message;
+        if (*frame) expect_same_mesh((**frame).mesh, whole.frames[frames++].mesh);
+    }
+    EXPECT_EQ(frames, whole.frames.size());
+}
+
 TEST(Damage, BehindADamagedIntraFrameDecodingGoesOnAtTheNext) {
     for (const auto* packets : {&animated(), &tracked()}) {
         const auto whole = decode_packets(*packets);

@@ -86,6 +86,31 @@ TEST(Limits, WhatWasRefusedChangesNothing) {
     for (std::size_t i = 2; i < packets.size(); ++i) EXPECT_TRUE(decoder.push(packets[i]).has_value());
 }
 
+TEST(Limits, DracoIsNotAskedForMoreThanTheFramesHeaderSays) {
+    EncoderOptions options;
+    options.intra_coder = draco_intra_coder();
+    DecoderOptions decoding;
+    decoding.intra_coder = draco_intra_coder();
+    for (const bool triangles : {true, false}) {
+        auto sequence = sequence_of(tfan_test::grid(12, 12), 1, colours);
+        if (!triangles) sequence.frames[0].mesh.triangles.clear();
+        const auto coded = encode(sequence, options);
+        Decoder decoder(decoding);
+        ASSERT_TRUE(decoder.push(coded.packets[0]).has_value());
+        ASSERT_TRUE(decoder.push(coded.packets[1]).has_value());
+        auto payload = *read_frame_payload(coded.packets[1].payload);
+        auto bytes = payload.of(Layer::external_intra);
+        for (std::size_t i = 0; i < 3; ++i) bytes[(triangles ? 12 : 11) + i] = 0xFF;  // the count of vertices
+        payload.set(Layer::external_intra, bytes);
+        auto packet = coded.packets[1];
+        packet.payload = write_frame_payload(payload);
+        const auto frame = decoder.push(packet);
+        ASSERT_FALSE(frame.has_value());
+        EXPECT_NE(frame.error().message.find("larger than its header says"), std::string::npos)
+            << frame.error().message;
+    }
+}
+
 // A sheet of squares, still: next to nothing is to be said of it.
 TestSequence flat_sheet(std::uint32_t side, int frames) {
     TestSequence out{"flat sheet", {}, {}};
