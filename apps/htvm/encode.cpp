@@ -177,10 +177,14 @@ void add_encode(CLI::App& app, Run& run) {
     command->footer(
         "Examples:\n"
         "  htvm encode capture/ --skeleton capture/skeleton.json -o person.htvm\n"
-        "  htvm encode 'scan_%05d.obj' -q 70 --keyint 60 -o person.htvm\n"
+        "  htvm encode 'scan_%05d.obj' -q 60 --keyint 60 -o person.htvm\n"
+        "  htvm encode capture/ --profile topology -s capture/skeleton.json -o exact.htvm\n"
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 --passes 2 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
-    command->callback([options, &run] { run = [options] { return encode(*options); }; });
+    command->callback([command, options, &run] {
+        check_profile(*command, options->encoding);
+        run = [options] { return encode(*options); };
+    });
 }
 
 }  // namespace htvm::app

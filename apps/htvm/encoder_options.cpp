@@ -41,7 +41,8 @@ void add_choice_options(CLI::App& command, EncodingOptions& options) {
     command
         .add_option(
             "--decide", options.decide,
-            "Choice of frames: fixed (I every --keyint, EP between), motion (by how far the skeleton's bones\n"
+            "topology: choice of frames: fixed (I every --keyint, EP between), motion (by how far the skeleton's "
+            "bones\n"
             "are from the last I-frame: --predicted-below, --intra-above), or rd (by measured bits and errors;\n"
             "slow). Default: fixed")
         ->check(CLI::IsMember({"fixed", "motion", "rd"}));
@@ -56,13 +57,15 @@ void add_choice_options(CLI::App& command, EncodingOptions& options) {
                     "(default)")
         ->check(millimetres);
     command
-        .add_option("--still-below", options.still_below,
-                    "Motion-based coding: the sub-meshes of bones that moved less than this, mm, are animated, the\n"
-                    "others coded, and both zippered; 0 (default): all are coded")
+        .add_option(
+            "--still-below", options.still_below,
+            "topology, motion-based coding: the sub-meshes of bones that moved less than this, mm, are animated, the\n"
+            "others coded, and both zippered; 0 (default): all are coded")
         ->check(millimetres);
     command
         .add_option("--animation-error", options.animation_error,
-                    "What would be animated is coded after all where it is farther than this, mm, from the capture's\n"
+                    "topology: what would be animated is coded after all where it is farther than this, mm, from the "
+                    "capture's\n"
                     "surface (root mean square, bone by bone; default 2); 0: unchecked, as the paper has it")
         ->check(millimetres);
     command.add_flag("--no-scene-changes", options.no_scene_changes,
@@ -115,9 +118,11 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     command
         .add_option(
             "-q,--quality", options.quality,
-            "Quality, 0 to 100 (default 50): positions in steps of 16 mm at 0, 4 mm at 33, 2 mm at 50, 1 mm at\n"
-            "67, 0.25 mm at 100; colours in steps of 32, 10, 5.7, 3.2 and 1 of 255 levels. Errors are about\n"
-            "half a step")
+            fmt::format(
+                "Quality, 0 to 100 (default {}): the surface is off by about 1.5 mm (M2) at 20, 0.7 at 40, 0.3 at\n"
+                "60, 0.1 at 80, in every profile. Steps of positions are 16 mm at 0, 4 mm at 33, 2 mm at 50, 1 mm\n"
+                "at 67, 0.25 mm at 100; of colours 32, 10, 5.7, 3.2 and 1 of 255 levels",
+                default_quality))
         ->check(CLI::Range(0.0, 100.0));
     command.add_option("--geometry-step", options.geometry_step, "Step of the positions in mm, instead of by quality")
         ->check(CLI::Range(1.0 / 65536, 1000.0));
@@ -126,7 +131,7 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     add_control_options(command, options);
     command
         .add_option("--lambda", options.lambda,
-                    "EP-frames: squared error that is worth one bit, in steps squared (default 0.12); more saves\n"
+                    "Squared error that is worth one bit, in steps squared (default 0.12); more saves\n"
                     "bits, 0 takes the nearest codeword")
         ->check(CLI::Range(0.0, 1000.0));
     command
@@ -142,46 +147,68 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     command
         .add_option(
             "--profile", options.profile,
-            "topology (default): keeps the capture's connectivity, with the choices that measured best; paper:\n"
-            "the published method's own choices (--reference bone, --registration point, --weights 0);\n"
-            "tracked: T-frames between the I-frames, which keep the I-frame's connectivity and lay it on each\n"
-            "frame's surface: less exact at the same quality, for a fraction of the bits, with or without a\n"
-            "skeleton; --decide, --still-below and --keep-duplicates do not touch T-frames")
+            "tracked (default): the fewest bits. Each frame is the last I-frame's mesh laid on the frame's surface\n"
+            "(T-frames), with or without a skeleton; connectivity and sampling are not the capture's. topology:\n"
+            "keeps every frame's own connectivity, for several times the bits; paper: the same by the published\n"
+            "method's own choices (--reference bone, --registration point, --weights 0). Options marked\n"
+            "topology serve both of these")
         ->check(CLI::IsMember({"topology", "paper", "tracked"}));
     command
         .add_option("--reference", options.reference,
-                    "Reference vertex of a residual: any, the nearest of the predicted mesh, or bone, the nearest of\n"
+                    "topology: reference vertex of a residual: any, the nearest of the predicted mesh, or bone, the "
+                    "nearest of\n"
                     "the same bone (default: by profile)")
         ->check(CLI::IsMember({"any", "bone"}));
     command
-        .add_option("--registration", options.registration,
-                    "Of the bones: by distances from point to plane, or from point to point (default: by profile)")
+        .add_option(
+            "--registration", options.registration,
+            "topology: of the bones, by distances from point to plane, or from point to point (default: by profile)")
         ->check(CLI::IsMember({"plane", "point"}));
     command
-        .add_option("--weights", options.weight_width,
-                    "Width in mm of the borders between bones, over which their motions blend; 0: none, each vertex\n"
-                    "moves with one bone (default: by profile)")
+        .add_option(
+            "--weights", options.weight_width,
+            "topology: width in mm of the borders between bones, over which their motions blend; 0: none, each vertex\n"
+            "moves with one bone (default: by profile)")
         ->check(CLI::Range(0.0, 1000.0));
     command
+        .add_option("--simplify", options.simplify,
+                    "tracked: how far the I-frames' meshes may be simplified, which the T-frames take over: error of\n"
+                    "their surface, in steps of the positions (default 0.4); 0: I-frames keep every vertex")
+        ->check(CLI::Range(0.0, 10.0));
+    command
         .add_option("--tracked-from", options.tracked_references,
-                    "--profile tracked: previous (default), T-frames refer to the frame before; intra: to the I-frame\n"
+                    "tracked: previous (default), T-frames refer to the frame before; intra: to the I-frame\n"
                     "alone, so that any of them may be lost, for a few more bits")
         ->check(CLI::IsMember({"previous", "intra"}));
     command
         .add_option("--node-spacing", options.node_spacing,
-                    "--profile tracked: mm between the nodes that move the mesh (default 80)")
+                    "tracked: mm between the nodes that move the mesh (default 80)")
         ->check(CLI::Range(1.0, 10000.0));
-    command.add_flag("--keep-duplicates", options.keep_duplicates,
-                     "Keep vertices that decode to the same point and attributes, and triangles that collapse: the\n"
-                     "decoded triangle set is then exactly the input's");
+    command.add_flag(
+        "--keep-duplicates", options.keep_duplicates,
+        "topology: keep vertices that decode to the same point and attributes, and triangles that collapse: the\n"
+        "decoded triangle set is then exactly the input's");
     command
         .add_option("--nearest", options.nearest_vertices,
-                    "Nearest vertices that the distance order counts (default 16)")
+                    "topology: nearest vertices that the distance order counts (default 16)")
         ->check(CLI::Range(1, 64));
     command.add_option("--radii", options.radii_file,
                        "Bone radii from htvm calibrate (default: the skeleton file's,\n"
                        "else calibrated on the first frame)");
     command.add_option("--threads", options.threads, "Threads (default: one a core); the bytes do not depend on it");
+}
+
+void check_profile(const CLI::App& command, const EncodingOptions& options) {
+    const bool tracked = options.profile == "tracked";
+    const std::vector<const char*> others =
+        tracked ? std::vector<const char*>{"--decide",          "--predicted-below", "--intra-above",  "--still-below",
+                                           "--animation-error", "--reference",       "--registration", "--weights",
+                                           "--keep-duplicates", "--nearest"}
+                : std::vector<const char*>{"--simplify", "--tracked-from", "--node-spacing"};
+    for (const char* name : others)
+        if (command.count(name) > 0)
+            throw CLI::ValidationError(fmt::format("{} does nothing with --profile {}: add --profile {}", name,
+                                                   options.profile, tracked ? "topology" : "tracked"));
 }
 
 Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture) {
@@ -203,6 +230,7 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     out.scene_changes = !options.no_scene_changes;
     out.tracked = options.profile == "tracked";
     if (options.tracked_references == "intra") out.tracked_references = TrackedReferences::intra;
+    if (options.simplify >= 0) out.simplify = options.simplify;
     if (options.node_spacing > 0) out.node_spacing = options.node_spacing;
     out.merge_duplicates = !options.keep_duplicates;
     out.nearest_vertices = options.nearest_vertices;

@@ -9,8 +9,11 @@
 
 namespace htvm::app {
 
+// About 0.5 mm off the surface (M2).
+constexpr double default_quality = 50;
+
 struct EncodingOptions {
-    double quality = 50;
+    double quality = default_quality;
     double geometry_step = 0;  // mm; 0: by quality
     double colour_step = 0;    // levels; 0: by quality
     double lambda = -1;        // below 0: the library's default
@@ -22,9 +25,10 @@ struct EncodingOptions {
     int passes = 1;                           // of rate control: the caller runs the first of two
     double target_error = 0;                  // mm; 0: none
     std::string intra = "tfan";
-    std::string profile = "topology";
-    std::string tracked_references;  // empty: the library's default
-    double node_spacing = 0;         // mm; 0: the library's default
+    std::string profile = "tracked";
+    std::string tracked_references;       // empty: the library's default
+    double simplify = -1;                 // below 0: the library's default
+    double node_spacing = 0;              // mm; 0: the library's default
     double weight_width = -1;             // mm; below 0: by profile
     std::string reference, registration;  // empty: by profile
     std::string radii_file;
@@ -34,6 +38,9 @@ struct EncodingOptions {
 };
 
 void add_encoding_options(CLI::App& command, EncodingOptions& options);
+
+// Ends with a usage error (CLI::ValidationError) where an option of another profile than the chosen one was given.
+void check_profile(const CLI::App& command, const EncodingOptions& options);
 
 // The library's options for a capture; reads the radii's file where one is named.
 Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture);

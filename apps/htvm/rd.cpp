@@ -30,7 +30,7 @@ using std::filesystem::path;
 struct Options {
     CaptureOptions capture;
     std::vector<double> qualities{20, 35, 50, 65, 80};
-    std::vector<std::string> coders{"paper", "htvm-ep", "tfan", "draco10"};
+    std::vector<std::string> coders{"htvm-t", "htvm-ep", "paper", "tfan", "draco10"};
     std::vector<std::string> peers;
     std::vector<std::string> metrics{"m1", "m2"};
     std::uint64_t samples = 200000;
@@ -275,15 +275,16 @@ void add_sweep_options(CLI::App& command, Options& o) {
         ->check(CLI::Range(0.0, 100.0))
         ->option_text("LIST");
     command
-        .add_option("--coders", o.coders,
-                    "Comma between (default paper,htvm-ep,tfan,draco10); none for peers alone:\n"
-                    "  paper    I- and EP-frames as in the paper (reference vertices by bone)\n"
-                    "  htvm-ep  the same with reference vertices from the whole mesh, as htvm encode\n"
-                    "  htvm-motion  htvm-ep by motion-based coding: what fits the capture is animated, not coded\n"
-                    "  htvm-rd  I-, EP- and P-frames chosen by measured bits and errors (slow)\n"
-                    "  htvm-t   I- and T-frames: the I-frame's mesh laid on each frame's surface\n"
-                    "  tfan     our TFAN alone, every frame an I-frame\n"
-                    "  draco10, draco7  libdraco at compression level 10, 7, every frame by itself")
+        .add_option(
+            "--coders", o.coders,
+            "Comma between (default htvm-t,htvm-ep,paper,tfan,draco10); none for peers alone:\n"
+            "  htvm-t   I- and T-frames, as htvm encode: a simplified mesh laid on each frame's surface\n"
+            "  paper    I- and EP-frames as in the paper (reference vertices by bone)\n"
+            "  htvm-ep  the same with reference vertices from the whole mesh, as htvm encode --profile topology\n"
+            "  htvm-motion  htvm-ep by motion-based coding: what fits the capture is animated, not coded\n"
+            "  htvm-rd  I-, EP- and P-frames chosen by measured bits and errors (slow)\n"
+            "  tfan     our TFAN alone, every frame an I-frame\n"
+            "  draco10, draco7  libdraco at compression level 10, 7, every frame by itself")
         ->delimiter(',')
         ->option_text("LIST");
     command.add_option("--peer", o.peers, "NAME=COMMAND: another coder, see below; may be given again")

@@ -94,9 +94,9 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
         options.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
         options.point_to_plane ? "plane" : "point", options.weight_width, options.lambda, options.nearest_vertices);
     if (options.tracked)
-        out.settings += fmt::format(", tracked from {}, nodes {}",
+        out.settings += fmt::format(", tracked from {}, nodes {}, simplify {}",
                                     options.tracked_references == TrackedReferences::intra ? "I" : "the frame before",
-                                    options.node_spacing);
+                                    options.node_spacing, options.simplify);
     out.settings +=
         fmt::format(", {}, P below {}, I above {}, still below {}, animation error {}{}",
                     choice_name(options.frame_choice), options.predicted_below, options.intra_above,
@@ -132,11 +132,13 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
                          "I- and EP-frames with the paper's choices: reference vertices by bone, point to point",
                          paper_options(key_interval)),
         codec_under_test(
-            "htvm-ep", "I- and EP-frames as htvm encode makes them: reference vertices anywhere, point to plane", ours),
+            "htvm-ep",
+            "I- and EP-frames as of htvm encode --profile topology: reference vertices anywhere, point to plane", ours),
         codec_under_test("htvm-motion",
                          "htvm-ep with motion-based coding: what fits the capture is animated, not coded", motion),
         codec_under_test("htvm-rd", "I-, EP- and P-frames chosen by measured bits and errors; slow", chosen),
-        codec_under_test("htvm-t", "I- and T-frames: the I-frame's mesh laid on each frame's surface", tracked),
+        codec_under_test("htvm-t", "I- and T-frames, as htvm encode makes them: a mesh laid on each frame's surface",
+                         tracked),
         codec_under_test("tfan", "our TFAN alone: every frame an I-frame", intra),
         draco_under_test("draco10", 10),
         draco_under_test("draco7", 7)};

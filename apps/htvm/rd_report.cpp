@@ -63,6 +63,12 @@ std::optional<double> value_of(const RdPoint& point, const Measure& measure) {
     return found->second;
 }
 
+// Of the bits.
+double intra_share(const RdPoint& point) {
+    const auto all = totals(point).bytes.total();
+    return all == 0 ? 0 : static_cast<double>(totals(point, FrameType::intra).bytes.total()) / static_cast<double>(all);
+}
+
 const RdPoint* extreme(std::span<const RdPoint> points, const std::string& coder, bool cheapest) {
     const RdPoint* out = nullptr;
     for (const auto& point : points) {
@@ -82,14 +88,15 @@ std::vector<std::string> coders_of(std::span<const RdPoint> points) {
 }
 
 std::string rate_table(std::span<const RdPoint> points) {
-    std::string out = fmt::format("{:<10}{:>5}{:>9}{:>8}{:>8}", "coder", "q", "step mm", "bpvf", "Mbit/s");
+    std::string out = fmt::format("{:<10}{:>5}{:>9}{:>8}{:>8}{:>6}", "coder", "q", "step mm", "bpvf", "Mbit/s", "I %");
     out += layer_titles();
     const auto shown = measured_curves(points);
     for (const auto* measure : shown) out += fmt::format("{:>8}", measure->brief);
     out += fmt::format("{:>9}{:>9}  {}\n", "enc fps", "dec fps", "setting");
     for (const auto& point : points) {
-        out += fmt::format("{:<10}{:>5g}{:>9.2f}{:>8.3f}{:>8.2f}", point.coder, point.quality, point.geometry_step,
-                           bits_per_vertex(point), megabits_per_second(point));
+        out +=
+            fmt::format("{:<10}{:>5g}{:>9.2f}{:>8.3f}{:>8.2f}{:>6.0f}", point.coder, point.quality, point.geometry_step,
+                        bits_per_vertex(point), megabits_per_second(point), 100 * intra_share(point));
         out += layer_cells(totals(point));
         for (const auto* measure : shown)
             out += fmt::format("{:>8}", number_or_dash(value_of(point, *measure), measure->digits));

@@ -50,6 +50,9 @@ struct EncoderOptions {
     bool tracked = false;  // T-frames between I-frames, where they fit the capture: the I-frame's connectivity instead
                            // of the frame's own, for a fraction of the bits
     TrackedReferences tracked_references = TrackedReferences::previous;
+    double simplify =
+        0.4;  // tracked: how far the I-frames' meshes, which the T-frames take over, may be simplified: error
+              // of their surface, in geometry steps; 0: they keep every vertex and their connectivity
     double node_spacing = 80;      // mm, T-frames: between the nodes of the deformation graph
     double predicted_below = 400;  // mm, choice by motion: with less skeletal motion since the I-frame, a P-frame
     double intra_above = 0;        // mm, choice by motion: with more, an I-frame; 0: never

@@ -103,7 +103,7 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     const auto coded_pose = state.poses.next(mesh, pose, state.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");
-    FrameUnderWay frame{*on_lattice, *coded_pose, {}, {}, {}};
+    FrameUnderWay frame{*on_lattice, *coded_pose, {}, {}, {}, {}};
     auto coded = code_frame(state, frame, force_intra);
     if (!coded) return tl::unexpected(coded.error());
     adopt(state, *coded);

@@ -5,6 +5,7 @@
 
 #include "codec/animated_frame.h"
 #include "codec/intra_frame.h"
+#include "codec/simplified_reference_enc.h"
 #include "codec/stage_clock_enc.h"
 
 namespace htvm {
@@ -112,7 +113,54 @@ std::vector<RigidMotion> skeletal_node_motion(const State& state, const FrameUnd
     return out;
 }
 
+// Steps at which the simplified I-frame and the T-frames behind it err about as much as other frames do at the steps
+// asked for: see docs/algorithm.md for the measurement.
+FrameSteps tracked_steps(const FrameSteps& steps) {
+    constexpr double finer = 0.55, coarser_colours = 1.3;
+    const auto scaled = [](double factor, std::int32_t step) {
+        return std::max(1, static_cast<std::int32_t>(std::lround(factor * step)));
+    };
+    return {scaled(finer, steps.geometry), scaled(coarser_colours, steps.colour)};
+}
+
+SimplifiedReferenceOptions simplification(const State& state, const FrameSteps& steps) {
+    constexpr double longest_edge = 40, reach = 30;  // mm
+    constexpr double colour_steps = 5;
+    const double units = 1.0 / state.header.lattice.step();
+    SimplifiedReferenceOptions out;
+    out.surface_error = state.options.simplify * steps.geometry;
+    out.colour_error = colour_steps * steps.colour;
+    out.longest_edge = longest_edge * units;
+    out.reach = reach * units;
+    out.threads = state.threads;
+    return out;
+}
+
+const TargetSurface& target_of(State& state, FrameUnderWay& frame) {
+    if (!frame.target) {
+        StageClock clock(state.stages);
+        frame.target = captured_surface(frame.mesh, deformation_options(state));
+        clock.done("search structures");
+    }
+    return *frame.target;
+}
+
 }  // namespace
+
+TrackedFit tracked_fit(State& state, FrameUnderWay& frame, const LatticeMesh& decoded, double edge) {
+    constexpr double stray_in_edges = 2, reach = 25, region = 100;  // mm
+    const auto& target = target_of(state, frame);
+    StageClock clock(state.stages);
+    const double units = 1.0 / state.header.lattice.step();
+    TrackedFitOptions options;
+    options.stray = std::max(stray_in_edges * edge, 1.0);
+    options.reach = std::max(reach * units, options.stray);
+    options.region = region * units;
+    options.threads = state.threads;
+    const auto out = measure_tracked_fit(target, decoded, options);
+    clock.done("fit of the tracking");
+    return out;
+}
 
 const FrameMotion& motion_of(State& state, FrameUnderWay& frame) {
     if (!frame.motion) {
@@ -138,17 +186,30 @@ const AnimationFit& fit_of(State& state, FrameUnderWay& frame) {
     return *frame.fit;
 }
 
-Result<FrameCandidate> encode_intra(State& state, const FrameUnderWay& frame, const FrameSteps& steps) {
+Result<FrameCandidate> encode_intra(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
+    const bool tracked = state.options.tracked;
+    const auto asked = tracked ? tracked_steps(steps) : steps;
+    LatticeMesh simplified;
+    if (tracked && state.options.simplify > 0) {
+        const auto& target = target_of(state, frame);
+        StageClock clock(state.stages);
+        simplified = simplified_reference(frame.mesh, target, simplification(state, steps));
+        clock.done("simplification");
+    }
+    const auto& mesh = tracked && state.options.simplify > 0 ? simplified : frame.mesh;
     StageClock clock(state.stages);
     IntraFrameOptions options;
     const double edge = mean_edge(frame.mesh);
-    options.geometry_step = state.options.key_interval == 1 ? steps.geometry : step_for_reference(edge, steps.geometry);
-    options.colour_step = steps.colour;
+    options.geometry_step =
+        state.options.key_interval == 1 ? asked.geometry : step_for_reference(mean_edge(mesh), asked.geometry);
+    options.colour_step = asked.colour;
     options.merge_duplicates = state.options.merge_duplicates;
     options.external = state.options.intra_coder ? &*state.options.intra_coder : nullptr;
     FramePayload payload;
-    auto decoded = encode_intra_frame(frame.mesh, options, payload);
+    auto decoded = encode_intra_frame(mesh, options, payload);
     if (!decoded) return tl::unexpected(decoded.error());
+    payload.header.source_vertices = static_cast<std::uint32_t>(frame.mesh.positions.size());
+    payload.header.source_triangles = static_cast<std::uint32_t>(frame.mesh.triangles.size());
     payload.set(Layer::pose, encode_pose(frame.pose));
     FrameCandidate out;
     out.type = FrameType::intra;
@@ -158,6 +219,7 @@ Result<FrameCandidate> encode_intra(State& state, const FrameUnderWay& frame, co
     out.intra_step = options.geometry_step;
     out.packets.push_back(frame_packet(PacketKind::intra, payload));
     clock.done("intra coding");
+    if (tracked && state.options.key_interval > 1) out.fit = tracked_fit(state, frame, out.decoded, edge);
     return out;
 }
 
@@ -211,14 +273,14 @@ FrameCandidate encode_coded_bones(State& state, FrameUnderWay& frame, const Fram
     return everything || !something ? encode_enhanced(state, frame, steps) : encode_moving(state, frame, steps, coded);
 }
 
-Result<FrameCandidate> encode_tracked(State& state, const FrameUnderWay& frame, const FrameSteps& steps) {
+Result<FrameCandidate> encode_tracked(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
     auto& group = *state.group;
     TrackedFrameOptions options;
     options.deformation = deformation_options(state);
-    options.geometry_step = steps.geometry;
-    // Remeshing alone makes colours at the same place differ from frame to frame: finer steps would code that noise.
-    // Measured: 4 times the static coder's step costs 0.1 dB of the pictures' PSNR and saves half of the colour's bits.
-    options.colour_step = 4.0 * steps.colour;
+    // Re-meshing alone makes colours at the same place differ from frame to frame: finer steps would code that noise.
+    constexpr double coarser_colours = 8;
+    options.geometry_step = tracked_steps(steps).geometry;
+    options.colour_step = coarser_colours * steps.colour;
     options.lambda = state.options.lambda;
     options.threads = state.threads;
     if (!group.tracked) {
@@ -229,8 +291,8 @@ Result<FrameCandidate> encode_tracked(State& state, const FrameUnderWay& frame, 
         clock.done("deformation graph");
     }
     const bool refer_to_last = group.last_tracked && state.options.tracked_references == TrackedReferences::previous;
-    auto encoded = encode_tracked_frame(frame.mesh, *group.tracked, refer_to_last, skeletal_node_motion(state, frame),
-                                        options, state.stages);
+    auto encoded = encode_tracked_frame(frame.mesh, target_of(state, frame), *group.tracked, refer_to_last,
+                                        skeletal_node_motion(state, frame), options, state.stages);
     if (!encoded) return tl::unexpected(encoded.error());
     FrameCandidate out;
     out.type = FrameType::tracked;
@@ -253,6 +315,7 @@ void adopt(State& state, const FrameCandidate& candidate) {
         group.edge = candidate.edge;
         group.intra_step = candidate.intra_step;
         group.plain_intra = candidate.plain_intra;
+        group.intra_fit = candidate.fit;
         group.steps = candidate.steps;
         group.intra_bytes = bytes;
         state.group = std::move(group);
@@ -263,7 +326,7 @@ void adopt(State& state, const FrameCandidate& candidate) {
             group.tracked->last = candidate.motion;
             group.tracked->state = candidate.tracked;
             group.last_tracked = state.next_frame;
-            if (group.best_fit == 0 || candidate.fit < group.best_fit) group.best_fit = candidate.fit;
+            if (group.best_fit == 0 || candidate.fit.rms < group.best_fit) group.best_fit = candidate.fit.rms;
         } else {
             group.motion = candidate.motion;
             group.codebooks = candidate.codebooks;

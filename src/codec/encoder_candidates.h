@@ -19,13 +19,14 @@ struct FrameUnderWay {
     std::optional<FrameMotion> motion;
     std::optional<AnimationFit> fit;
     std::optional<CapturedSurface> surface;
+    std::optional<TargetSurface> target;  // likewise, for tracking
 };
 
 // Needs state.group, and the attributes of its reference.
 const FrameMotion& motion_of(Encoder::State& state, FrameUnderWay& frame);
 const AnimationFit& fit_of(Encoder::State& state, FrameUnderWay& frame);
 
-Result<FrameCandidate> encode_intra(Encoder::State& state, const FrameUnderWay& frame, const FrameSteps& steps);
+Result<FrameCandidate> encode_intra(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps);
 FrameCandidate encode_predicted(Encoder::State& state, FrameUnderWay& frame);
 FrameCandidate encode_enhanced(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps);
 // Motion-based: coded_bones has one entry a bone, at least one true whose sub-mesh in the reference has a vertex.
@@ -36,8 +37,11 @@ FrameCandidate encode_moving(Encoder::State& state, FrameUnderWay& frame, const 
 FrameCandidate encode_coded_bones(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps,
                                   const std::vector<bool>& coded);
 
+// How well a decoded mesh stands for the frame. edge: mean edge of the I-frame's captured mesh, lattice units.
+TrackedFit tracked_fit(Encoder::State& state, FrameUnderWay& frame, const LatticeMesh& decoded, double edge);
+
 // Needs options.tracked.
-Result<FrameCandidate> encode_tracked(Encoder::State& state, const FrameUnderWay& frame, const FrameSteps& steps);
+Result<FrameCandidate> encode_tracked(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps);
 
 // The state after the frame: a new reference after an I-frame, the motion and codebooks after the others.
 void adopt(Encoder::State& state, const FrameCandidate& candidate);

@@ -18,6 +18,7 @@ Result<void> check(const EncoderOptions& o) {
         if (!(mm >= 0 && mm <= 1e6)) return bad("a threshold or error must be within 0 and 1,000,000 mm");
     if (!(o.node_spacing >= 1 && o.node_spacing <= 10000))
         return bad("the node spacing must be within 1 and 10,000 mm");
+    if (!(o.simplify >= 0 && o.simplify <= 10)) return bad("simplification must be within 0 and 10 steps");
     if (!(o.bits_per_second >= 0 && o.bits_per_second <= 1e12))
         return bad("the bitrate must be within 0 and 10^12 bit/s");
     if (!(o.buffer_seconds >= 0.01 && o.buffer_seconds <= 3600)) return bad("the buffer must hold 0.01 to 3600 s");

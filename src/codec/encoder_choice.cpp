@@ -83,18 +83,24 @@ Result<FrameCandidate> choose_by_motion(State& state, FrameUnderWay& frame, cons
     return encode_what_moves(state, frame, steps);
 }
 
+// Whether a T-frame does worse than its group can: over all, or in one region, such as a hand, as far as that shows.
+bool lost_track(const TrackedFit& fit, const Group& group, double units) {
+    constexpr double more_strays = 0.004, worst_to_best = 2.2, region_to_best = 6, region_to_intra = 1.5;
+    constexpr double visible = 5, visible_in_edges = 0.6;  // mm; of the capture's edges
+    const double best = group.best_fit > 0 ? group.best_fit : fit.rms;
+    return fit.stray_share > group.intra_fit.stray_share + more_strays || fit.rms > worst_to_best * best ||
+           fit.worst_region > std::max({region_to_best * best, region_to_intra * group.intra_fit.worst_region,
+                                        visible * units, visible_in_edges * group.edge});
+}
+
 // A T-frame where it fits the capture: where a hand has left a pocket, or an arm was lost, the I-frame's mesh no longer
 // serves, and an I-frame is due; so it is where the T-frames since the last one have grown too dear.
 Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
-    constexpr double stray_in_edges = 2, most_strays = 0.004, worst_to_best = 2.2;
     auto candidate = encode_tracked(state, frame, steps);
     if (!candidate) return candidate;
     const auto& group = *state.group;
-    StageClock clock(state.stages);
-    const auto fit = measure_tracked_fit(frame.mesh, candidate->decoded, stray_in_edges * group.edge, state.threads);
-    candidate->fit = fit.rms;
-    clock.done("fit of the tracking");
-    const bool lost = fit.stray_share > most_strays || (group.best_fit > 0 && fit.rms > worst_to_best * group.best_fit);
+    const auto& fit = candidate->fit = tracked_fit(state, frame, candidate->decoded, group.edge);
+    const bool lost = lost_track(fit, group, 1.0 / state.header.lattice.step());
     return lost || intra_is_paid_for(state, *candidate) ? encode_intra(state, frame, steps) : std::move(candidate);
 }
 

@@ -12,6 +12,7 @@
 #include "codec/rate_control_enc.h"
 #include "codec/sequence_header.h"
 #include "codec/sequence_index.h"
+#include "codec/tracked_fit_enc.h"
 #include "codec/tracked_frame_enc.h"
 #include "geometry/surface_distance.h"
 #include "htvm/encoder.hpp"
@@ -32,13 +33,12 @@ struct FrameCandidate {
     LatticeMesh decoded;
     CodedPose pose;                   // I: what the reference is skinned with
     double edge = 0;                  // I: mean edge of the captured mesh, lattice units
-    double best_fit = 0;              // of the T-frames since the I-frame; 0: none yet
     std::int32_t intra_step = 1;      // I: of the positions, lattice units
     std::vector<RigidMotion> motion;  // P, EP: of each bone
     Codebooks codebooks;              // EP: as the frame leaves them
     TrackedState tracked;             // T: likewise; motion is then that of the nodes
     std::uint32_t reference = 0;      // T: number of the frame that it refers to
-    double fit = 0;                   // T: root mean square distance from the capture, sampled; lattice units
+    TrackedFit fit;                   // T, and I that T-frames refer to
     bool in_part = false;             // EP: by motion-based coding
     std::vector<std::uint32_t> distance_order_counts;
     double quality = 50;        // under rate or error control: of the quality knob
@@ -60,7 +60,8 @@ struct Group {
     Codebooks codebooks;
     std::optional<TrackedGroup> tracked;        // made when the first T-frame asks for it
     std::optional<std::uint32_t> last_tracked;  // number of the last T-frame
-    double best_fit = 0;                        // of the T-frames since the I-frame; 0: none yet
+    TrackedFit intra_fit;                       // of the I-frame itself, where T-frames refer to it
+    double best_fit = 0;                        // rms of the T-frames since; 0: none yet
     std::int32_t intra_step = 1;                // of the I-frame's positions
     SurfaceErrors plain_intra;  // errors of the I-frame's mesh as an I-frame at `steps` that nothing refers to
     FrameSteps steps;

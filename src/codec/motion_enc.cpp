@@ -42,6 +42,19 @@ double mean_edge(const LatticeMesh& mesh) {
     return mesh.triangles.empty() ? 0 : sum / (3.0 * static_cast<double>(mesh.triangles.size()));
 }
 
+double sampled_mean_edge(const LatticeMesh& mesh) {
+    constexpr std::size_t every = 8;
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); i += every) {
+        const auto& t = mesh.triangles[i];
+        sum +=
+            std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i % 3]], mesh.positions[t[(i + 1) % 3]])));
+        ++count;
+    }
+    return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
 ReferenceSearch make_reference_search(const ReferenceMesh& reference) {
     ReferenceSearch out;
     const auto normals = vertex_normals(reference.mesh);

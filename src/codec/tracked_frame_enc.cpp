@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "codec/motion_enc.h"
 #include "codec/stage_clock_enc.h"
-#include "core/parallel.h"
+#include "codec/tracked_targets_enc.h"
 
 namespace htvm {
 namespace {
@@ -59,152 +58,7 @@ NodeMotionOptions motion_options(double geometry_step) {
     return out;
 }
 
-// Values where a vertex has no target: the mean of its neighbours', from the rim inwards; in the end nothing.
-void fill_gaps(std::vector<std::int32_t>& values, std::size_t components, std::vector<bool> known,
-               std::span<const Triangle> triangles) {
-    constexpr int rounds = 24;
-    if (std::find(known.begin(), known.end(), false) == known.end()) return;
-    std::vector<Triangle> open;
-    for (const auto& t : triangles)
-        if (!known[t[0]] || !known[t[1]] || !known[t[2]]) open.push_back(t);
-    std::vector<std::int64_t> sum(values.size(), 0);
-    std::vector<std::uint32_t> count(known.size(), 0);
-    for (int round = 0; round < rounds; ++round) {
-        for (const auto& t : open)
-            for (const auto to : t) {
-                if (known[to]) continue;
-                for (const auto from : t) {
-                    if (!known[from]) continue;
-                    for (std::size_t c = 0; c < components; ++c)
-                        sum[to * components + c] += values[from * components + c];
-                    ++count[to];
-                }
-            }
-        bool any = false;
-        for (const auto& t : open)
-            for (const auto v : t) {
-                if (known[v] || count[v] == 0) continue;
-                for (std::size_t c = 0; c < components; ++c)
-                    values[v * components + c] = static_cast<std::int32_t>(sum[v * components + c] / count[v]);
-                known[v] = any = true;
-            }
-        if (!any) break;
-        std::erase_if(open, [&](const Triangle& t) { return known[t[0]] && known[t[1]] && known[t[2]]; });
-    }
-}
-
-// How far along its normal each moved vertex is from the target's surface, lattice units.
-std::vector<std::int32_t> displacements(std::span<const LatticePoint> moved, std::span<const ExactNormal> normals,
-                                        const std::vector<SurfaceTarget>& targets,
-                                        std::span<const Triangle> triangles) {
-    std::vector<std::int32_t> out(moved.size(), 0);
-    std::vector<bool> known(moved.size(), false);
-    for (std::size_t v = 0; v < moved.size(); ++v) {
-        if (!targets[v].valid) continue;
-        const auto& p = targets[v].point;
-        const double d = (static_cast<double>(p[0]) - moved[v].x) * normals[v].x +
-                         (static_cast<double>(p[1]) - moved[v].y) * normals[v].y +
-                         (static_cast<double>(p[2]) - moved[v].z) * normals[v].z;
-        out[v] = static_cast<std::int32_t>(std::lround(d));
-        known[v] = true;
-    }
-    fill_gaps(out, 1, std::move(known), triangles);
-    return out;
-}
-
-std::array<double, 3> barycentric(const Point3f& p, const Point3f& a, const Point3f& b, const Point3f& c) {
-    const auto vector = [](const Point3f& from, const Point3f& to) {
-        return Eigen::Vector3d(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
-    };
-    const auto u = vector(a, b), v = vector(a, c), w = vector(a, p);
-    const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), wu = w.dot(u), wv = w.dot(v);
-    const double area = uu * vv - uv * uv;
-    if (!(area > 0)) return {1, 0, 0};
-    const double s = std::clamp((vv * wu - uv * wv) / area, 0.0, 1.0);
-    const double t = std::clamp((uu * wv - uv * wu) / area, 0.0, 1.0 - s);
-    return {1 - s - t, s, t};
-}
-
-// What the target shows where each vertex ended, less the reference's colour.
-std::vector<std::int32_t> colour_changes(const LatticeMesh& captured, const std::vector<Point3f>& captured_points,
-                                         const TrackedReference& reference, const std::vector<SurfaceTarget>& targets) {
-    std::vector<std::int32_t> out(3 * targets.size(), 0);
-    std::vector<bool> known(targets.size(), false);
-    for (std::size_t v = 0; v < targets.size(); ++v) {
-        if (!targets[v].valid) continue;
-        const auto& t = captured.triangles[targets[v].triangle];
-        const auto share =
-            barycentric(targets[v].point, captured_points[t[0]], captured_points[t[1]], captured_points[t[2]]);
-        for (std::size_t c = 0; c < 3; ++c) {
-            double level = 0;
-            for (std::size_t i = 0; i < 3; ++i) level += share[i] * captured.colours[t[i]][c];
-            out[3 * v + c] = static_cast<std::int32_t>(std::lround(level)) - reference.mesh.colours[v][c];
-        }
-        known[v] = true;
-    }
-    fill_gaps(out, 3, std::move(known), reference.mesh.triangles);
-    return out;
-}
-
-// About the mean length of a mesh's sides, from some of them; 0 without triangles.
-double about_edge(const LatticeMesh& mesh) {
-    constexpr std::size_t every = 8;
-    double sum = 0;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < mesh.triangles.size(); i += every) {
-        const auto& t = mesh.triangles[i];
-        sum +=
-            std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i % 3]], mesh.positions[t[(i + 1) % 3]])));
-        ++count;
-    }
-    return count > 0 ? sum / static_cast<double>(count) : 0;
-}
-
-// From samples of one surface to the other.
-TrackedFit one_way_fit(const TargetSurface& from, const TargetSurface& to, double stray, unsigned threads) {
-    std::vector<Point3f> points, normals;
-    for (const auto v : from.samples) {
-        points.push_back(from.positions[v]);
-        normals.push_back(from.normals[v]);
-    }
-    SurfaceTargetOptions options;
-    options.reach = static_cast<float>(stray);
-    options.agreement = 0;
-    options.threads = threads;
-    const auto found = surface_targets(points, normals, to, options);
-    double squares = 0;
-    std::size_t near = 0;
-    for (std::size_t i = 0; i < found.size(); ++i) {
-        if (!found[i].valid) {
-            squares += stray * stray;
-            continue;
-        }
-        ++near;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const double d = static_cast<double>(found[i].point[axis]) - points[i][axis];
-            squares += d * d;
-        }
-    }
-    if (found.empty()) return {};
-    return {std::sqrt(squares / static_cast<double>(found.size())),
-            static_cast<double>(found.size() - near) / static_cast<double>(found.size())};
-}
-
 }  // namespace
-
-TrackedFit measure_tracked_fit(const LatticeMesh& captured, const LatticeMesh& decoded, double stray,
-                               unsigned threads) {
-    constexpr std::size_t samples = 4000;
-    const auto surface_of = [&](const LatticeMesh& mesh) {
-        return make_target_surface(points_of(mesh.positions), mesh.triangles,
-                                   static_cast<float>(std::max({2 * about_edge(mesh), stray / 24, 2.0})), samples, 1);
-    };
-    std::optional<TargetSurface> a, b;
-    parallel_invoke(
-        threads, [&] { a = surface_of(captured); }, [&] { b = surface_of(decoded); });
-    const auto forth = one_way_fit(*a, *b, stray, threads), back = one_way_fit(*b, *a, stray, threads);
-    return {std::max(forth.rms, back.rms), std::max(forth.stray_share, back.stray_share)};
-}
 
 TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOptions& options) {
     TrackedGroup out;
@@ -217,22 +71,23 @@ TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOpt
     return out;
 }
 
-Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TrackedGroup& group, bool refer_to_last,
+TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
+    // Cells no finer than the search can go through: of captures with tiny triangles, or none.
+    const double edge = std::max({sampled_mean_edge(mesh), options.far_reach * options.millimetre / 48, 1.0});
+    return make_target_surface(points_of(mesh.positions), mesh.triangles, static_cast<float>(2 * edge),
+                               options.back_samples, options.threads);
+}
+
+Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TargetSurface& surface,
+                                                 const TrackedGroup& group, bool refer_to_last,
                                                  std::span<const RigidMotion> skeletal,
                                                  const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);
     const auto& reference = group.reference;
     const auto& triangles = reference.mesh.triangles;
-    const auto captured_points = points_of(mesh.positions);
-    // Cells no finer than the search can go through: of captures with tiny triangles, or none.
-    const double edge =
-        std::max({about_edge(mesh), options.deformation.far_reach * options.deformation.millimetre / 48, 1.0});
-    const auto target = make_target_surface(captured_points, mesh.triangles, static_cast<float>(2 * edge),
-                                            options.deformation.back_samples, options.threads);
-    clock.done("search structures");
     EncodedTrackedFrame out;
-    out.motion = register_deformation(group.deformable, target,
-                                      best_start(group, target, skeletal, options.deformation), options.deformation);
+    out.motion = register_deformation(group.deformable, surface,
+                                      best_start(group, surface, skeletal, options.deformation), options.deformation);
     clock.done("registration");
 
     const std::span<const QuantisedTransform> before = refer_to_last
@@ -242,15 +97,8 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
                                      before, motion_options(options.geometry_step));
     const auto moved = moved_by_nodes(reference, motion.transforms, options.threads);
     const auto normals = exact_normals(moved, triangles);
-    const auto moved_points = points_of(moved);
-    std::vector<Point3f> normal_points;
-    normal_points.reserve(normals.size());
-    for (const auto& n : normals)
-        normal_points.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
-    SurfaceTargetOptions search;
-    search.reach = static_cast<float>(30 * options.deformation.millimetre);
-    search.threads = options.threads;
-    const auto targets = surface_targets(moved_points, normal_points, target, search);
+    const auto targets = find_tracked_targets({moved, normals, triangles, reference.mesh.colours}, mesh, surface,
+                                              30 * options.deformation.millimetre, options.threads);
     clock.done("targets");
 
     FieldOptions geometry;
@@ -261,24 +109,22 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     colour.lambda = options.lambda;
     colour.turned = true;
     Result<EncodedField> displacement, colours;
-    parallel_invoke(
-        options.threads,
-        [&] {
-            displacement = encode_field(reference.hierarchy, displacements(moved, normals, targets, triangles), 1,
-                                        geometry, refer_to_last ? &group.state.displacement : nullptr);
-        },
-        [&] {
-            if (!reference.mesh.colours.empty())
-                colours = encode_field(reference.hierarchy, colour_changes(mesh, captured_points, reference, targets),
-                                       3, colour, refer_to_last ? &group.state.colour : nullptr);
-        });
-    if (!displacement) return tl::unexpected(displacement.error());
+    const auto code_displacement = [&] {
+        displacement = encode_field(reference.hierarchy, targets.displacement, 1, geometry,
+                                    refer_to_last ? &group.state.displacement : nullptr);
+        if (displacement) out.mesh.positions = displaced(moved, normals, displacement->values);
+    };
+    if (reference.mesh.colours.empty())
+        code_displacement();
+    else
+        colours = encode_field(reference.hierarchy, targets.colours, 3, colour,
+                               refer_to_last ? &group.state.colour : nullptr, options.threads, code_displacement);
     if (!reference.mesh.colours.empty() && !colours) return tl::unexpected(colours.error());
+    if (!displacement) return tl::unexpected(displacement.error());
     clock.done("fields");
 
     out.mesh.triangles = triangles;
     out.mesh.texcoords = reference.mesh.texcoords;
-    out.mesh.positions = displaced(moved, normals, displacement->values);
     if (!reference.mesh.normals.empty())
         out.mesh.normals = quantised_normals(exact_normals(out.mesh.positions, triangles));
     out.state.transforms = std::move(motion.transforms);

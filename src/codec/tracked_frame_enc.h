@@ -29,13 +29,8 @@ struct TrackedGroup {
 };
 TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOptions& options);
 
-// How well a tracked frame stands for the captured mesh, from a few thousand samples each way.
-struct TrackedFit {
-    double rms = 0;          // lattice units, the larger direction; strays count as `stray` away
-    double stray_share = 0;  // of the samples that have no surface within `stray` facing the same way, likewise
-};
-// stray: lattice units.
-TrackedFit measure_tracked_fit(const LatticeMesh& captured, const LatticeMesh& decoded, double stray, unsigned threads);
+// The captured mesh, ready to be registered to.
+TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions& options);
 
 struct EncodedTrackedFrame {
     FramePayload payload;  // header and layers
@@ -46,7 +41,9 @@ struct EncodedTrackedFrame {
 
 // refer_to_last: predict from the frame before (group.state must be of it), else from the I-frame alone.
 // skeletal: where the skeleton moves each node, or empty: one of the starts that the registration chooses from.
-Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TrackedGroup& group, bool refer_to_last,
+// surface: of `mesh`, see captured_surface().
+Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TargetSurface& surface,
+                                                 const TrackedGroup& group, bool refer_to_last,
                                                  std::span<const RigidMotion> skeletal,
                                                  const TrackedFrameOptions& options, std::vector<StageTime>& stages);
 

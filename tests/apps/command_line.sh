@@ -22,8 +22,11 @@ expect() {
 expect 0 "3 frames" "$htvm" synth capture --frames 3 --vertices 600
 expect 0 '"radii"' "$htvm" calibrate capture -s capture/skeleton.json
 expect 0 "" "$htvm" calibrate capture -s capture/skeleton.json -o radii.json
-expect 0 "bits/vertex" "$htvm" encode capture -s capture/skeleton.json --radii radii.json --keyint 2 -o a.htvm
-expect 0 '"type": "EP"' "$htvm" encode capture -s capture/skeleton.json --json -o b.htvm
+expect 0 "bits/vertex" "$htvm" encode capture -s capture/skeleton.json --radii radii.json --keyint 2 --profile topology -o a.htvm
+expect 0 '"type": "EP"' "$htvm" encode capture -s capture/skeleton.json --profile topology --json -o b.htvm
+expect 0 '"type": "T"' "$htvm" encode capture --json -o b.htvm
+expect 2 "add --profile topology" "$htvm" encode capture --keep-duplicates -o b.htvm
+expect 2 "add --profile tracked" "$htvm" encode capture --profile paper --simplify 0 -o b.htvm
 expect 0 "skeleton: 15 joints, 14 bones" "$htvm" info a.htvm
 expect 0 '"megabits_per_second"' "$htvm" info a.htvm --json
 expect 0 "3 frames to decoded" "$htvm" decode a.htvm -o decoded
@@ -88,7 +91,7 @@ expect 3 "damaged" "$htvm" decode damaged.htvm -o x
 # Lost frames: everything else is decoded, it is said what is not, and --conceal shows something instead.
 # The offsets of the packets are found by their sync words; pick KIND FRAME says where such a packet begins and ends.
 "$htvm" synth walk --frames 8 --first-frame 40 --vertices 500 2>/dev/null >/dev/null
-expect 0 '"type": "P"' "$htvm" encode walk -s walk/skeleton.json --keyint 4 --still-below 100 --animation-error 0 --json -o walk.htvm
+expect 0 '"type": "P"' "$htvm" encode walk -s walk/skeleton.json --profile topology --keyint 4 --still-below 100 --animation-error 0 --json -o walk.htvm
 packets() { # offset, size, kind, frame of every packet
     local at=0 size end header
     end=$(wc -c <walk.htvm)

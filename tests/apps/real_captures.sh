@@ -13,17 +13,21 @@ for folder in "$HTVM_DATA"/*/; do
     name=$(basename "$folder")
     skeleton=()
     [ -f "$folder/skeleton.json" ] && skeleton=(--skeleton "$folder/skeleton.json")
-    # Errors stay near half a step (2 mm in three dimensions: 1 mm RMS, a little more by ECVQ), whatever the capture.
-    "$htvm" encode "$folder" "${skeleton[@]}" --frames 4 --keyint 3 -q 50 -o "$work/a.htvm" >"$work/log" 2>&1 ||
-        { fail "$name: encode: $(tail -1 "$work/log")"; continue; }
-    "$htvm" compare "$folder" "$work/a.htvm" --frames 4 --only m1 --json >"$work/m1.json" 2>"$work/log" ||
-        { fail "$name: compare: $(tail -1 "$work/log")"; continue; }
-    grep -q m1 "$work/m1.json" || fail "$name: compare gave no M1"
-    "$htvm" decode "$work/a.htvm" -o "$work/one" --threads 1 2>/dev/null || fail "$name: decode"
-    "$htvm" decode "$work/a.htvm" -o "$work/two" --threads 4 2>/dev/null || fail "$name: decode with threads"
-    diff -rq "$work/one" "$work/two" >/dev/null || fail "$name: the decoded meshes depend on the threads"
+    for profile in tracked topology; do
+        "$htvm" encode "$folder" "${skeleton[@]}" --profile $profile --frames 4 --keyint 3 -q 50 -o "$work/a.htvm" \
+            >"$work/log" 2>&1 || { fail "$name: encode: $(tail -1 "$work/log")"; continue; }
+        # The same error in every profile, whatever the capture: 0.3 to 1 mm off the surface at -q 50.
+        "$htvm" compare "$folder" "$work/a.htvm" --frames 4 --only m2 --samples 20000 --json >"$work/m2.json" \
+            2>"$work/log" || { fail "$name: compare: $(tail -1 "$work/log")"; continue; }
+        awk -F'[:,]' '/"worst_frame_mm"/ {last=$2} END {exit !(last > 0.2 && last < 1)}' "$work/m2.json" ||
+            fail "$name, $profile: M2 is $(grep worst_frame "$work/m2.json" | tail -1)"
+        "$htvm" decode "$work/a.htvm" -o "$work/one" --threads 1 2>/dev/null || fail "$name: decode"
+        "$htvm" decode "$work/a.htvm" -o "$work/two" --threads 4 2>/dev/null || fail "$name: decode with threads"
+        diff -rq "$work/one" "$work/two" >/dev/null || fail "$name: the decoded meshes depend on the threads"
+        rm -rf "${work:?}"/*
+    done
     # With duplicates kept, no vertex and no triangle is lost.
-    "$htvm" encode "$folder" "${skeleton[@]}" --frames 2 -q 30 --keep-duplicates --json -o "$work/k.htvm" 2>/dev/null |
+    "$htvm" encode "$folder" "${skeleton[@]}" --profile topology --frames 2 -q 30 --keep-duplicates --json -o "$work/k.htvm" 2>/dev/null |
         awk -F'[:,]' '/"source_triangles"/ {s=$2} /"source_vertices"/ {v=$2} /"triangles"/ && !/source/ {if ($2 != 0) t=$2}
                       /"vertices"/ && !/source/ {if (t != s || $2 != v) exit 1}' || fail "$name: counts differ with --keep-duplicates"
     rm -rf "${work:?}"/*

@@ -52,6 +52,20 @@ TEST(TrackedFrames, KeepTheConnectivityOfTheirIntraFrame) {
     for (const auto& mesh : coded.reconstructions) EXPECT_EQ(mesh.triangles, coded.reconstructions[0].triangles);
 }
 
+TEST(TrackedFrames, HaveASimplifiedIntraFrameUnlessToldNotTo) {
+    const auto sequence = walking(2, true);
+    auto options = tracked();
+    const auto simplified = encode(sequence, options);
+    options.simplify = 0;
+    options.merge_duplicates = false;
+    const auto whole = encode(sequence, options);
+    const auto captured = sequence.frames[0].mesh.positions.size();
+    EXPECT_EQ(whole.infos[0].vertices, captured);
+    EXPECT_LT(simplified.infos[0].vertices, captured);
+    EXPECT_EQ(simplified.infos[0].source_vertices, captured);
+    EXPECT_EQ(simplified.infos[0].source_triangles, sequence.frames[0].mesh.triangles.size());
+}
+
 TEST(TrackedFrames, TakeAFractionOfTheBitsForTheSameSurface) {
     for (const bool skeleton : {false, true}) {
         const auto sequence = walking(5, skeleton);

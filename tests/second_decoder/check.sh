@@ -15,11 +15,16 @@ checked=0
 contains() {
     grep -q " $1" "$work/kinds" || { echo "$name: no frame is $1"; cat "$work/kinds"; exit 1; }
 }
-# same NAME INPUT OPTION...: encodes the input with the options, decodes it with both, compares.
+# same NAME INPUT OPTION...: encodes the input with the options (--profile topology unless they name one), decodes it with
+# both, compares.
 same() {
     name=$1
     input=$2
     shift 2
+    case " $* " in
+        *" --profile "*) ;;
+        *) set -- --profile topology "$@" ;;
+    esac
     rm -rf "$work/decoded"
     "$htvm" encode "$input" --unit mm "$@" -o "$work/stream.htvm" >"$work/log" 2>&1 ||
         { echo "$name: encode $* failed"; cat "$work/log"; exit 1; }
@@ -84,6 +89,8 @@ for keyint in 2 30; do
     done
 done
 same moving "$work/moving" --profile tracked --skeleton "$work/moving/skeleton.json"
+contains tracked
+same moving "$work/moving" --profile tracked --simplify 0 --tracked-from intra
 contains tracked
 for stream in "$here"/../data/conformance/*.htvm; do
     stored "$stream"

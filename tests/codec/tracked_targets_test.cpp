@@ -1,0 +1,152 @@
+// What tracked frames aim at: targets of a moved reference, the simplified reference, and the fit of what came out.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "codec/simplified_reference_enc.h"
+#include "codec/tracked_fit_enc.h"
+#include "codec/tracked_targets_enc.h"
+#include "geometry/nearest_points.h"
+
+namespace htvm {
+namespace {
+
+// A square height field of cells x cells, `cell` lattice units a side, its middle at the origin, facing +z.
+template <class Height>
+LatticeMesh height_field(std::int32_t cells, std::int32_t cell, const Height& height) {
+    LatticeMesh out;
+    const auto at = [&](std::int32_t i) { return (2 * i - cells) * cell / 2; };
+    for (std::int32_t y = 0; y <= cells; ++y)
+        for (std::int32_t x = 0; x <= cells; ++x)
+            out.positions.push_back({at(x), at(y), static_cast<std::int32_t>(std::lround(height(at(x), at(y))))});
+    for (std::int32_t y = 0; y < cells; ++y)
+        for (std::int32_t x = 0; x < cells; ++x) {
+            const auto a = static_cast<std::uint32_t>(y * (cells + 1) + x), b = a + 1;
+            const auto c = a + static_cast<std::uint32_t>(cells) + 1, d = c + 1;
+            out.triangles.push_back({a, b, d});
+            out.triangles.push_back({a, d, c});
+        }
+    return out;
+}
+
+double flat(double, double) { return 0; }
+double bowl(double x, double y) { return -(x * x + y * y) / 4000; }
+
+TargetSurface surface_of(const LatticeMesh& mesh) {
+    return make_target_surface(points_of(mesh.positions), mesh.triangles, 80, 1000, 1);
+}
+
+TrackedTargets targets_of(const LatticeMesh& reference, const LatticeMesh& captured, double reach = 500,
+                          unsigned threads = 1) {
+    const auto normals = exact_normals(reference.positions, reference.triangles);
+    return find_tracked_targets({reference.positions, normals, reference.triangles, reference.colours}, captured,
+                                surface_of(captured), reach, threads);
+}
+
+TEST(TrackedTargets, are_the_distance_along_the_normal) {
+    const auto captured = height_field(40, 30, [](double, double) { return 24; });
+    for (const auto d : targets_of(height_field(10, 100, flat), captured).displacement) EXPECT_EQ(d, 24);
+}
+
+TEST(TrackedTargets, lay_the_triangles_of_a_coarse_mesh_on_a_bent_surface_not_only_its_vertices) {
+    const auto captured = height_field(64, 25, bowl);
+    const auto reference = height_field(8, 200, bowl);  // vertices on the surface, triangles below it
+    const auto targets = targets_of(reference, captured);
+    const auto moved =
+        displaced(reference.positions, exact_normals(reference.positions, reference.triangles), targets.displacement);
+    EXPECT_GT(std::accumulate(targets.displacement.begin(), targets.displacement.end(), 0), 0);
+    auto fitted = reference;
+    fitted.positions = moved;
+    TrackedFitOptions options;
+    const auto before = measure_tracked_fit(surface_of(captured), reference, options);
+    const auto after = measure_tracked_fit(surface_of(captured), fitted, options);
+    EXPECT_LT(after.rms, 0.75 * before.rms);
+}
+
+TEST(TrackedTargets, are_taken_from_neighbours_where_nothing_is_in_reach) {
+    auto captured = height_field(40, 30, [](double, double) { return 16; });
+    std::erase_if(captured.triangles, [&](const Triangle& t) { return captured.positions[t[0]].x > 200; });
+    const auto targets = targets_of(height_field(10, 100, flat), captured, 60);
+    for (const auto d : targets.displacement) EXPECT_NEAR(d, 16, 2);
+}
+
+TEST(TrackedTargets, ask_for_the_colours_that_are_there_whatever_the_sampling) {
+    auto captured = height_field(40, 30, flat);
+    for (const auto p : captured.positions)
+        captured.colours.push_back(
+            {static_cast<std::uint8_t>(128 + p.x / 10), 40, static_cast<std::uint8_t>(128 - p.y / 10)});
+    auto reference = height_field(7, 130, flat);
+    reference.colours.assign(reference.positions.size(), {100, 100, 100});
+    const auto targets = targets_of(reference, captured);
+    ASSERT_EQ(targets.colours.size(), 3 * reference.positions.size());
+    for (std::size_t v = 0; v < reference.positions.size(); ++v) {
+        EXPECT_NEAR(targets.colours[3 * v], 28 + reference.positions[v].x / 10, 1);
+        EXPECT_NEAR(targets.colours[3 * v + 1], -60, 1);
+        EXPECT_NEAR(targets.colours[3 * v + 2], 28 - reference.positions[v].y / 10, 1);
+    }
+}
+
+TEST(TrackedTargets, are_the_same_for_any_number_of_threads) {
+    const auto captured = height_field(64, 25, bowl);
+    const auto reference = height_field(20, 80, flat);
+    EXPECT_EQ(targets_of(reference, captured, 500, 1).displacement,
+              targets_of(reference, captured, 500, 3).displacement);
+}
+
+TEST(TrackedTargets, of_nothing_are_nothing) {
+    EXPECT_TRUE(targets_of({}, height_field(4, 30, flat)).displacement.empty());
+    for (const auto d : targets_of(height_field(4, 100, flat), {}).displacement) EXPECT_EQ(d, 0);
+}
+
+TEST(SimplifiedReference, has_fewer_vertices_within_the_error) {
+    auto captured = height_field(64, 25, bowl);
+    captured.colours.assign(captured.positions.size(), {9, 8, 7});
+    captured.normals.assign(captured.positions.size(), {0, 0, 127});
+    SimplifiedReferenceOptions options;
+    options.surface_error = 8;
+    const auto out = simplified_reference(captured, surface_of(captured), options);
+    EXPECT_LT(out.positions.size(), captured.positions.size() / 5);
+    EXPECT_LT(measure_tracked_fit(surface_of(captured), out, {}).rms, 8);
+    ASSERT_EQ(out.colours.size(), out.positions.size());
+    EXPECT_EQ(out.colours[0], (Colour{9, 8, 7}));
+    EXPECT_EQ(out.normals.size(), out.positions.size());
+}
+
+TEST(SimplifiedReference, with_texture_coordinates_or_without_triangles_is_the_captured_mesh) {
+    auto captured = height_field(8, 25, flat);
+    captured.texcoords.assign(captured.positions.size(), {1, 2});
+    EXPECT_EQ(simplified_reference(captured, surface_of(captured), {}).positions, captured.positions);
+    LatticeMesh points;
+    points.positions = {{1, 2, 3}, {4, 5, 6}};
+    EXPECT_EQ(simplified_reference(points, surface_of(points), {}).positions, points.positions);
+}
+
+TEST(TrackedFit, of_the_same_surface_is_nothing) {
+    const auto captured = height_field(64, 25, bowl);
+    const auto fit = measure_tracked_fit(surface_of(captured), captured, {});
+    EXPECT_LT(fit.rms, 0.5);
+    EXPECT_EQ(fit.stray_share, 0);
+}
+
+TEST(TrackedFit, tells_of_one_region_that_does_not_fit_where_the_whole_hardly_shows_it) {
+    const auto captured = height_field(100, 25, flat);
+    const auto bumped = height_field(100, 25, [](double x, double y) { return x * x + y * y < 200 * 200 ? 100 : 0; });
+    TrackedFitOptions options;
+    options.region = 500;
+    const auto fit = measure_tracked_fit(surface_of(captured), bumped, options);
+    EXPECT_LT(fit.rms, 20);
+    EXPECT_GT(fit.worst_region, 2 * fit.rms);
+}
+
+TEST(TrackedFit, counts_what_one_surface_lacks_as_strays_both_ways) {
+    const auto whole = height_field(64, 25, flat);
+    auto part = whole;
+    std::erase_if(part.triangles, [&](const Triangle& t) { return part.positions[t[0]].x > 400; });
+    EXPECT_GT(measure_tracked_fit(surface_of(whole), part, {}).stray_share, 0.05);
+    EXPECT_GT(measure_tracked_fit(surface_of(part), whole, {}).stray_share, 0.05);
+}
+
+}  // namespace
+}  // namespace htvm
