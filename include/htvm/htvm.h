@@ -236,6 +236,7 @@ typedef struct htvm_encoder_options {
     uint32_t frame_choice;       /* HTVM_CHOICE_... HTVM_CHOICE_FIXED */
     uint32_t tracked;            /* 1: T-frames between I-frames, where they fit the capture. 0 */
     uint32_t tracked_from_intra; /* 1: T-frames refer to I-frames alone, any may be lost; 0: to the frame before. 0 */
+    double simplify;             /* geometry steps, T-frames: error of the I-frames' simplified meshes; 0: whole. 0.4 */
     double node_spacing;         /* mm, T-frames. 80 */
     double predicted_below;      /* mm, choice by motion. 400 */
     double intra_above;          /* mm, choice by motion; 0: never. 0 */

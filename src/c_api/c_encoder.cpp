@@ -44,6 +44,7 @@ htvm_encoder_options default_options() {
     out.frame_choice = static_cast<std::uint32_t>(cpp.frame_choice);
     out.tracked = cpp.tracked;
     out.tracked_from_intra = cpp.tracked_references == htvm::TrackedReferences::intra;
+    out.simplify = cpp.simplify;
     out.node_spacing = cpp.node_spacing;
     out.predicted_below = cpp.predicted_below;
     out.intra_above = cpp.intra_above;
@@ -78,6 +79,7 @@ htvm::EncoderOptions cpp_options(const htvm_encoder_options& options) {
     out.tracked = options.tracked != 0;
     out.tracked_references =
         options.tracked_from_intra != 0 ? htvm::TrackedReferences::intra : htvm::TrackedReferences::previous;
+    out.simplify = options.simplify;
     out.node_spacing = options.node_spacing;
     out.predicted_below = options.predicted_below;
     out.intra_above = options.intra_above;

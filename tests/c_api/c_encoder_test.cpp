@@ -144,6 +144,7 @@ TEST(CEncoder, EveryOptionReachesTheCppEncoder) {
     options.tracked = 1;
     cpp.tracked_references = TrackedReferences::intra;
     options.tracked_from_intra = 1;
+    cpp.simplify = options.simplify = 0.2;
     cpp.node_spacing = options.node_spacing = 120;
     EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
 
