@@ -9,8 +9,8 @@
 
 namespace htvm::app {
 
-// About 0.5 mm off the surface (M2).
-constexpr double default_quality = 50;
+// About 0.6 mm off the surface (M2).
+constexpr double default_quality = 42;
 
 struct EncodingOptions {
     double quality = default_quality;

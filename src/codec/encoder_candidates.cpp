@@ -147,7 +147,8 @@ const TargetSurface& target_of(State& state, FrameUnderWay& frame) {
 
 }  // namespace
 
-TrackedFit tracked_fit(State& state, FrameUnderWay& frame, const LatticeMesh& decoded, double edge) {
+TrackedFit tracked_fit(State& state, FrameUnderWay& frame, const LatticeMesh& decoded, double edge,
+                       std::span<const double> intra_squared) {
     constexpr double stray_in_edges = 2, reach = 25, region = 100;  // mm
     const auto& target = target_of(state, frame);
     StageClock clock(state.stages);
@@ -157,7 +158,7 @@ TrackedFit tracked_fit(State& state, FrameUnderWay& frame, const LatticeMesh& de
     options.reach = std::max(reach * units, options.stray);
     options.region = region * units;
     options.threads = state.threads;
-    const auto out = measure_tracked_fit(target, decoded, options);
+    const auto out = measure_tracked_fit(target, decoded, intra_squared, options);
     clock.done("fit of the tracking");
     return out;
 }
@@ -219,7 +220,7 @@ Result<FrameCandidate> encode_intra(State& state, FrameUnderWay& frame, const Fr
     out.intra_step = options.geometry_step;
     out.packets.push_back(frame_packet(PacketKind::intra, payload));
     clock.done("intra coding");
-    if (tracked && state.options.key_interval > 1) out.fit = tracked_fit(state, frame, out.decoded, edge);
+    if (tracked && state.options.key_interval > 1) out.fit = tracked_fit(state, frame, out.decoded, edge, {});
     return out;
 }
 

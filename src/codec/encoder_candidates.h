@@ -38,7 +38,9 @@ FrameCandidate encode_coded_bones(Encoder::State& state, FrameUnderWay& frame, c
                                   const std::vector<bool>& coded);
 
 // How well a decoded mesh stands for the frame. edge: mean edge of the I-frame's captured mesh, lattice units.
-TrackedFit tracked_fit(Encoder::State& state, FrameUnderWay& frame, const LatticeMesh& decoded, double edge);
+// intra_squared: see measure_tracked_fit().
+TrackedFit tracked_fit(Encoder::State& state, FrameUnderWay& frame, const LatticeMesh& decoded, double edge,
+                       std::span<const double> intra_squared);
 
 // Needs options.tracked.
 Result<FrameCandidate> encode_tracked(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps);

@@ -85,8 +85,8 @@ Result<FrameCandidate> choose_by_motion(State& state, FrameUnderWay& frame, cons
 
 // Whether a T-frame does worse than its group can: over all, or in one region, such as a hand, as far as that shows.
 bool lost_track(const TrackedFit& fit, const Group& group, double units) {
-    constexpr double more_strays = 0.004, worst_to_best = 2.2, region_to_best = 6, region_to_intra = 1.5;
-    constexpr double visible = 5, visible_in_edges = 0.6;  // mm; of the capture's edges
+    constexpr double more_strays = 0.004, worst_to_best = 2.2, region_to_best = 7, region_to_intra = 1.5;
+    constexpr double visible = 6, visible_in_edges = 0.5;  // mm; of the capture's edges
     const double best = group.best_fit > 0 ? group.best_fit : fit.rms;
     return fit.stray_share > group.intra_fit.stray_share + more_strays || fit.rms > worst_to_best * best ||
            fit.worst_region > std::max({region_to_best * best, region_to_intra * group.intra_fit.worst_region,
@@ -99,7 +99,8 @@ Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const 
     auto candidate = encode_tracked(state, frame, steps);
     if (!candidate) return candidate;
     const auto& group = *state.group;
-    const auto& fit = candidate->fit = tracked_fit(state, frame, candidate->decoded, group.edge);
+    const auto& fit = candidate->fit =
+        tracked_fit(state, frame, candidate->decoded, group.edge, group.intra_fit.squared);
     const bool lost = lost_track(fit, group, 1.0 / state.header.lattice.step());
     return lost || intra_is_paid_for(state, *candidate) ? encode_intra(state, frame, steps) : std::move(candidate);
 }

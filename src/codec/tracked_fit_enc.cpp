@@ -68,12 +68,13 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
         if (squared[i] > options.stray * options.stray) ++strays;
     }
     const auto count = static_cast<double>(points.size());
-    return {std::sqrt(squares / count), static_cast<double>(strays) / count, worst_of(std::move(samples))};
+    return {std::sqrt(squares / count), static_cast<double>(strays) / count, worst_of(std::move(samples)), {}};
 }
 
 // The captured surface is so fine that the triangles round the nearest vertex suffice, and a side is told from the
 // other, as of a sleeve, by its normals.
-TrackedFit fit_of_decoded(const Samples& decoded, const TargetSurface& captured, const TrackedFitOptions& options) {
+std::vector<double> distances_of_decoded(const Samples& decoded, const TargetSurface& captured,
+                                         const TrackedFitOptions& options) {
     SurfaceTargetOptions search;
     search.reach = static_cast<float>(options.reach);
     search.agreement = 0;
@@ -88,7 +89,7 @@ TrackedFit fit_of_decoded(const Samples& decoded, const TargetSurface& captured,
             squared[i] += d * d;
         }
     }
-    return summed_up(decoded.points, squared, options);
+    return squared;
 }
 
 TrackedFit fit_of_captured(const Samples& captured, const SurfaceSearch& decoded, const TrackedFitOptions& options) {
@@ -104,15 +105,19 @@ TrackedFit fit_of_captured(const Samples& captured, const SurfaceSearch& decoded
 }  // namespace
 
 TrackedFit measure_tracked_fit(const TargetSurface& captured, const LatticeMesh& decoded,
-                               const TrackedFitOptions& options) {
+                               std::span<const double> intra_squared, const TrackedFitOptions& options) {
     const auto points = points_of(decoded.positions);
     const auto forth = fit_of_captured(samples_of(captured.positions, captured.normals, captured.triangles),
                                        SurfaceSearch(points, decoded.triangles), options);
-    const auto back = fit_of_decoded(
-        samples_of(points, vertex_normals(points, decoded.triangles, options.threads), decoded.triangles), captured,
-        options);
+    const auto samples =
+        samples_of(points, vertex_normals(points, decoded.triangles, options.threads), decoded.triangles);
+    auto squared = distances_of_decoded(samples, captured, options);
+    std::vector<double> more(squared.size(), 0);
+    if (intra_squared.size() == squared.size())
+        for (std::size_t i = 0; i < squared.size(); ++i) more[i] = std::max(0.0, squared[i] - intra_squared[i]);
+    const auto back = summed_up(samples.points, more, options);
     return {std::max(forth.rms, back.rms), std::max(forth.stray_share, back.stray_share),
-            std::max(forth.worst_region, back.worst_region)};
+            std::max(forth.worst_region, back.worst_region), std::move(squared)};
 }
 
 }  // namespace htvm

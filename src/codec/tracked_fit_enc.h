@@ -1,6 +1,9 @@
 // Whether a tracked frame still stands for the captured mesh. Encoder side.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "codec/lattice_mesh.h"
 #include "geometry/target_surface.h"
 
@@ -8,9 +11,10 @@ namespace htvm {
 
 // From a few thousand samples each way, the worse direction of the two; lattice units.
 struct TrackedFit {
-    double rms = 0;           // distance from surface to surface; none counts as more than `reach`
-    double stray_share = 0;   // of the samples that are farther than `stray`
-    double worst_region = 0;  // the root mean square in the worst cube of space
+    double rms = 0;               // distance from surface to surface; none counts as more than `reach`
+    double stray_share = 0;       // of the samples that are farther than `stray`
+    double worst_region = 0;      // the root mean square in the worst cube of space
+    std::vector<double> squared;  // distances of the decoded mesh's samples from the captured surface
 };
 
 struct TrackedFitOptions {
@@ -20,8 +24,10 @@ struct TrackedFitOptions {
     unsigned threads = 1;
 };
 
-// captured: of the captured mesh.
+// captured: of the captured mesh. intra_squared: `squared` of the I-frame, whose connectivity `decoded` has; what its
+// samples were off there is not held against the frame, since the search does not find every long triangle of a sole,
+// nor are those of the I-frame itself, for which it is empty.
 TrackedFit measure_tracked_fit(const TargetSurface& captured, const LatticeMesh& decoded,
-                               const TrackedFitOptions& options);
+                               std::span<const double> intra_squared, const TrackedFitOptions& options);
 
 }  // namespace htvm
