@@ -25,6 +25,7 @@ add_library(htvm_app STATIC ${app_sources})
 target_include_directories(htvm_app PUBLIC apps/htvm)
 target_link_libraries(htvm_app PUBLIC htvm_encoder htvm_decoder htvm_draco htvm_io htvm_synth htvm_metrics
                                       CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
+htvm_precompile(htvm_app <CLI/CLI.hpp> <fmt/core.h> <nlohmann/json.hpp> <filesystem> <string> <vector>)
 target_compile_definitions(htvm_app PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)

@@ -10,7 +10,7 @@
 namespace htvm::app {
 
 // About 0.6 mm off the surface (M2).
-constexpr double default_quality = 45;
+constexpr double default_quality = 42;
 
 struct EncodingOptions {
     double quality = default_quality;

@@ -125,7 +125,7 @@ FrameSteps tracked_steps(const FrameSteps& steps) {
 
 SimplifiedReferenceOptions simplification(const State& state, const FrameSteps& steps) {
     constexpr double longest_edge = 40, reach = 30;  // mm
-    constexpr double colour_steps = 5;
+    constexpr double colour_steps = 2.5;
     const double units = 1.0 / state.header.lattice.step();
     SimplifiedReferenceOptions out;
     out.surface_error = state.options.simplify * steps.geometry;
@@ -279,7 +279,7 @@ Result<FrameCandidate> encode_tracked(State& state, FrameUnderWay& frame, const 
     TrackedFrameOptions options;
     options.deformation = deformation_options(state);
     // Re-meshing alone makes colours at the same place differ from frame to frame: finer steps would code that noise.
-    constexpr double coarser_colours = 8;
+    constexpr double coarser_colours = 6;
     options.geometry_step = tracked_steps(steps).geometry;
     options.colour_step = coarser_colours * steps.colour;
     options.lambda = state.options.lambda;

@@ -2,12 +2,43 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <tuple>
 
 #include "codec/tracked_targets_enc.h"
 #include "geometry/simplification.h"
 
 namespace htvm {
 namespace {
+
+// One vertex for all in the same place, with the first one's colour: else the two sides of a seam, as of a texture's
+// chart, would be simplified apart, and gape.
+LatticeMesh welded(const LatticeMesh& captured) {
+    const std::size_t vertices = captured.positions.size();
+    std::vector<std::uint32_t> by_place(vertices), number(vertices);
+    std::iota(by_place.begin(), by_place.end(), 0u);
+    const auto place = [&](std::uint32_t v) {
+        return std::tuple(captured.positions[v].x, captured.positions[v].y, captured.positions[v].z);
+    };
+    std::sort(by_place.begin(), by_place.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return place(a) != place(b) ? place(a) < place(b) : a < b; });
+    for (std::size_t i = 0; i < vertices; ++i) {
+        const bool again = i > 0 && captured.positions[by_place[i]] == captured.positions[by_place[i - 1]];
+        number[by_place[i]] = again ? number[by_place[i - 1]] : by_place[i];
+    }
+    LatticeMesh out;
+    for (std::uint32_t v = 0; v < vertices; ++v) {
+        if (number[v] != v) {
+            number[v] = number[number[v]];  // an earlier one, numbered already
+            continue;
+        }
+        number[v] = static_cast<std::uint32_t>(out.positions.size());
+        out.positions.push_back(captured.positions[v]);
+        if (!captured.colours.empty()) out.colours.push_back(captured.colours[v]);
+    }
+    for (const auto& [a, b, c] : captured.triangles) out.triangles.push_back({number[a], number[b], number[c]});
+    return out;
+}
 
 LatticeMesh with_fewer_vertices(const LatticeMesh& captured, const SimplifiedReferenceOptions& options) {
     std::vector<Eigen::Vector3d> points;
@@ -43,7 +74,7 @@ void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const Target
 LatticeMesh simplified_reference(const LatticeMesh& captured, const TargetSurface& surface,
                                  const SimplifiedReferenceOptions& options) {
     if (captured.triangles.empty() || !captured.texcoords.empty()) return captured;
-    auto out = with_fewer_vertices(captured, options);
+    auto out = with_fewer_vertices(welded(captured), options);
     fit_to_surface(out, captured, surface, options);
     if (!captured.normals.empty()) out.normals = quantised_normals(exact_normals(out.positions, out.triangles));
     return out;

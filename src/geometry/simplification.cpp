@@ -86,6 +86,7 @@ struct Simplifier {
     void judge(std::uint32_t a, std::uint32_t b);
     Vector3d merged_position(std::uint32_t a, std::uint32_t b) const;
     bool allowed(std::uint32_t a, std::uint32_t b, const Vector3d& to);
+    Vector3d facing(std::uint32_t v) const;
     bool keeps_shape(std::uint32_t moving, std::uint32_t other, const Vector3d& to) const;
     void collapse(std::uint32_t keep, std::uint32_t drop, const Vector3d& to);
     void neighbours(std::uint32_t v, std::vector<std::uint32_t>& out) const;
@@ -183,9 +184,27 @@ void Simplifier::judge(std::uint32_t a, std::uint32_t b) {
     if (cost <= 1) queue.push({cost, std::min(a, b), std::max(a, b), age[a] + age[b]});
 }
 
-// The triangles round a vertex neither turn over, nor become slivers, when it moves; those of the edge go.
+// 1 of an equilateral triangle, 0 of one without area.
+double roundness(const Vector3d& area_normal, const std::array<Vector3d, 3>& p) {
+    const double sides = (p[1] - p[0]).squaredNorm() + (p[2] - p[1]).squaredNorm() + (p[0] - p[2]).squaredNorm();
+    return sides > 0 ? 2 * std::sqrt(3.0) * area_normal.norm() / sides : 0;
+}
+
+// The mean normal of the triangles round a vertex, by area.
+Vector3d Simplifier::facing(std::uint32_t v) const {
+    Vector3d out = Vector3d::Zero();
+    for (const auto t : fans[v]) {
+        const auto& [a, b, c] = triangles[t];
+        out += area_normal(positions[a], positions[b], positions[c]);
+    }
+    return out;
+}
+
+// The triangles round a vertex neither turn over, nor become slivers, when it moves; those of the edge go. Triangles
+// without area, as captures on a coarse grid have, must come to face as those around them do.
 bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Vector3d& to) const {
-    constexpr double least_cosine = 0.3, least_roundness = 0.15;
+    constexpr double least_turn = 0.3, least_facing = 0.2, least_roundness = 0.3;
+    const Vector3d around = facing(moving);
     for (const auto t : fans[moving]) {
         const auto& corners = triangles[t];
         if (std::find(corners.begin(), corners.end(), other) != corners.end()) continue;
@@ -196,14 +215,11 @@ bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Ve
         }
         const Vector3d was = area_normal(before[0], before[1], before[2]);
         const Vector3d is = area_normal(after[0], after[1], after[2]);
-        if (was.dot(is) < least_cosine * was.norm() * is.norm()) return false;
-        const auto round = [](const Vector3d& normal, const std::array<Vector3d, 3>& p) {
-            const double sides =
-                (p[1] - p[0]).squaredNorm() + (p[2] - p[1]).squaredNorm() + (p[0] - p[2]).squaredNorm();
-            return sides > 0 ? 2 * std::sqrt(3.0) * normal.norm() / sides : 0;  // 1 of an equilateral triangle
-        };
-        const double roundness = round(is, after);
-        if (roundness < least_roundness && roundness < round(was, before)) return false;
+        if (was.dot(is) < least_turn * was.norm() * is.norm()) return false;
+        const bool faced = was.norm() > 0 && was.dot(around) >= least_facing * was.norm() * around.norm();
+        if ((faced || !(was.norm() > 0)) && is.dot(around) < least_facing * is.norm() * around.norm()) return false;
+        const double round = roundness(is, after);
+        if (round < least_roundness && round < roundness(was, before)) return false;
         if (options.longest_edge > 0)
             for (std::size_t i = 0; i < 3; ++i)
                 if (corners[i] != moving && (after[i] - to).norm() > options.longest_edge) return false;

@@ -53,7 +53,7 @@ TEST(TrackedFrames, KeepTheConnectivityOfTheirIntraFrame) {
 }
 
 TEST(TrackedFrames, HaveASimplifiedIntraFrameUnlessToldNotTo) {
-    const auto sequence = walking(2, true);
+    const auto sequence = walking(2, true, 6000);
     auto options = tracked();
     const auto simplified = encode(sequence, options);
     options.simplify = 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "codec/simplified_reference_enc.h"
@@ -112,6 +113,32 @@ TEST(SimplifiedReference, has_fewer_vertices_within_the_error) {
     ASSERT_EQ(out.colours.size(), out.positions.size());
     EXPECT_EQ(out.colours[0], (Colour{9, 8, 7}));
     EXPECT_EQ(out.normals.size(), out.positions.size());
+}
+
+TEST(SimplifiedReference, does_not_gape_where_a_seam_has_two_vertices_in_the_same_place) {
+    const auto whole = height_field(32, 25, bowl);
+    auto cut = whole;  // the right half's triangles get vertices of their own along the middle
+    for (auto& t : cut.triangles) {
+        const bool right = std::all_of(t.begin(), t.end(), [&](std::uint32_t v) { return whole.positions[v].x >= 0; });
+        if (!right) continue;
+        for (auto& v : t)
+            if (whole.positions[v].x == 0) {
+                cut.positions.push_back(whole.positions[v]);
+                v = static_cast<std::uint32_t>(cut.positions.size() - 1);
+            }
+    }
+    SimplifiedReferenceOptions options;
+    options.surface_error = 8;
+    const auto out = simplified_reference(cut, surface_of(cut), options);
+    EXPECT_LT(out.positions.size(), whole.positions.size() / 4);
+    std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
+    for (const auto& t : out.triangles)
+        for (std::size_t i = 0; i < 3; ++i) ++sides[std::minmax(t[i], t[(i + 1) % 3])];
+    for (const auto& [edge, count] : sides) {
+        const auto a = out.positions[edge.first], b = out.positions[edge.second];
+        const bool inside = std::abs(a.x + b.x) < 600 && std::abs(a.y + b.y) < 600;
+        EXPECT_TRUE(!inside || count == 2) << a.x << " " << a.y;
+    }
 }
 
 TEST(SimplifiedReference, with_texture_coordinates_or_without_triangles_is_the_captured_mesh) {
