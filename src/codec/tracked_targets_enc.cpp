@@ -187,12 +187,11 @@ std::array<double, 3> barycentric(const Point3f& p, const Point3f& a, const Poin
 // What the surface shows at each sample less what the reference shows there: a list of levels a component.
 std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const LatticeMesh& captured,
                                                   const TargetSurface& surface,
-                                                  const std::vector<SurfaceTarget>& targets) {
+                                                  const std::vector<SurfaceTarget>& targets, unsigned threads) {
     std::array<std::vector<double>, 3> out;
     for (auto& component : out) component.assign(targets.size(), 0);
     const std::size_t vertices = moved.positions.size();
-    for (std::size_t i = 0; i < targets.size(); ++i) {
-        if (!targets[i].valid) continue;
+    const auto look_at = [&](std::size_t i) {
         const auto& t = captured.triangles[targets[i].triangle];
         const auto share =
             barycentric(targets[i].point, surface.positions[t[0]], surface.positions[t[1]], surface.positions[t[2]]);
@@ -206,7 +205,11 @@ std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, c
             }
             out[c][i] = level;
         }
-    }
+    };
+    parallel_for(targets.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            if (targets[i].valid) look_at(i);
+    });
     return out;
 }
 
@@ -220,21 +223,23 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
     search.threads = threads;
     const auto targets = surface_targets(samples.points, samples.normals, surface, search);
     const auto fit = make_surface_fit(moved, targets);
+    std::vector<std::vector<double>> seen(1);
+    seen[0] = distances(samples, targets);
+    if (!moved.colours.empty())
+        for (auto& component : colour_changes(moved, captured, surface, targets, threads))
+            seen.push_back(std::move(component));
+    parallel_for(seen.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t c = begin; c < end; ++c) seen[c] = fit.fitted(seen[c]);
+    });
     TrackedTargets out;
     const std::size_t vertices = moved.positions.size();
     out.displacement.resize(vertices);
-    const auto shifts = fit.fitted(distances(samples, targets));
-    for (std::size_t v = 0; v < vertices; ++v) out.displacement[v] = static_cast<std::int32_t>(std::lround(shifts[v]));
+    for (std::size_t v = 0; v < vertices; ++v) out.displacement[v] = static_cast<std::int32_t>(std::lround(seen[0][v]));
     if (moved.colours.empty()) return out;
     out.colours.resize(3 * vertices);
-    const auto seen = colour_changes(moved, captured, surface, targets);
-    parallel_for(3, threads, 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t c = begin; c < end; ++c) {
-            const auto levels = fit.fitted(seen[c]);
-            for (std::size_t v = 0; v < vertices; ++v)
-                out.colours[3 * v + c] = static_cast<std::int32_t>(std::lround(std::clamp(levels[v], -255.0, 255.0)));
-        }
-    });
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t c = 0; c < 3; ++c)
+            out.colours[3 * v + c] = static_cast<std::int32_t>(std::lround(std::clamp(seen[1 + c][v], -255.0, 255.0)));
     return out;
 }
 
