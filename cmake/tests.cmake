@@ -7,6 +7,8 @@ function(htvm_tests floor)
     add_executable(test_${floor} ${sources})
     target_include_directories(test_${floor} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
     target_link_libraries(test_${floor} PRIVATE ${ARGN} GTest::gtest_main GTest::gmock)
+    # What is tested is optimised; optimising the tests would take longer than running them.
+    target_compile_options(test_${floor} PRIVATE $<$<CONFIG:Release>:-O1>)
     htvm_precompile(test_${floor} <gmock/gmock.h> <gtest/gtest.h> <algorithm> <random> <string> <vector>)
     target_compile_definitions(test_${floor} PRIVATE HTVM_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
     gtest_discover_tests(test_${floor} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
