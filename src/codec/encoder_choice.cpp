@@ -102,7 +102,8 @@ Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const 
     const auto& fit = candidate->fit =
         tracked_fit(state, frame, candidate->decoded, group.edge, group.intra_fit.squared);
     const bool lost = lost_track(fit, group, 1.0 / state.header.lattice.step());
-    return lost || intra_is_paid_for(state, *candidate) ? encode_intra(state, frame, steps) : std::move(candidate);
+    const bool dear = static_cast<double>(candidate->bytes()) > group.intra_bytes;
+    return lost || dear ? encode_intra(state, frame, steps) : std::move(candidate);
 }
 
 bool is_due(const State& state, const LatticeMesh& mesh) {

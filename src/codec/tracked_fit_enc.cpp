@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/parallel.h"
 #include "geometry/nearest_points.h"
@@ -16,14 +17,18 @@ struct SampledDistance {
     double squared = 0;
 };
 
+// The two farthest of each cube are left out: one sample that found the wrong sheet is no region lost.
 double worst_of(std::vector<SampledDistance> samples) {
-    constexpr std::ptrdiff_t fewest = 10;
-    std::sort(samples.begin(), samples.end(), [](const auto& a, const auto& b) { return a.cube < b.cube; });
+    constexpr std::ptrdiff_t fewest = 10, left_out = 2;
+    std::sort(samples.begin(), samples.end(),
+              [](const auto& a, const auto& b) { return a.cube != b.cube ? a.cube < b.cube : a.squared < b.squared; });
     double worst = 0;
     for (auto i = samples.begin(), j = i; i != samples.end(); i = j) {
-        double sum = 0;
-        for (j = i; j != samples.end() && j->cube == i->cube; ++j) sum += j->squared;
-        if (j - i >= fewest) worst = std::max(worst, sum / static_cast<double>(j - i));
+        j = std::find_if(i, samples.end(), [&](const auto& sample) { return sample.cube != i->cube; });
+        if (j - i < fewest) continue;
+        const double sum = std::accumulate(i, j - left_out, 0.0,
+                                           [](double total, const auto& sample) { return total + sample.squared; });
+        worst = std::max(worst, sum / static_cast<double>(j - i - left_out));
     }
     return std::sqrt(worst);
 }
