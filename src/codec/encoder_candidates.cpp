@@ -120,7 +120,8 @@ FrameSteps tracked_steps(const FrameSteps& steps) {
     const auto scaled = [](double factor, std::int32_t step) {
         return std::max(1, static_cast<std::int32_t>(std::lround(factor * step)));
     };
-    return {scaled(finer, steps.geometry), scaled(coarser_colours, steps.colour)};
+    constexpr std::int32_t coarsest_colours = 255;  // that a frame's header can say
+    return {scaled(finer, steps.geometry), std::min(scaled(coarser_colours, steps.colour), coarsest_colours)};
 }
 
 SimplifiedReferenceOptions simplification(const State& state, const FrameSteps& steps) {
