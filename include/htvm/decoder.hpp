@@ -4,8 +4,9 @@
 //   for each packet:  auto frame = decoder.push(packet);   // Result<std::optional<DecodedFrame>>
 //                     if (frame && *frame) show((*frame)->mesh);
 //
-// Frames refer to I-frames (and to codebook packets) alone: any EP-frame may be left out, but a lost codebook costs the
-// frames that name it, until the next one. A decoder may start at any I-frame once it has seen the
+// EP- and P-frames refer to I-frames (and to codebook packets) alone: any of them may be left out, but a lost codebook costs
+// the frames that name it, until the next one. T-frames refer to the I-frame or, by default, to the T-frame before: a lost
+// one then costs those up to the next that refers to an I-frame. A decoder may start at any I-frame once it has seen the
 // sequence header.
 #pragma once
 

@@ -79,7 +79,8 @@ struct EncoderOptions {
     std::optional<ExternalIntraCoder> intra_coder;  // codes I-frames; none: TFAN
 };
 
-// The two steps of a quality knob, 0..100, that means the same error whatever the capture: positions step by
+// The two steps of a quality knob, 0..100, that means about the same error whatever the capture, with T-frames or
+// without (these and their I-frames take finer positions and coarser colours than said): positions step by
 // 16 mm at 0, 2 mm at 50, 0.25 mm at 100 (halved every 16.7), colours by 32, 5.7 and 1 levels (halved every 20).
 struct QualitySteps {
     double geometry_step, colour_step;
