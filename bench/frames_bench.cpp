@@ -152,7 +152,7 @@ void decode_tracked(benchmark::State& state) { decode(state, Kind::tracked); }
 
 void arguments(benchmark::internal::Benchmark* benchmark) {
     benchmark->ArgNames({"quality", "threads"});
-    for (const int quality : {25, 50, 75})
+    for (const int quality : {25, 42, 50, 75})
         for (const int threads : {1, 2}) benchmark->Args({quality, threads});
     benchmark->Unit(benchmark::kMillisecond)->UseRealTime();
 }
