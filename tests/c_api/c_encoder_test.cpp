@@ -52,11 +52,12 @@ htvm_pose c_pose(const Pose& pose) {
 
 // A skeleton as the C interface takes it, with the arrays that it refers to.
 struct CSkeleton {
+    Skeleton cpp;  // whose names the C struct points at
     std::vector<std::uint16_t> bones;
     std::vector<const char*> names;
     htvm_skeleton skeleton;
 
-    explicit CSkeleton(const Skeleton& cpp) {
+    explicit CSkeleton(Skeleton given) : cpp(std::move(given)) {
         for (const auto& bone : cpp.bones) {
             bones.push_back(bone.first);
             bones.push_back(bone.second);
