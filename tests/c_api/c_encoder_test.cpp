@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <utility>
 #include <limits>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "c_api/c_test_streams.h"
 
