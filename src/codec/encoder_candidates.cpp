@@ -333,8 +333,7 @@ void adopt(State& state, const FrameCandidate& candidate) {
             group.motion = candidate.motion;
             group.codebooks = candidate.codebooks;
         }
-        const bool whole = candidate.type == FrameType::enhanced && !candidate.in_part;
-        if (whole || candidate.type == FrameType::tracked) {
+        if (candidate.type == FrameType::enhanced && !candidate.in_part) {
             if (group.least_bytes == 0 || bytes < group.least_bytes) group.least_bytes = bytes;
             group.excess_bytes += bytes - group.least_bytes;
         }

@@ -94,7 +94,8 @@ bool lost_track(const TrackedFit& fit, const Group& group, double units) {
 }
 
 // A T-frame where it fits the capture: where a hand has left a pocket, or an arm was lost, the I-frame's mesh no longer
-// serves, and an I-frame is due; so it is where the T-frames since the last one have grown too dear.
+// serves, and an I-frame is due; so it is, at the earliest the least key interval
+// behind the last, where the T-frame takes more bits than the I-frame did.
 Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
     auto candidate = encode_tracked(state, frame, steps);
     if (!candidate) return candidate;
@@ -102,7 +103,8 @@ Result<FrameCandidate> choose_tracked(State& state, FrameUnderWay& frame, const 
     const auto& fit = candidate->fit =
         tracked_fit(state, frame, candidate->decoded, group.edge, group.intra_fit.squared);
     const bool lost = lost_track(fit, group, 1.0 / state.header.lattice.step());
-    const bool dear = static_cast<double>(candidate->bytes()) > group.intra_bytes;
+    const bool dear = frames_since_intra(state) >= state.options.least_key_interval &&
+                      static_cast<double>(candidate->bytes()) > group.intra_bytes;
     return lost || dear ? encode_intra(state, frame, steps) : std::move(candidate);
 }
 

@@ -49,8 +49,8 @@ std::optional<FrameCandidate> choose_animation(State& state, FrameUnderWay& fram
     return candidate;
 }
 
-}  // namespace
-
+// True where what the frames since the I-frame have cost above the cheapest of them, this one too, would have paid for
+// a new one.
 bool intra_is_paid_for(const State& state, const FrameCandidate& candidate) {
     const auto& group = *state.group;
     const double bytes = static_cast<double>(candidate.bytes());
@@ -58,6 +58,8 @@ bool intra_is_paid_for(const State& state, const FrameCandidate& candidate) {
     return std::int64_t{state.next_frame} - group.reference.frame >= state.options.least_key_interval &&
            group.excess_bytes + bytes - least > group.intra_bytes - least;
 }
+
+}  // namespace
 
 SurfaceErrors errors_of(const State& state, FrameUnderWay& frame, const LatticeMesh& decoded) {
     SurfaceDistanceOptions options;

@@ -16,8 +16,4 @@ Result<FrameCandidate> encode_measured_intra(Encoder::State& state, FrameUnderWa
 // the frames since the last one have cost more above the cheapest of them than a new one would.
 Result<FrameCandidate> choose_by_cost(Encoder::State& state, FrameUnderWay& frame, const FrameSteps& steps);
 
-// True where what the frames since the I-frame have cost above the cheapest of them, this one too, would have paid for
-// a new one.
-bool intra_is_paid_for(const Encoder::State& state, const FrameCandidate& candidate);
-
 }  // namespace htvm

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 
+#include "codec/duplicates_enc.h"
 #include "codec/tracked_targets_enc.h"
 #include "geometry/simplification.h"
 
@@ -14,29 +13,11 @@ namespace {
 // One vertex for all in the same place, with the first one's colour: else the two sides of a seam, as of a texture's
 // chart, would be simplified apart, and gape.
 LatticeMesh welded(const LatticeMesh& captured) {
-    const std::size_t vertices = captured.positions.size();
-    std::vector<std::uint32_t> by_place(vertices), number(vertices);
-    std::iota(by_place.begin(), by_place.end(), 0u);
-    const auto place = [&](std::uint32_t v) {
-        return std::tuple(captured.positions[v].x, captured.positions[v].y, captured.positions[v].z);
-    };
-    std::sort(by_place.begin(), by_place.end(),
-              [&](std::uint32_t a, std::uint32_t b) { return place(a) != place(b) ? place(a) < place(b) : a < b; });
-    for (std::size_t i = 0; i < vertices; ++i) {
-        const bool again = i > 0 && captured.positions[by_place[i]] == captured.positions[by_place[i - 1]];
-        number[by_place[i]] = again ? number[by_place[i - 1]] : by_place[i];
-    }
-    LatticeMesh out;
-    for (std::uint32_t v = 0; v < vertices; ++v) {
-        if (number[v] != v) {
-            number[v] = number[number[v]];  // an earlier one, numbered already
-            continue;
-        }
-        number[v] = static_cast<std::uint32_t>(out.positions.size());
-        out.positions.push_back(captured.positions[v]);
-        if (!captured.colours.empty()) out.colours.push_back(captured.colours[v]);
-    }
-    for (const auto& [a, b, c] : captured.triangles) out.triangles.push_back({number[a], number[b], number[c]});
+    LatticeMesh places;
+    places.positions = captured.positions;
+    const auto merging = find_duplicates(places);
+    auto out = kept_vertices(captured, merging.kept);
+    out.triangles = merged_triangles(captured.triangles, merging, false);
     return out;
 }
 

@@ -33,29 +33,17 @@ double worst_of(std::vector<SampledDistance> samples) {
     return std::sqrt(worst);
 }
 
-struct Samples {
-    std::vector<Point3f> points, normals;
-};
-
 // Every so many-th vertex and triangle's middle.
-Samples samples_of(std::span<const Point3f> points, std::span<const Point3f> normals,
-                   std::span<const Triangle> triangles) {
+SurfaceSamples samples_of(std::span<const Point3f> points, std::span<const Point3f> normals,
+                          std::span<const Triangle> triangles) {
     constexpr std::size_t wanted = 2000;  // of each
-    Samples out;
+    SurfaceSamples out;
     for (std::size_t v = 0, every = 1 + points.size() / wanted; v < points.size(); v += every) {
         out.points.push_back(points[v]);
         out.normals.push_back(normals[v]);
     }
-    for (std::size_t t = 0, every = 1 + triangles.size() / wanted; t < triangles.size(); t += every) {
-        Point3f point{}, normal{};
-        for (const auto corner : triangles[t])
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                point[axis] += points[corner][axis] / 3;
-                normal[axis] += normals[corner][axis] / 3;
-            }
-        out.points.push_back(point);
-        out.normals.push_back(normal);
-    }
+    for (std::size_t t = 0, every = 1 + triangles.size() / wanted; t < triangles.size(); t += every)
+        add_middle(out, points, normals, triangles[t]);
     return out;
 }
 
@@ -78,7 +66,7 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
 
 // The captured surface is so fine that the triangles round the nearest vertex suffice, and a side is told from the
 // other, as of a sleeve, by its normals.
-std::vector<double> distances_of_decoded(const Samples& decoded, const TargetSurface& captured,
+std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, const TargetSurface& captured,
                                          const TrackedFitOptions& options) {
     SurfaceTargetOptions search;
     search.reach = static_cast<float>(options.reach);
@@ -97,7 +85,8 @@ std::vector<double> distances_of_decoded(const Samples& decoded, const TargetSur
     return squared;
 }
 
-TrackedFit fit_of_captured(const Samples& captured, const SurfaceSearch& decoded, const TrackedFitOptions& options) {
+TrackedFit fit_of_captured(const SurfaceSamples& captured, const SurfaceSearch& decoded,
+                           const TrackedFitOptions& options) {
     std::vector<double> squared(captured.points.size(), options.reach * options.reach);
     if (!decoded.empty())
         parallel_for(squared.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {

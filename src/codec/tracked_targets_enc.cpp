@@ -45,28 +45,12 @@ void fill_gaps(std::vector<double>& values, std::vector<bool> known, std::span<c
 }
 
 // Where the captured surface is looked at: at the moved reference's vertices, then at its triangles' middles.
-struct Samples {
-    std::vector<Point3f> points, normals;
-};
-
-Samples samples_of(const MovedReference& moved) {
-    Samples out;
+SurfaceSamples samples_of(const MovedReference& moved) {
+    SurfaceSamples out;
     out.points = points_of(moved.positions);
     for (const auto& n : moved.normals)
         out.normals.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
-    for (const auto& t : moved.triangles) {
-        Point3f point{}, normal{};
-        for (const auto corner : t)
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                point[axis] += out.points[corner][axis] / 3;
-                normal[axis] += out.normals[corner][axis];
-            }
-        const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-        if (length > 0)
-            for (auto& c : normal) c /= length;
-        out.points.push_back(point);
-        out.normals.push_back(normal);
-    }
+    for (const auto& t : moved.triangles) add_middle(out, out.points, out.normals, t);
     return out;
 }
 
@@ -160,7 +144,7 @@ std::vector<double> SurfaceFit::fitted(const std::vector<double>& seen) const {
 }
 
 // How far along its normal each sample is from the surface, lattice units.
-std::vector<double> distances(const Samples& samples, const std::vector<SurfaceTarget>& targets) {
+std::vector<double> distances(const SurfaceSamples& samples, const std::vector<SurfaceTarget>& targets) {
     std::vector<double> out(targets.size(), 0);
     for (std::size_t i = 0; i < targets.size(); ++i) {
         if (!targets[i].valid) continue;

@@ -335,18 +335,6 @@ double between(double from, double to, int step, int steps) {
 
 }  // namespace
 
-DeformationOptions thorough_deformation() {
-    DeformationOptions options;
-    options.coarse_rounds = 12;
-    options.fine_rounds = 6;
-    options.settled = 0.5;
-    options.far_reach = 400;
-    options.samples = 9000;
-    options.back_samples = 7000;
-    options.last_stiffness = 0.005;
-    return options;
-}
-
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const TargetSurface& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options) {
     std::vector<RigidMotion> motion(start.begin(), start.end());

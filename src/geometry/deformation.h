@@ -57,9 +57,6 @@ struct SampleBlend {
     std::uint8_t count = 0;
 };
 
-// For files: two to three times as slow, further reach and finer sampling; goes with nodes 60 mm apart.
-DeformationOptions thorough_deformation();
-
 // How a vertex follows its handles; the blocks are left open.
 SampleBlend blend_of(const VertexWeights& weights);
 

@@ -183,6 +183,21 @@ TargetSurface make_target_surface(std::span<const Point3f> positions, std::span<
             std::move(coarse)};
 }
 
+void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::span<const Point3f> normals,
+                const Triangle& triangle) {
+    Point3f point{}, normal{};
+    for (const auto corner : triangle)
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            point[axis] += points[corner][axis] / 3;
+            normal[axis] += normals[corner][axis];
+        }
+    const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    if (length > 0)
+        for (auto& c : normal) c /= length;
+    samples.points.push_back(point);
+    samples.normals.push_back(normal);
+}
+
 std::vector<SurfaceTarget> surface_targets(std::span<const Point3f> moved, std::span<const Point3f> normals,
                                            const TargetSurface& target, const SurfaceTargetOptions& options) {
     std::vector<SurfaceTarget> out(moved.size());

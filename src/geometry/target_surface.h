@@ -49,6 +49,14 @@ struct SurfaceTargetOptions {
     unsigned threads = 1;
 };
 
+// Points on a mesh, and which way it faces there.
+struct SurfaceSamples {
+    std::vector<Point3f> points, normals;  // normals: unit length, or zero
+};
+// Adds a triangle's middle. points, normals: of the mesh's vertices, which may stand at the beginning of the samples.
+void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::span<const Point3f> normals,
+                const Triangle& triangle);
+
 // The closest point for each of the moved reference's vertices, among the triangles around the nearest target vertex
 // whose normal agrees. normals: of the moved vertices (vertex_normals).
 std::vector<SurfaceTarget> surface_targets(std::span<const Point3f> moved, std::span<const Point3f> normals,
