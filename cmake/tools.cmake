@@ -12,6 +12,10 @@ target_link_libraries(htvm_libdraco INTERFACE ${DRACO_LIBRARY})
 
 htvm_floor(io DIRECTORY src/io LINKS htvm_core htvm_libdraco nlohmann_json::nlohmann_json)
 htvm_floor(synth DIRECTORY src/synth LINKS htvm_core Eigen3::Eigen)
+# It reads nothing, and makes what the tests of all else need: under sanitizers that would take half of their time.
+if(HTVM_SANITIZE MATCHES "address")
+  target_compile_options(htvm_synth PRIVATE -fno-sanitize=all -O2)
+endif()
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
 
 # Draco-coded I-frames: plugs into the encoder and the decoder, which do not know libdraco.
@@ -26,6 +30,7 @@ target_include_directories(htvm_app PUBLIC apps/htvm)
 target_link_libraries(htvm_app PUBLIC htvm_encoder htvm_decoder htvm_draco htvm_io htvm_synth htvm_metrics
                                       CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
 htvm_precompile(htvm_app <CLI/CLI.hpp> <fmt/core.h> <nlohmann/json.hpp> <filesystem> <string> <vector>)
+target_compile_options(htvm_app PRIVATE $<$<CONFIG:Debug>:-O0>) # with sanitizers, optimising it takes minutes
 target_compile_definitions(htvm_app PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)

@@ -7,7 +7,7 @@ htvm=$(realpath "$1")
 out=$(realpath -m "${2:-$(dirname "$0")/seeds}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-mkdir -p "$out"/{decode_file,decode_stream,import_{ply,obj,drc,bvh,json,azure}}
+mkdir -p "$out"/{decode_file,decode_stream,c_decoder,import_{ply,obj,drc,bvh,json,azure}}
 
 "$htvm" synth "$work/capture" --first-frame 30 --frames 5 --vertices 150 >/dev/null 2>&1
 "$htvm" synth "$work/normals" --first-frame 60 --frames 3 --vertices 150 --normals >/dev/null 2>&1
@@ -45,13 +45,19 @@ json.dump({"joints": ["a", "b", "c"], "bones": [[0, 1], [1, 2]], "frames": poses
 PYTHON
 tiny="$work/tiny/skeleton.json"
 
-# stream NAME CAPTURE OPTIONS...: to decode_file as it is, to decode_stream behind a number of changes: none
+# stream NAME CAPTURE OPTIONS...: to decode_file as it is, to decode_stream behind a number of changes (none), to c_decoder
+# behind a dozen calls: send, receive, copy and ask, conceal, discard and send, receive and copy
 stream() {
     local name=$1 capture=$2
     shift 2
     "$htvm" encode "$work/$capture" -o "$work/$name.htvm" "$@" >/dev/null 2>&1
     cp "$work/$name.htvm" "$out/decode_file/$name"
     { printf '\x00' && cat "$work/$name.htvm"; } >"$out/decode_stream/$name"
+    {
+        printf '\x0c\x00\x00\xff\x01\x00\x00\x03\x00\x50\x03\x01\x50\x03\x02\x50\x05\x01\x40\x01\x00\x00'
+        printf '\x06\x05\x09\x03\x05\xff\x07\x00\xff\x01\x00\x00\x04\x06\xff'
+        cat "$work/$name.htvm"
+    } >"$out/c_decoder/$name"
     [[ $name =~ ^tiny_(enhanced|tracked)$ ]] || return 0
     # A lost packet, one that comes twice, a changed byte of a layer.
     {

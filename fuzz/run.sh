@@ -12,7 +12,7 @@ shift 3
 # The longest inputs, bytes: enough for a few small frames, few enough to be fast.
 longest() {
     case $1 in
-        decode_* | encoder | import_* | packets) echo 4096 ;;
+        decode_* | c_* | encoder | import_* | packets) echo 4096 ;;
         *) echo 1024 ;;
     esac
 }
@@ -27,7 +27,7 @@ run_one() {
         [ -d "$folder" ] && folders+=("$folder")
     done
     # Frames of many features: weighing the corpus by the rarest takes a fifth of the time.
-    case $target in decode_* | encoder) options+=(-entropic=0) ;; esac
+    case $target in decode_* | c_* | encoder) options+=(-entropic=0) ;; esac
     [ "$target" = decode_file ] && folders+=("$sources/../tests/data/conformance")
     [ -f "$sources/dictionaries/$target.dict" ] && options+=("-dict=$sources/dictionaries/$target.dict")
     started=$(date +%s)

@@ -1,6 +1,7 @@
 // htvm calibrate: bone radii from a T-pose.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,6 @@
 // A capture as the commands read it: meshes from files or standard input, each with its pose.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +11,10 @@
 #include "htvm/skeleton.hpp"
 #include "io/ply.h"
 #include "io/sequence.h"
+
+namespace CLI {
+class App;
+}
 
 namespace htvm::app {
 

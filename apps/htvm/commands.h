@@ -1,10 +1,13 @@
 // The shape of the command line: one file per subcommand, each with one function that adds it to the parser.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 
 #include "htvm/result.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace htvm::app {
 

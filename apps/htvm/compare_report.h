@@ -1,7 +1,7 @@
 // What a comparison says: as a table for people, as JSON and as lines of CSV for programs.
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "metrics/compare.h"

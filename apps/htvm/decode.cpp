@@ -1,6 +1,7 @@
 // htvm decode: a stream in, meshes out.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdint>

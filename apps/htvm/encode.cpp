@@ -1,6 +1,7 @@
 // htvm encode: meshes and a skeleton in, a stream out.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>

@@ -1,11 +1,14 @@
 // The encoder's options on the command line, shared by every command that encodes.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "capture.h"
 #include "htvm/encoder.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace htvm::app {
 

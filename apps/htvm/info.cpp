@@ -1,6 +1,7 @@
 // htvm info: what is in a stream.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 

@@ -1,6 +1,7 @@
 // htvm: the command line. Exit codes: 0 done, 1 bad input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <exception>

@@ -1,6 +1,7 @@
 // htvm rd: rates and distortions of our coders and their peers over a sequence.
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <filesystem>

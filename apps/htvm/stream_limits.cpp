@@ -1,5 +1,7 @@
 #include "stream_limits.h"
 
+#include <CLI/CLI.hpp>
+
 namespace htvm::app {
 namespace {
 

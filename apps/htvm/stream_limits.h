@@ -1,9 +1,11 @@
 // The options that say what the commands that read a stream accept of it.
 #pragma once
 
-#include <CLI/CLI.hpp>
-
 #include "htvm/decoder.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace htvm::app {
 

@@ -6,11 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "htvm/lattice_mesh.hpp"
 #include "htvm/result.hpp"
 
 namespace htvm {
-
-struct LatticeMesh;
 
 // How large a mesh packed bytes claim to hold.
 struct ClaimedCounts {

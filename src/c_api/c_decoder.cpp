@@ -6,7 +6,6 @@
 #include <string>
 
 #include "c_api/c_status.h"
-#include "codec/lattice_mesh.h"  // libc++ wants it whole where DecoderOptions are moved
 #include "htvm/decoder.hpp"
 
 using htvm::c_api::check_struct;

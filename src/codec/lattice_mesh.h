@@ -1,26 +1,15 @@
-// A mesh as the codec holds it: integers only, so that encoder and decoder agree to the bit.
+// Meshes to and from the lattice on which the codec works.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "core/lattice.h"
+#include "htvm/lattice_mesh.hpp"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 
 namespace htvm {
-
-using QuantisedNormal = std::array<std::int32_t, 3>;    // each component times 127, rounded
-using QuantisedTexcoord = std::array<std::int32_t, 2>;  // each component times 4096, rounded
-
-struct LatticeMesh {
-    std::vector<LatticePoint> positions;
-    std::vector<Triangle> triangles;
-    std::vector<Colour> colours;
-    std::vector<QuantisedNormal> normals;
-    std::vector<QuantisedTexcoord> texcoords;
-};
 
 // Where lattice coordinates lie in space: millimetres = origin + coordinates * 2^-bits.
 struct Lattice {

@@ -3,22 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <compare>
 #include <cstdint>
-#include <vector>
 
 #include "core/exact_arithmetic.h"
+#include "htvm/lattice_mesh.hpp"
 
 namespace htvm {
-
-// Lattice coordinates. The lattice step is 2^-lattice_bits mm. |x|, |y|, |z| <= lattice_limit for every decoded
-// vertex, so that a difference fits 26 bits and a squared distance is an exact int64 (and an exact double).
-struct LatticePoint {
-    std::int32_t x = 0, y = 0, z = 0;
-    auto operator<=>(const LatticePoint&) const = default;
-};
-
-inline constexpr std::int32_t lattice_limit = 1 << 24;
 
 inline LatticePoint operator+(LatticePoint a, LatticePoint b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline LatticePoint operator-(LatticePoint a, LatticePoint b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "htvm/encoder.hpp"
 #include "reproduce_motion_gallery.h"
 

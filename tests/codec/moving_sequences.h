@@ -12,12 +12,9 @@ namespace htvm::test {
 
 // Consecutive frames of the synthetic person as it begins to walk, with all attributes.
 inline TestSequence walking(int frames, int vertices, int first = 40) {
-    SynthOptions options;
-    options.vertices = vertices;
-    options.normals = true;
     TestSequence out{"walking", synth_skeleton(), {}};
     for (int t = 0; t < frames; ++t) {
-        auto frame = synth_frame(options, first + t);
+        auto frame = synthetic_frame(vertices, first + t);
         auto with_texcoords = frame.mesh;
         give_attributes(with_texcoords, texcoords, static_cast<unsigned>(t));
         frame.mesh.texcoords = std::move(with_texcoords.texcoords);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <random>
 #include <string>
@@ -77,14 +78,24 @@ inline TestSequence sequence_of(const tfan_test::TestMesh& shape, int frames, un
     return out;
 }
 
+// A frame of the synthetic person with colours and normals. Kept: making it takes longer than most tests of it.
+inline SynthFrame synthetic_frame(int vertices, int frame) {
+    static std::map<std::pair<int, int>, SynthFrame> made;
+    const auto [entry, is_new] = made.try_emplace({vertices, frame});
+    if (is_new) {
+        SynthOptions options;
+        options.vertices = vertices;
+        options.normals = true;
+        entry->second = synth_frame(options, frame);
+    }
+    return entry->second;
+}
+
 inline TestSequence synthetic(bool skeleton, int frames, int vertices = 1500) {
-    SynthOptions options;
-    options.vertices = vertices;
-    options.normals = true;
     TestSequence out{skeleton ? "synthetic" : "synthetic without skeleton", {}, {}};
     if (skeleton) out.skeleton = synth_skeleton();
     for (int t = 0; t < frames; ++t) {
-        auto frame = synth_frame(options, 10 * t);
+        auto frame = synthetic_frame(vertices, 10 * t);
         if (skeleton)
             out.frames.push_back({std::move(frame.mesh), std::move(frame.pose)});
         else

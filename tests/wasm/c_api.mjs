@@ -14,7 +14,7 @@ const [modulePath, folder] = process.argv.slice(2);
 async function load(path) {
     const wasi = new WASI({ version: 'preview1' });
     const module = await WebAssembly.compile(await readFile(path));
-    const instance = await WebAssembly.instantiate(module, wasi.getImportObject());
+    const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: wasi.wasiImport });
     wasi.initialize(instance);
     return instance.exports;
 }

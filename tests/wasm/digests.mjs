@@ -11,5 +11,5 @@ const wasi = new WASI({
     returnOnExit: true,
 });
 const compiled = await WebAssembly.compile(await readFile(module));
-const instance = await WebAssembly.instantiate(compiled, wasi.getImportObject());
+const instance = await WebAssembly.instantiate(compiled, { wasi_snapshot_preview1: wasi.wasiImport });
 process.exitCode = wasi.start(instance);

@@ -1,0 +1,153 @@
+// The encoder's C interface on any meshes, poses and options, structs of earlier versions among them: a status and a
+// sentence, or packets that the C decoder takes, frame by frame.
+#include <array>
+#include <cstring>
+
+#include "any_capture.h"
+#include "htvm/htvm.h"
+
+namespace {
+
+using namespace htvm;
+using fuzz::require;
+
+constexpr std::array numbers = {0.0,
+                                1.0,
+                                2.0,
+                                6.0,
+                                30.0,
+                                255.0,
+                                1000.0,
+                                -1.0,
+                                0.05,
+                                1e6,
+                                1e30,
+                                std::numeric_limits<double>::infinity(),
+                                std::numeric_limits<double>::quiet_NaN()};
+
+// A few fields changed, each to a value that may be far out of its range.
+htvm_encoder_options any_options(fuzz::FuzzInput& input) {
+    htvm_encoder_options out;
+    require(htvm_encoder_options_init(&out, sizeof out) == HTVM_OK, "options are given their defaults");
+    out.geometry_step = 8;
+    const std::array<double*, 13> doubles = {
+        &out.geometry_step,   &out.colour_step,  &out.lambda,      &out.simplify,        &out.node_spacing,
+        &out.predicted_below, &out.intra_above,  &out.still_below, &out.animation_error, &out.bits_per_second,
+        &out.buffer_seconds,  &out.target_error, &out.weight_width};
+    const std::array<std::int32_t*, 4> integers = {&out.key_interval, &out.least_key_interval, &out.nearest_vertices,
+                                                   &out.lattice_bits};
+    const std::array<std::uint32_t*, 10> words = {
+        &out.scene_changes, &out.frame_choice,   &out.tracked,          &out.tracked_from_intra, &out.merge_duplicates,
+        &out.reference_any, &out.point_to_plane, &out.unit_micrometres, &out.fps_numerator,      &out.fps_denominator};
+    for (std::uint32_t n = input.below(6); n > 0; --n) {
+        const std::uint8_t which = input.u8();
+        if (which < 100)
+            *doubles[which % doubles.size()] = numbers[input.below(numbers.size())];
+        else if (which < 140)
+            *integers[which % integers.size()] = input.number(1 << 30);
+        else if (which < 250)
+            *words[which % words.size()] = input.below(4);
+        else
+            out.struct_size = input.below(sizeof out + 1);
+    }
+    out.threads = 1;
+    return out;
+}
+
+// The mesh's arrays as C has them. Attributes that do not fit its vertices are left out: C cannot say such a thing.
+htvm_mesh mesh_of(const Mesh& mesh, std::uint8_t age) {
+    htvm_mesh out;
+    require(htvm_mesh_init(&out, sizeof out) == HTVM_OK, "a mesh is given its defaults");
+    if (age > 250) out.struct_size = age - 251u;
+    out.vertices = static_cast<std::uint32_t>(mesh.positions.size());
+    out.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+    const auto fits = [&](const auto& attribute) {
+        return attribute.size() == mesh.positions.size() && !attribute.empty();
+    };
+    if (out.vertices > 0) out.positions = mesh.positions[0].data();
+    if (out.triangles > 0) out.indices = mesh.triangles[0].data();
+    if (fits(mesh.colours)) out.colours = mesh.colours[0].data();
+    if (fits(mesh.normals)) out.normals = mesh.normals[0].data();
+    if (fits(mesh.texcoords)) out.texcoords = mesh.texcoords[0].data();
+    return out;
+}
+
+// All packets that there are; each is decoded at once.
+void receive(htvm_encoder* encoder, htvm_decoder* decoder, std::size_t frames_due) {
+    std::size_t frames = 0;
+    for (;;) {
+        std::size_t size = 0;
+        const auto asked = htvm_encoder_receive_packet(encoder, nullptr, 0, &size);
+        if (asked == HTVM_AGAIN || asked == HTVM_END) break;
+        require(asked == HTVM_BUFFER_TOO_SMALL && size > 0, "a capacity of 0 asks for the size");
+        std::vector<std::uint8_t> packet(size);
+        require(htvm_encoder_receive_packet(encoder, packet.data(), size, &size) == HTVM_OK && size == packet.size(),
+                "and the packet is of that size");
+        require(htvm_decoder_send_packet(decoder, packet.data(), size) == HTVM_OK, "the decoder takes the packet");
+        const auto decoded = htvm_decoder_receive_frame(decoder, nullptr, 0);
+        if (decoded < 0) std::cerr << htvm_decoder_last_error(decoder) << '\n';
+        require(decoded >= 0, "what the encoder sends can be decoded");
+        frames += decoded == HTVM_OK;
+    }
+    require(frames == frames_due, "one frame a mesh");
+}
+
+void send(htvm_encoder* encoder, htvm_decoder* decoder, const fuzz::AnyCapture& capture, std::uint8_t age) {
+    std::int64_t time = 0;
+    const std::size_t joints = capture.skeleton.joint_names.size(), bones = capture.skeleton.bones.size();
+    for (const auto& frame : capture.frames) {
+        const auto mesh = mesh_of(frame.mesh, age);
+        htvm_pose pose;
+        require(htvm_pose_init(&pose, sizeof pose) == HTVM_OK, "a pose is given its defaults");
+        const bool any_pose = frame.pose && frame.pose->joints.size() == joints && joints > 0;
+        if (any_pose) {
+            pose.joints = frame.pose->joints[0].data();
+            if (frame.pose->orientations.size() == bones && bones > 0)
+                pose.orientations = frame.pose->orientations[0].data();
+        }
+        const auto status =
+            htvm_encoder_send_mesh(encoder, &mesh, any_pose ? &pose : nullptr, time += 33333, age % 8 == 7);
+        require(status == HTVM_OK || status == HTVM_BAD_INPUT || status == HTVM_LIMIT,
+                "a status that the header names");
+        if (status < 0) require(std::strlen(htvm_encoder_last_error(encoder)) > 0, "a failure says what was wrong");
+        receive(encoder, decoder, status == HTVM_OK);
+    }
+    require(htvm_encoder_finish(encoder) == HTVM_OK, "a sequence can be ended");
+    receive(encoder, decoder, 0);
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    fuzz::FuzzInput input(data, size);
+    const std::uint8_t age = input.u8();
+    auto options = any_options(input);
+    const auto capture = fuzz::any_capture(input);
+    std::vector<std::uint16_t> bone_joints;
+    for (const auto& bone : capture.skeleton.bones) bone_joints.insert(bone_joints.end(), {bone.first, bone.second});
+    htvm_skeleton skeleton;
+    require(htvm_skeleton_init(&skeleton, sizeof skeleton) == HTVM_OK, "a skeleton is given its defaults");
+    skeleton.joints = static_cast<std::uint32_t>(capture.skeleton.joint_names.size());
+    skeleton.bones = static_cast<std::uint32_t>(capture.skeleton.bones.size());
+    skeleton.bone_joints = bone_joints.data();
+    options.skeleton = &skeleton;
+    htvm_encoder* encoder = nullptr;
+    std::array<char, 40> words{};
+    const auto status = htvm_encoder_create(&options, &encoder, words.data(), words.size());
+    require((status == HTVM_OK) == (encoder != nullptr), "a handle where there is success");
+    require(words.back() == 0, "the sentence is cut where the array ends");
+    if (status != HTVM_OK) {
+        require(status == HTVM_BAD_INPUT || status == HTVM_UNSUPPORTED, "a status that the header names");
+        require(words[0] != 0, "a failure says what was wrong");
+        return 0;
+    }
+    htvm_decoder_options limits;
+    require(htvm_decoder_options_init(&limits, sizeof limits) == HTVM_OK, "options are given their defaults");
+    limits.threads = 1;
+    htvm_decoder* decoder = nullptr;
+    require(htvm_decoder_create(&limits, &decoder) == HTVM_OK, "a decoder can be made");
+    send(encoder, decoder, capture, age);
+    htvm_encoder_destroy(encoder);
+    htvm_decoder_destroy(decoder);
+    return 0;
+}

@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# The encoder and the decoder under valgrind: tests/valgrind/run.sh HTVM
+# HTVM: the command line, built without sanitizers. Encodes and decodes a small capture with every profile, and decodes the
+# conformance streams. Fails where memory is used wrongly, read before it was written, or lost.
+set -euo pipefail
+htvm=$(realpath "$1")
+streams=$(cd "$(dirname "$0")/../data/conformance" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+failures=0
+
+check() {
+    local name=$1
+    shift
+    if valgrind --quiet --error-exitcode=99 --leak-check=full --errors-for-leak-kinds=definite,possible \
+        --num-callers=20 "$@" >"$work/log" 2>&1; then
+        printf '%-50s clean\n' "$name"
+    else
+        printf '%-50s FAILED\n' "$name"
+        tail -40 "$work/log"
+        failures=$((failures + 1))
+    fi
+}
+
+"$htvm" synth "$work/capture" --frames 4 --vertices 800 >"$work/log" 2>&1
+for profile in tracked topology paper; do
+    check "htvm encode, $profile" "$htvm" encode "$work/capture" -s "$work/capture/skeleton.json" --profile $profile --threads 2 \
+        -o "$work/$profile.htvm"
+    check "htvm decode, $profile" "$htvm" decode "$work/$profile.htvm" --threads 2 -o "$work/decoded_$profile"
+done
+for stream in "$streams"/*.htvm; do
+    name=$(basename "$stream" .htvm)
+    check "htvm decode, conformance stream $name" "$htvm" decode "$stream" --threads 2 -o "$work/$name"
+done
+[ $failures -eq 0 ]
