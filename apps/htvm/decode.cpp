@@ -267,8 +267,6 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
 }
 
 Result<void> decode(const Options& options) {
-    if (options.output == "-" && options.json)
-        return fail(ErrorKind::bad_input, "--json prints on standard output, where -o - puts the meshes; choose one");
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
     auto output = MeshOutput::open(options);
@@ -327,7 +325,11 @@ void add_decode(CLI::App& app, Run& run) {
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"
         "  htvm decode - -o - < person.htvm | viewer --ply");
-    command->callback([options, &run] { run = [options] { return decode(*options); }; });
+    command->callback([options, &run] {
+        if (options->output == "-" && options->json)
+            throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the meshes; choose one");
+        run = [options] { return decode(*options); };
+    });
 }
 
 }  // namespace htvm::app

@@ -129,13 +129,7 @@ void report(const Options& options, const Summary& summary, const RateReport& ra
 }
 
 Result<void> encode(const Options& options) {
-    if (options.output == "-" && options.json)
-        return fail(ErrorKind::bad_input, "--json prints on standard output, where -o - puts the stream; choose one");
     const bool two_passes = options.encoding.passes == 2;
-    if (two_passes && options.capture.input == "-")
-        return fail(
-            ErrorKind::bad_input,
-            "--passes 2 reads the capture twice, which standard input does not allow; give files, or --passes 1");
     auto capture = Capture::open(options.capture);
     if (!capture) return tl::unexpected(capture.error());
     auto settings = encoder_options(options.encoding, *capture);
@@ -184,6 +178,12 @@ void add_encode(CLI::App& app, Run& run) {
         "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
     command->callback([command, options, &run] {
         check_profile(*command, options->encoding);
+        if (options->output == "-" && options->json)
+            throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
+        if (options->encoding.passes == 2 && options->capture.input == "-")
+            throw CLI::ValidationError(
+                "--passes",
+                "2 reads the capture twice, which standard input does not allow; give files, or --passes 1");
         run = [options] { return encode(*options); };
     });
 }

@@ -16,6 +16,21 @@ double error_percent(const RateReport& report, std::uint64_t bytes, double secon
     return 100 * (rate_of(bytes, seconds) / report.bits_per_second - 1);
 }
 
+// Of frames that a target error leaves at an end of the range of qualities, where they are off it.
+std::string beyond_reach(const RateReport& report) {
+    const auto coded = [&](auto test) {
+        return std::count_if(report.costs.begin(), report.costs.end(), [&](const FrameCost& cost) {
+            return cost.type != FrameType::predicted && test(cost.quality);
+        });
+    };
+    const auto finest = coded([](double quality) { return quality >= 100; });
+    const auto coarsest = coded([](double quality) { return quality <= 0; });
+    std::string out;
+    if (finest > 0) out += fmt::format("; {} frames have the finest quality and may still err more", finest);
+    if (coarsest > 0) out += fmt::format("; {} frames have the coarsest quality and err less", coarsest);
+    return out;
+}
+
 }  // namespace
 
 RateReport::RateReport(const EncoderOptions& options)
@@ -50,8 +65,8 @@ std::string rate_summary(const RateReport& report, std::uint64_t bytes, double s
     const std::string qualities =
         fmt::format("quality {:.1f} to {:.1f}, {:.1f} on average", quality.lowest, quality.highest, quality.mean);
     if (!report.rate_controlled())
-        return fmt::format("target error {:g} mm: {} (htvm compare --only m2 measures the errors)", report.target_error,
-                           qualities);
+        return fmt::format("target error {:g} mm: {}{} (htvm compare --only m2 measures the errors)",
+                           report.target_error, qualities, beyond_reach(report));
     std::string out = fmt::format("target {:g} Mbit/s: {:+.1f} %; buffer of {:g} s at most {:.0f} % full; {}",
                                   report.bits_per_second / 1e6, error_percent(report, bytes, seconds),
                                   report.buffer_seconds, report.buffer.peak_percent(), qualities);

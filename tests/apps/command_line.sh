@@ -27,6 +27,8 @@ expect 0 '"type": "EP"' "$htvm" encode capture -s capture/skeleton.json --profil
 expect 0 '"type": "T"' "$htvm" encode capture --json -o b.htvm
 expect 2 "add --profile topology" "$htvm" encode capture --keep-duplicates -o b.htvm
 expect 2 "add --profile tracked" "$htvm" encode capture --profile paper --simplify 0 -o b.htvm
+expect 2 "choose one" "$htvm" encode capture --json -o -
+expect 2 "choose one" "$htvm" decode a.htvm --json -o -
 expect 0 "skeleton: 15 joints, 14 bones" "$htvm" info a.htvm
 expect 0 '"megabits_per_second"' "$htvm" info a.htvm --json
 expect 0 "3 frames to decoded" "$htvm" decode a.htvm -o decoded
@@ -54,7 +56,7 @@ expect 0 "a buffer of 0.5 s is at most" "$htvm" info rate.htvm --bitrate 2 --buf
 expect 5 "overfills the buffer" "$htvm" info rate.htvm --bitrate 0.05 --buffer 0.1
 expect 0 '"buffer_peak_percent"' "$htvm" encode capture --bitrate 2 --passes 2 --json -o rate.htvm
 expect 5 "give a bitrate of at least" "$htvm" encode capture --bitrate 0.005 -o rate.htvm
-expect 1 "standard input" "$htvm" encode - --bitrate 2 --passes 2 -o rate.htvm
+expect 2 "standard input" "$htvm" encode - --bitrate 2 --passes 2 -o rate.htvm
 expect 2 "excludes" "$htvm" encode capture --bitrate 2 -q 50 -o rate.htvm
 expect 2 "excludes" "$htvm" encode capture --bitrate 2 --target-error 1 -o rate.htvm
 expect 2 "--bitrate" "$htvm" encode capture --passes 2 -o rate.htvm
