@@ -44,6 +44,7 @@ struct Summary {
     std::uint32_t due = 0;                     // the number of the frame that should come next
     std::optional<std::int64_t> timestamp_us;  // of the frame before
     double decode_seconds = 0;
+    std::optional<Error> refused;  // of the first frame that a limit, or this version, kept from being decoded
     nlohmann::json list = nlohmann::json::array();
     std::size_t written() const { return decoded + concealed; }
     double frames_per_second() const { return static_cast<double>(decoded) / std::max(decode_seconds, 1e-9); }
@@ -177,8 +178,9 @@ Result<void> fill_gap(Decoding& d, const Packet& next) {
 
 // A packet that is sound, but cannot be decoded.
 Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error) {
-    if (error.kind == ErrorKind::unsupported || error.kind == ErrorKind::limit) return tl::unexpected(error);
+    const bool is_refused = error.kind == ErrorKind::unsupported || error.kind == ErrorKind::limit;
     if (!frame_type(packet.kind)) {
+        if (is_refused) return tl::unexpected(error);
         warn(fmt::format("a packet that came with frame {} is lost: {}", packet.frame, error.message));
         ++d.summary.damaged_packets;
         return {};
@@ -188,6 +190,7 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
     warn(fmt::format("frame {} is lost: {}{}", packet.frame, error.message,
                      *done ? "; the I-frame's mesh, moved, stands in for it" : ""));
     ++d.summary.undecodable;
+    if (is_refused && !d.summary.refused) d.summary.refused = error;
     return {};
 }
 
@@ -248,6 +251,9 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
         return fail(ErrorKind::limit,
                     fmt::format("{} has {} packets of more than {} bytes; raise --max-packet to decode them",
                                 options.input, input.oversized_packets(), options.limits.max_packet_bytes));
+    if (summary.refused)
+        return fail(summary.refused->kind, fmt::format("{}: {} frames could not be decoded; the first: {}",
+                                                       options.input, summary.undecodable, summary.refused->message));
     if (input.damaged_bytes() > 0)
         return fail(ErrorKind::corrupt_stream,
                     fmt::format("{} is damaged: {} bytes were no sound packet; {} frames were decoded, {} lost besides",
@@ -286,7 +292,7 @@ Result<void> decode(const Options& options) {
         }
     }
     if (options.json) print_json(summary, *input);
-    if (!decoder.sequence())
+    if (!decoder.sequence() && input->oversized_packets() == 0)
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
     tell_what_was_written(options, *output, summary);
     return judge(options, *output, *input, summary);

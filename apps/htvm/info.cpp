@@ -124,6 +124,8 @@ Result<void> info(const Options& options) {
         if (options.json) frames.push_back(frame_json(*frame));
         if (!options.json && !options.summary) print_frame(*frame);
     }
+    if (!headers.sequence() && input->oversized_packets() > 0)
+        return fail(ErrorKind::limit, options.input + " has packets larger than --max-packet, its header among them");
     if (!headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
     const auto& s = *headers.sequence();

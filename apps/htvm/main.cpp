@@ -3,7 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <string>
 
@@ -37,6 +39,18 @@ std::string usage_message(const CLI::App* app, const CLI::Error& error) {
 // Output that is still buffered may fail to arrive: a full disk must not look like success.
 bool output_arrived() { return std::fflush(stdout) == 0 && std::ferror(stdout) == 0; }
 
+// CLI11 takes "nan" for a number within any range, and "-1" for a very large one.
+void refuse_odd_numbers(const CLI::App& command) {
+    for (const auto* option : command.get_options())
+        for (const auto& text : option->results()) {
+            const auto type = option->get_type_name();
+            if (type.starts_with("FLOAT") && std::isnan(std::strtod(text.c_str(), nullptr)))
+                throw CLI::ValidationError(option->get_name(), text + " is not a number");
+            if (type.starts_with("UINT") && text.starts_with('-'))
+                throw CLI::ValidationError(option->get_name(), text + " is less than 0");
+        }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -64,6 +78,7 @@ int main(int argc, char** argv) {
     }
     try {
         app.parse(argc, argv);
+        for (const auto* command : app.get_subcommands()) refuse_odd_numbers(*command);
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : 2;
     }

@@ -3,13 +3,14 @@
  * Decoding a stream that comes in pieces (examples/decode.c is a whole program):
  *
  *   htvm_decoder *decoder = NULL;
- *   htvm_decoder_create(NULL, &decoder);
+ *   if (htvm_decoder_create(NULL, &decoder) != HTVM_OK) return 1;
  *   while (there are bytes) {
  *       htvm_decoder_send_bytes(decoder, bytes, count);
  *       htvm_frame_info info;
  *       htvm_status status;
  *       while ((status = htvm_decoder_receive_frame(decoder, &info, sizeof info)) != HTVM_AGAIN) {
- *           if (status != HTVM_OK) { puts(htvm_decoder_last_error(decoder)); continue; }
+ *           if (status == HTVM_BAD_INPUT) return 1;               the call is wrong, and would be wrong again
+ *           if (status != HTVM_OK) { puts(htvm_decoder_last_error(decoder)); continue; }     a packet is lost
  *           htvm_decoder_copy_positions(decoder, positions, capacity);
  *       }
  *   }
@@ -285,8 +286,8 @@ htvm_status htvm_skeleton_init(htvm_skeleton* skeleton, size_t struct_size);
 htvm_status htvm_mesh_init(htvm_mesh* mesh, size_t struct_size);
 htvm_status htvm_pose_init(htvm_pose* pose, size_t struct_size);
 
-/* The steps of a quality of 0..100 that means the same error whatever the capture: 16 mm at 0, 2 mm at 50, 0.25 mm at
- * 100. Either may be NULL. */
+/* The steps of a quality that means the same error whatever the capture: 16 mm at 0, 2 mm at 50, 0.25 mm at 100; one
+ * outside of 0..100 counts as the nearer end. Either pointer may be NULL. */
 void htvm_quality_steps(double quality, double* geometry_step, double* colour_step);
 
 /* Makes an encoder. options: NULL for the defaults. *encoder is set to NULL unless the status is HTVM_OK:
@@ -301,7 +302,7 @@ void htvm_encoder_destroy(htvm_encoder* encoder);
 const char* htvm_encoder_last_error(const htvm_encoder* encoder);
 
 /* Codes one frame; the arrays are read during the call only. pose: of the options' skeleton; NULL where the tracker
- * lost it, or there is none. Timestamps must ascend. force_intra: 1 for an I-frame. HTVM_BAD_INPUT: the mesh or pose is
+ * lost it, but not in the first frame, or where there is no skeleton. Timestamps must ascend. force_intra: 1 for an I-frame. HTVM_BAD_INPUT: the mesh or pose is
  * wrong; HTVM_LIMIT: under rate control, a frame that the buffer cannot hold. After an error the frame is not part of
  * the stream, and the next may be sent. */
 htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh, const htvm_pose* pose,

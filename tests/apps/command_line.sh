@@ -29,6 +29,11 @@ expect 2 "add --profile topology" "$htvm" encode capture --keep-duplicates -o b.
 expect 2 "add --profile tracked" "$htvm" encode capture --profile paper --simplify 0 -o b.htvm
 expect 2 "choose one" "$htvm" encode capture --json -o -
 expect 2 "choose one" "$htvm" decode a.htvm --json -o -
+expect 2 "is not a number" "$htvm" encode capture --geometry-step nan -o b.htvm
+expect 2 "is less than 0" "$htvm" encode capture --frames -1 -o b.htvm
+expect 2 "--max-memory" "$htvm" decode a.htvm -M -1 -o unlimited
+expect 5 "raise --max-packet" "$htvm" decode a.htvm --max-packet 10 -o nothing
+expect 5 "larger than --max-packet" "$htvm" info a.htvm --max-packet 10
 expect 0 "skeleton: 15 joints, 14 bones" "$htvm" info a.htvm
 expect 0 '"megabits_per_second"' "$htvm" info a.htvm --json
 expect 0 "3 frames to decoded" "$htvm" decode a.htvm -o decoded
