@@ -7,7 +7,10 @@ import { crc32 } from './crc32.mjs';
 
 const OK = 0, AGAIN = 1, BAD_INPUT = -1, CORRUPT_STREAM = -2;
 const COLOURS = 1, NORMALS = 2, TEXCOORDS = 4;
-const infoSize = 64;  // sizeof(htvm_frame_info)
+const infoSize = 64;      // sizeof(htvm_frame_info)
+const optionsSize = 56;   // sizeof(htvm_decoder_options)
+const maxMemoryAt = 32;   // offsetof(htvm_decoder_options, max_memory); 64-bit numbers are BigInts
+const maxMemory = 256n << 20n;
 
 const [modulePath, folder] = process.argv.slice(2);
 
@@ -23,10 +26,13 @@ async function load(path) {
 class Decoder {
     constructor(library) {
         this.library = library;
-        const place = library.malloc(4);
-        const status = library.htvm_decoder_create(0, place);
+        const options = library.malloc(optionsSize), place = library.malloc(4);
+        library.htvm_decoder_options_init(options, optionsSize);
+        this.view().setBigUint64(options + maxMemoryAt, maxMemory, true);
+        const status = library.htvm_decoder_create(options, place);
         this.handle = this.view().getUint32(place, true);
         library.free(place);
+        library.free(options);
         if (status !== OK) throw new Error(`htvm_decoder_create: ${status}`);
         this.info = library.malloc(infoSize);
     }

@@ -9,3 +9,4 @@ ln -sfn /usr/include/tl $out/include/tl # the one header of others, for the mach
 tests/digests/ninja_file.sh >$out/build.ninja
 ninja -f $out/build.ninja build/wasm/htvm_decoder.wasm
 node --no-warnings tests/wasm/c_api.mjs build/wasm/htvm_decoder.wasm tests/data/conformance
+echo "The decoder for JavaScript: build/wasm/htvm_decoder.wasm"
