@@ -26,7 +26,8 @@
  * - Lengths are millimetres, times microseconds, rotations 3x3 matrices by rows. Arrays are packed: x y z x y z ...
  * - A capacity is the number of elements (not bytes, not vertices) that the array has room for.
  * - Structs begin with struct_size, so that they may grow. Those that the caller fills are given their defaults by
- *   their _init function, called with sizeof the struct; those that the library fills take that sizeof beside them.
+ *   their _init function, called with sizeof the struct (another size that no version can have is refused later); those
+ *   that the library fills take that sizeof beside them.
  * - A handle may be used by one thread at a time; different handles by different threads at once.
  * - Functions that take a handle give HTVM_BAD_INPUT where it is NULL; _destroy takes NULL and does nothing.
  * - No C++ exception leaves these functions. (A WebAssembly build has none: where memory runs out there, it traps.)

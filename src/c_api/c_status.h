@@ -65,7 +65,8 @@ void destroy_handle(T* handle, htvm_allocator allocator) {
 }
 
 // Versioned structs. Those of the caller, of another version perhaps, are as long as their struct_size says: what this
-// version has more is left at its default, and what it does not know must be 0.
+// version has more is left at its default, and what it does not know must be 0. The size of a struct is a multiple of
+// its alignment in every version, so that no pointer is cut in half.
 enum class StructSize { good, never_set, from_a_later_version };
 
 template <class Struct>
@@ -73,7 +74,7 @@ StructSize read_struct(const Struct* given, Struct& out) {
     constexpr std::size_t least = 2 * sizeof(std::uint32_t);
     std::uint32_t size = 0;
     std::memcpy(&size, given, sizeof size);
-    if (size < least || size > 65536) return StructSize::never_set;
+    if (size < least || size > 65536 || size % alignof(Struct) != 0) return StructSize::never_set;
     const auto* bytes = reinterpret_cast<const unsigned char*>(given);
     for (std::size_t i = sizeof(Struct); i < size; ++i)
         if (bytes[i] != 0) return StructSize::from_a_later_version;

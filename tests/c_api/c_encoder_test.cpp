@@ -1,6 +1,7 @@
 // The C interface's encoder gives the bytes of the C++ one, and survives callers who do as they should not.
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -232,6 +233,8 @@ TEST(CEncoder, WrongOptionsAreToldInASentence) {
     EXPECT_TRUE(told(options)) << "joints that are not there";
     skeleton.joints = 0xFFFFFFFF;
     EXPECT_TRUE(told(options));
+    options.struct_size = offsetof(htvm_encoder_options, skeleton) + sizeof(void*) / 2;
+    EXPECT_TRUE(told(options)) << "a size that cuts the pointer in half";
     options.struct_size = 0;
     EXPECT_TRUE(told(options));
     EXPECT_EQ(htvm_encoder_create(&options, &encoder, text, 4), HTVM_BAD_INPUT);
