@@ -52,7 +52,9 @@ Result<std::array<std::int32_t, 3>> lattice_origin(const Mesh& mesh) {
         }
         const double middle = (low + high) / 2;
         if (!(std::abs(middle) < 1e9))
-            return fail(ErrorKind::bad_input, "the first mesh has a coordinate that is not finite, or lies more than 1000 km from the origin");
+            return fail(
+                ErrorKind::bad_input,
+                "the first mesh has a coordinate that is not finite, or lies more than 1000 km from the origin");
         origin[axis] = rounded(middle);
     }
     return origin;
