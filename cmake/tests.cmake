@@ -26,7 +26,7 @@ function(htvm_tests floor)
 endfunction()
 htvm_tests(core htvm_core)
 htvm_tests(entropy htvm_entropy)
-htvm_tests(geometry htvm_geometry)
+htvm_tests(surface htvm_surface)
 htvm_tests(codec htvm_encoder htvm_decoder htvm_draco htvm_synth)
 # Replaces operator new, hence a program of its own.
 htvm_tests(memory htvm_c htvm_encoder htvm_decoder htvm_synth)

@@ -19,7 +19,7 @@ endif()
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
 
 # Draco-coded I-frames: plugs into the encoder and the decoder, which do not know libdraco.
-file(GLOB draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
+file(GLOB_RECURSE draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
 htvm_floor(draco SOURCES ${draco_sources} LINKS htvm_decoder htvm_libdraco)
 
 # The command line: everything but main.cpp is a library, so that tests reach it.

@@ -10,6 +10,8 @@
 
 namespace htvm::fuzz {
 
+using namespace internal;
+
 struct SmallMesh {
     std::vector<LatticePoint> positions;
     std::vector<Triangle> triangles;

@@ -13,6 +13,8 @@
 
 namespace htvm::fuzz {
 
+using namespace internal;
+
 inline std::vector<Packet> read_packets(std::span<const std::uint8_t> bytes, std::size_t piece) {
     PacketReader reader;
     std::vector<Packet> out;

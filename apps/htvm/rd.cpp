@@ -24,6 +24,8 @@
 #include "work_folder.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 using std::filesystem::path;

@@ -10,6 +10,8 @@
 #include "io/mesh_file.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 using std::filesystem::path;

@@ -12,6 +12,8 @@
 #include "io/mesh_file.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 Result<void> keep_frame(const std::filesystem::path& folder, const SourceFrame& source, const Mesh& decoded) {

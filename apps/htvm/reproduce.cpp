@@ -25,6 +25,8 @@
 #include "work_folder.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 using std::filesystem::path;

@@ -13,6 +13,8 @@
 #include "terminal.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 constexpr const char* no_rates = "the coders share no range of rates in this run, so that none can be matched.";

@@ -14,6 +14,8 @@
 #include "terminal.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 double now_ms() {

@@ -2,17 +2,19 @@
 
 #include <cmath>
 
-#include "codec/animated_frame.h"
-#include "codec/codebook.h"
-#include "codec/coded_bones.h"
-#include "codec/enhanced_frame.h"
-#include "codec/intra_frame.h"
-#include "codec/sequence_header.h"
-#include "codec/sequence_index.h"
-#include "codec/transforms.h"
-#include "codec/zipper_trim.h"
+#include "codec/paper/animated_frame.h"
+#include "codec/paper/codebook.h"
+#include "codec/paper/coded_bones.h"
+#include "codec/paper/enhanced_frame.h"
+#include "codec/intra/intra_frame.h"
+#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence_index.h"
+#include "codec/reference/transforms.h"
+#include "codec/paper/zipper_trim.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 // What a decoder keeps between frames, laid open.

@@ -20,6 +20,8 @@
 #include "terminal.h"
 
 namespace htvm::app {
+
+using namespace internal;
 namespace {
 
 constexpr int most_frames = 1000000;

@@ -1,12 +1,13 @@
 // Codebooks and the packets they come in, and residual layers coded with them.
-#include "codec/residual_layer.h"
-#include "codec/sequence_index.h"
+#include "codec/paper/residual_layer.h"
+#include "codec/stream/sequence_index.h"
 #include "core/lattice.h"
 #include "fuzz_input.h"
 
 namespace {
 
 using namespace htvm;
+using namespace htvm::internal;
 using fuzz::require;
 
 Codebook any_codebook(fuzz::FuzzInput& input) {

@@ -1,11 +1,12 @@
 // The whole decoder on a stream whose packets are lost, doubled, in another order, damaged or mixed up, every CRC
 // right. The input: a number of changes, four bytes each, then a stream.
-#include "codec/frame_payload.h"
+#include "codec/stream/frame_payload.h"
 #include "whole_decoder.h"
 
 namespace {
 
 using namespace htvm;
+using namespace htvm::internal;
 
 // Damages one layer of a frame, or a number of its header, and leaves the rest as it is.
 void change_layer(Packet& packet, std::uint8_t choice, std::uint8_t where, std::uint8_t value) {

@@ -1,5 +1,5 @@
 // The range decoder and its symbol models: what any bytes decode to, encoded again, decodes to the same.
-#include "codec/attribute_residual.h"
+#include "codec/intra/attribute_residual.h"
 #include "entropy/range_decoder.h"
 #include "entropy/range_encoder.h"
 #include "fuzz_input.h"
@@ -7,6 +7,7 @@
 namespace {
 
 using namespace htvm;
+using namespace htvm::internal;
 
 enum class Kind : std::uint8_t { bit, raw, symbol, number, signed_number, residual, count };
 

@@ -1,15 +1,16 @@
 // What both sides derive from an I-frame: skinning, smooth weights, nodes of a deformation graph, nearest vertices.
 #include <numeric>
 
-#include "codec/deformation_nodes.h"
-#include "codec/handle_weights.h"
-#include "codec/prediction.h"
-#include "codec/tracked_frame.h"
+#include "codec/reference/deformation_nodes.h"
+#include "codec/reference/handle_weights.h"
+#include "codec/reference/prediction.h"
+#include "codec/tracked/tracked_frame.h"
 #include "small_mesh.h"
 
 namespace {
 
 using namespace htvm;
+using namespace htvm::internal;
 using fuzz::require;
 
 void check_weights(const HandleWeights& weights, std::size_t vertices, std::size_t handles) {

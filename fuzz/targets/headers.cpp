@@ -1,12 +1,13 @@
 // The sequence header, the index and the payload of frames: what can be read comes back when written.
-#include "codec/frame_payload.h"
-#include "codec/sequence_header.h"
-#include "codec/sequence_index.h"
+#include "codec/stream/frame_payload.h"
+#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence_index.h"
 #include "fuzz_input.h"
 
 namespace {
 
 using namespace htvm;
+using namespace htvm::internal;
 using fuzz::require;
 
 void check_header(std::span<const std::uint8_t> bytes) {

@@ -2,14 +2,15 @@
 // exactly, for any connectivity; damaged layers give values in range, or an error.
 #include <cstdlib>
 
-#include "codec/attribute_values.h"
-#include "codec/intra_colours.h"
-#include "codec/intra_positions.h"
+#include "codec/intra/attribute_values.h"
+#include "codec/intra/intra_colours.h"
+#include "codec/intra/intra_positions.h"
 #include "small_mesh.h"
 
 namespace {
 
 using namespace htvm;
+using namespace htvm::internal;
 using fuzz::require;
 
 template <class Value>

@@ -1,5 +1,5 @@
 // The mapping layer: counts of residuals come back; damaged layers give counts with the right sum, or an error.
-#include "codec/mapping.h"
+#include "codec/paper/mapping.h"
 
 #include <numeric>
 
@@ -7,6 +7,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
+using namespace htvm::internal;
     using fuzz::require;
     fuzz::FuzzInput input(data, size);
     const auto mesh = fuzz::small_mesh(input);

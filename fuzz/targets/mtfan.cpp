@@ -1,10 +1,11 @@
 // Connectivity of EP-frames: any triangles over any positions come back; any bytes give triangles, or an error.
-#include "codec/mtfan.h"
+#include "codec/paper/mtfan.h"
 
 #include "small_mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
+using namespace htvm::internal;
     using fuzz::require;
     fuzz::FuzzInput input(data, size);
     const auto mesh = fuzz::small_mesh(input);

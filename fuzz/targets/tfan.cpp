@@ -1,10 +1,11 @@
 // Connectivity of I-frames: any triangles come back; any bytes give triangles of vertices that are there, or an error.
-#include "codec/tfan.h"
+#include "codec/intra/tfan.h"
 
 #include "small_mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
+using namespace htvm::internal;
     using fuzz::require;
     fuzz::FuzzInput input(data, size);
     if (input.flag()) {

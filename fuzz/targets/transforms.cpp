@@ -1,12 +1,13 @@
 // Transforms of bones, the pose of an I-frame, and the motion of nodes: layers come back; damage stays in range.
-#include "codec/transforms.h"
+#include "codec/reference/transforms.h"
 
-#include "codec/node_motion.h"
+#include "codec/tracked/node_motion.h"
 #include "small_mesh.h"
 
 namespace {
 
 using namespace htvm;
+using namespace htvm::internal;
 using fuzz::require;
 
 QuantisedRotation any_rotation(fuzz::FuzzInput& input) {

@@ -1,6 +1,6 @@
 // The vertex hierarchy of any mesh, and fields on it: they come back as the encoder promised, frame after frame;
 // damaged layers give values in range, or an error.
-#include "codec/vertex_field.h"
+#include "codec/tracked/vertex_field.h"
 
 #include <cstdlib>
 #include <optional>
@@ -9,6 +9,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
+using namespace htvm::internal;
     using fuzz::require;
     fuzz::FuzzInput input(data, size);
     const auto mesh = fuzz::small_mesh(input);

@@ -5,9 +5,11 @@
 #include <string>
 #include <string_view>
 
-#include "codec/sequence_header.h"
+#include "codec/stream/sequence_header.h"
 
 namespace htvm::c_api {
+
+using namespace internal;
 namespace {
 
 void* allocate_by_malloc(void*, std::size_t bytes) { return std::malloc(bytes); }
@@ -100,7 +102,7 @@ uint32_t htvm_version() { return HTVM_VERSION_MAJOR << 16 | HTVM_VERSION_MINOR <
 
 const char* htvm_version_string() { return "0.1.0"; }
 
-uint32_t htvm_stream_version() { return htvm::stream_version; }
+uint32_t htvm_stream_version() { return htvm::internal::stream_version; }
 
 const char* htvm_status_text(htvm_status status) {
     switch (status) {

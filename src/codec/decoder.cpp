@@ -4,17 +4,19 @@
 #include <new>
 #include <stdexcept>
 
-#include "codec/animated_frame.h"
-#include "codec/decoder_limits.h"
-#include "codec/enhanced_frame.h"
-#include "codec/intra_frame.h"
-#include "codec/sequence_header.h"
-#include "codec/sequence_index.h"
-#include "codec/tracked_frame.h"
-#include "codec/transforms.h"
+#include "codec/paper/animated_frame.h"
+#include "codec/stream/decoder_limits.h"
+#include "codec/paper/enhanced_frame.h"
+#include "codec/intra/intra_frame.h"
+#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence_index.h"
+#include "codec/tracked/tracked_frame.h"
+#include "codec/reference/transforms.h"
 #include "core/parallel.h"
 
 namespace htvm {
+
+using namespace internal;
 
 struct Decoder::State {
     DecoderOptions options;

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "codec/encoder_check.h"
-#include "codec/encoder_choice.h"
+#include "codec/choice/encoder_choice.h"
 #include "codec/encoder_state.h"
 #include "codec/stage_clock_enc.h"
 #include "core/parallel.h"
@@ -16,9 +16,11 @@
 
 namespace htvm {
 
+using namespace internal;
+
 namespace {
 
-using State = Encoder::State;
+using State = EncoderState;
 
 // 1/16 mm, or as fine as makes the step eight units.
 int lattice_bits(const EncoderOptions& options) {
@@ -158,6 +160,8 @@ RateControlOptions rate_options(const EncoderOptions& options) {
 
 }  // namespace
 
+struct Encoder::State : EncoderState {};
+
 QualitySteps quality_steps(double quality) {
     const double q = std::clamp(quality, 0.0, 100.0) / 100;
     return {16 * std::exp2(-6 * q), 32 * std::exp2(-5 * q)};
@@ -165,7 +169,7 @@ QualitySteps quality_steps(double quality) {
 
 Result<Encoder> Encoder::create(const EncoderOptions& options) try {
     if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
-    auto state = std::make_unique<State>();
+    auto state = std::make_unique<Encoder::State>();
     state->options = options;
     state->threads = thread_count(options.threads);
     if (options.bits_per_second > 0) state->rate.emplace(rate_options(options), options.first_pass);

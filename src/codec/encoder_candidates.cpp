@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "codec/animated_frame.h"
-#include "codec/intra_frame.h"
-#include "codec/simplified_reference_enc.h"
+#include "codec/paper/animated_frame.h"
+#include "codec/intra/intra_frame.h"
+#include "codec/tracked/simplified_reference_enc.h"
 #include "codec/stage_clock_enc.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
-using State = Encoder::State;
+using State = EncoderState;
 
 // Where frames refer to an I-frame, its step is no wider than half an edge: EP-frames then save more than it costs.
 // Their quantiser starts from the same cells; the price of a bit stays that of the step asked for, so that it is the
@@ -343,4 +343,4 @@ void adopt(State& state, const FrameCandidate& candidate) {
     clock.done("reference");
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

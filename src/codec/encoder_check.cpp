@@ -1,9 +1,9 @@
 #include "codec/encoder_check.h"
 
-#include "codec/frame_payload.h"
-#include "codec/lattice_mesh.h"
+#include "codec/stream/frame_payload.h"
+#include "codec/reference/lattice_mesh.h"
 
-namespace htvm {
+namespace htvm::internal {
 
 Result<void> check(const EncoderOptions& o) {
     auto bad = [](const char* what) { return fail(ErrorKind::bad_input, what); };
@@ -42,4 +42,4 @@ Result<void> check(const EncoderOptions& o) {
     return {};
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

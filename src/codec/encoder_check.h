@@ -3,9 +3,9 @@
 
 #include "htvm/encoder.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 
 // bad_input, naming the option and its range, where one is out of it or contradicts another.
 Result<void> check(const EncoderOptions& options);
 
-}  // namespace htvm
+}  // namespace htvm::internal

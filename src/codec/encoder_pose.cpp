@@ -4,10 +4,10 @@
 #include <cmath>
 #include <string>
 
-#include "codec/motion_enc.h"
+#include "codec/paper/motion_enc.h"
 #include "core/orientation.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 Vector3d middle_of(const Mesh& mesh) {
@@ -100,4 +100,4 @@ Result<CodedPose> PoseTracker::next(const Mesh& mesh, const Pose* pose, const La
     return out;
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

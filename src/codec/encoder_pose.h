@@ -1,12 +1,12 @@
 // The pose of each frame as the codec needs it: on the lattice, complete, with an orientation for every bone.
 #pragma once
 
-#include "codec/lattice_mesh.h"
-#include "codec/transforms.h"
+#include "codec/reference/lattice_mesh.h"
+#include "codec/reference/transforms.h"
 #include "htvm/mesh.hpp"
 #include "htvm/skeleton.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 
 struct PoseTracker {
     Skeleton skeleton;
@@ -22,4 +22,4 @@ struct PoseTracker {
 // skeleton without bones: none is tracked. bad_input where there is a skeleton but no pose for the first frame.
 Result<PoseTracker> make_pose_tracker(const Skeleton& skeleton, const Mesh& first_mesh, const Pose* first_pose);
 
-}  // namespace htvm
+}  // namespace htvm::internal

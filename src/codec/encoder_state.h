@@ -7,17 +7,17 @@
 #include <vector>
 
 #include "codec/encoder_pose.h"
-#include "codec/enhanced_frame_enc.h"
-#include "codec/error_control_enc.h"
-#include "codec/rate_control_enc.h"
-#include "codec/sequence_header.h"
-#include "codec/sequence_index.h"
-#include "codec/tracked_fit_enc.h"
-#include "codec/tracked_frame_enc.h"
-#include "geometry/surface_distance.h"
+#include "codec/paper/enhanced_frame_enc.h"
+#include "codec/choice/error_control_enc.h"
+#include "codec/choice/rate_control_enc.h"
+#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence_index.h"
+#include "codec/tracked/tracked_fit_enc.h"
+#include "codec/tracked/tracked_frame_enc.h"
+#include "surface/surface_distance.h"
 #include "htvm/encoder.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 
 // How coarsely a frame is quantised.
 struct FrameSteps {
@@ -70,7 +70,7 @@ struct Group {
     double excess_bytes = 0;  // what the others cost above it
 };
 
-struct Encoder::State {
+struct EncoderState {
     EncoderOptions options;
     unsigned threads = 1;
     SequenceHeader header;
@@ -94,4 +94,4 @@ struct Encoder::State {
     std::vector<std::uint32_t> distance_order_counts;
 };
 
-}  // namespace htvm
+}  // namespace htvm::internal

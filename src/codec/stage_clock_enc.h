@@ -6,7 +6,7 @@
 
 #include "htvm/encoder.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 
 class StageClock {
 public:
@@ -23,4 +23,4 @@ private:
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-}  // namespace htvm
+}  // namespace htvm::internal

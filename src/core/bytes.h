@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace htvm {
+namespace htvm::internal {
 
 class ByteWriter {
 public:
@@ -90,4 +90,4 @@ private:
     bool ok_ = true;
 };
 
-}  // namespace htvm
+}  // namespace htvm::internal

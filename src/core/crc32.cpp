@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Tables = std::array<std::array<std::uint32_t, 256>, 8>;
@@ -38,4 +38,4 @@ std::uint32_t crc32(std::span<const std::uint8_t> data) {
     return c ^ 0xFFFFFFFFu;
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

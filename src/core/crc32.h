@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <span>
 
-namespace htvm {
+namespace htvm::internal {
 
 std::uint32_t crc32(std::span<const std::uint8_t> data);
 
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -10,9 +10,9 @@
 #error "htvm must be compiled without -ffast-math (/fp:fast): decoders must agree to the bit"
 #endif
 
-namespace htvm {
+namespace htvm::internal {
 
 static_assert(std::numeric_limits<double>::is_iec559 && std::numeric_limits<double>::digits == 53);
 static_assert(FLT_EVAL_METHOD == 0, "no extended precision: on 32-bit x86 compile with -msse2 -mfpmath=sse");
 
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace htvm {
+namespace htvm::internal {
 
 inline constexpr int weight_bits = 12;
 inline constexpr std::size_t handles_a_vertex = 4;
@@ -21,4 +21,4 @@ struct VertexWeights {
 
 using HandleWeights = std::vector<VertexWeights>;  // one a vertex
 
-}  // namespace htvm
+}  // namespace htvm::internal

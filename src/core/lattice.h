@@ -8,7 +8,7 @@
 #include "core/exact_arithmetic.h"
 #include "htvm/lattice_mesh.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 
 inline LatticePoint operator+(LatticePoint a, LatticePoint b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline LatticePoint operator-(LatticePoint a, LatticePoint b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
@@ -36,4 +36,4 @@ inline std::int64_t divide_rounded(std::int64_t numerator, std::int64_t denomina
     return numerator >= 0 ? (numerator + half) / denominator : -((-numerator + half) / denominator);
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 Vector3d operator+(const Vector3d& a, const Vector3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
@@ -276,4 +276,4 @@ std::vector<Rotation> derive_turning_orientations(const Skeleton& skeleton, cons
     return result;
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

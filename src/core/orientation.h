@@ -7,7 +7,7 @@
 
 #include "htvm/skeleton.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 
 inline constexpr Rotation identity_rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 
@@ -45,4 +45,4 @@ std::vector<Rotation> derive_orientations(const Skeleton& skeleton, const Pose& 
 // Joints all in one line give the minimal rotation alone. Falls back to derive_orientations where joints are missing.
 std::vector<Rotation> derive_turning_orientations(const Skeleton& skeleton, const Pose& pose, const Pose& reference);
 
-}  // namespace htvm
+}  // namespace htvm::internal

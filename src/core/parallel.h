@@ -10,7 +10,7 @@
 
 #include "core/thread.h"
 
-namespace htvm {
+namespace htvm::internal {
 
 // The exception of whichever thread failed first. A thread that an exception leaves would end the process.
 struct FirstFailure {
@@ -82,4 +82,4 @@ void parallel_invoke(unsigned threads, const First& first, const Second& second)
     failure.rethrow();
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -7,7 +7,7 @@
 #include <thread>
 #endif
 
-namespace htvm {
+namespace htvm::internal {
 
 #ifdef __STDCPP_THREADS__
 
@@ -36,4 +36,4 @@ inline unsigned thread_count(unsigned) { return 1; }
 
 #endif
 
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -8,7 +8,7 @@
 
 #include "entropy/models.h"
 
-namespace htvm {
+namespace htvm::internal {
 
 // The bits a decision costs under a model, without adapting it.
 inline double decision_cost(const BinaryModel& model, bool bit) {
@@ -35,4 +35,4 @@ private:
     double bits_ = 0;
 };
 
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -9,7 +9,7 @@
 
 #include "entropy/models.h"
 
-namespace htvm {
+namespace htvm::internal {
 
 // Log odds are natural, in 1/256, from -2047 to 2047; probabilities in 1/65536.
 // 65536 / (1 + exp(-x / 256)) for x = -2048, -1920, ..., 2048.
@@ -71,4 +71,4 @@ bool code_mixed(Coder& coder, Mixer<N>& mixer, const std::array<BinaryModel*, N>
     return bit;
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -14,7 +14,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace htvm {
+namespace htvm::internal {
 
 // The probability that the next decision is 1, in 1/65536, adapted by 1/(n + 1.5) for the n-th decision down to
 // 1/128: it learns a stationary source as fast as counting does and follows one that drifts.
@@ -108,4 +108,4 @@ void encode_signed(Writer& writer, SignedModel& model, std::int32_t value) {
     encode_unsigned(writer, model.magnitude, static_cast<std::uint32_t>(value < 0 ? -value : value) - 1);
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

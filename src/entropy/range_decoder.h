@@ -7,7 +7,7 @@
 
 #include "entropy/models.h"
 
-namespace htvm {
+namespace htvm::internal {
 
 // Reads zeros past the end of the data. A stream that was not cut short never needs more than four of them:
 // exhausted() says that more were read, and a loop that decodes many symbols checks it to stop early.
@@ -94,4 +94,4 @@ inline std::int32_t decode_signed(RangeDecoder& decoder, SignedModel& model) {
     return negative ? -static_cast<std::int32_t>(clamped) : static_cast<std::int32_t>(clamped);
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

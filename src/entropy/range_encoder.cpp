@@ -1,6 +1,6 @@
 #include "entropy/range_encoder.h"
 
-namespace htvm {
+namespace htvm::internal {
 
 void RangeEncoder::shift_low() {
     const bool carry = low_ > 0xFFFFFFFFu;
@@ -46,4 +46,4 @@ std::vector<std::uint8_t> RangeEncoder::finish() {
     return std::move(bytes_);
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

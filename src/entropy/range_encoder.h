@@ -6,7 +6,7 @@
 
 #include "entropy/models.h"
 
-namespace htvm {
+namespace htvm::internal {
 
 class RangeEncoder {
 public:
@@ -42,4 +42,4 @@ inline void RangeEncoder::bit(BinaryModel& model, bool bit) {
     }
 }
 
-}  // namespace htvm
+}  // namespace htvm::internal

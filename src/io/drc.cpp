@@ -16,6 +16,8 @@
 
 namespace htvm {
 
+using namespace internal;
+
 namespace {
 
 tl::unexpected<Error> not_readable(const std::string& why) {

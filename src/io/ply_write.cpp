@@ -6,6 +6,8 @@
 
 namespace htvm {
 
+using namespace internal;
+
 namespace {
 
 template <std::size_t N>

@@ -7,6 +7,8 @@
 #include "core/orientation.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 constexpr double same_time = 0.0002;  // s: a hand at 5 m/s moves 1 mm

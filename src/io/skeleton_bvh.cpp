@@ -8,6 +8,8 @@
 #include "core/orientation.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 constexpr std::size_t no_parent = static_cast<std::size_t>(-1);

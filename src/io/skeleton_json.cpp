@@ -9,6 +9,8 @@
 #include "io/skeleton_json_value.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 using nlohmann::json;

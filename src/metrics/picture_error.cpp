@@ -8,6 +8,8 @@
 
 namespace htvm {
 
+using namespace internal;
+
 PictureErrorSums& operator+=(PictureErrorSums& sums, const PictureErrorSums& more) {
     sums.pixels += more.pixels;
     sums.foreground_pixels += more.foreground_pixels;

@@ -9,6 +9,8 @@
 #include "metrics/mesh_measures.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 struct Cloud {

@@ -11,6 +11,8 @@
 #include "core/parallel.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 constexpr std::int32_t subpixels = 256;

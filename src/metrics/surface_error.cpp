@@ -11,6 +11,8 @@
 #include "metrics/surface_index.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 struct DistanceSums {

@@ -12,6 +12,8 @@
 
 namespace htvm {
 
+using namespace internal;
+
 struct SurfaceIndex::Impl {
     const Mesh* mesh = nullptr;
     RTCDevice device = nullptr;

@@ -13,6 +13,8 @@
 #include "metrics/surface_index.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 // Sets that grow together (union-find with path halving; the lower index is the root).

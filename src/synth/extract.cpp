@@ -8,6 +8,8 @@
 #include "core/parallel.h"
 
 namespace htvm::synth {
+
+using namespace internal;
 namespace {
 
 using Eigen::Vector3d;

@@ -16,6 +16,8 @@
 #include "synth/remesh.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 using namespace synth;

@@ -11,6 +11,8 @@
 
 namespace htvm::test {
 
+using namespace internal;
+
 // A person of some 300 vertices with skeleton, colours and normals; an I-frame, EP-frames, P-frames, T-frames.
 inline const CodedSequence& coded_person() {
     static const auto coded = [] {

@@ -1,10 +1,10 @@
-#include "codec/attribute_values.h"
+#include "codec/intra/attribute_values.h"
 
 #include <gtest/gtest.h>
 
 #include "codec/intra_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Pair = std::array<std::int32_t, 2>;
@@ -100,4 +100,4 @@ TEST(AttributeValues, DamagedBytesGiveAnErrorOrValuesWithinTheLimit) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

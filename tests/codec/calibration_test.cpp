@@ -4,7 +4,7 @@
 
 #include "htvm/encoder.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 Skeleton one_bone() {
@@ -86,4 +86,4 @@ TEST(Calibration, SaysWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

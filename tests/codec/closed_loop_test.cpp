@@ -7,7 +7,7 @@
 #include "codec/test_sequences.h"
 #include "codec/tfan_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -330,4 +330,4 @@ TEST(ClosedLoop, ACapturedMeshCodedTwiceGivesTheSameBytes) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

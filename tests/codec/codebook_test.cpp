@@ -1,4 +1,4 @@
-#include "codec/codebook.h"
+#include "codec/paper/codebook.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include "codec/random_numbers.h"
 #include "entropy/cost.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 Codebook random_codebook(std::size_t size, std::int32_t reach, std::int32_t scale, std::mt19937& random) {
@@ -117,4 +117,4 @@ TEST(IndexModel, IsSoundForTheLongestLengthsEverywhere) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

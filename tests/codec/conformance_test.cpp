@@ -17,7 +17,7 @@
 #include "core/bytes.h"
 #include "core/crc32.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -292,4 +292,4 @@ TEST(Conformance, StoredStreamsDecodeToTheirDigests) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <map>
 
-#include "codec/frame_payload.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/moving_sequences.h"
 #include "codec/tracked_sequences.h"
 #include "htvm/decoder.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -202,4 +202,4 @@ TEST(Damage, BehindADamagedIntraFrameDecodingGoesOnAtTheNext) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

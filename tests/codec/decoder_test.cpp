@@ -5,12 +5,12 @@
 
 #include <map>
 
-#include "codec/frame_payload.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/hostile_bytes.h"
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -316,4 +316,4 @@ TEST(Hostile, EveryLayerReplacedByNoiseDoesNoHarm) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

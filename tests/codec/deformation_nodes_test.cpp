@@ -1,4 +1,4 @@
-#include "codec/deformation_nodes.h"
+#include "codec/reference/deformation_nodes.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 // A strip of vertices `step` apart along x, two rows; vertex 2 i and 2 i + 1 are column i.
@@ -219,4 +219,4 @@ TEST(DeformationNodes, ExtremePlacesAndSpacingsAreLegal) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

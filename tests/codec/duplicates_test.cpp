@@ -2,10 +2,10 @@
 
 #include <random>
 
-#include "codec/duplicates_enc.h"
+#include "codec/paper/duplicates_enc.h"
 #include "codec/random_numbers.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using test::below;
@@ -82,4 +82,4 @@ TEST(Duplicates, KeptVerticesKeepTheirAttributes) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "codec/motion_enc.h"
+#include "codec/paper/motion_enc.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 Mesh tall() {
@@ -84,4 +84,4 @@ TEST(PoseTracker, ASkeletonNeedsAPoseForTheFirstFrame) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include "codec/moving_sequences.h"
-#include "geometry/surface_distance.h"
+#include "surface/surface_distance.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using test::TestSequence;
@@ -229,4 +229,4 @@ TEST(EncoderError, EveryFrameComesNearTheTarget) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -6,10 +6,10 @@
 #include <functional>
 #include <limits>
 
-#include "codec/sequence_index.h"
+#include "codec/stream/sequence_index.h"
 #include "codec/test_sequences.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -273,4 +273,4 @@ TEST(Encoder, AnIntraCoderThatFailsCostsItsFrameAlone) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -5,7 +5,7 @@
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -99,4 +99,4 @@ TEST(EncoderThreads, AGivenError) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

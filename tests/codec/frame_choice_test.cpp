@@ -1,11 +1,11 @@
 // Which kind of frame a frame becomes (paper, section III-B, and past it).
 #include <gtest/gtest.h>
 
-#include "codec/scene_change_enc.h"
+#include "codec/choice/scene_change_enc.h"
 #include "codec/test_sequences.h"
-#include "geometry/surface_distance.h"
+#include "surface/surface_distance.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -134,4 +134,4 @@ TEST(ChoiceByCost, IsNeverWorseThanIntraFramesAtTheSameQuality) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

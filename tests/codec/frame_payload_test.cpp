@@ -1,11 +1,11 @@
-#include "codec/frame_payload.h"
+#include "codec/stream/frame_payload.h"
 
 #include <gtest/gtest.h>
 
 #include "codec/hostile_bytes.h"
 #include "core/bytes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 FramePayload full_payload() {
@@ -103,4 +103,4 @@ TEST(FramePayload, DamageGivesAnErrorOrNoMoreThanTheBytesHold) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

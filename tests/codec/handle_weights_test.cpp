@@ -1,4 +1,4 @@
-#include "codec/handle_weights.h"
+#include "codec/reference/handle_weights.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "codec/random_numbers.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Handles = std::vector<std::uint16_t>;
@@ -241,4 +241,4 @@ TEST(SmoothWeights, AreExactShortestPathsAlthoughVerticesRememberFewHandles) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

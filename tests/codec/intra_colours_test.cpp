@@ -1,4 +1,4 @@
-#include "codec/intra_colours.h"
+#include "codec/intra/intra_colours.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "codec/intra_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 TEST(IntraColours, DecoderAndEncoderAgreeAndStayWithinHalfAStep) {
@@ -76,4 +76,4 @@ TEST(IntraColours, AStepOrPositionsThatCannotBeAreErrors) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

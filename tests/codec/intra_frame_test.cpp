@@ -1,4 +1,4 @@
-#include "codec/intra_frame.h"
+#include "codec/intra/intra_frame.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "codec/tfan_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 LatticeMesh lattice_mesh_of(const tfan_test::TestMesh& shape) {
@@ -104,4 +104,4 @@ TEST(IntraFrame, WhatAnExternalCoderGivesIsNotTrusted) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

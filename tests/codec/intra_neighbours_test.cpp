@@ -1,4 +1,4 @@
-#include "codec/intra_neighbours.h"
+#include "codec/intra/intra_neighbours.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "codec/intra_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Edge = std::set<std::uint32_t>;
@@ -75,4 +75,4 @@ TEST(Neighbours, ATriangleBeyondTheVerticesIsAnError) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,10 +1,10 @@
-#include "codec/intra_positions.h"
+#include "codec/intra/intra_positions.h"
 
 #include <gtest/gtest.h>
 
 #include "codec/intra_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 TEST(IntraPositions, EveryMeshComesBackExactly) {
@@ -57,4 +57,4 @@ TEST(IntraPositions, DamagedBytesGiveAnErrorOrPointsOnTheLattice) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -11,6 +11,8 @@
 
 namespace htvm::intra_test {
 
+using namespace internal;
+
 struct Connectivity {
     std::size_t vertex_count = 0;
     std::vector<Triangle> triangles;

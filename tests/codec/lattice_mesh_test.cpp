@@ -1,4 +1,4 @@
-#include "codec/lattice_mesh.h"
+#include "codec/reference/lattice_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -155,4 +155,4 @@ TEST(LatticeMesh, TheFarthestPointIsHalfTheLatticeAway) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -3,12 +3,12 @@
 
 #include <algorithm>
 
-#include "codec/frame_payload.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/moving_sequences.h"
-#include "codec/sequence_header.h"
+#include "codec/stream/sequence_header.h"
 #include "htvm/decoder.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -167,4 +167,4 @@ TEST(LeastPayload, AFrameInLessIsCorrupt) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <map>
 
-#include "codec/frame_payload.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -260,4 +260,4 @@ TEST(Predicted, OtherCountsThanTheReferenceMeshsAreRefused) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,4 +1,4 @@
-#include "codec/mapping.h"
+#include "codec/paper/mapping.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "codec/hostile_bytes.h"
 #include "codec/random_numbers.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using test::below;
@@ -115,4 +115,4 @@ TEST(Mapping, DamageGivesAnErrorOrAsManyResidualsAsAsked) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -4,11 +4,11 @@
 #include <cmath>
 #include <random>
 
-#include "codec/motion_enc.h"
+#include "codec/paper/motion_enc.h"
 #include "codec/random_numbers.h"
 #include "codec/tfan_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Eigen::Vector3d;
@@ -180,4 +180,4 @@ TEST(BoneRegistration, ABoneWithTooFewVerticesKeepsItsSkeletalMotion) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -5,10 +5,12 @@
 #include <string>
 #include <utility>
 
-#include "codec/frame_payload.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/test_sequences.h"
 
 namespace htvm::test {
+
+using namespace internal;
 
 // Consecutive frames of the synthetic person as it begins to walk, with all attributes.
 inline TestSequence walking(int frames, int vertices, int first = 40) {

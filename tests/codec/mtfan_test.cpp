@@ -1,4 +1,4 @@
-#include "codec/mtfan.h"
+#include "codec/paper/mtfan.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "codec/tfan_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using tfan_test::as_multiset;
@@ -139,4 +139,4 @@ TEST(Mtfan, DamagedBytesNeverNameAVertexThatDoesNotExist) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,11 +1,11 @@
-#include "codec/nearest_order.h"
+#include "codec/paper/nearest_order.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 // The oracle: every other point sorted by (squared distance, index).
@@ -81,4 +81,4 @@ TEST(NearestOrder, TheFarthestCornersOfTheLatticeAreHandled) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -10,7 +10,7 @@
 #include "core/bytes.h"
 #include "core/crc32.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -179,4 +179,4 @@ TEST(PacketReader, NoiseGivesNoPackets) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

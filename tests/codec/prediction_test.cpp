@@ -1,14 +1,14 @@
-#include "codec/prediction.h"
+#include "codec/reference/prediction.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <random>
 
-#include "codec/handle_weights.h"
+#include "codec/reference/handle_weights.h"
 #include "codec/random_numbers.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using test::between;
@@ -216,4 +216,4 @@ TEST(Prediction, IsTheSameForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

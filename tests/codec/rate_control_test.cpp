@@ -6,10 +6,10 @@
 #include <random>
 
 #include "codec/random_numbers.h"
-#include "codec/rate_control_enc.h"
-#include "codec/rate_plan_enc.h"
+#include "codec/choice/rate_control_enc.h"
+#include "codec/choice/rate_plan_enc.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 // A capture whose frame sizes follow log2(bits) = level + slope * quality, with noise of +-10 %.
@@ -213,4 +213,4 @@ TEST(RatePlan, LowersOnlyWhatOverfillsTheBuffer) {
 TEST(RatePlan, OfNoFramesIsEmpty) { EXPECT_TRUE(plan_qualities({}, {}, 0.04).empty()); }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,4 +1,4 @@
-#include "codec/residual_layer.h"
+#include "codec/paper/residual_layer.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "codec/random_numbers.h"
 #include "core/lattice.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 Codebook codebook_of(std::size_t size) {
@@ -94,4 +94,4 @@ TEST(ResidualLayer, AHugeCountWithFewBytesEndsSoon) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -3,9 +3,9 @@
 #include <random>
 
 #include "codec/random_numbers.h"
-#include "codec/residual_mapping_enc.h"
+#include "codec/paper/residual_mapping_enc.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using test::between;
@@ -104,4 +104,4 @@ TEST(ResidualOrder, IsByReferenceVertexAndStable) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,11 +1,11 @@
-#include "codec/rigid_transform.h"
+#include "codec/reference/rigid_transform.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <random>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 Eigen::Quaterniond random_quaternion(std::mt19937& random) {
@@ -98,4 +98,4 @@ TEST(QuantisedRotation, TheFarthestPointsDoNotOverflow) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,11 +1,11 @@
-#include "codec/sequence_header.h"
+#include "codec/stream/sequence_header.h"
 
 #include <gtest/gtest.h>
 
 #include "codec/hostile_bytes.h"
-#include "codec/mtfan.h"
+#include "codec/paper/mtfan.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 SequenceHeader full_header() {
@@ -147,4 +147,4 @@ TEST(SequenceHeader, DamageGivesAnErrorOrAHeaderInRange) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,4 +1,4 @@
-#include "codec/sequence_index.h"
+#include "codec/stream/sequence_index.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "codec/hostile_bytes.h"
 #include "core/bytes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 void expect_comes_back(const std::vector<IndexEntry>& entries) {
@@ -85,4 +85,4 @@ TEST(CodebookPayload, DamageIsSurvived) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

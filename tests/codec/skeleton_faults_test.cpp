@@ -6,9 +6,9 @@
 #include <functional>
 
 #include "codec/test_sequences.h"
-#include "geometry/surface_distance.h"
+#include "surface/surface_distance.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -145,4 +145,4 @@ TEST(SkeletonFaults, CostNoMoreThanAFewBits) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

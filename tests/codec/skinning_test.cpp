@@ -1,4 +1,4 @@
-#include "codec/skinning.h"
+#include "codec/reference/skinning.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "codec/random_numbers.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using test::between;
@@ -151,4 +151,4 @@ TEST(Cylinders, TakeTheirJointsAndRadii) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -20,6 +20,8 @@
 
 namespace htvm::test {
 
+using namespace internal;
+
 struct SequenceFrame {
     Mesh mesh;
     std::optional<Pose> pose;

@@ -1,4 +1,4 @@
-#include "codec/tfan.h"
+#include "codec/intra/tfan.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "codec/tfan_test_meshes.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using tfan_test::as_multiset;
@@ -120,4 +120,4 @@ TEST(Tfan, DamagedBytesNeverNameAVertexThatDoesNotExist) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

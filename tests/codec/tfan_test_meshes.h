@@ -14,6 +14,8 @@
 
 namespace htvm::tfan_test {
 
+using namespace internal;
+
 struct TestMesh {
     std::string name;
     std::uint32_t vertex_count = 0;

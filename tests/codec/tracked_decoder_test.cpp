@@ -4,7 +4,7 @@
 #include "codec/moving_sequences.h"
 #include "codec/tracked_sequences.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -71,4 +71,4 @@ TEST(TrackedDecoder, AStarDoesNotMakeEveryNodeSearchTheCrowdBehindItsHub) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

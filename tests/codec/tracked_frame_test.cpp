@@ -1,5 +1,5 @@
 // T-frames: the I-frame's mesh laid on the captured surface.
-#include "codec/tracked_frame.h"
+#include "codec/tracked/tracked_frame.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 
 #include "codec/hostile_bytes.h"
 #include "codec/test_sequences.h"
-#include "geometry/surface_distance.h"
+#include "surface/surface_distance.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using namespace test;
@@ -261,4 +261,4 @@ TEST(NodeMotion, ThatIsAsBeforeTakesNextToNothing) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

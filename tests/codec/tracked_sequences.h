@@ -5,12 +5,14 @@
 #include <random>
 #include <vector>
 
-#include "codec/intra_frame.h"
-#include "codec/sequence_header.h"
+#include "codec/intra/intra_frame.h"
+#include "codec/stream/sequence_header.h"
 #include "codec/test_sequences.h"
-#include "codec/tracked_frame.h"
+#include "codec/tracked/tracked_frame.h"
 
 namespace htvm::test {
+
+using namespace internal;
 
 struct ChanceMotion {
     double turn = 300, shift = 400;  // of a node's transform beside the common one, in quanta and lattice units

@@ -6,12 +6,12 @@
 #include <map>
 #include <numeric>
 
-#include "codec/simplified_reference_enc.h"
-#include "codec/tracked_fit_enc.h"
-#include "codec/tracked_targets_enc.h"
-#include "geometry/nearest_points.h"
+#include "codec/tracked/simplified_reference_enc.h"
+#include "codec/tracked/tracked_fit_enc.h"
+#include "codec/tracked/tracked_targets_enc.h"
+#include "surface/nearest_points.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 // A square height field of cells x cells, `cell` lattice units a side, its middle at the origin, facing +z.
@@ -187,4 +187,4 @@ TEST(TrackedFit, does_not_hold_against_a_frame_what_its_intra_frame_was_off_alre
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,4 +1,4 @@
-#include "codec/transforms.h"
+#include "codec/reference/transforms.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include "codec/hostile_bytes.h"
 #include "codec/random_numbers.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 QuantisedRotation random_rotation(std::mt19937& random) {
@@ -117,4 +117,4 @@ TEST(CodedPose, DamageGivesAnErrorOrJointsOnTheLattice) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

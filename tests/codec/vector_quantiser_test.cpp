@@ -6,9 +6,9 @@
 #include <string>
 
 #include "codec/random_numbers.h"
-#include "codec/vector_quantiser_enc.h"
+#include "codec/paper/vector_quantiser_enc.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Residuals = std::vector<ResidualVector>;
@@ -224,4 +224,4 @@ TEST(Training, IsBoundedByTheLargestCodebook) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

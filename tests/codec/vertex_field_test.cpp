@@ -1,4 +1,4 @@
-#include "codec/vertex_field.h"
+#include "codec/tracked/vertex_field.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "core/bytes.h"
 #include "core/crc32.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 VertexHierarchy hierarchy_of(const intra_test::Connectivity& mesh, unsigned seed = 1) {
@@ -268,4 +268,4 @@ TEST(VertexField, AShortenedLayerIsAnError) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

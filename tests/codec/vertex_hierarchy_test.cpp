@@ -1,4 +1,4 @@
-#include "codec/vertex_hierarchy.h"
+#include "codec/reference/vertex_hierarchy.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include "core/bytes.h"
 #include "core/crc32.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 // What every hierarchy must be: each node of a finer level joined exactly once, counts and rows in order.
@@ -128,4 +128,4 @@ TEST(VertexHierarchy, RefusesWhatIsNoMeshOnTheLattice) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -1,4 +1,4 @@
-#include "codec/zipper.h"
+#include "codec/paper/zipper.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "codec/random_numbers.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 constexpr double pi = 3.14159265358979;
@@ -249,4 +249,4 @@ TEST(Zipper, TheNumberOfThreadsChangesNothing) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 const std::vector<std::uint64_t> edges = {0,          1,           0x7f,       0x80,       0x3fff,    0x4000,
@@ -122,4 +122,4 @@ TEST(Bytes, ASpanLongerThanWhatIsLeftIsEmptyAndWrong) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 std::uint32_t of_text(std::string_view text) {
@@ -52,4 +52,4 @@ TEST(Crc32, EveryFlippedBitShows) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

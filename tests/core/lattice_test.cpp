@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 TEST(Lattice, QuotientsRoundToTheNearestAndHalvesAwayFromZero) {
@@ -46,4 +46,4 @@ TEST(Lattice, PointsAddAndCompareByComponents) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

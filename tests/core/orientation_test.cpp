@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 void expect_vector(const Vector3d& a, const Vector3d& b, double tolerance = 1e-9) {
@@ -203,4 +203,4 @@ TEST(DeriveTurningOrientations, RandomPosesGiveRotationsAlongTheBones) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

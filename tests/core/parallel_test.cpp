@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 using Pieces = std::vector<std::pair<std::size_t, std::size_t>>;
@@ -87,4 +87,4 @@ TEST(ThreadCount, ZeroIsOneACore) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

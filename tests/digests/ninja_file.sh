@@ -12,7 +12,10 @@ common="-std=c++20 -ffp-contract=off -fno-fast-math -Wall -Wextra -Iinclude -Isr
 wasi="--target=wasm32-wasi -I$out/include"
 
 # The decoder's sources: those of CMakeLists.txt.
-sources() { ls src/core/*.cpp src/entropy/*.cpp src/codec/*.cpp | grep -vE '(_enc|/encoder[a-z_]*|_draco)\.cpp$'; }
+sources() {
+    find src/core src/entropy src/codec -name '*.cpp' | LC_ALL=C sort |
+        grep -vE '(_enc|/encoder[a-z_]*|/choice/[a-z_]*|_draco)\.cpp$'
+}
 
 # build NAME COMPILER FLAGS LINK_FLAGS SOURCES...: objects in NAME, and NAME/digests.
 build() {

@@ -6,7 +6,7 @@
 #include "entropy/range_decoder.h"
 #include "entropy/range_encoder.h"
 
-namespace htvm {
+namespace htvm::internal {
 namespace {
 
 TEST(RangeCoder, NothingCodedTakesNoBytes) {
@@ -112,4 +112,4 @@ TEST(BinaryModel, LearnsASkewedSourceToWithinTwoPercentOfItsEntropy) {
 }
 
 }  // namespace
-}  // namespace htvm
+}  // namespace htvm::internal

@@ -9,6 +9,8 @@
 #include "core/orientation.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 using testing::Contains;

@@ -3,12 +3,14 @@
 
 #include <string>
 
-#include "codec/decoder_limits.h"
+#include "codec/stream/decoder_limits.h"
 #include "core/crc32.h"
 #include "memory/counted_allocations.h"
 #include "memory/memory_streams.h"
 
 namespace htvm {
+
+using namespace internal;
 namespace {
 
 using namespace test;

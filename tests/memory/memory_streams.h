@@ -8,6 +8,8 @@
 
 namespace htvm::test {
 
+using namespace internal;
+
 // Header, I, then P- and EP-frames, whole and in part, twice over.
 inline std::vector<Packet> animated_stream(int vertices) {
     auto options = motion_based(40, 3);

@@ -34,7 +34,7 @@ test_in_parts() {
     for part in "${parts[@]}"; do wait "$part" || failures=$((failures + 1)); done
 }
 
-for name in test_core test_entropy test_geometry test_c_api test_codec; do test_in_parts "$name"; done
+for name in test_core test_entropy test_surface test_c_api test_codec; do test_in_parts "$name"; done
 
 htvm=$build/htvm
 "$htvm" synth "$logs/capture" --frames 12 --vertices 4000 >"$logs/synth.log" 2>&1

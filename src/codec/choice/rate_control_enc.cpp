@@ -1,0 +1,244 @@
+#include "codec/choice/rate_control_enc.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/choice/rate_plan_enc.h"
+
+namespace htvm::internal {
+namespace {
+
+std::size_t index_of(FrameType type) { return static_cast<std::size_t>(type); }
+bool is_intra(FrameType type) { return type == FrameType::intra; }
+
+// Frames that were seen of this type, EP and T counted as one.
+int seen_like(const FrameSizeModel& model, FrameType type) {
+    if (is_intra(type) || type == FrameType::predicted) return model.seen[index_of(type)];
+    return model.seen[index_of(FrameType::enhanced)] + model.seen[index_of(FrameType::tracked)];
+}
+
+// How much of a surprise is believed: little of the usual noise; half of a jump, and nearly all when it comes again.
+double belief(const FrameSizeModel& model, double surprise) {
+    constexpr double jump = 0.35;
+    const double last_surprise = model.last_surprise;
+    if (std::abs(surprise) < jump) return model.usual_belief;
+    return surprise * last_surprise > 0 && std::abs(last_surprise) >= jump ? 0.8 : 0.4;
+}
+
+// The slope from neighbouring frames of a type: a content that changes moves bits and quality against each other, so
+// that levels would teach the wrong slope; steps that do not look like a step of quality are left out.
+void learn_slope(FrameSizeModel& model, const FrameCost& before, const FrameCost& now) {
+    const double step = now.quality - before.quality, change = std::log2(now.bits / before.bits);
+    if (std::abs(step) < 1.5 || std::abs(change - model.slope * step) > 0.4 + 0.02 * std::abs(step)) return;
+    model.slope_weight += step * step;
+    model.slope_sum += step * change;
+    model.slope = std::clamp(model.slope_sum / model.slope_weight, 0.01, 0.12);
+}
+
+RateControlOptions sane(RateControlOptions o) {
+    const auto positive = [](double x, double otherwise) { return std::isfinite(x) && x > 0 ? x : otherwise; };
+    o.bits_per_second = positive(o.bits_per_second, 8e6);
+    o.frames_per_second = positive(o.frames_per_second, 30);
+    o.buffer_seconds = std::max(positive(o.buffer_seconds, 1), 1 / o.frames_per_second);
+    o.key_interval = std::max(o.key_interval, 1);
+    o.highest_quality = std::max(o.highest_quality, o.lowest_quality);
+    o.largest_step = positive(o.largest_step, 2);
+    return o;
+}
+
+}  // namespace
+
+double expected_bits(const FrameSizeModel& model, FrameType type, double quality) {
+    if (type == FrameType::predicted) return model.predicted_bits;
+    return std::exp2(model.content + (is_intra(type) ? model.intra_extra : 0) + model.slope * quality);
+}
+
+void learn(FrameSizeModel& model, const FrameCost& frame) {
+    if (!(frame.bits > 0)) return;
+    const bool first = model.seen[index_of(frame.type)]++ == 0;
+    if (frame.type == FrameType::predicted) {
+        model.predicted_bits += (first ? 1 : 0.2) * (frame.bits - model.predicted_bits);
+        return;
+    }
+    const double surprise = std::log2(frame.bits / expected_bits(model, frame.type, frame.quality));
+    if (first) {
+        const bool other = seen_like(model, is_intra(frame.type) ? FrameType::enhanced : FrameType::intra) > 0;
+        if (is_intra(frame.type) && other) {
+            model.intra_extra += surprise;
+        } else {
+            model.content += surprise;
+            if (other) model.intra_extra -= surprise;
+        }
+    } else {
+        learn_slope(model, model.last[index_of(frame.type)], frame);
+        // The slope turns about the quality of now, where the sizes are known.
+        const double again = std::log2(frame.bits / expected_bits(model, frame.type, frame.quality));
+        const double believed = belief(model, again) * again;
+        // Of I-frames alone nobody can tell how much more they take than others.
+        const bool compared = is_intra(frame.type) && seen_like(model, FrameType::enhanced) > 0;
+        model.content += compared ? believed / 2 : believed;
+        if (compared) model.intra_extra += believed;
+        model.last_surprise = again;
+    }
+    model.last[index_of(frame.type)] = frame;
+}
+
+RateController::RateController(const RateControlOptions& options, std::vector<FrameCost> first_pass)
+    : options_(sane(options)), first_pass_(std::move(first_pass)) {
+    per_frame_ = options_.bits_per_second / options_.frames_per_second;
+    capacity_ = options_.bits_per_second * options_.buffer_seconds;
+    level_ = (options_.lowest_quality + options_.highest_quality) / 2;
+    model_.intra_extra = options_.intra_extra;
+    // What a large buffer can take need not be followed.
+    model_.usual_belief = std::clamp(3 * per_frame_ / capacity_, 0.05, 0.15);
+    // Before anything is seen: as many I-frames as the key interval asks for.
+    recent_.assign(static_cast<std::size_t>(std::clamp(options_.key_interval, 1, 1000)), FrameType::enhanced);
+    recent_[0] = FrameType::intra;
+    if (first_pass_.empty()) return;
+    for (auto& cost : first_pass_) cost.bits = std::isfinite(cost.bits) ? std::max(cost.bits, 0.0) : 0.0;
+    // What the first pass taught counts little against what this one will.
+    for (const auto& cost : first_pass_) learn(model_, cost);
+    plan_slope_ = model_.slope;
+    plan_ = plan_qualities(first_pass_, options_, plan_slope_);
+    rest_.assign(first_pass_.size() + 1, {});
+    for (std::size_t i = first_pass_.size(); i-- > 0;) {
+        rest_[i] = rest_[i + 1];
+        rest_[i][first_pass_[i].type == FrameType::predicted ? 0 : 1] += bits_at(first_pass_[i], plan_[i], plan_slope_);
+    }
+}
+
+double RateController::room() const { return capacity_ - buffer_; }
+
+bool RateController::is_guess(FrameType type) const {
+    return type != FrameType::predicted && first_pass_.empty() && (frames_ == 0 || (!is_intra(type) && !sent_between_));
+}
+
+double RateController::quality(FrameType type) const {
+    double q = frames_ < plan_.size() ? planned_quality() : live_quality(type);
+    if (type != FrameType::predicted) {
+        const double most = 0.9 * room(), expected = expected_bits(model_, type, q);
+        const bool known = seen_like(model_, FrameType::intra) + seen_like(model_, FrameType::enhanced) > 0;
+        if (known && expected > most) q -= std::log2(expected / std::max(most, 1.0)) / model_.slope;
+    }
+    return std::clamp(q, options_.lowest_quality, options_.highest_quality);
+}
+
+// The line's bits, and what brings the buffer to the level wanted just before an I-frame: the bits that the line idled,
+// so that all of them together are on target; at least a little, so that it does not idle, at most half the buffer.
+double RateController::wanted_bits() const {
+    const double frames = capacity_ / per_frame_, horizon = std::clamp(1.5 * frames, 4.0, 60.0);
+    const double phase = 1 - static_cast<double>(since_intra_) / options_.key_interval;
+    const double of_intra = std::max(0.0, expected_bits(model_, FrameType::intra, level_) - per_frame_);
+    const double before_intra = buffer_ - (since_intra_ > 0 ? of_intra * std::max(0.0, phase) : 0);
+    const double least = std::min(capacity_ / 5, 4 * per_frame_);
+    const double most = std::max(least, std::min(capacity_ / 2, 0.85 * capacity_ - of_intra));
+    const double wanted = std::clamp(idle_bits_, least, most);
+    return std::clamp(per_frame_ + (wanted - before_intra) / horizon, per_frame_ / 4, per_frame_ * 1.06);
+}
+
+double RateController::live_quality(FrameType type) const {
+    const double wanted = wanted_bits();
+    const auto average = [&](double q) {
+        double bits = 0;
+        for (const auto t : recent_) bits += expected_bits(model_, t, q);
+        return bits / static_cast<double>(recent_.size());
+    };
+    double low = options_.lowest_quality, high = options_.highest_quality;
+    if (average(high) <= wanted) low = high;
+    for (int i = 0; i < 20; ++i) {
+        const double middle = (low + high) / 2;
+        (average(middle) <= wanted ? low : high) = middle;
+    }
+    // The first frames know little, and may go far from each other.
+    const int seen = seen_like(model_, FrameType::enhanced) + seen_like(model_, FrameType::intra);
+    if (is_guess(type)) return low;
+    // An I-frame and the frame behind it may both move at no cost.
+    const bool free = since_intra_ == 1 || is_intra(type);
+    const double change = low - level_, step = std::max(options_.largest_step / (free ? 2 : 1), 20.0 / seen);
+    if (std::abs(change) < (free ? 0.5 : options_.stay)) return level_;
+    return level_ + std::clamp(change, -step, step);
+}
+
+double RateController::planned_bits(std::size_t frame, double correction) const {
+    const auto& cost = first_pass_[frame];
+    const double bits = bits_at(cost, plan_[frame], plan_slope_);
+    return cost.type == FrameType::predicted ? bits : bits * std::exp2(planned_surprise_ + model_.slope * correction);
+}
+
+// The correction with which the rest of the sequence spends what is left.
+double RateController::remaining_correction() const {
+    const auto& rest = rest_[frames_];
+    const double left = per_frame_ * static_cast<double>(plan_.size()) - total_bits_ - rest[0];
+    if (!(rest[1] > 0)) return correction_;
+    const double ratio = std::clamp(left / rest[1], 1e-3, 1e3);
+    const double range = options_.highest_quality - options_.lowest_quality;
+    return std::clamp((std::log2(ratio) - planned_surprise_) / model_.slope, -range, range);
+}
+
+// The highest level of the buffer in the next frames.
+double RateController::peak_of_plan(double correction) const {
+    constexpr std::size_t farthest = 300;
+    double buffer = buffer_, highest = 0;
+    for (std::size_t i = frames_; i < std::min(plan_.size(), frames_ + farthest); ++i) {
+        buffer += planned_bits(i, correction);
+        highest = std::max(highest, buffer);
+        buffer = std::max(0.0, buffer - per_frame_);
+    }
+    return highest;
+}
+
+double RateController::planned_quality() const {
+    double high = correction_;
+    if (peak_of_plan(high) > 0.95 * capacity_) {
+        double low = high - (options_.highest_quality - options_.lowest_quality);
+        for (int i = 0; i < 12; ++i) {
+            const double middle = (low + high) / 2;
+            (peak_of_plan(middle) > 0.95 * capacity_ ? high : low) = middle;
+        }
+        high = low;
+    }
+    return plan_[frames_] + high;
+}
+
+double RateController::lower_quality(FrameType type, double quality, double bits) {
+    // What the model says, a tenth more, and at least a step that doubles from call to call.
+    const double range = options_.highest_quality - options_.lowest_quality;
+    const double least = range / 20 * std::exp2(calls_++);
+    const double excess = bits > 0 ? std::log2(bits / std::max(room(), 1.0)) + 0.15 : 0;
+    const double needed = type == FrameType::predicted ? 0 : excess / model_.slope;
+    if (calls_ >= 5) return options_.lowest_quality;
+    return std::max(options_.lowest_quality, quality - std::max(least, needed));
+}
+
+void RateController::coded(FrameType type, double quality, double bits) {
+    bits = std::isfinite(bits) ? std::max(bits, 0.0) : 0.0;
+    // An I-frame that had to be cut to fit does not pull the EP-frames after it down.
+    const bool between = !is_intra(type) && type != FrameType::predicted;
+    if (between || !sent_between_) level_ = quality;
+    sent_between_ = sent_between_ || between;
+    if (is_intra(type) && std::abs(quality - level_) <= options_.largest_step) level_ = quality;
+    if (frames_ < plan_.size() && type == first_pass_[frames_].type && type != FrameType::predicted && bits > 0) {
+        const double planned = planned_bits(frames_, quality - plan_[frames_]);
+        if (planned > 0)
+            planned_surprise_ += std::max(0.05, 1.0 / static_cast<double>(frames_ + 5)) * std::log2(bits / planned);
+    }
+    learn(model_, {type, quality, bits});
+    recent_[frames_ % recent_.size()] = type;
+    since_intra_ = is_intra(type) ? 1 : since_intra_ + (since_intra_ > 0 ? 1 : 0);
+    total_bits_ += bits;
+    buffer_ += bits;
+    idle_bits_ += std::max(0.0, per_frame_ - buffer_);
+    buffer_ = std::max(0.0, buffer_ - per_frame_);
+    ++frames_;
+    calls_ = 0;
+    if (frames_ + 10 <= plan_.size()) correct_plan(type);
+}
+
+void RateController::correct_plan(FrameType type) {
+    const double change = remaining_correction() - correction_;
+    if (std::abs(change) < (is_intra(type) ? options_.stay / 4 : options_.stay)) return;
+    const double step = frames_ < 15 ? 4 * options_.largest_step : options_.largest_step;
+    correction_ += std::clamp(change, -step, step);
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,28 @@
+// I-frames (paper, section III-C): positions on a coarser grid of the lattice, connectivity by TFAN, each attribute
+// predicted from its neighbours; or the whole mesh by another static coder.
+#pragma once
+
+#include "codec/stream/frame_payload.h"
+#include "codec/reference/lattice_mesh.h"
+#include "htvm/intra_coder.hpp"
+
+namespace htvm::internal {
+
+struct IntraFrameOptions {
+    std::int32_t geometry_step = 32;  // lattice units, >= 1
+    std::int32_t colour_step = 6;     // levels, 1..255
+    bool merge_duplicates = true;
+    const ExternalIntraCoder* external = nullptr;  // none: TFAN
+};
+
+// Fills the payload's header and layers (all but the pose), and gives the mesh that the decoder will have.
+Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrameOptions& options,
+                                       FramePayload& payload);
+
+// external: of the number that the payload names, or null: unsupported then.
+Result<LatticeMesh> decode_intra_frame(const FramePayload& payload, const ExternalIntraCoder* external);
+
+// A grid point's place on the lattice, and a quantised colour's levels.
+inline LatticePoint from_grid(LatticePoint q, std::int32_t step) { return {q.x * step, q.y * step, q.z * step}; }
+
+}  // namespace htvm::internal

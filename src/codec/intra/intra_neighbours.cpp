@@ -1,0 +1,191 @@
+#include "codec/intra/intra_neighbours.h"
+
+#include <algorithm>
+#include <array>
+
+namespace htvm::internal {
+
+namespace {
+
+constexpr std::uint32_t none = 0xFFFFFFFFu;
+constexpr std::size_t size_limit = std::size_t{1} << 28;
+
+// Corner 3 t + i is corner i of triangle t. Degenerate triangles have no corners in the tables.
+struct Corners {
+    std::vector<std::uint32_t> vertex;    // of each corner
+    std::vector<std::uint32_t> opposite;  // the corner across the edge that faces this corner, or none
+    std::vector<std::uint32_t> first_at;  // rows of `at`, by vertex
+    std::vector<std::uint32_t> at;        // the corners at each vertex, in triangle order
+};
+
+std::uint32_t next_corner(std::uint32_t c) { return c % 3 == 2 ? c - 2 : c + 1; }
+std::uint32_t previous_corner(std::uint32_t c) { return c % 3 == 0 ? c + 2 : c - 1; }
+
+// Pairs the corners that face the same edge. Edges are visited by their smaller vertex v, through the corners at v; for
+// each larger vertex, `waiting` holds a corner that still lacks its other side.
+void pair_opposites(Corners& corners, std::size_t vertex_count) {
+    corners.opposite.assign(corners.vertex.size(), none);
+    std::vector<std::uint32_t> waiting(vertex_count, none);
+    auto face = [&](std::uint32_t other, std::uint32_t facing) {
+        if (waiting[other] == none) {
+            waiting[other] = facing;
+            return;
+        }
+        corners.opposite[facing] = waiting[other];
+        corners.opposite[waiting[other]] = facing;
+        waiting[other] = none;
+    };
+    for (std::uint32_t v = 0; v < vertex_count; ++v) {
+        const std::span row =
+            std::span(corners.at).subspan(corners.first_at[v], corners.first_at[v + 1] - corners.first_at[v]);
+        for (const std::uint32_t c : row) {
+            const std::uint32_t after = next_corner(c), before = previous_corner(c);
+            if (corners.vertex[after] > v) face(corners.vertex[after], before);
+            if (corners.vertex[before] > v) face(corners.vertex[before], after);
+        }
+        for (const std::uint32_t c : row) {
+            waiting[corners.vertex[next_corner(c)]] = none;
+            waiting[corners.vertex[previous_corner(c)]] = none;
+        }
+    }
+}
+
+Corners make_corners(std::span<const Triangle> triangles, std::size_t vertex_count) {
+    Corners corners;
+    corners.vertex.reserve(triangles.size() * 3);
+    corners.first_at.assign(vertex_count + 1, 0);
+    for (const Triangle& t : triangles) {
+        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+        for (const std::uint32_t v : t) {
+            corners.vertex.push_back(v);
+            ++corners.first_at[v + 1];
+        }
+    }
+    for (std::size_t v = 0; v < vertex_count; ++v) corners.first_at[v + 1] += corners.first_at[v];
+    corners.at.resize(corners.vertex.size());
+    std::vector<std::uint32_t> fill(corners.first_at.begin(), corners.first_at.end() - 1);
+    for (std::uint32_t c = 0; c < corners.vertex.size(); ++c) corners.at[fill[corners.vertex[c]]++] = c;
+    pair_opposites(corners, vertex_count);
+    return corners;
+}
+
+// A vertex waits in the queue of its score: the number of parallelograms it completes, at most score_limit. The queues
+// are last in, first out. It may wait in several; the entries that are out of date are passed over.
+constexpr std::size_t score_limit = 4;
+
+struct Traversal {
+    std::vector<std::uint8_t> coded;
+    std::vector<std::uint8_t> queued;  // has been put in a queue
+    std::vector<std::uint8_t> score;   // by vertex
+    std::array<std::vector<std::uint32_t>, score_limit + 1> queues;
+    std::uint32_t seed = 0;
+
+    void push(std::uint32_t v) {
+        queued[v] = 1;
+        queues[score[v]].push_back(v);
+    }
+    void meet(std::uint32_t v) {
+        if (!queued[v]) push(v);
+    }
+    void gain(std::uint32_t v) {
+        if (score[v] == score_limit) return;
+        ++score[v];
+        push(v);
+    }
+    std::uint32_t pop() {
+        for (std::size_t s = score_limit + 1; s-- > 0;) {
+            auto& queue = queues[s];
+            while (!queue.empty()) {
+                const std::uint32_t v = queue.back();
+                queue.pop_back();
+                if (!coded[v] && score[v] == s) return v;
+            }
+        }
+        while (coded[seed]) ++seed;
+        return seed;
+    }
+};
+
+void add_neighbour(Neighbours& out, std::size_t row, std::uint32_t v) {
+    if (out.neighbours.size() - row >= row_limit) return;
+    for (std::size_t i = row; i < out.neighbours.size(); ++i)
+        if (out.neighbours[i] == v) return;
+    out.neighbours.push_back(v);
+}
+
+// Codes vertex v: its candidates are written out, and the vertices that it completes a parallelogram for gain one.
+// Only parallelograms across an edge count for the order; the others come with them.
+void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint32_t v) {
+    const std::size_t neighbour_row = out.neighbours.size(), parallelogram_row = out.parallelograms.size();
+    auto add_parallelogram = [&](std::uint32_t a, std::uint32_t b, std::uint32_t opposite, bool across) {
+        if (out.parallelograms.size() - parallelogram_row < row_limit)
+            out.parallelograms.push_back({a, b, opposite, across});
+    };
+    // The vertex across the edge that this corner faces, or none.
+    auto beyond = [&](std::uint32_t corner) {
+        const std::uint32_t o = corners.opposite[corner];
+        return o == none ? none : corners.vertex[o];
+    };
+    auto is_known = [&](std::uint32_t vertex) { return vertex != none && state.coded[vertex]; };
+    state.coded[v] = 1;
+    for (std::uint32_t i = corners.first_at[v]; i < corners.first_at[v + 1]; ++i) {
+        const std::uint32_t c = corners.at[i], after = next_corner(c), before = previous_corner(c);
+        const std::uint32_t p = corners.vertex[after], q = corners.vertex[before];
+        const bool knows_p = state.coded[p], knows_q = state.coded[q];
+        if (knows_p) add_neighbour(out, neighbour_row, p);
+        if (knows_q) add_neighbour(out, neighbour_row, q);
+        if (knows_p && knows_q) {
+            const std::uint32_t y = beyond(c);
+            if (is_known(y) && y != v)
+                add_parallelogram(p, q, y, true);
+            else if (y != none && y != v)
+                state.gain(y);
+            // An edge at v is seen from both of its triangles, and counted from the one with the lower facing corner.
+            const std::uint32_t past_q = beyond(after), past_p = beyond(before);
+            if (is_known(past_p) && past_p != q && before < corners.opposite[before])
+                add_parallelogram(past_p, q, p, false);
+            if (is_known(past_q) && past_q != p && after < corners.opposite[after])
+                add_parallelogram(p, past_q, q, false);
+        } else if (knows_p != knows_q) {
+            const std::uint32_t unknown = knows_p ? q : p;
+            if (is_known(beyond(knows_p ? before : after)))
+                state.gain(unknown);
+            else
+                state.meet(unknown);
+        } else {
+            state.meet(p);
+            state.meet(q);
+        }
+    }
+}
+
+}  // namespace
+
+Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count) {
+    if (vertex_count > size_limit || triangles.size() > size_limit)
+        return fail(ErrorKind::limit, "intra attributes: more than 2^28 vertices or triangles; split the mesh");
+    for (const Triangle& t : triangles)
+        if (std::max({t[0], t[1], t[2]}) >= vertex_count)
+            return fail(ErrorKind::bad_input, "intra attributes: a triangle names a vertex that does not exist");
+    const Corners corners = make_corners(triangles, vertex_count);
+    Traversal state;
+    state.coded.assign(vertex_count, 0);
+    state.queued.assign(vertex_count, 0);
+    state.score.assign(vertex_count, 0);
+    Neighbours out;
+    out.order.reserve(vertex_count);
+    out.first_parallelogram.reserve(vertex_count + 1);
+    out.first_neighbour.reserve(vertex_count + 1);
+    for (std::size_t rank = 0; rank < vertex_count; ++rank) {
+        out.first_parallelogram.push_back(static_cast<std::uint32_t>(out.parallelograms.size()));
+        out.first_neighbour.push_back(static_cast<std::uint32_t>(out.neighbours.size()));
+        const std::uint32_t v = state.pop();
+        out.order.push_back(v);
+        visit(corners, state, out, v);
+    }
+    out.first_parallelogram.push_back(static_cast<std::uint32_t>(out.parallelograms.size()));
+    out.first_neighbour.push_back(static_cast<std::uint32_t>(out.neighbours.size()));
+    return out;
+}
+
+}  // namespace htvm::internal

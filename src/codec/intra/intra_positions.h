@@ -1,0 +1,27 @@
+// The positions of an intra frame, coded without loss given its connectivity.
+//
+// A vertex is predicted from the vertices known round it: a combination of the mean of its neighbours, its
+// parallelograms and the mean of its neighbours' neighbours, whose weights the encoder fits to the frame and sends. The
+// residual is coded component by component, the one most across the surface last: it is predicted to lie in the plane
+// of the known triangles, given the other two.
+//
+// Layer: six signed bytes (weights in 1/64), then the range-coded residuals in the order of Neighbours::order.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "codec/intra/intra_neighbours.h"
+#include "core/lattice.h"
+
+namespace htvm::internal {
+
+// q: one point a vertex, q.size() == neighbours.vertex_count(), every point on_lattice(). No vertices give no bytes.
+std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours);
+
+// The points that were encoded. Errors: corrupt_stream where the bytes end too early or lead off the lattice.
+Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::uint8_t> bytes,
+                                                         const Neighbours& neighbours);
+
+}  // namespace htvm::internal

@@ -1,0 +1,344 @@
+// The syntax of triangle fans, for both sides: what is coded at a focus vertex, and in which context.
+//
+// Every function codes one thing: with a FanWriter it writes what is wanted and returns it, with a FanReader it ignores
+// what is wanted and returns what it read. A Coder has
+//     bool bit(BinaryModel&, bool wanted)
+//     std::uint32_t number(UnsignedModel&, std::uint32_t wanted)
+// Vertices are named by their visiting number. At the focus, an open half-edge that enters it comes from a vertex where
+// the coded triangles around the focus end and a fan may start (a start candidate); an open half-edge that leaves it
+// goes to a vertex where they start and a fan may end (an end candidate).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "entropy/mixing.h"
+#include "codec/intra/tfan_open_edges.h"
+#include "entropy/models.h"
+#include "entropy/range_decoder.h"
+#include "entropy/range_encoder.h"
+
+namespace htvm::internal {
+
+struct FanWriter {
+    RangeEncoder& encoder;
+    bool bit(BinaryModel& model, bool wanted) {
+        encoder.bit(model, wanted);
+        return wanted;
+    }
+    std::uint32_t number(UnsignedModel& model, std::uint32_t wanted) {
+        encode_unsigned(encoder, model, wanted);
+        return wanted;
+    }
+};
+
+struct FanReader {
+    RangeDecoder& decoder;
+    bool bit(BinaryModel& model, bool) { return decoder.bit(model); }
+    std::uint32_t number(UnsignedModel& model, std::uint32_t) { return decode_unsigned(decoder, model); }
+};
+
+// How a fan's boundary goes on from its current vertex.
+enum class Step : std::uint8_t {
+    new_vertex,    // to a vertex met for the first time
+    close,         // to an end candidate, where the fan ends
+    left,          // to the vertex that also completes the open edge of the current vertex
+    right,         // to the vertex from which the fan can close by completing the open edge of the end candidate
+    known_vertex,  // to any other visited vertex
+    stop,          // no further: the fan ends at a boundary of the mesh
+};
+
+inline constexpr std::uint32_t most_candidates = 4;  // start and end candidates that can be named
+inline constexpr std::uint32_t longest_walk = 31;    // steps along open edges in search of a known vertex
+
+// Where a fan stands: what both sides know before its next step.
+struct FanState {
+    std::uint32_t focus = 0;
+    std::uint32_t start = OpenEdges::none;     // the boundary's first vertex
+    std::uint32_t previous = OpenEdges::none;  // the boundary vertex before the current one
+    std::uint32_t current = OpenEdges::none;
+    std::uint32_t length = 0;  // triangles in the fan
+    Step last = Step::stop;    // the step that led here; stop: none yet
+    bool from_candidate = false;
+
+    // From the open edges, by look_around():
+    std::array<std::uint32_t, most_candidates> ends{};
+    std::uint32_t end_count = 0;
+    std::uint32_t behind = OpenEdges::none;      // the third vertex of the coded triangle before the current vertex
+    std::uint32_t beyond_end = OpenEdges::none;  // the third vertex of the coded triangle after the first end candidate
+    std::uint32_t left = OpenEdges::none, right = OpenEdges::none;
+    bool fills_hole = false;  // one triangle would complete the open edges on both sides
+};
+
+// Contexts for the next step that come from elsewhere than connectivity: none (all 0) in TFAN, from the decoded
+// positions in M-TFAN.
+struct FanHints {
+    std::uint32_t gap = 0;    // 0 .. 15: the angle at the focus from the current vertex to the end candidate
+    std::uint32_t left = 0;   // 0 .. 7: the angle at the current vertex that the left triangle would fill
+    std::uint32_t right = 0;  // 0 .. 7: the angle at the end candidate that the right triangle would fill
+};
+
+struct FanModels {
+    std::array<std::array<std::array<BinaryModel, 4>, 3>, 16> more_fans;  // triangles, start and end candidates
+    std::array<BinaryModel, 4> starts_at_candidate;
+    std::array<BinaryModel, most_candidates> start_index, end_index;
+    BinaryModel starts_at_known;
+    std::array<std::array<BinaryModel, 16384>, 5> is_new;  // by five sets of contexts each, see code_is_new()
+    std::array<Mixer<5>, 64> new_mixer;
+    std::array<std::array<BinaryModel, 16384>, 5> closing;
+    std::array<Mixer<5>, 64> close_mixer;
+    std::array<std::array<std::array<BinaryModel, 8>, 8>, 4> goes_left;
+    std::array<std::array<BinaryModel, 8>, 8> goes_right;
+    std::array<BinaryModel, 8> stops;
+    std::array<BinaryModel, 2> walks, walks_left;
+    UnsignedModel walk_steps;
+    UnsignedModel far;
+};
+
+// The vertex before `vertex` along the open edges, not `avoided` or `also_avoided`; or none.
+inline std::uint32_t before_on_border(const OpenEdges& edges, std::uint32_t vertex, std::uint32_t avoided,
+                                      std::uint32_t also_avoided) {
+    std::uint32_t edge = edges.first_in(vertex);
+    for (int i = 0; i < 4 && edge != OpenEdges::none; ++i, edge = edges[edge].next_in)
+        if (edges[edge].from != avoided && edges[edge].from != also_avoided) return edges[edge].from;
+    return OpenEdges::none;
+}
+
+// The vertex after `vertex` along the open edges, not `avoided`; or none.
+inline std::uint32_t after_on_border(const OpenEdges& edges, std::uint32_t vertex, std::uint32_t avoided) {
+    std::uint32_t edge = edges.first_out(vertex);
+    for (int i = 0; i < 4 && edge != OpenEdges::none; ++i, edge = edges[edge].next_out)
+        if (edges[edge].to != avoided) return edges[edge].to;
+    return OpenEdges::none;
+}
+
+// Of several end candidates, the one that bounds the same gap as the fan's start comes first.
+inline void put_own_gap_first(const OpenEdges& edges, FanState& fan) {
+    std::uint32_t vertex = fan.start;
+    for (std::uint32_t i = 0; i < longest_walk && vertex != OpenEdges::none; ++i) {
+        for (std::uint32_t k = 0; k < fan.end_count; ++k) {
+            if (fan.ends[k] != vertex || vertex == fan.start) continue;
+            std::swap(fan.ends[0], fan.ends[k]);
+            return;
+        }
+        const std::uint32_t edge = edges.first_in(vertex);
+        vertex = edge == OpenEdges::none ? OpenEdges::none : edges[edge].from;
+    }
+}
+
+// The end candidates of the fan, its own start last if it may become one.
+inline void find_ends(const OpenEdges& edges, FanState& fan) {
+    fan.end_count = 0;
+    std::uint32_t edge = edges.first_out(fan.focus);
+    for (std::uint32_t i = 0; i < 2 * most_candidates && edge != OpenEdges::none && fan.end_count + 1 < most_candidates;
+         ++i, edge = edges[edge].next_out)
+        if (edges[edge].to != fan.start) fan.ends[fan.end_count++] = edges[edge].to;
+    if (fan.end_count > 1 && fan.from_candidate) put_own_gap_first(edges, fan);
+    if (fan.end_count > 0)
+        for (edge = edges.first_out(fan.focus); edge != OpenEdges::none && fan.beyond_end == OpenEdges::none;
+             edge = edges[edge].next_out)
+            if (edges[edge].to == fan.ends[0]) fan.beyond_end = edges[edge].apex;
+    if (!fan.from_candidate) fan.ends[fan.end_count++] = fan.start;
+}
+
+// Fills in what follows from the open edges at the fan's current vertex.
+inline void look_around(const OpenEdges& edges, FanState& fan) {
+    const std::uint32_t end = fan.end_count > 0 ? fan.ends[0] : OpenEdges::none;
+    fan.left =
+        fan.last == Step::new_vertex ? OpenEdges::none : before_on_border(edges, fan.current, fan.focus, fan.previous);
+    fan.right = end == OpenEdges::none || end == fan.start ? OpenEdges::none : after_on_border(edges, end, fan.focus);
+    fan.fills_hole = fan.left == end || fan.right == fan.current;
+    if (end == OpenEdges::none) fan.fills_hole = false;
+    if (fan.left == end) fan.left = OpenEdges::none;
+    if (fan.right == fan.current || fan.right == fan.left) fan.right = OpenEdges::none;
+}
+
+template <class Coder>
+std::uint32_t code_index(Coder& coder, std::array<BinaryModel, most_candidates>& models, std::uint32_t count,
+                         std::uint32_t wanted) {
+    std::uint32_t index = 0;
+    while (index + 1 < count && coder.bit(models[index], wanted > index)) ++index;
+    return index;
+}
+
+// Whether the focus has another fan, after the fans before it.
+template <class Coder>
+bool code_more_fans(Coder& coder, FanModels& models, const OpenEdges& edges, std::uint32_t focus, bool wanted) {
+    const auto count = [&](std::uint32_t edge, auto next) {
+        std::uint32_t n = 0;
+        for (; edge != OpenEdges::none && n < 2; edge = next(edges[edge])) ++n;
+        return n;
+    };
+    const std::uint32_t starts = count(edges.first_in(focus), [](const OpenEdges::HalfEdge& e) { return e.next_in; });
+    const std::uint32_t ends = count(edges.first_out(focus), [](const OpenEdges::HalfEdge& e) { return e.next_out; });
+    const std::uint32_t triangles = std::min(edges.triangle_count(focus), 15u);
+    return coder.bit(models.more_fans[triangles][starts][ends], wanted);
+}
+
+// The number of a visited vertex that no candidate names: by a walk along the open edges from the current vertex or
+// from the end candidate, else by how much later than the focus it was visited.
+template <class Coder>
+std::uint32_t code_known_vertex(Coder& coder, FanModels& models, const OpenEdges& edges, const FanState& fan,
+                                std::uint32_t wanted) {
+    const auto back = [&](std::uint32_t vertex) { return before_on_border(edges, vertex, fan.focus, fan.previous); };
+    const auto forth = [&](std::uint32_t vertex) { return after_on_border(edges, vertex, fan.focus); };
+    const std::uint32_t end = fan.end_count > 0 ? fan.ends[0] : OpenEdges::none;
+    bool leftward = false;
+    std::uint32_t steps = 0;
+    std::uint32_t back_vertex = fan.current, forth_vertex = end;
+    for (std::uint32_t i = 1; i <= longest_walk && steps == 0; ++i) {
+        if (back_vertex != OpenEdges::none) back_vertex = back(back_vertex);
+        if (forth_vertex != OpenEdges::none) forth_vertex = forth(forth_vertex);
+        if (back_vertex == wanted || forth_vertex == wanted) {
+            steps = i;
+            leftward = back_vertex == wanted;
+        }
+    }
+    if (coder.bit(models.walks[fan.end_count > 0], steps > 0)) {
+        leftward = coder.bit(models.walks_left[0], leftward);
+        steps = coder.number(models.walk_steps, steps - 1) + 1;
+        std::uint32_t vertex = leftward ? fan.current : end;
+        for (std::uint32_t i = 0; i < std::min(steps, longest_walk) && vertex != OpenEdges::none; ++i)
+            vertex = leftward ? back(vertex) : forth(vertex);
+        return vertex;
+    }
+    return coder.number(models.far, wanted - fan.focus) + fan.focus;
+}
+
+struct CodedStep {
+    Step step;
+    std::uint32_t vertex;  // the visiting number; none for a new vertex and for stop
+};
+
+// The contexts of a step, each clipped to a class.
+struct StepContexts {
+    std::uint32_t situation = 0;  // 0: no end candidate, 1: one triangle fills the gap, 2 .. 4: by the last step
+    std::uint32_t length = 0;     // triangles in the fan, up to 7
+    std::uint32_t ways = 0;       // 0 .. 3: left and right exist
+    bool turned = false;          // the last step went left or right
+    // Coded triangles at the focus (up to 15) and (up to 7) at the vertices around the gap.
+    std::uint32_t focus = 0, current = 0, end = 0, left = 0, right = 0, behind = 0, beyond = 0;
+    FanHints hints;
+};
+
+inline StepContexts step_contexts(const OpenEdges& edges, const FanState& fan, const FanHints& hints) {
+    const auto count = [&](std::uint32_t vertex, std::uint32_t most) {
+        return vertex == OpenEdges::none ? 0u : std::min(edges.triangle_count(vertex), most);
+    };
+    StepContexts c;
+    c.situation = fan.end_count == 0             ? 0
+                  : fan.fills_hole               ? 1
+                  : fan.last == Step::new_vertex ? 2
+                  : fan.last == Step::stop       ? 3
+                                                 : 4;
+    c.length = std::min(fan.length, 7u);
+    c.ways = (fan.left != OpenEdges::none ? 1u : 0u) + (fan.right != OpenEdges::none ? 2u : 0u);
+    c.turned = fan.last == Step::right || fan.last == Step::left;
+    c.focus = count(fan.focus, 15);
+    c.current = count(fan.current, 7);
+    c.end = count(fan.end_count > 0 ? fan.ends[0] : OpenEdges::none, 7);
+    c.left = count(fan.left, 7);
+    c.right = count(fan.right, 7);
+    c.behind = count(fan.behind, 7);
+    c.beyond = count(fan.beyond_end, 7);
+    c.hints = hints;
+    return c;
+}
+
+template <class Coder>
+bool code_is_new(Coder& coder, FanModels& models, const StepContexts& c, bool wanted) {
+    auto& m = models.is_new;
+    const std::uint32_t gap = c.hints.gap;
+    return code_mixed(
+        coder, models.new_mixer[c.situation * 8 + c.length],
+        std::array<BinaryModel*, 5>{&m[0][((c.focus * 8 + c.end) * 8 + c.situation) * 16 + gap],
+                                    &m[1][((c.focus * 8 + c.current) * 8 + c.situation) * 16 + gap],
+                                    &m[2][((gap * 8 + c.hints.left) * 8 + c.hints.right) * 8 + c.situation],
+                                    &m[3][(c.focus * 8 + c.end) * 8 + c.right],
+
+                                    &m[4][((c.focus * 8 + c.behind) * 8 + c.beyond) * 8 + c.situation]},
+        wanted);
+}
+
+template <class Coder>
+bool code_closes(Coder& coder, FanModels& models, const StepContexts& c, bool wanted) {
+    auto& m = models.closing;
+    const std::uint32_t gap = c.hints.gap;
+    return code_mixed(
+        coder, models.close_mixer[c.situation * 4 + c.ways],
+        std::array<BinaryModel*, 5>{&m[0][((c.focus * 8 + c.situation) * 4 + c.ways) * 2 + c.turned],
+                                    &m[1][(c.focus * 8 + c.current) * 8 + c.end],
+                                    &m[2][((c.focus * 8 + c.end) * 8 + c.situation) * 16 + gap],
+                                    &m[3][((c.left * 8 + c.current) * 8 + c.end) * 8 + c.right],
+
+                                    &m[4][((gap * 8 + c.hints.left) * 8 + c.hints.right) * 8 + c.situation]},
+        wanted);
+}
+
+// The next step of the fan; wanted.vertex counts for close and known_vertex. In a corrupt stream the vertex may be out
+// of range.
+template <class Coder>
+CodedStep code_step(Coder& coder, FanModels& models, const OpenEdges& edges, const FanState& fan, const FanHints& hints,
+                    CodedStep wanted) {
+    const StepContexts contexts = step_contexts(edges, fan, hints);
+    if (code_is_new(coder, models, contexts, wanted.step == Step::new_vertex))
+        return {Step::new_vertex, OpenEdges::none};
+    if (fan.end_count > 0 && code_closes(coder, models, contexts, wanted.step == Step::close)) {
+        std::uint32_t index = 0;
+        while (index < fan.end_count && fan.ends[index] != wanted.vertex) ++index;
+        return {Step::close, fan.ends[code_index(coder, models.end_index, fan.end_count, index)]};
+    }
+    if (fan.left != OpenEdges::none &&
+        coder.bit(models.goes_left[contexts.ways][contexts.current][contexts.hints.left], wanted.step == Step::left))
+        return {Step::left, fan.left};
+    if (fan.right != OpenEdges::none &&
+        coder.bit(models.goes_right[contexts.end][contexts.hints.right], wanted.step == Step::right))
+        return {Step::right, fan.right};
+    if (fan.length > 0 && coder.bit(models.stops[std::min(fan.end_count, 3u)], wanted.step == Step::stop))
+        return {Step::stop, OpenEdges::none};
+    return {Step::known_vertex, code_known_vertex(coder, models, edges, fan, wanted.vertex)};
+}
+
+// How a fan gets to a vertex of this visiting number (none: not visited yet).
+inline CodedStep classify_step(const FanState& fan, std::uint32_t number) {
+    if (number == OpenEdges::none) return {Step::new_vertex, number};
+    for (std::uint32_t i = 0; i < fan.end_count; ++i)
+        if (fan.ends[i] == number) return {Step::close, number};
+    if (number == fan.left) return {Step::left, number};
+    if (number == fan.right) return {Step::right, number};
+    return {Step::known_vertex, number};
+}
+
+inline void advance(FanState& fan, const CodedStep& step) {
+    fan.previous = fan.behind = fan.current;
+    fan.current = step.vertex;
+    fan.last = step.step;
+    ++fan.length;
+}
+
+// Where a fan starts: from_candidate and start are set, start to none for a new vertex. `wanted` is the start, or none.
+template <class Coder>
+void code_start(Coder& coder, FanModels& models, const OpenEdges& edges, FanState& fan, std::uint32_t wanted) {
+    std::array<std::uint32_t, most_candidates> starts{};
+    std::uint32_t count = 0, index = 0;
+    std::array<std::uint32_t, most_candidates> behind{};
+    std::uint32_t edge = edges.first_in(fan.focus);
+    for (; count < most_candidates && edge != OpenEdges::none; edge = edges[edge].next_in) {
+        behind[count] = edges[edge].apex;
+        starts[count++] = edges[edge].from;
+    }
+    while (index < count && starts[index] != wanted) ++index;
+    fan.from_candidate = count > 0 && coder.bit(models.starts_at_candidate[count - 1], index < count);
+    if (fan.from_candidate) {
+        index = code_index(coder, models.start_index, count, index);
+        fan.start = starts[index];
+        fan.behind = behind[index];
+    } else if (coder.bit(models.starts_at_known, wanted != OpenEdges::none)) {
+        fan.start = coder.number(models.far, wanted - fan.focus) + fan.focus;
+    } else {
+        fan.start = OpenEdges::none;
+    }
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,31 @@
+#include "codec/paper/animated_frame.h"
+
+#include "codec/reference/transforms.h"
+
+namespace htvm::internal {
+
+LatticeMesh animate(const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms,
+                    std::vector<LatticePoint> predicted) {
+    LatticeMesh out;
+    out.positions = std::move(predicted);
+    out.triangles = reference.mesh.triangles;
+    out.colours = reference.mesh.colours;
+    out.normals = predict_normals(reference, transforms);
+    out.texcoords = reference.mesh.texcoords;
+    return out;
+}
+
+Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
+                                             unsigned threads) {
+    const auto& mesh = reference.mesh;
+    if (payload.header.vertices != mesh.positions.size() || payload.header.triangles != mesh.triangles.size())
+        return fail(ErrorKind::corrupt_stream, "P-frame: it has other counts than its I-frame");
+    auto transforms = decode_transforms(payload.of(Layer::transforms), reference.pivots.size());
+    if (!transforms) return tl::unexpected(transforms.error());
+    AnimatedFrame out;
+    out.mesh = animate(reference, *transforms, predict_positions(reference, *transforms, threads));
+    out.transforms = std::move(*transforms);
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,31 @@
+// The reference mesh moved to another frame: P-frames (paper, section III-B), and the part of a motion-coded EP-frame
+// that is not coded (section V).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "codec/stream/frame_payload.h"
+#include "codec/reference/prediction.h"
+
+namespace htvm::internal {
+
+// M_P as a whole mesh: positions and normals moved, connectivity, colours and texture coordinates the reference's.
+// predicted: from predict_positions() with the same transforms.
+LatticeMesh animate(const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms,
+                    std::vector<LatticePoint> predicted);
+
+struct AnimatedFrame {
+    LatticeMesh mesh;
+    std::vector<QuantisedTransform> transforms;  // one a bone
+};
+
+// A P-frame. corrupt_stream where its counts are not the reference's or its transforms are damaged.
+Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
+                                             unsigned threads);
+
+// A P-frame's payload. source: the captured mesh's counts.
+FramePayload predicted_frame_payload(const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms,
+                                     std::uint32_t source_vertices, std::uint32_t source_triangles);
+
+}  // namespace htvm::internal

@@ -1,0 +1,209 @@
+#include "codec/paper/enhanced_frame_enc.h"
+
+#include "codec/paper/animated_frame.h"
+#include "codec/intra/attribute_values.h"
+#include "codec/paper/coded_bones.h"
+#include "codec/paper/duplicates_enc.h"
+#include "codec/paper/enhanced_frame.h"
+#include "codec/paper/mapping.h"
+#include "codec/paper/mtfan.h"
+#include "codec/paper/residual_layer.h"
+#include "codec/stage_clock_enc.h"
+#include "codec/reference/transforms.h"
+#include "codec/paper/zipper.h"
+#include "core/parallel.h"
+
+namespace htvm::internal {
+namespace {
+
+// Everything of the frame's vertices in the order E^ord, one entry a residual.
+struct OrderedResiduals {
+    ResidualOrder order;
+    QuantisedResiduals geometry, colour;
+    LatticeMesh decoded;  // vertices only
+};
+
+std::vector<ResidualVector> position_residuals(const LatticeMesh& mesh, std::span<const LatticePoint> predicted,
+                                               const ResidualOrder& order) {
+    std::vector<ResidualVector> out;
+    out.reserve(order.vertex.size());
+    for (std::size_t k = 0; k < order.vertex.size(); ++k) {
+        const LatticePoint e = mesh.positions[order.vertex[k]] - predicted[order.reference[k]];
+        out.push_back({e.x, e.y, e.z});
+    }
+    return out;
+}
+
+std::vector<ResidualVector> colour_residuals(const LatticeMesh& mesh, const LatticeMesh& reference,
+                                             const ResidualOrder& order) {
+    std::vector<ResidualVector> out;
+    out.reserve(order.vertex.size());
+    for (std::size_t k = 0; k < order.vertex.size(); ++k) {
+        const auto& c = mesh.colours[order.vertex[k]];
+        const auto& r = reference.colours[order.reference[k]];
+        out.push_back({c[0] - r[0], c[1] - r[1], c[2] - r[2]});
+    }
+    return out;
+}
+
+// A codebook is tried as it is; only where the frame no longer suits it is a new one trained, and taken if it costs
+// less with the bits that sending it takes.
+QuantisedResiduals quantise_with(CodebookInUse& use, std::span<const ResidualVector> residuals,
+                                 const QuantiserOptions& options) {
+    constexpr double worth_training = 1.02;
+    const auto count = static_cast<double>(std::max<std::size_t>(residuals.size(), 1));
+    use.is_new = false;
+    QuantisedResiduals kept;
+    double kept_cost = 0;
+    if (use.codebook && use.codebook->escape_step == options.step) {
+        kept = quantise(residuals, *use.codebook, options);
+        kept_cost = lagrangian(residuals, kept, *use.codebook, options);
+        if (kept_cost / count <= worth_training * use.cost_when_new) return kept;
+    }
+    auto trained = train_codebook(residuals, options);
+    auto fresh = quantise(residuals, trained, options);
+    const double fresh_cost = lagrangian(residuals, fresh, trained, options);
+    const double bit = options.lambda * options.step * options.step;
+    const double sending = bit * 8 * static_cast<double>(encode_codebook(trained).size() + packet_overhead);
+    if (!kept.indices.empty() && kept_cost <= fresh_cost + sending) {
+        use.cost_when_new = std::max(use.cost_when_new, kept_cost / count / worth_training);
+        return kept;
+    }
+    use.codebook = std::move(trained);
+    use.cost_when_new = fresh_cost / count;
+    ++use.number;
+    use.is_new = true;
+    return fresh;
+}
+
+// What the decoder adds up: predicted vertices and reference attributes plus quantised residuals.
+LatticeMesh decode_vertices(const LatticeMesh& mesh, const ReferenceMesh& reference,
+                            std::span<const LatticePoint> predicted, const OrderedResiduals& residuals) {
+    LatticeMesh out;
+    const auto& order = residuals.order;
+    for (std::size_t k = 0; k < order.vertex.size(); ++k) {
+        out.positions.push_back(add_residual(predicted[order.reference[k]], residuals.geometry.values[k]));
+        if (!mesh.colours.empty())
+            out.colours.push_back(add_colour(reference.mesh.colours[order.reference[k]], residuals.colour.values[k]));
+        if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[order.vertex[k]]);
+        if (!mesh.texcoords.empty()) out.texcoords.push_back(mesh.texcoords[order.vertex[k]]);
+    }
+    return out;
+}
+
+template <class Value>
+std::vector<Value> selected(const std::vector<Value>& values, const std::vector<std::uint32_t>& kept) {
+    std::vector<Value> out;
+    if (values.empty()) return out;
+    out.reserve(kept.size());
+    for (const auto k : kept) out.push_back(values[k]);
+    return out;
+}
+
+// Leaves out the residuals of merged vertices; the triangles follow into the numbering of E^ord.
+std::vector<Triangle> remove_duplicates(OrderedResiduals& residuals, const std::vector<Triangle>& triangles,
+                                        bool merge) {
+    auto& order = residuals.order;
+    const auto merging = merge ? find_duplicates(residuals.decoded) : no_duplicates(order.vertex.size());
+    Merging of_source;  // from the captured mesh's own numbering
+    of_source.number.resize(order.vertex.size());
+    for (std::size_t k = 0; k < order.vertex.size(); ++k) of_source.number[order.vertex[k]] = merging.number[k];
+    auto out = merged_triangles(triangles, of_source, merge);
+    if (merging.kept.size() < order.vertex.size()) {
+        order.vertex = selected(order.vertex, merging.kept);
+        order.reference = selected(order.reference, merging.kept);
+        residuals.geometry = {selected(residuals.geometry.indices, merging.kept),
+                              selected(residuals.geometry.values, merging.kept)};
+        residuals.colour = {selected(residuals.colour.indices, merging.kept),
+                            selected(residuals.colour.values, merging.kept)};
+        residuals.decoded = kept_vertices(residuals.decoded, merging.kept);
+    }
+    return out;
+}
+
+// The layers that need no connectivity.
+void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrameSource& source,
+                          std::span<const std::uint8_t> eligible, const Codebooks& codebooks, FramePayload& payload) {
+    const auto& reference = *source.reference;
+    const auto& transforms = source.motion->transforms;
+    std::vector<std::uint32_t> residuals_of(reference.mesh.positions.size(), 0);
+    for (const auto r : residuals.order.reference) ++residuals_of[r];
+    payload.set(Layer::transforms, encode_transforms(transforms));
+    payload.set(Layer::mapping, encode_mapping(residuals_of, reference.mapping_prior, eligible));
+    payload.set(Layer::geometry, encode_residuals(residuals.geometry, *codebooks.geometry.codebook));
+    if (!reference.mesh.colours.empty())
+        payload.set(Layer::colour, encode_residuals(residuals.colour, *codebooks.colour.codebook));
+    if (!reference.mesh.normals.empty()) {
+        const auto turned = selected(predict_normals(reference, transforms), residuals.order.reference);
+        payload.set(Layer::normals, encode_attribute_values(residuals.decoded.normals, turned));
+    }
+    if (!reference.mesh.texcoords.empty()) {
+        const auto of_reference = selected(reference.mesh.texcoords, residuals.order.reference);
+        payload.set(Layer::texcoords, encode_attribute_values(residuals.decoded.texcoords, of_reference));
+    }
+}
+
+// Residuals against the predicted mesh, quantised, and what they decode to.
+OrderedResiduals quantise_residuals(const EnhancedFrameSource& source, std::span<const std::uint8_t> eligible,
+                                    Codebooks& codebooks, const EnhancedFrameOptions& options, StageClock& clock) {
+    const auto& mesh = *source.mesh;
+    const auto& reference = *source.reference;
+    const auto& predicted = source.motion->predicted;
+    const auto reference_of_vertex = find_reference_vertices(
+        reference, *source.search, predicted, source.motion->transforms, mesh.positions, source.bone_of_vertex,
+        source.nearest, eligible, options.reference_choice, options.threads);
+    OrderedResiduals out;
+    out.order = order_residuals(reference_of_vertex, predicted.size());
+    clock.done("reference vertices");
+    out.geometry = quantise_with(codebooks.geometry, position_residuals(mesh, predicted, out.order), options.geometry);
+    if (!reference.mesh.colours.empty())
+        out.colour = quantise_with(codebooks.colour, colour_residuals(mesh, reference.mesh, out.order), options.colour);
+    out.decoded = decode_vertices(mesh, reference, predicted, out);
+    clock.done("quantisation");
+    return out;
+}
+
+}  // namespace
+
+EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
+                                           const EnhancedFrameOptions& options, std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    const auto& reference = *source.reference;
+    const unsigned threads = options.threads;
+    std::vector<std::uint8_t> eligible;
+    if (!source.coded_bones.empty()) eligible = vertices_of_coded_bones(reference, source.coded_bones);
+    auto residuals = quantise_residuals(source, eligible, codebooks, options, clock);
+    const auto triangles = remove_duplicates(residuals, source.mesh->triangles, options.merge_duplicates);
+    clock.done("duplicates");
+
+    EncodedEnhancedFrame out;
+    EncodedMtfan connectivity;
+    parallel_invoke(
+        threads, [&] { encode_vertex_layers(residuals, source, eligible, codebooks, out.payload); },
+        [&] {
+            connectivity = encode_mtfan(residuals.decoded.positions, triangles, options.nearest_vertices, threads);
+        });
+    clock.done("connectivity and entropy coding");
+
+    out.payload.set(Layer::fans, std::move(connectivity.fans));
+    out.payload.set(Layer::distance_orders, std::move(connectivity.distance_orders));
+    auto& header = out.payload.header;
+    header.source_vertices = source.source_vertices;
+    header.source_triangles = source.source_triangles;
+    header.vertices = static_cast<std::uint32_t>(residuals.decoded.positions.size());
+    header.triangles = static_cast<std::uint32_t>(connectivity.triangles.size());
+    header.geometry_codebook = codebooks.geometry.number;
+    header.colour_codebook = codebooks.colour.number;
+    out.mesh = std::move(residuals.decoded);
+    out.mesh.triangles = std::move(connectivity.triangles);
+    out.distance_order_counts = std::move(connectivity.distance_order_counts);
+    if (!source.coded_bones.empty()) {
+        out.payload.set(Layer::coded_bones, write_coded_bones(source.coded_bones));
+        out.mesh = zipper(out.mesh, animate(reference, source.motion->transforms, source.motion->predicted),
+                          still_vertices(reference, source.coded_bones), threads);
+        clock.done("zippering");
+    }
+    return out;
+}
+
+}  // namespace htvm::internal

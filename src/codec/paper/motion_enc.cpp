@@ -1,0 +1,138 @@
+#include "codec/paper/motion_enc.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "core/parallel.h"
+
+namespace htvm::internal {
+namespace {
+
+Eigen::Vector3d vector_of(LatticePoint p) { return {p.x * 1.0, p.y * 1.0, p.z * 1.0}; }
+
+LatticePoint rounded(const Eigen::Vector3d& v) {
+    auto whole = [](double c) {
+        return static_cast<std::int32_t>(std::lround(std::clamp(c, -1.0 * lattice_limit, 1.0 * lattice_limit)));
+    };
+    return {whole(v.x()), whole(v.y()), whole(v.z())};
+}
+
+std::vector<Eigen::Vector3f> vertex_normals(const LatticeMesh& mesh) {
+    std::vector<Eigen::Vector3f> normals(mesh.positions.size(), Eigen::Vector3f::Zero());
+    for (const auto& t : mesh.triangles) {
+        const Eigen::Vector3d a = vector_of(mesh.positions[t[0]]);
+        const Eigen::Vector3d b = vector_of(mesh.positions[t[1]]) - a, c = vector_of(mesh.positions[t[2]]) - a;
+        const Eigen::Vector3f area = b.cross(c).cast<float>();
+        for (const auto v : t) normals[v] += area;
+    }
+    for (auto& n : normals) n.normalize();
+    return normals;
+}
+
+}  // namespace
+
+double mean_edge(const LatticeMesh& mesh) {
+    double sum = 0;
+    for (const auto& t : mesh.triangles)
+        for (std::size_t i = 0; i < 3; ++i)
+            sum +=
+                std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i]], mesh.positions[t[(i + 1) % 3]])));
+    return mesh.triangles.empty() ? 0 : sum / (3.0 * static_cast<double>(mesh.triangles.size()));
+}
+
+double sampled_mean_edge(const LatticeMesh& mesh) {
+    constexpr std::size_t every = 8;
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); i += every) {
+        const auto& t = mesh.triangles[i];
+        sum +=
+            std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i % 3]], mesh.positions[t[(i + 1) % 3]])));
+        ++count;
+    }
+    return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+ReferenceSearch make_reference_search(const ReferenceMesh& reference) {
+    ReferenceSearch out;
+    const auto normals = vertex_normals(reference.mesh);
+    for (std::size_t bone = 0; bone < reference.pivots.size(); ++bone) {
+        std::vector<Point3f> points;
+        out.normals.emplace_back();
+        for (const auto v : reference.sub_meshes.of(bone)) {
+            points.push_back(point_of(reference.mesh.positions[v]));
+            out.normals.back().push_back(normals[v]);
+        }
+        out.sub_mesh.emplace_back(points);
+    }
+    return out;
+}
+
+Eigen::Matrix3d matrix_of(const QuantisedRotation& rotation) {
+    const auto m = rotation_matrix(rotation);
+    Eigen::Matrix3d out;
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column)
+            out(row, column) = static_cast<double>(m[static_cast<std::size_t>(3 * row + column)]) / (1 << matrix_bits);
+    return out;
+}
+
+QuantisedRotation quantise_orientation(const Rotation& orientation) {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> matrix(orientation.data());
+    const Eigen::Quaterniond q(Eigen::Matrix3d{matrix});
+    return quantise_rotation({q.w(), q.x(), q.y(), q.z()});
+}
+
+std::vector<RigidMotion> skeletal_motion(const ReferenceMesh& reference, const std::vector<Bone>& bones,
+                                         const CodedPose& pose) {
+    std::vector<RigidMotion> out;
+    for (std::size_t i = 0; i < bones.size(); ++i) {
+        RigidMotion motion;
+        motion.rotation = matrix_of(pose.orientations[i]) * matrix_of(reference.orientations[i]).transpose();
+        motion.shift =
+            vector_of(pose.joints[bones[i].first]) - motion.rotation * vector_of(reference.joints[bones[i].first]);
+        out.push_back(motion);
+    }
+    return out;
+}
+
+std::vector<RigidMotion> register_bones(const ReferenceSearch& reference, std::span<const LatticePoint> frame,
+                                        const SubMeshes& frame_sub_meshes, std::span<const RigidMotion> skeletal,
+                                        std::span<const RigidMotion> before, const RegistrationOptions& options,
+                                        unsigned threads) {
+    std::vector<RigidMotion> out(skeletal.begin(), skeletal.end());
+    std::atomic<std::size_t> next{0};
+    auto work = [&](std::size_t, std::size_t) {
+        for (std::size_t bone = next++; bone < out.size(); bone = next++) {
+            std::vector<Point3f> points;
+            for (const auto v : frame_sub_meshes.of(bone)) points.push_back(point_of(frame[v]));
+            const auto& sub_mesh = reference.sub_mesh[bone];
+            if (!before.empty() && registration_error(sub_mesh, points, before[bone], options) <
+                                       registration_error(sub_mesh, points, out[bone], options))
+                out[bone] = before[bone];
+            out[bone] = register_points(sub_mesh, reference.normals[bone], points, out[bone], options);
+        }
+    };
+    // Each piece takes the next bone that is left: sub-meshes differ much in size.
+    parallel_for(std::min<std::size_t>(threads, out.size()), threads, 1, work);
+    return out;
+}
+
+QuantisedTransform quantise_motion(const RigidMotion& motion, LatticePoint pivot) {
+    const Eigen::Quaterniond q(motion.rotation);
+    QuantisedTransform out;
+    out.rotation = quantise_rotation({q.w(), q.x(), q.y(), q.z()});
+    out.shift = rounded(motion(vector_of(pivot)) - vector_of(pivot));
+    return out;
+}
+
+RigidMotion motion_of(const QuantisedTransform& transform, LatticePoint pivot) {
+    RigidMotion out;
+    out.rotation = matrix_of(transform.rotation);
+    out.shift = vector_of(pivot) + vector_of(transform.shift) - out.rotation * vector_of(pivot);
+    return out;
+}
+
+}  // namespace htvm::internal

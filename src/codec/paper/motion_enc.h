@@ -1,0 +1,42 @@
+// Per-bone motion of an EP-frame against its reference: skeletal prediction (paper, eq. 4), refined by registration of
+// the bone's sub-meshes (eq. 5). Encoder side: what comes out is quantised before it predicts anything.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "codec/reference/prediction.h"
+#include "codec/reference/transforms.h"
+#include "surface/registration.h"
+
+namespace htvm::internal {
+
+// The reference's sub-meshes, ready for nearest-neighbour search; built once an I-frame. Lattice units.
+struct ReferenceSearch {
+    std::vector<NearestPoints> sub_mesh;                // one a bone
+    std::vector<std::vector<Eigen::Vector3f>> normals;  // of the sub-mesh's vertices, from the triangles around them
+};
+ReferenceSearch make_reference_search(const ReferenceMesh& reference);
+
+// The mean length of the triangles' sides, lattice units; 0 without triangles.
+double mean_edge(const LatticeMesh& mesh);
+// About that, from every eighth triangle.
+double sampled_mean_edge(const LatticeMesh& mesh);
+
+// eq. 4: the motion of each bone from the reference's pose to this frame's.
+std::vector<RigidMotion> skeletal_motion(const ReferenceMesh& reference, const std::vector<Bone>& bones,
+                                         const CodedPose& pose);
+
+// eq. 5: starts each bone from the better of its skeletal motion and its motion in the frame before (empty at first),
+// and registers the reference's sub-mesh to the frame's. frame_sub_meshes: the frame's own vertices by bone.
+std::vector<RigidMotion> register_bones(const ReferenceSearch& reference, std::span<const LatticePoint> frame,
+                                        const SubMeshes& frame_sub_meshes, std::span<const RigidMotion> skeletal,
+                                        std::span<const RigidMotion> before, const RegistrationOptions& options,
+                                        unsigned threads);
+
+QuantisedTransform quantise_motion(const RigidMotion& motion, LatticePoint pivot);
+RigidMotion motion_of(const QuantisedTransform& transform, LatticePoint pivot);
+QuantisedRotation quantise_orientation(const Rotation& orientation);
+Eigen::Matrix3d matrix_of(const QuantisedRotation& rotation);
+
+}  // namespace htvm::internal

@@ -1,0 +1,429 @@
+#include "codec/reference/deformation_nodes.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <utility>
+
+namespace htvm::internal {
+namespace {
+
+using Distance = std::uint32_t;
+constexpr Distance unreached = std::numeric_limits<Distance>::max();
+
+// floor(sqrt(value)) for values up to 2^52, exact: the double root is off by at most one.
+std::uint32_t integer_root(std::int64_t value) {
+    auto root = static_cast<std::int64_t>(std::sqrt(static_cast<double>(value)));
+    while (root * root > value) --root;
+    while ((root + 1) * (root + 1) <= value) ++root;
+    return static_cast<std::uint32_t>(root);
+}
+
+struct Step {
+    std::uint32_t vertex;
+    Distance length;
+};
+
+// Where one can go from each vertex, in compressed rows.
+struct Graph {
+    std::vector<std::uint32_t> first;
+    std::vector<Step> steps;
+    std::span<const Step> from(std::uint32_t vertex) const {
+        return std::span(steps).subspan(first[vertex], first[vertex + 1] - first[vertex]);
+    }
+};
+
+using VertexPair = std::pair<std::uint32_t, std::uint32_t>;
+
+// Vertices by the cell of a cubic grid they lie in; within a cell ascending.
+class Cells {
+public:
+    using Cell = std::array<std::int32_t, 3>;
+    Cells(std::span<const LatticePoint> positions, std::int32_t side) : positions_(positions), side_(side) {
+        entries_.reserve(positions.size());
+        for (std::uint32_t v = 0; v < positions.size(); ++v) entries_.push_back({cell_of(positions[v]), v});
+        std::sort(entries_.begin(), entries_.end());
+    }
+    Cell cell_of(LatticePoint p) const { return {down(p.x), down(p.y), down(p.z)}; }
+    // Up to `most` vertices of a cell, through visit(vertex).
+    template <class Visit>
+    void visit(const Cell& cell, std::size_t most, const Visit& visit) const {
+        auto it = std::lower_bound(entries_.begin(), entries_.end(), std::pair{cell, std::uint32_t{0}});
+        for (; it != entries_.end() && it->first == cell && most > 0; ++it, --most) visit(it->second);
+    }
+
+private:
+    std::int32_t down(std::int32_t c) const { return c >= 0 ? c / side_ : -((-c - 1) / side_) - 1; }
+    std::span<const LatticePoint> positions_;
+    std::int32_t side_;
+    std::vector<std::pair<Cell, std::uint32_t>> entries_;
+};
+
+// The connected piece of each vertex: the lowest vertex in it.
+class Pieces {
+public:
+    explicit Pieces(std::size_t vertices) : parent_(vertices) {
+        for (std::uint32_t v = 0; v < vertices; ++v) parent_[v] = v;
+    }
+    std::uint32_t of(std::uint32_t v) {
+        while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
+        return v;
+    }
+    bool join(std::uint32_t a, std::uint32_t b) {
+        a = of(a), b = of(b);
+        if (a == b) return false;
+        parent_[std::max(a, b)] = std::min(a, b);
+        return true;
+    }
+
+private:
+    std::vector<std::uint32_t> parent_;
+};
+
+// Vertices at the same place, each with the next of them.
+void link_coincident(std::span<const LatticePoint> positions, Pieces& pieces, std::vector<VertexPair>& links) {
+    std::vector<std::pair<LatticePoint, std::uint32_t>> order;
+    order.reserve(positions.size());
+    for (std::uint32_t v = 0; v < positions.size(); ++v) order.emplace_back(positions[v], v);
+    std::sort(order.begin(), order.end());
+    for (std::size_t i = 1; i < order.size(); ++i)
+        if (order[i - 1].first == order[i].first) {
+            links.emplace_back(order[i - 1].second, order[i].second);
+            pieces.join(order[i - 1].second, order[i].second);
+        }
+}
+
+// Each vertex with the nearest one of another piece within reach. Crowded cells are looked into only in part.
+void link_near(std::span<const LatticePoint> positions, std::int32_t reach, Pieces& pieces,
+               std::vector<VertexPair>& links) {
+    bool several = false;
+    for (std::uint32_t v = 1; v < positions.size() && !several; ++v) several = pieces.of(v) != pieces.of(0);
+    if (!several || reach <= 0) return;
+    constexpr std::size_t most_a_cell = 24;
+    const Cells cells(positions, reach);
+    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+        const auto middle = cells.cell_of(positions[v]);
+        const std::uint32_t piece = pieces.of(v);
+        std::pair<std::int64_t, std::uint32_t> best{std::int64_t{reach} * reach, unreached};
+        for (int c = 0; c < 27; ++c)
+            cells.visit({middle[0] + c % 3 - 1, middle[1] + c / 3 % 3 - 1, middle[2] + c / 9 - 1}, most_a_cell,
+                        [&](std::uint32_t other) {
+                            if (pieces.of(other) == piece) return;
+                            best = std::min(best, {squared_distance(positions[v], positions[other]), other});
+                        });
+        if (best.second != unreached) links.emplace_back(v, best.second);
+    }
+}
+
+// An edge between two triangles comes twice in a row; measures those that stay.
+void keep_each_step_once(std::span<const LatticePoint> positions, Graph& graph) {
+    std::uint32_t kept = 0;
+    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+        const auto begin = graph.steps.begin() + graph.first[v], end = graph.steps.begin() + graph.first[v + 1];
+        std::sort(begin, end, [](const Step& a, const Step& b) { return a.vertex < b.vertex; });
+        graph.first[v] = kept;
+        for (auto it = begin; it != end; ++it) {
+            if (it != begin && it->vertex == graph.steps[kept - 1].vertex) continue;
+            graph.steps[kept++] = {it->vertex, integer_root(squared_distance(positions[v], positions[it->vertex]))};
+        }
+    }
+    graph.first.back() = kept;
+    graph.steps.resize(kept);
+}
+
+Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach) {
+    Pieces pieces(positions.size());
+    for (const auto& t : triangles) {
+        pieces.join(t[0], t[1]);
+        pieces.join(t[1], t[2]);
+    }
+    std::vector<VertexPair> links;
+    link_coincident(positions, pieces, links);
+    link_near(positions, reach, pieces, links);
+
+    Graph graph;
+    graph.first.assign(positions.size() + 1, 0);
+    auto over_all = [&](const auto& visit) {
+        for (const auto& t : triangles)
+            for (std::size_t k = 0; k < 3; ++k)
+                if (t[k] != t[(k + 1) % 3]) visit(t[k], t[(k + 1) % 3]);
+        for (const auto& [a, b] : links) visit(a, b);
+    };
+    over_all([&](std::uint32_t a, std::uint32_t b) { ++graph.first[a + 1], ++graph.first[b + 1]; });
+    for (std::size_t v = 1; v < graph.first.size(); ++v) graph.first[v] += graph.first[v - 1];
+    graph.steps.resize(graph.first.back());
+    std::vector<std::uint32_t> next(graph.first.begin(), graph.first.end() - 1);
+    over_all([&](std::uint32_t a, std::uint32_t b) {
+        graph.steps[next[a]++].vertex = b;
+        graph.steps[next[b]++].vertex = a;
+    });
+    keep_each_step_once(positions, graph);
+    return graph;
+}
+
+// Which vertices the nodes so far reach within the spacing, and the nodes' vertices.
+struct Cover {
+    std::vector<Distance> distance;
+    std::vector<std::uint8_t> reached;  // how many nodes came nearer to each vertex than those before
+    std::vector<std::uint32_t> nodes;
+};
+// On surfaces a few nodes do. A star whose rays are nodes, each a little nearer to the hub than the last, could make
+// every one of them search all that lies behind the hub.
+constexpr std::uint8_t most_reached = 16;
+
+// Dijkstra's algorithm from a new node, no further than spacing and only where it is nearer than the nodes before it.
+void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover& cover,
+                std::vector<std::pair<Distance, std::uint32_t>>& heap) {
+    cover.nodes.push_back(start);
+    cover.distance[start] = 0;
+    heap.assign(1, {0, start});
+    while (!heap.empty()) {
+        std::pop_heap(heap.begin(), heap.end(), std::greater<>());
+        const auto [distance, vertex] = heap.back();
+        heap.pop_back();
+        if (distance != cover.distance[vertex]) continue;
+        ++cover.reached[vertex];
+        for (const Step& step : graph.from(vertex)) {
+            const Distance there = distance + step.length;  // both are below 2^26
+            if (there > spacing || there >= cover.distance[step.vertex]) continue;
+            if (cover.reached[step.vertex] == most_reached) continue;
+            cover.distance[step.vertex] = there;
+            heap.emplace_back(there, step.vertex);
+            std::push_heap(heap.begin(), heap.end(), std::greater<>());
+        }
+    }
+}
+
+// Covers all vertices, or stops when that takes more than most_nodes.
+bool cover_all(const Graph& graph, Distance spacing, std::size_t most_nodes, Cover& cover) {
+    const std::size_t vertices = graph.first.size() - 1;
+    cover.distance.assign(vertices, unreached);
+    cover.reached.assign(vertices, 0);
+    cover.nodes.clear();
+    std::vector<std::pair<Distance, std::uint32_t>> heap;
+    for (std::uint32_t v = 0; v < vertices; ++v) {
+        if (cover.distance[v] != unreached) continue;
+        if (cover.nodes.size() == most_nodes) return false;
+        reach_from(graph, v, spacing, cover, heap);
+    }
+    return true;
+}
+
+// The nearest few nodes of a vertex along the mesh: those that move it, and the next, which says how far they count.
+struct NearNode {
+    Distance distance = 0;
+    std::uint16_t node = 0;
+    auto operator<=>(const NearNode&) const = default;
+};
+constexpr std::size_t near_nodes = handles_a_vertex + 1;
+struct NearNodes {
+    std::array<NearNode, near_nodes> near;
+    std::uint8_t count = 0;
+};
+
+// Enters a node where it is one of the nearest, or nearer than known; says whether.
+bool enter(NearNodes& list, NearNode candidate) {
+    if (list.count == near_nodes && list.near[near_nodes - 1] <= candidate) return false;
+    std::size_t place = 0;
+    while (place < list.count && list.near[place].node != candidate.node) ++place;
+    if (place < list.count && list.near[place] <= candidate) return false;
+    if (place == list.count && list.count < near_nodes) ++list.count;
+    place = std::min<std::size_t>(place, near_nodes - 1);
+    for (; place > 0 && candidate < list.near[place - 1]; --place) list.near[place] = list.near[place - 1];
+    list.near[place] = candidate;
+    return true;
+}
+
+struct Visit {
+    std::uint32_t vertex = 0;
+    NearNode near;
+};
+
+// A queue by distance, then by node, for Dijkstra's algorithm, which never asks for less than it got last (Ahuja,
+// Mehlhorn, Orlin, Tarjan: Faster algorithms for the shortest path problem, 1990): visits wait by the highest bit in
+// which they differ from the last one, and move to lower bits when their turn comes near. By node too, as a vertex
+// would else be visited again for every lower node at the same distance.
+class RadixQueue {
+public:
+    bool empty() const { return size_ == 0; }
+    void push(const Visit& visit) {
+        waiting_[static_cast<std::size_t>(std::bit_width(key(visit) ^ last_))].push_back(visit);
+        ++size_;
+    }
+    Visit pop() {
+        if (waiting_[0].empty()) refill();
+        const Visit visit = waiting_[0].back();
+        waiting_[0].pop_back();
+        --size_;
+        return visit;
+    }
+
+private:
+    static std::uint64_t key(const Visit& visit) { return std::uint64_t{visit.near.distance} << 16 | visit.near.node; }
+    void refill() {
+        std::size_t bit = 1;
+        while (waiting_[bit].empty()) ++bit;
+        last_ = std::numeric_limits<std::uint64_t>::max();
+        for (const Visit& visit : waiting_[bit]) last_ = std::min(last_, key(visit));
+        for (const Visit& visit : waiting_[bit])
+            waiting_[static_cast<std::size_t>(std::bit_width(key(visit) ^ last_))].push_back(visit);
+        waiting_[bit].clear();
+    }
+    std::array<std::vector<Visit>, 49> waiting_;
+    std::uint64_t last_ = 0;
+    std::size_t size_ = 0;
+};
+
+// The shortest ways from all nodes at once. A node that is not among a vertex's nearest is not among those of any
+// vertex beyond it either, so the lists are exact although they are short.
+std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::uint32_t>& nodes) {
+    std::vector<NearNodes> lists(graph.first.size() - 1);
+    RadixQueue queue;
+    auto reach = [&](std::uint32_t vertex, NearNode near) {
+        if (enter(lists[vertex], near)) queue.push({vertex, near});
+    };
+    for (std::size_t n = 0; n < nodes.size(); ++n) reach(nodes[n], {0, static_cast<std::uint16_t>(n)});
+    while (!queue.empty()) {
+        const Visit visit = queue.pop();
+        const NearNodes& list = lists[visit.vertex];
+        const auto end = list.near.begin() + list.count;
+        if (std::find(list.near.begin(), end, visit.near) == end) continue;
+        for (const Step& step : graph.from(visit.vertex))
+            if (visit.near.distance <= unreached / 2)
+                reach(step.vertex, {visit.near.distance + step.length, visit.near.node});
+    }
+    return lists;
+}
+
+// Sumner's weights, (1 - distance / distance of the next node)^2, made to sum to one: the rest goes to the nearest.
+VertexWeights weights_of(const NearNodes& list, Distance spacing) {
+    const std::size_t count = std::min<std::size_t>(list.count, handles_a_vertex);
+    const Distance last = list.near[count - 1].distance;
+    const Distance zero = list.count == near_nodes ? std::max<Distance>(list.near[near_nodes - 1].distance, 1)
+                                                   : std::max<Distance>(2 * spacing, last + spacing / 4 + 1);
+    std::array<std::uint64_t, handles_a_vertex> share{};
+    std::uint64_t sum = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+        // Twelve bits before squaring: the sum fits easily.
+        const std::uint64_t nearness = std::uint64_t{zero - list.near[k].distance} * 4096 / zero;
+        share[k] = nearness * nearness;
+        sum += share[k];
+    }
+    std::array<std::pair<std::int32_t, std::uint16_t>, handles_a_vertex> entries{};  // weight below zero, node
+    std::int32_t rest = 1 << weight_bits;
+    for (std::size_t k = 1; k < count; ++k) {
+        const auto weight = sum == 0 ? 0 : static_cast<std::int32_t>((share[k] << weight_bits) / sum);
+        entries[k] = {-weight, list.near[k].node};
+        rest -= weight;
+    }
+    entries[0] = {-rest, list.near[0].node};
+    std::sort(entries.begin(), entries.end());
+    VertexWeights out;
+    for (std::size_t k = 0; k < handles_a_vertex && entries[k].first < 0; ++k) {
+        out.handle[k] = entries[k].second;
+        out.weight[k] = static_cast<std::uint16_t>(-entries[k].first);
+    }
+    return out;
+}
+
+// Vertices that no node reaches go to the node nearest in space, the lower of equally near ones.
+void take_nearest_in_space(std::span<const LatticePoint> positions, const std::vector<std::uint32_t>& nodes,
+                           std::vector<NearNodes>& lists) {
+    for (std::size_t v = 0; v < positions.size(); ++v) {
+        if (lists[v].count > 0) continue;
+        std::pair<std::int64_t, std::size_t> best{std::numeric_limits<std::int64_t>::max(), 0};
+        for (std::size_t n = 0; n < nodes.size(); ++n)
+            best = std::min(best, {squared_distance(positions[v], positions[nodes[n]]), n});
+        lists[v].near[0] = {0, static_cast<std::uint16_t>(best.second)};
+        lists[v].count = 1;
+    }
+}
+
+void sort_and_merge(std::vector<NodePair>& pairs) {
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+}
+
+std::vector<NodePair> touching_regions(const Graph& graph, const std::vector<std::uint16_t>& node) {
+    std::vector<NodePair> pairs;
+    for (std::uint32_t v = 0; v < node.size(); ++v)
+        for (const Step& step : graph.from(v))
+            if (node[v] < node[step.vertex]) pairs.push_back({node[v], node[step.vertex]});
+    sort_and_merge(pairs);
+    return pairs;
+}
+
+// Ties the connected groups of nodes together by the shortest pairs that do it (Prim 1957, existing pairs for nothing).
+void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>& pairs) {
+    const std::size_t count = places.size();
+    if (count < 2) return;
+    Pieces groups(count);
+    for (const auto& pair : pairs) groups.join(pair.first, pair.second);
+    std::vector<std::int64_t> nearest(count, std::numeric_limits<std::int64_t>::max());
+    std::vector<std::uint32_t> from(count, 0);
+    std::vector<bool> inside(count, false);
+    std::vector<NodePair> added;
+    auto take_group = [&](std::uint32_t group) {
+        for (std::uint32_t n = 0; n < count; ++n) {
+            if (groups.of(n) != group) continue;
+            inside[n] = true;
+            for (std::uint32_t other = 0; other < count; ++other) {
+                const auto d = squared_distance(places[n], places[other]);
+                if (inside[other] || d >= nearest[other]) continue;
+                nearest[other] = d;
+                from[other] = n;
+            }
+        }
+    };
+    take_group(groups.of(0));
+    for (;;) {
+        std::uint32_t next = 0;
+        bool found = false;
+        for (std::uint32_t n = 0; n < count; ++n)
+            if (!inside[n] && (!found || nearest[n] < nearest[next])) next = n, found = true;
+        if (!found) break;
+        added.push_back({static_cast<std::uint16_t>(std::min(next, from[next])),
+                         static_cast<std::uint16_t>(std::max(next, from[next]))});
+        take_group(groups.of(next));
+    }
+    pairs.insert(pairs.end(), added.begin(), added.end());
+    sort_and_merge(pairs);
+}
+
+}  // namespace
+
+DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
+                                          const DeformationNodeOptions& options) {
+    DeformationNodes nodes;
+    if (positions.empty()) return nodes;
+    const Graph graph = mesh_graph(positions, triangles, options.link_reach);
+    const std::size_t most = std::clamp<std::size_t>(options.most_nodes, 1, most_deformation_nodes);
+    Cover cover;
+    // Eight times 1.5 makes the spacing 25 times as wide.
+    std::int64_t spacing = std::clamp<std::int64_t>(options.spacing, 1, 2 * lattice_limit);
+    bool covered = cover_all(graph, static_cast<Distance>(spacing), most, cover);
+    for (int attempt = 0; attempt < 8 && !covered; ++attempt) {
+        spacing = std::min<std::int64_t>(spacing + spacing / 2 + 1, 2 * lattice_limit);
+        covered = cover_all(graph, static_cast<Distance>(spacing), most, cover);
+    }
+    auto lists = nearest_nodes(graph, cover.nodes);
+    if (!covered) take_nearest_in_space(positions, cover.nodes, lists);
+
+    nodes.vertex = std::move(cover.nodes);
+    nodes.handle_of_vertex.reserve(positions.size());
+    nodes.weights.reserve(positions.size());
+    for (const auto& list : lists) {
+        nodes.handle_of_vertex.push_back(list.near[0].node);
+        nodes.weights.push_back(weights_of(list, static_cast<Distance>(spacing)));
+    }
+    nodes.neighbours = touching_regions(graph, nodes.handle_of_vertex);
+    std::vector<LatticePoint> places;
+    for (const std::uint32_t v : nodes.vertex) places.push_back(positions[v]);
+    connect_groups(places, nodes.neighbours);
+    return nodes;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,133 @@
+#include "codec/reference/lattice_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace htvm::internal {
+namespace {
+
+constexpr double normal_scale = 127.0;
+constexpr double texcoord_scale = 4096.0;
+constexpr double texcoord_limit = 4096.0;
+// Half the lattice, so that predictions and residuals of what is captured stay on it.
+constexpr std::int32_t capture_limit = lattice_limit / 2;
+
+bool finite(const Vector3f& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
+
+template <class Values>
+Result<void> check_length(const Values& values, std::size_t vertices, const char* what) {
+    if (values.empty() || values.size() == vertices) return {};
+    return fail(ErrorKind::bad_input, std::string("the mesh has ") + std::to_string(vertices) + " vertices but " +
+                                          std::to_string(values.size()) + " " + what);
+}
+
+Result<void> check(const Mesh& mesh) {
+    if (mesh.positions.size() > 0x7FFFFFFF || mesh.triangles.size() > 0x7FFFFFFF)
+        return fail(ErrorKind::limit, "the mesh has more than 2^31 - 1 vertices or triangles");
+    const std::size_t n = mesh.positions.size();
+    if (auto ok = check_length(mesh.colours, n, "colours"); !ok) return ok;
+    if (auto ok = check_length(mesh.normals, n, "normals"); !ok) return ok;
+    if (auto ok = check_length(mesh.texcoords, n, "texture coordinates"); !ok) return ok;
+    for (std::size_t k = 0; k < mesh.triangles.size(); ++k)
+        for (const auto index : mesh.triangles[k])
+            if (index >= n)
+                return fail(ErrorKind::bad_input, "triangle " + std::to_string(k) + " names vertex " +
+                                                      std::to_string(index) + " of " + std::to_string(n));
+    return {};
+}
+
+std::int32_t rounded(double v) { return static_cast<std::int32_t>(std::floor(v + 0.5)); }
+
+}  // namespace
+
+Result<std::array<std::int32_t, 3>> lattice_origin(const Mesh& mesh) {
+    std::array<std::int32_t, 3> origin{};
+    if (mesh.positions.empty()) return origin;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        double low = mesh.positions[0][axis], high = low;
+        for (const auto& p : mesh.positions) {
+            low = std::min(low, static_cast<double>(p[axis]));
+            high = std::max(high, static_cast<double>(p[axis]));
+        }
+        const double middle = (low + high) / 2;
+        if (!(std::abs(middle) < 1e9))
+            return fail(
+                ErrorKind::bad_input,
+                "the first mesh has a coordinate that is not finite, or lies more than 1000 km from the origin");
+        origin[axis] = rounded(middle);
+    }
+    return origin;
+}
+
+Result<LatticePoint> to_lattice(const std::array<double, 3>& point, const Lattice& lattice) {
+    const double scale = static_cast<double>(1 << lattice.bits);
+    std::array<std::int32_t, 3> out{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double v = (point[axis] - lattice.origin[axis]) * scale;
+        if (!(std::abs(v) < capture_limit))
+            return fail(ErrorKind::bad_input, "a point lies more than " +
+                                                  std::to_string((capture_limit >> lattice.bits) / 1000) +
+                                                  " m from where the sequence began, or is not finite");
+        out[axis] = rounded(v);
+    }
+    return LatticePoint{out[0], out[1], out[2]};
+}
+
+Result<LatticeMesh> to_lattice(const Mesh& mesh, const Lattice& lattice) {
+    if (auto ok = check(mesh); !ok) return tl::unexpected(ok.error());
+    LatticeMesh out;
+    out.triangles = mesh.triangles;
+    out.colours = mesh.colours;
+    out.positions.reserve(mesh.positions.size());
+    for (std::size_t k = 0; k < mesh.positions.size(); ++k) {
+        const auto& p = mesh.positions[k];
+        auto point = to_lattice(std::array<double, 3>{p[0], p[1], p[2]}, lattice);
+        if (!point) return fail(point.error().kind, "vertex " + std::to_string(k) + ": " + point.error().message);
+        out.positions.push_back(*point);
+    }
+    for (std::size_t k = 0; k < mesh.normals.size(); ++k) {
+        const auto& n = mesh.normals[k];
+        if (!finite(n) || std::abs(n[0]) > 8 || std::abs(n[1]) > 8 || std::abs(n[2]) > 8)
+            return fail(ErrorKind::bad_input,
+                        "vertex " + std::to_string(k) + " has a normal that is not a unit vector");
+        out.normals.push_back(
+            {rounded(n[0] * normal_scale), rounded(n[1] * normal_scale), rounded(n[2] * normal_scale)});
+    }
+    for (std::size_t k = 0; k < mesh.texcoords.size(); ++k) {
+        const auto& t = mesh.texcoords[k];
+        if (!(std::abs(t[0]) < texcoord_limit) || !(std::abs(t[1]) < texcoord_limit))
+            return fail(ErrorKind::bad_input,
+                        "vertex " + std::to_string(k) + " has a texture coordinate beyond 4096 or not finite");
+        out.texcoords.push_back({rounded(t[0] * texcoord_scale), rounded(t[1] * texcoord_scale)});
+    }
+    return out;
+}
+
+std::array<double, 3> to_millimetres(LatticePoint p, const Lattice& lattice) {
+    const double step = lattice.step();
+    return {lattice.origin[0] + p.x * step, lattice.origin[1] + p.y * step, lattice.origin[2] + p.z * step};
+}
+
+Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice) {
+    Mesh out;
+    out.triangles = mesh.triangles;
+    out.colours = mesh.colours;
+    out.positions.reserve(mesh.positions.size());
+    for (const auto& p : mesh.positions) {
+        const auto mm = to_millimetres(p, lattice);
+        out.positions.push_back({static_cast<float>(mm[0]), static_cast<float>(mm[1]), static_cast<float>(mm[2])});
+    }
+    for (const auto& n : mesh.normals) {
+        const double x = n[0], y = n[1], z = n[2];
+        const double length = std::sqrt(x * x + y * y + z * z);
+        const double scale = length > 0 ? 1.0 / length : 0.0;
+        out.normals.push_back(
+            {static_cast<float>(x * scale), static_cast<float>(y * scale), static_cast<float>(z * scale)});
+    }
+    for (const auto& t : mesh.texcoords)
+        out.texcoords.push_back({static_cast<float>(t[0] / texcoord_scale), static_cast<float>(t[1] / texcoord_scale)});
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,44 @@
+// Geometry prediction: the reference mesh moved to another frame, bone by bone (paper, section IV-B, eq. 4-5).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "codec/reference/blending.h"
+#include "codec/reference/lattice_mesh.h"
+#include "codec/paper/mapping.h"
+#include "codec/reference/rigid_transform.h"
+#include "codec/reference/skinning.h"
+#include "core/handles.h"
+
+namespace htvm::internal {
+
+// What every EP-frame refers to: the decoded mesh of the last I-frame, skinned, with what both sides derive from it.
+struct ReferenceMesh {
+    LatticeMesh mesh;
+    std::vector<BoneIndex> bone_of_vertex;
+    SubMeshes sub_meshes;
+    HandleWeights weights;                        // of the bones, one a vertex; empty: each vertex moves with its bone
+    std::vector<LatticePoint> pivots;             // one a bone: the mean of its sub-mesh's vertices, or its first joint
+    std::vector<LatticePoint> joints;             // of the I-frame's pose
+    std::vector<QuantisedRotation> orientations;  // T_I^i of each bone
+    MappingPrior mapping_prior;
+    std::uint32_t frame = 0;
+};
+
+// Skins the decoded I-mesh and derives the pivots. bones must not be empty. weight_width, lattice units, is that of
+// smooth_weights(); 0: rigid.
+ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
+                             std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
+                             std::int32_t weight_width, std::uint32_t frame, unsigned threads);
+
+// M_P: the reference vertices moved by their bones' transforms, one transform a bone. A vertex of several bones goes to
+// the weighted mean of where they move it, rounded once and kept within the lattice.
+std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
+                                            std::span<const QuantisedTransform> transforms, unsigned threads);
+
+// The reference's normals turned by their bones' transforms, blended likewise.
+std::vector<QuantisedNormal> predict_normals(const ReferenceMesh& reference,
+                                             std::span<const QuantisedTransform> transforms);
+
+}  // namespace htvm::internal

@@ -1,0 +1,227 @@
+#include "codec/reference/vertex_hierarchy.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace htvm::internal {
+
+namespace {
+
+constexpr std::size_t most_elements = std::size_t{1} << 28;
+
+using Vector = std::array<double, 3>;
+
+Vector operator-(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// What the next coarser level is built from.
+struct Layer {
+    std::vector<std::uint32_t> vertices;  // below each node
+    std::vector<Vector> centre;           // of them
+    std::vector<std::uint32_t> first_neighbour, neighbours;
+
+    std::size_t size() const { return vertices.size(); }
+    std::span<const std::uint32_t> around(std::size_t node) const {
+        return std::span(neighbours).subspan(first_neighbour[node], first_neighbour[node + 1] - first_neighbour[node]);
+    }
+};
+
+Layer layer_of_vertices(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
+    Layer layer;
+    const std::size_t n = positions.size();
+    layer.vertices.assign(n, 1);
+    layer.centre.reserve(n);
+    for (const LatticePoint p : positions)
+        layer.centre.push_back({static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)});
+    std::vector<std::uint32_t> first(n + 1, 0), used;
+    for (const Triangle& t : triangles)
+        for (const std::uint32_t v : t) ++first[v + 1];
+    for (std::size_t v = 0; v < n; ++v) first[v + 1] += first[v];
+    std::vector<std::uint32_t> at(first.begin(), first.end() - 1), corners(triangles.size() * 3);
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (const std::uint32_t v : triangles[t]) corners[at[v]++] = static_cast<std::uint32_t>(t);
+    std::vector<std::uint32_t> seen(n, no_node);
+    layer.first_neighbour.assign(1, 0);
+    layer.first_neighbour.reserve(n + 1);
+    layer.neighbours.reserve(triangles.size() * 3 + n);
+    for (std::uint32_t v = 0; v < n; ++v) {
+        seen[v] = v;
+        for (std::uint32_t k = first[v]; k < first[v + 1]; ++k)
+            for (const std::uint32_t u : triangles[corners[k]]) {
+                if (seen[u] == v) continue;
+                seen[u] = v;
+                layer.neighbours.push_back(u);
+            }
+        layer.first_neighbour.push_back(static_cast<std::uint32_t>(layer.neighbours.size()));
+    }
+    return layer;
+}
+
+// Interleaves the bits of the cell of a point, for an order in which near points are mostly near.
+std::uint64_t morton_code(const Vector& p) {
+    std::uint64_t code = 0;
+    std::array<std::uint32_t, 3> cell{};
+    for (std::size_t c = 0; c < 3; ++c)  // 21 bits each
+        cell[c] = static_cast<std::uint32_t>((p[c] + lattice_limit) / 32.0);
+    for (int bit = 20; bit >= 0; --bit)
+        for (std::size_t c = 0; c < 3; ++c) code = code * 2 + ((cell[c] >> bit) & 1);
+    return code;
+}
+
+// The partner of each node, or no_node.
+std::vector<std::uint32_t> match(const Layer& layer) {
+    const std::size_t n = layer.size();
+    std::vector<std::uint32_t> partner(n, no_node), order(n);
+    for (std::uint32_t v = 0; v < n; ++v) order[v] = v;
+    std::stable_sort(order.begin(), order.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return layer.vertices[a] < layer.vertices[b]; });
+    std::size_t alone = n;
+    for (const std::uint32_t v : order) {
+        if (partner[v] != no_node) continue;
+        std::uint32_t best = no_node;
+        double least = 0;
+        for (const std::uint32_t u : layer.around(v)) {
+            if (partner[u] != no_node) continue;
+            const Vector apart = layer.centre[u] - layer.centre[v];
+            const double score = (dot(apart, apart) + 1.0) * layer.vertices[u];
+            if (best != no_node && score >= least) continue;
+            best = u;
+            least = score;
+        }
+        if (best == no_node) continue;
+        partner[v] = best;
+        partner[best] = v;
+        alone -= 2;
+    }
+    if (alone <= n / 2) return partner;
+    // Too few pairs: the nodes left over pair up with who is near in space.
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> left;
+    left.reserve(alone);
+    for (std::uint32_t v = 0; v < n; ++v)
+        if (partner[v] == no_node) left.emplace_back(morton_code(layer.centre[v]), v);
+    std::sort(left.begin(), left.end());
+    for (std::size_t i = 0; i + 1 < left.size(); i += 2) {
+        partner[left[i].second] = left[i + 1].second;
+        partner[left[i + 1].second] = left[i].second;
+    }
+    return partner;
+}
+
+// Joins partners. `level` gets everything but the slopes; returns the layer that it makes.
+Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, HierarchyLevel& level) {
+    Layer coarse;
+    std::vector<std::uint32_t> parent(fine.size());
+    for (std::uint32_t v = 0; v < fine.size(); ++v) {
+        const std::uint32_t u = partner[v];
+        if (u != no_node && u < v) continue;
+        const auto node = static_cast<std::uint32_t>(level.first.size());
+        const std::uint32_t a = fine.vertices[v], b = u == no_node ? 0 : fine.vertices[u];
+        parent[v] = node;
+        if (u != no_node) parent[u] = node;
+        level.first.push_back(v);
+        level.second.push_back(u);
+        Vector centre = fine.centre[v];
+        if (u != no_node)
+            for (std::size_t c = 0; c < 3; ++c) centre[c] += (fine.centre[u][c] - centre[c]) * b / (1.0 * a + b);
+        coarse.centre.push_back(centre);
+        coarse.vertices.push_back(a + b);
+        level.second_share.push_back(static_cast<std::uint32_t>((std::uint64_t{b} << share_bits) / (a + b)));
+        const double scale = u == no_node ? 0.0 : std::sqrt(1.0 / a + 1.0 / b) * (1 << split_scale_bits);
+        level.split_scale.push_back(static_cast<std::uint16_t>(scale + 0.5));
+    }
+    std::vector<std::uint32_t> seen(level.size(), no_node);
+    coarse.first_neighbour.assign(1, 0);
+    coarse.neighbours.reserve(fine.neighbours.size() / 2);
+    for (std::uint32_t p = 0; p < level.size(); ++p) {
+        seen[p] = p;
+        const std::size_t full = coarse.neighbours.size() + hierarchy_row_limit;
+        for (const std::uint32_t child : {level.first[p], level.second[p]}) {
+            if (child == no_node) continue;
+            for (const std::uint32_t u : fine.around(child)) {
+                const std::uint32_t q = parent[u];
+                if (seen[q] == p || coarse.neighbours.size() == full) continue;
+                seen[q] = p;
+                coarse.neighbours.push_back(q);
+            }
+        }
+        coarse.first_neighbour.push_back(static_cast<std::uint32_t>(coarse.neighbours.size()));
+    }
+    return coarse;
+}
+
+// Solves the symmetric m x = b by Cramer's rule.
+Vector solve(const std::array<Vector, 3>& m, const Vector& b) {
+    auto minor = [](const Vector& p, const Vector& q) -> Vector {
+        return {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
+    };
+    const Vector c0 = minor(m[1], m[2]), c1 = minor(m[2], m[0]), c2 = minor(m[0], m[1]);
+    const double determinant = dot(m[0], c0);
+    if (!(determinant > 0)) return {};
+    return {(c0[0] * b[0] + c1[0] * b[1] + c2[0] * b[2]) / determinant,
+            (c0[1] * b[0] + c1[1] * b[1] + c2[1] * b[2]) / determinant,
+            (c0[2] * b[0] + c1[2] * b[1] + c2[2] * b[2]) / determinant};
+}
+
+// The gradient of a field round node p by least squares, weighted by vertices over squared distance, applied to the
+// way from second to first: a fixed weight for every neighbour's mean. Held back a little so that the direction across
+// the surface, of which the neighbours say nothing, stays at rest.
+void find_slopes(const Layer& fine, const Layer& coarse, std::uint32_t p, HierarchyLevel& level) {
+    constexpr double hold = 0.01;
+    const auto around = coarse.around(p);
+    std::array<Vector, 3> m{};
+    double trace = 0;
+    auto weight_of = [&](std::uint32_t q, const Vector& way) { return coarse.vertices[q] / (dot(way, way) + 1.0); };
+    for (const std::uint32_t q : around) {
+        const Vector way = coarse.centre[q] - coarse.centre[p];
+        const double weight = weight_of(q, way);
+        for (std::size_t i = 0; i < 3; ++i)
+            for (std::size_t j = 0; j < 3; ++j) m[i][j] += weight * way[i] * way[j];
+        trace += weight * dot(way, way);
+    }
+    for (std::size_t i = 0; i < 3; ++i) m[i][i] += hold * trace + 1e-3;
+    const Vector turned = solve(m, fine.centre[level.first[p]] - fine.centre[level.second[p]]);
+    std::size_t at = coarse.first_neighbour[p];
+    for (const std::uint32_t q : around) {
+        const Vector way = coarse.centre[q] - coarse.centre[p];
+        const double slope = dot(way, turned) * weight_of(q, way) * (1 << slope_bits);
+        constexpr double most = 1 << 15;
+        level.slopes[at++] = static_cast<std::int32_t>(std::floor(std::clamp(slope, -most, most) + 0.5));
+    }
+}
+
+}  // namespace
+
+Result<VertexHierarchy> build_vertex_hierarchy(std::span<const LatticePoint> positions,
+                                               std::span<const Triangle> triangles) {
+    if (positions.size() > most_elements || triangles.size() > most_elements)
+        return fail(ErrorKind::limit, "vertex hierarchy: more than 2^28 vertices or triangles");
+    for (std::size_t v = 0; v < positions.size(); ++v)
+        if (!on_lattice(positions[v]))
+            return fail(ErrorKind::bad_input, "vertex hierarchy: vertex " + std::to_string(v) + " is off the lattice");
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (const std::uint32_t v : triangles[t])
+            if (v >= positions.size())
+                return fail(ErrorKind::bad_input,
+                            "vertex hierarchy: triangle " + std::to_string(t) + " names a vertex that is not there");
+    VertexHierarchy hierarchy;
+    hierarchy.vertex_count = positions.size();
+    Layer fine = layer_of_vertices(positions, triangles);
+    while (fine.size() > 1) {
+        HierarchyLevel level;
+        Layer coarse = join(fine, match(fine), level);
+        level.slopes.assign(coarse.neighbours.size(), 0);
+        for (std::uint32_t p = 0; p < level.size(); ++p)
+            if (level.second[p] != no_node) find_slopes(fine, coarse, p, level);
+        level.vertices = coarse.vertices;
+        level.first_neighbour = coarse.first_neighbour;
+        level.neighbours = coarse.neighbours;
+        hierarchy.levels.push_back(std::move(level));
+        fine = std::move(coarse);
+    }
+    return hierarchy;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,64 @@
+// The payload of a frame packet: a few numbers, then layers that can each be decoded, or skipped, by themselves.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace htvm::internal {
+
+enum class Layer : std::uint8_t {
+    pose = 1,             // I: joints and orientations of the skeleton
+    transforms = 2,       // P, EP: one rigid transform a bone
+    geometry = 3,         // I: positions in the order of TFAN; EP: quantised residuals
+    colour = 4,           // likewise
+    normals = 5,          // likewise, without a codebook
+    texcoords = 6,        // likewise
+    mapping = 7,          // EP: the graph of Fig. 4
+    fans = 8,             // I: TFAN; EP: the part of M-TFAN that TFAN has too
+    distance_orders = 9,  // EP: the generalised distance orders of M-TFAN
+    external_intra = 10,  // I: a mesh as another coder packed it
+    coded_bones = 11,     // EP with motion-based coding: the bones whose sub-meshes are coded
+};
+inline constexpr std::size_t layer_count = 12;  // one more than the largest number
+
+inline constexpr std::uint8_t intra_coder_tfan = 0;
+inline constexpr std::uint8_t intra_coder_draco = 1;
+
+struct FrameHeader {
+    std::uint32_t source_vertices = 0, source_triangles = 0;   // of the captured mesh
+    std::uint32_t vertices = 0, triangles = 0;                 // of the decoded mesh
+    std::uint32_t geometry_step = 64;                          // I: step of positions, lattice units, >= 1
+    std::uint32_t colour_step = 8;                             // I: step of colours, levels, 1..255
+    std::uint8_t intra_coder = intra_coder_tfan;               // I
+    std::uint32_t geometry_codebook = 0, colour_codebook = 0;  // EP: numbers of the codebooks used
+};
+
+struct FramePayload {
+    FrameHeader header;
+    std::array<std::vector<std::uint8_t>, layer_count> layers;
+    std::array<bool, layer_count> present{};
+    void set(Layer layer, std::vector<std::uint8_t> bytes) {
+        layers[static_cast<std::size_t>(layer)] = std::move(bytes);
+        present[static_cast<std::size_t>(layer)] = true;
+    }
+    bool has(Layer layer) const { return present[static_cast<std::size_t>(layer)]; }
+    const std::vector<std::uint8_t>& of(Layer layer) const { return layers[static_cast<std::size_t>(layer)]; }
+};
+
+// The fewest bytes that the payload of an I- or EP-frame of so many vertices and triangles may have: it bounds what a
+// few bytes can make a decoder do.
+inline std::uint64_t least_payload(std::uint64_t vertices, std::uint64_t triangles) {
+    return std::max((vertices + 63) / 64, (triangles + 127) / 128);
+}
+
+// An I- or EP-frame (known by its pose or mapping) that came out shorter than it may be gets zeros behind its layers.
+std::vector<std::uint8_t> write_frame_payload(const FramePayload& payload);
+// Layers of a number that is not known are skipped.
+Result<FramePayload> read_frame_payload(std::span<const std::uint8_t> bytes);
+
+}  // namespace htvm::internal

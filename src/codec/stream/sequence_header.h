@@ -1,0 +1,32 @@
+// The sequence header: what a decoder must know before any frame.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "codec/reference/lattice_mesh.h"
+#include "htvm/result.hpp"
+#include "htvm/skeleton.hpp"
+
+namespace htvm::internal {
+
+inline constexpr std::uint16_t stream_version = 1;
+
+struct SequenceHeader {
+    Lattice lattice;
+    std::uint32_t fps_numerator = 30, fps_denominator = 1;
+    std::uint32_t unit_micrometres = 1000;  // the unit that the capture came in, so that a decoder can give it back
+    bool skeleton_tracked = true;           // false: the bones stand in for a skeleton that the capture has not
+    Skeleton skeleton;                      // at least one bone
+    std::vector<std::int32_t> radii;        // r^i of each bone, lattice units
+    std::int32_t node_spacing = 0;          // of T-frames' deformation nodes, lattice units; 0: no T-frames
+    std::uint8_t nearest_vertices = 16;     // m of the distance order
+    std::int32_t weight_width = 0;          // of smooth_weights(), lattice units; 0: rigid skinning, as in the paper
+};
+
+std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header);
+Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payload);
+
+}  // namespace htvm::internal

@@ -1,0 +1,148 @@
+#include "codec/tracked/tracked_frame_enc.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/paper/motion_enc.h"
+#include "codec/stage_clock_enc.h"
+#include "codec/tracked/tracked_targets_enc.h"
+
+namespace htvm::internal {
+namespace {
+
+std::vector<HandlePair> pairs_of(const TrackedReference& reference) {
+    std::vector<HandlePair> out;
+    for (const auto& pair : reference.nodes.neighbours) {
+        const auto a = point_of(reference.pivots[pair.first]), b = point_of(reference.pivots[pair.second]);
+        HandlePair handles;
+        handles.first = pair.first;
+        handles.second = pair.second;
+        handles.point = {(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0, (a[2] + b[2]) / 2.0};
+        out.push_back(handles);
+    }
+    return out;
+}
+
+// The start whose surface lies nearest: where the last frame was, one step on, or where the skeleton says.
+std::vector<RigidMotion> best_start(const TrackedGroup& group, const TargetSurface& target,
+                                    std::span<const RigidMotion> skeletal, const DeformationOptions& options) {
+    std::vector<std::vector<RigidMotion>> starts;
+    starts.push_back(group.last.empty() ? std::vector<RigidMotion>(group.reference.pivots.size()) : group.last);
+    if (!group.before_last.empty()) starts.push_back(moved_on(group.deformable, group.before_last, group.last));
+    if (!skeletal.empty()) starts.emplace_back(skeletal.begin(), skeletal.end());
+    if (starts.size() == 1) return std::move(starts[0]);
+    std::size_t best = 0;
+    double least = 0;
+    for (std::size_t i = 0; i < starts.size(); ++i) {
+        const double error = deformation_error(group.deformable, target, starts[i], options);
+        if (i > 0 && error >= least) continue;
+        best = i;
+        least = error;
+    }
+    return std::move(starts[best]);
+}
+
+std::vector<QuantisedTransform> quantised(const std::vector<RigidMotion>& motion,
+                                          std::span<const LatticePoint> pivots) {
+    std::vector<QuantisedTransform> out;
+    for (std::size_t i = 0; i < motion.size(); ++i) out.push_back(quantise_motion(motion[i], pivots[i]));
+    return out;
+}
+
+// Half the displacement's step for shifts; turns so coarse that most stay as predicted: measured, see
+// docs/algorithm.md.
+NodeMotionOptions motion_options(double geometry_step) {
+    NodeMotionOptions out;
+    out.shift_exponent = std::clamp(static_cast<int>(std::lround(std::log2(std::max(geometry_step, 1.0)))) - 1, 0, 8);
+    out.rotation_exponent = std::clamp(out.shift_exponent + 4, 0, 10);
+    return out;
+}
+
+}  // namespace
+
+TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOptions& options) {
+    TrackedGroup out;
+    const auto points = points_of(reference.mesh.positions);
+    std::vector<Eigen::Vector3d> handles;
+    for (const auto pivot : reference.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
+    out.deformable = make_deformable(points, reference.mesh.triangles, reference.nodes.weights, handles,
+                                     pairs_of(reference), options);
+    out.reference = std::move(reference);
+    return out;
+}
+
+TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
+    // Cells no finer than the search can go through: of captures with tiny triangles, or none.
+    const double edge = std::max({sampled_mean_edge(mesh), options.far_reach * options.millimetre / 48, 1.0});
+    return make_target_surface(points_of(mesh.positions), mesh.triangles, static_cast<float>(2 * edge),
+                               options.back_samples, options.threads);
+}
+
+Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TargetSurface& surface,
+                                                 const TrackedGroup& group, bool refer_to_last,
+                                                 std::span<const RigidMotion> skeletal,
+                                                 const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    const auto& reference = group.reference;
+    const auto& triangles = reference.mesh.triangles;
+    EncodedTrackedFrame out;
+    out.motion = register_deformation(group.deformable, surface,
+                                      best_start(group, surface, skeletal, options.deformation), options.deformation);
+    clock.done("registration");
+
+    const std::span<const QuantisedTransform> before = refer_to_last
+                                                           ? std::span<const QuantisedTransform>(group.state.transforms)
+                                                           : std::span<const QuantisedTransform>{};
+    auto motion = encode_node_motion(quantised(out.motion, reference.pivots), reference.parents, reference.pivots,
+                                     before, motion_options(options.geometry_step));
+    const auto moved = moved_by_nodes(reference, motion.transforms, options.threads);
+    const auto normals = exact_normals(moved, triangles);
+    const auto targets = find_tracked_targets({moved, normals, triangles, reference.mesh.colours}, mesh, surface,
+                                              30 * options.deformation.millimetre, options.threads);
+    clock.done("targets");
+
+    FieldOptions geometry;
+    geometry.step = {options.geometry_step, options.geometry_step, options.geometry_step};
+    geometry.lambda = options.lambda;
+    FieldOptions colour;
+    colour.step = {options.colour_step, options.colour_step, options.colour_step};
+    colour.lambda = options.lambda;
+    colour.turned = true;
+    Result<EncodedField> displacement, colours;
+    const auto code_displacement = [&] {
+        displacement = encode_field(reference.hierarchy, targets.displacement, 1, geometry,
+                                    refer_to_last ? &group.state.displacement : nullptr);
+        if (displacement) out.mesh.positions = displaced(moved, normals, displacement->values);
+    };
+    if (reference.mesh.colours.empty())
+        code_displacement();
+    else
+        colours = encode_field(reference.hierarchy, targets.colours, 3, colour,
+                               refer_to_last ? &group.state.colour : nullptr, options.threads, code_displacement);
+    if (!reference.mesh.colours.empty() && !colours) return tl::unexpected(colours.error());
+    if (!displacement) return tl::unexpected(displacement.error());
+    clock.done("fields");
+
+    out.mesh.triangles = triangles;
+    out.mesh.texcoords = reference.mesh.texcoords;
+    if (!reference.mesh.normals.empty())
+        out.mesh.normals = quantised_normals(exact_normals(out.mesh.positions, triangles));
+    out.state.transforms = std::move(motion.transforms);
+    out.state.displacement = std::move(displacement->history);
+    auto& header = out.payload.header;
+    header.source_vertices = static_cast<std::uint32_t>(mesh.positions.size());
+    header.source_triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+    header.vertices = static_cast<std::uint32_t>(reference.mesh.positions.size());
+    header.triangles = static_cast<std::uint32_t>(triangles.size());
+    out.payload.set(Layer::transforms, std::move(motion.bytes));
+    out.payload.set(Layer::geometry, std::move(displacement->bytes));
+    if (!reference.mesh.colours.empty()) {
+        out.mesh.colours = recoloured(reference.mesh.colours, colours->values);
+        out.state.colour = std::move(colours->history);
+        out.payload.set(Layer::colour, std::move(colours->bytes));
+    }
+    clock.done("reconstruction");
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,230 @@
+#include "codec/tracked/tracked_targets_enc.h"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "core/parallel.h"
+#include "surface/nearest_points.h"
+
+namespace htvm::internal {
+namespace {
+
+// Values where nothing is known: the mean of the neighbours', from the rim inwards; in the end nothing.
+void fill_gaps(std::vector<double>& values, std::vector<bool> known, std::span<const Triangle> triangles) {
+    constexpr int rounds = 24;
+    if (std::find(known.begin(), known.end(), false) == known.end()) return;
+    std::vector<Triangle> open;
+    const auto is_known = [&](const Triangle& t) { return known[t[0]] && known[t[1]] && known[t[2]]; };
+    std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(open),
+                 [&](const auto& t) { return !is_known(t); });
+    std::vector<double> sum(values.size());
+    std::vector<std::uint32_t> count(values.size());
+    for (int round = 0; round < rounds && !open.empty(); ++round) {
+        for (const auto& t : open)
+            for (const auto to : t) {
+                if (known[to]) continue;
+                for (const auto from : t) {
+                    if (!known[from]) continue;
+                    sum[to] += values[from];
+                    ++count[to];
+                }
+            }
+        bool any = false;
+        for (const auto& t : open)
+            for (const auto v : t) {
+                if (known[v] || count[v] == 0) continue;
+                values[v] = sum[v] / count[v];
+                known[v] = any = true;
+            }
+        if (!any) break;
+        std::erase_if(open, is_known);
+    }
+}
+
+// Where the captured surface is looked at: at the moved reference's vertices, then at its triangles' middles.
+SurfaceSamples samples_of(const MovedReference& moved) {
+    SurfaceSamples out;
+    out.points = points_of(moved.positions);
+    for (const auto& n : moved.normals)
+        out.normals.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
+    for (const auto& t : moved.triangles) add_middle(out, out.points, out.normals, t);
+    return out;
+}
+
+// The function on the mesh, linear within each triangle, that is nearest to what was seen at the samples: least squares
+// with the weights that integrate squares exactly (a twelfth of a triangle's area at each corner, three quarters at its
+// middle), by conjugate gradients.
+struct SurfaceFit {
+    std::span<const Triangle> triangles;
+    std::vector<double> corner_weight, middle_weight;  // zero where nothing was seen
+    std::vector<double> diagonal;
+
+    std::vector<double> times(const std::vector<double>& x) const;
+    std::vector<double> fitted(const std::vector<double>& seen) const;
+};
+
+SurfaceFit make_surface_fit(const MovedReference& moved, const std::vector<SurfaceTarget>& targets) {
+    const std::size_t vertices = moved.positions.size();
+    SurfaceFit out;
+    out.triangles = moved.triangles;
+    out.corner_weight.assign(vertices, 0);
+    out.middle_weight.assign(moved.triangles.size(), 0);
+    for (std::size_t t = 0; t < moved.triangles.size(); ++t) {
+        const auto& corners = moved.triangles[t];
+        const auto at = [&](std::size_t i) {
+            const auto p = moved.positions[corners[i]];
+            return Eigen::Vector3d(p.x, p.y, p.z);
+        };
+        const double area = (at(1) - at(0)).cross(at(2) - at(0)).norm() / 2;
+        for (const auto v : corners)
+            if (targets[v].valid) out.corner_weight[v] += area / 12;
+        if (targets[vertices + t].valid) out.middle_weight[t] = area * 3 / 4;
+    }
+    out.diagonal = out.corner_weight;
+    for (std::size_t t = 0; t < moved.triangles.size(); ++t)
+        for (const auto v : moved.triangles[t]) out.diagonal[v] += out.middle_weight[t] / 9;
+    return out;
+}
+
+std::vector<double> SurfaceFit::times(const std::vector<double>& x) const {
+    std::vector<double> out(x.size());
+    for (std::size_t v = 0; v < x.size(); ++v) out[v] = corner_weight[v] * x[v];
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+        const auto& [a, b, c] = triangles[t];
+        const double share = middle_weight[t] * (x[a] + x[b] + x[c]) / 9;
+        out[a] += share;
+        out[b] += share;
+        out[c] += share;
+    }
+    return out;
+}
+
+std::vector<double> SurfaceFit::fitted(const std::vector<double>& seen) const {
+    constexpr int rounds = 6;
+    const std::size_t vertices = diagonal.size();
+    std::vector<double> x(vertices, 0), residual(vertices, 0);
+    for (std::size_t v = 0; v < vertices; ++v) {
+        x[v] = corner_weight[v] > 0 ? seen[v] : 0;
+        residual[v] = corner_weight[v] * seen[v];
+    }
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (const auto v : triangles[t]) residual[v] += middle_weight[t] * seen[vertices + t] / 3;
+    const auto product = times(x);
+    std::vector<double> direction(vertices);
+    double product_before = 0;
+    for (std::size_t v = 0; v < vertices; ++v) {
+        residual[v] -= product[v];
+        direction[v] = diagonal[v] > 0 ? residual[v] / diagonal[v] : 0;
+        product_before += residual[v] * direction[v];
+    }
+    for (int round = 0; round < rounds && product_before > 0; ++round) {
+        const auto image = times(direction);
+        double along = 0;
+        for (std::size_t v = 0; v < vertices; ++v) along += direction[v] * image[v];
+        if (!(along > 0)) break;
+        const double step = product_before / along;
+        double product_after = 0;
+        for (std::size_t v = 0; v < vertices; ++v) {
+            x[v] += step * direction[v];
+            residual[v] -= step * image[v];
+            if (diagonal[v] > 0) product_after += residual[v] * residual[v] / diagonal[v];
+        }
+        for (std::size_t v = 0; v < vertices; ++v)
+            direction[v] =
+                (diagonal[v] > 0 ? residual[v] / diagonal[v] : 0) + product_after / product_before * direction[v];
+        product_before = product_after;
+    }
+    std::vector<bool> known(vertices);
+    for (std::size_t v = 0; v < vertices; ++v) known[v] = diagonal[v] > 0;
+    fill_gaps(x, std::move(known), triangles);
+    return x;
+}
+
+// How far along its normal each sample is from the surface, lattice units.
+std::vector<double> distances(const SurfaceSamples& samples, const std::vector<SurfaceTarget>& targets) {
+    std::vector<double> out(targets.size(), 0);
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+        if (!targets[i].valid) continue;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            out[i] +=
+                (static_cast<double>(targets[i].point[axis]) - samples.points[i][axis]) * samples.normals[i][axis];
+    }
+    return out;
+}
+
+std::array<double, 3> barycentric(const Point3f& p, const Point3f& a, const Point3f& b, const Point3f& c) {
+    const auto vector = [](const Point3f& from, const Point3f& to) {
+        return Eigen::Vector3d(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
+    };
+    const auto u = vector(a, b), v = vector(a, c), w = vector(a, p);
+    const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), wu = w.dot(u), wv = w.dot(v);
+    const double area = uu * vv - uv * uv;
+    if (!(area > 0)) return {1, 0, 0};
+    const double s = std::clamp((vv * wu - uv * wv) / area, 0.0, 1.0);
+    const double t = std::clamp((uu * wv - uv * wu) / area, 0.0, 1.0 - s);
+    return {1 - s - t, s, t};
+}
+
+// What the surface shows at each sample less what the reference shows there: a list of levels a component.
+std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const LatticeMesh& captured,
+                                                  const TargetSurface& surface,
+                                                  const std::vector<SurfaceTarget>& targets, unsigned threads) {
+    std::array<std::vector<double>, 3> out;
+    for (auto& component : out) component.assign(targets.size(), 0);
+    const std::size_t vertices = moved.positions.size();
+    const auto look_at = [&](std::size_t i) {
+        const auto& t = captured.triangles[targets[i].triangle];
+        const auto share =
+            barycentric(targets[i].point, surface.positions[t[0]], surface.positions[t[1]], surface.positions[t[2]]);
+        for (std::size_t c = 0; c < 3; ++c) {
+            double level = 0;
+            for (std::size_t corner = 0; corner < 3; ++corner) level += share[corner] * captured.colours[t[corner]][c];
+            if (i < vertices) {
+                level -= moved.colours[i][c];
+            } else {
+                for (const auto v : moved.triangles[i - vertices]) level -= moved.colours[v][c] / 3.0;
+            }
+            out[c][i] = level;
+        }
+    };
+    parallel_for(targets.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            if (targets[i].valid) look_at(i);
+    });
+    return out;
+}
+
+}  // namespace
+
+TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
+                                    const TargetSurface& surface, double reach, unsigned threads) {
+    const auto samples = samples_of(moved);
+    SurfaceTargetOptions search;
+    search.reach = static_cast<float>(reach);
+    search.threads = threads;
+    const auto targets = surface_targets(samples.points, samples.normals, surface, search);
+    const auto fit = make_surface_fit(moved, targets);
+    std::vector<std::vector<double>> seen(1);
+    seen[0] = distances(samples, targets);
+    if (!moved.colours.empty())
+        for (auto& component : colour_changes(moved, captured, surface, targets, threads))
+            seen.push_back(std::move(component));
+    parallel_for(seen.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t c = begin; c < end; ++c) seen[c] = fit.fitted(seen[c]);
+    });
+    TrackedTargets out;
+    const std::size_t vertices = moved.positions.size();
+    out.displacement.resize(vertices);
+    for (std::size_t v = 0; v < vertices; ++v) out.displacement[v] = static_cast<std::int32_t>(std::lround(seen[0][v]));
+    if (moved.colours.empty()) return out;
+    out.colours.resize(3 * vertices);
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t c = 0; c < 3; ++c)
+            out.colours[3 * v + c] = static_cast<std::int32_t>(std::lround(std::clamp(seen[1 + c][v], -255.0, 255.0)));
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,192 @@
+#include <cmath>
+
+#include "codec/tracked/vertex_field_walk.h"
+
+namespace htvm::internal {
+
+namespace {
+
+// The axes of a turned field, in 1/65536: the mean, red less blue, green less the other two; orthonormal.
+constexpr std::int64_t third = 37837, half = 46341, sixth = 26755;  // 1/sqrt(3), 1/sqrt(2), 1/sqrt(6)
+
+}  // namespace
+
+std::int64_t root_step(std::uint32_t step, std::size_t vertex_count) {
+    const double root = std::sqrt(static_cast<double>(std::max<std::size_t>(vertex_count, 1)));
+    return std::max<std::int64_t>(1, static_cast<std::int64_t>(step / root));
+}
+
+void predict_splits(const HierarchyLevel& level, std::span<const std::int32_t> means,
+                    std::vector<std::int32_t>& splits) {
+    splits.assign(level.size(), 0);
+    for (std::size_t p = 0; p < level.size(); ++p) {
+        if (level.second[p] == no_node) continue;
+        std::int64_t sum = 0;
+        for (std::uint32_t i = level.first_neighbour[p]; i < level.first_neighbour[p + 1]; ++i)
+            sum += std::int64_t{level.slopes[i]} * (means[level.neighbours[i]] - means[p]);
+        splits[p] = static_cast<std::int32_t>(
+            std::clamp<std::int64_t>(sum >> slope_bits, -std::int64_t{2} * most_mean, std::int64_t{2} * most_mean));
+    }
+}
+
+void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means,
+                 std::span<const std::int32_t> predicted, std::uint32_t step, std::span<const std::int32_t> rests,
+                 std::vector<std::int32_t>& finer) {
+    for (std::size_t p = 0; p < level.size(); ++p) {
+        if (level.second[p] == no_node) {
+            finer[level.first[p]] = means[p];
+            continue;
+        }
+        std::int64_t difference = predicted[p];
+        if (rests[p] != 0) difference += rests[p] * split_step(step, level.split_scale[p]);
+        const SplitMeans children = split_mean(means[p], difference, level.second_share[p]);
+        finer[level.first[p]] = children.first;
+        finer[level.second[p]] = children.second;
+    }
+}
+
+namespace {
+
+// The magnitudes of `above` by node of the finer level, from those of the coarser: a node that was joined to none takes
+// over what is above it.
+void pass_down(const HierarchyLevel& coarser, std::span<const std::uint8_t> own, std::span<const std::uint8_t> above,
+               std::vector<std::uint8_t>& below) {
+    for (std::size_t p = 0; p < coarser.size(); ++p) {
+        const bool single = coarser.second[p] == no_node;
+        below[coarser.first[p]] = single ? above[p] : own[p];
+        if (!single) below[coarser.second[p]] = own[p];
+    }
+}
+
+}  // namespace
+
+FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldHeader& header, std::size_t count,
+                     const FieldHistory* before)
+    : hierarchy(mesh), has_history(before != nullptr), components(count) {
+    const std::size_t levels = hierarchy.levels.size();
+    for (std::size_t c = 0; c < count; ++c) {
+        ComponentWalk& component = components[c];
+        component.before = before ? &before->planes[c] : nullptr;
+        component.step = header.step[c];
+        component.last = first_mode(has_history);
+        component.above.assign(1, 0);
+        FieldPlane& plane = component.plane;
+        plane.mean.resize(levels + 1);
+        plane.mean[0].resize(hierarchy.vertex_count);
+        plane.slope.resize(levels);
+        plane.magnitude.resize(levels);
+        component.rests.resize(levels);
+        for (std::size_t k = 0; k < levels; ++k) {
+            const std::size_t nodes = hierarchy.levels[k].size();
+            plane.mean[k + 1].resize(nodes);
+            plane.slope[k].resize(nodes);
+            plane.magnitude[k].resize(nodes);
+            component.rests[k].resize(nodes);
+        }
+    }
+}
+
+void FieldWalk::begin_level(std::size_t k, std::size_t c) {
+    const HierarchyLevel& level = hierarchy.levels[k];
+    ComponentWalk& component = components[c];
+    component.active.resize(level.size());
+    predict_splits(level, component.plane.mean[k + 1], component.plane.slope[k]);
+    LevelPrediction& prediction = component.prediction;
+    prediction.now = component.plane.slope[k];
+    if (!component.before) return;
+    prediction.slope_before = component.before->slope[k];
+    const auto& means = component.before->mean[k];
+    prediction.before.assign(level.size(), 0);
+    for (std::size_t p = 0; p < level.size(); ++p)
+        if (level.second[p] != no_node) prediction.before[p] = means[level.first[p]] - means[level.second[p]];
+}
+
+void FieldWalk::end_level(std::size_t k, std::size_t c, const LevelMode& mode) {
+    const HierarchyLevel& level = hierarchy.levels[k];
+    ComponentWalk& component = components[c];
+    FieldPlane& plane = component.plane;
+    if (!mode.coded) component.prediction.choose(mode);
+    split_level(level, plane.mean[k + 1], component.prediction.chosen, component.step, component.rests[k],
+                plane.mean[k]);
+    if (k == 0) return;
+    std::vector<std::uint8_t> below(hierarchy.levels[k - 1].size(), 0);
+    pass_down(level, plane.magnitude[k], component.above, below);
+    component.above = std::move(below);
+}
+
+LevelMagnitudes FieldWalk::magnitudes(std::size_t k, std::size_t c) const {
+    const ComponentWalk& component = components[c];
+    LevelMagnitudes out{.above = component.above, .before = {}, .other = {}, .third = {}};
+    if (component.before) out.before = component.before->magnitude[k];
+    if (c > 0) out.other = components[c - 1].rests[k];
+    if (c > 1) out.third = components[c - 2].rests[k];
+    return out;
+}
+
+FieldHistory history_of(FieldWalk& walk, bool turned) {
+    FieldHistory out{.turned = turned, .planes = {}};
+    for (auto& component : walk.components) out.planes.push_back(std::move(component.plane));
+    return out;
+}
+
+std::vector<std::int32_t> field_values(const std::vector<FieldPlane>& planes, std::size_t vertex_count, bool turned) {
+    const std::size_t components = planes.size();
+    std::vector<std::int32_t> values(vertex_count * components);
+    if (!turned) {
+        for (std::size_t c = 0; c < components; ++c)
+            for (std::size_t v = 0; v < vertex_count; ++v)
+                values[v * components + c] = (planes[c].mean[0][v] + field_one / 2) >> field_bits;
+        return values;
+    }
+    constexpr int shift = 16 + field_bits;
+    constexpr std::int64_t rounding = std::int64_t{1} << (shift - 1);
+    for (std::size_t v = 0; v < vertex_count; ++v) {
+        const std::int64_t a = third * planes[0].mean[0][v], b = half * planes[1].mean[0][v];
+        const std::int64_t s = sixth * planes[2].mean[0][v];
+        values[v * 3 + 0] = static_cast<std::int32_t>((a + b - s + rounding) >> shift);
+        values[v * 3 + 1] = static_cast<std::int32_t>((a + 2 * s + rounding) >> shift);
+        values[v * 3 + 2] = static_cast<std::int32_t>((a - b - s + rounding) >> shift);
+    }
+    return values;
+}
+
+bool history_fits(const FieldHistory& history, const VertexHierarchy& hierarchy, std::size_t components, bool turned) {
+    if (history.planes.size() != components || history.turned != turned) return false;
+    const std::size_t levels = hierarchy.levels.size();
+    for (const FieldPlane& plane : history.planes) {
+        if (plane.mean.size() != levels + 1 || plane.slope.size() != levels || plane.magnitude.size() != levels)
+            return false;
+        if (plane.mean[0].size() != hierarchy.vertex_count) return false;
+        for (std::size_t k = 0; k < levels; ++k)
+            if (plane.mean[k + 1].size() != hierarchy.levels[k].size() ||
+                plane.slope[k].size() != hierarchy.levels[k].size() ||
+                plane.magnitude[k].size() != hierarchy.levels[k].size())
+                return false;
+    }
+    return true;
+}
+
+double field_error_bound(const VertexHierarchy& hierarchy, double step) {
+    const auto quantised = static_cast<std::uint32_t>(std::clamp(step, 0.0, 1048576.0) * field_one + 0.5);
+    std::vector<double> bound(1, static_cast<double>(root_step(quantised, hierarchy.vertex_count)) / 2 + 0.5);
+    for (std::size_t k = hierarchy.levels.size(); k-- > 0;) {
+        const HierarchyLevel& level = hierarchy.levels[k];
+        const std::size_t finer = k > 0 ? hierarchy.levels[k - 1].size() : hierarchy.vertex_count;
+        std::vector<double> below(finer);
+        for (std::size_t p = 0; p < level.size(); ++p) {
+            below[level.first[p]] = bound[p];
+            if (level.second[p] == no_node) continue;
+            constexpr double rounding = 2.5;  // of the means in the encoder, of the difference's share and its own
+            const double own = static_cast<double>(split_step(quantised, level.split_scale[p])) / 2;
+            const double share = static_cast<double>(level.second_share[p]) / (1 << share_bits);
+            below[level.first[p]] += own * share + rounding;
+            below[level.second[p]] = bound[p] + own * (1 - share) + rounding;
+        }
+        bound = std::move(below);
+    }
+    double largest = 0;
+    for (const double b : bound) largest = std::max(largest, b);
+    return largest / field_one;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,86 @@
+// A smooth vector field on the vertices of a mesh that both sides know: how far a tracked surface lies from where its
+// reference was moved to, or how its colours differ from the reference's (design, section 4).
+//
+// The field is coded from coarse to fine over a VertexHierarchy: the mean of all vertices, then for each pair of nodes
+// the difference of their two means, predicted from the slopes of the decoded means round the pair (and, where there is
+// a history, from the frame before), quantised by a step that makes every difference count by the squared error it
+// causes. Closed loop: no error builds up. The encoder zeroes what costs more bits than it is worth.
+//
+// Layer: a byte of flags (bit 0: turned, bit 1: has a history), the step of each component as a varint in 1/256, then
+// range coded: the mean of each component, and level by level, component by component, whether all differences are as
+// predicted, how they are predicted, and the quantised rests.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "codec/reference/vertex_hierarchy.h"
+#include "htvm/result.hpp"
+
+namespace htvm::internal {
+
+inline constexpr std::size_t most_field_components = 3;
+inline constexpr std::int32_t field_limit = 1 << 20;  // of every component's absolute value
+
+struct FieldOptions {
+    // By component, in the values' unit: what a vertex's own error is quantised by, 1/256 to 2^20; 0: not coded, the
+    // component decodes to 0 everywhere. A turned field has the step of a direction in space for each.
+    std::array<double, most_field_components> step{32, 32, 32};
+    // What a bit is worth, in squared steps: from 0 (always the nearest) on. 0.1 to 0.15 gives the least error for the
+    // bits at every rate; more wastes bits on large errors, which a larger step would spare.
+    double lambda = 0.12;
+    // Code sum, and two differences, of three components that resemble each other: red, green and blue.
+    bool turned = false;
+    double first_weight = 1;  // of a turned field: the sum's step is step[0] / first_weight
+};
+
+// One component of a decoded field in 1/256 of the values' unit, with what predicts the next frame.
+struct FieldPlane {
+    std::vector<std::vector<std::int32_t>> mean;       // [0]: by vertex, [1 + k]: by node of level k
+    std::vector<std::vector<std::int32_t>> slope;      // [k]: by node of level k, the difference that the means predict
+    std::vector<std::vector<std::uint8_t>> magnitude;  // [k]: by node of level k, of the quantised rest, at most 255
+};
+
+// What a frame leaves for the next on the same hierarchy; the same on both sides.
+struct FieldHistory {
+    bool turned = false;
+    std::vector<FieldPlane> planes;  // one a component
+};
+
+struct EncodedField {
+    std::vector<std::uint8_t> bytes;
+    std::vector<std::int32_t> values;  // as decode_field gives them
+    FieldHistory history;
+};
+
+struct DecodedField {
+    std::vector<std::int32_t> values;  // vertices x components, |.| <= 4 * field_limit whatever the bytes say
+    FieldHistory history;
+};
+
+// values: vertices x components, the components of a vertex side by side. before: the history of a frame on the same
+// hierarchy, or null; it is used where it predicts better. Errors: bad_input where sizes do not fit, a value is beyond
+// field_limit, a step or lambda out of range, or a field other than of three components is to be turned.
+// threads: two at most serve, three components side by side; any number gives the same bytes. beside: other work for
+// the second of them, done when the call returns, but for one that fails.
+Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values,
+                                  std::size_t components, const FieldOptions& options = {},
+                                  const FieldHistory* before = nullptr, unsigned threads = 1,
+                                  const std::function<void()>& beside = {});
+
+// `before`: as given to the encoder; needed where the layer says so. Errors: corrupt_stream where the bytes end too
+// early, or name steps or a history that cannot be; bad_input where `before` is of another mesh.
+Result<DecodedField> decode_field(std::span<const std::uint8_t> bytes, const VertexHierarchy& hierarchy,
+                                  std::size_t components, const FieldHistory* before = nullptr);
+
+// The largest error of a vertex, in the values' unit, that lambda 0 can leave before values are rounded to whole
+// numbers, in a component that is not turned and has this step: about 1.3 steps on meshes of some 30,000 vertices, as
+// the errors of a vertex's differences add up. Where it is below 0.5 the coding is lossless: there, with a step of
+// 0.25.
+double field_error_bound(const VertexHierarchy& hierarchy, double step);
+
+}  // namespace htvm::internal

@@ -1,0 +1,214 @@
+// What encoder and decoder of a vertex field share: the walk over the hierarchy from coarse to fine, the prediction of
+// each difference and its contexts. Integers throughout; means and differences are in 1/256 of the values' unit.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <vector>
+
+#include "codec/tracked/vertex_field.h"
+#include "codec/tracked/vertex_field_models.h"
+#include "core/lattice.h"
+
+namespace htvm::internal {
+
+inline constexpr int field_bits = 8;  // of the fraction of means, differences and steps
+inline constexpr std::int32_t field_one = 1 << field_bits;
+inline constexpr std::int32_t most_mean = 1 << 29;
+inline constexpr std::uint32_t most_step = 1u << 28;
+
+// What the layer says beside the differences.
+struct FieldHeader {
+    bool turned = false, has_history = false;
+    std::array<std::uint32_t, most_field_components> step{};  // 0: not coded
+};
+
+// How the differences of a level and component are coded.
+struct LevelMode {
+    bool coded = false;        // false: all as predicted
+    std::uint32_t slope = 0;   // the weight of the predicted difference in quarters, 0..7
+    std::uint32_t before = 0;  // the weight of the frame before in quarters, 0..4
+    bool operator==(const LevelMode&) const = default;
+};
+// What stands for the mode of the level above at the top.
+inline LevelMode first_mode(bool has_history) { return {.coded = true, .slope = 4, .before = has_history ? 4u : 0u}; }
+
+// The quantisation step of the difference at a node.
+inline std::int64_t split_step(std::uint32_t step, std::uint32_t scale) {
+    return std::max<std::int64_t>(1, (std::int64_t{step} * scale) >> split_scale_bits);
+}
+
+// The quantisation step of the mean of all: the whole mesh's error as one vertex's.
+std::int64_t root_step(std::uint32_t step, std::size_t vertex_count);
+
+// The difference of each node's two children: as the slopes of `means` (by node of this level) say.
+void predict_splits(const HierarchyLevel& level, std::span<const std::int32_t> means,
+                    std::vector<std::int32_t>& splits);
+
+// The differences of one level and component, ready to be coded.
+struct LevelPrediction {
+    std::span<const std::int32_t> now, slope_before;  // by node, as the slopes say: of this frame and of the one before
+    std::vector<std::int32_t> before;                 // by node, in the frame before; like the one above empty without
+    std::vector<std::int32_t> chosen;                 // by node, as the mode mixes them
+
+    std::int32_t of(std::size_t node, const LevelMode& mode) const {
+        std::int64_t sum = std::int64_t{mode.slope} * now[node];
+        if (mode.before > 0 && !before.empty())
+            sum += std::int64_t{mode.before} * before[node] -
+                   (((std::int64_t{mode.slope} * mode.before) * slope_before[node]) >> 2);
+        return static_cast<std::int32_t>(std::clamp<std::int64_t>((sum + 2) >> 2, -2 * most_mean, 2 * most_mean));
+    }
+    void choose(const LevelMode& mode) {
+        chosen.resize(now.size());
+        for (std::size_t p = 0; p < now.size(); ++p) chosen[p] = of(p, mode);
+    }
+};
+
+// The two means that a node's own mean and the difference between them give.
+struct SplitMeans {
+    std::int32_t first, second;
+};
+inline SplitMeans split_mean(std::int32_t mean, std::int64_t difference, std::uint32_t second_share) {
+    difference = std::clamp<std::int64_t>(difference, -2 * most_mean, 2 * most_mean);
+    const std::int64_t part = (difference * second_share + (std::int64_t{1} << (share_bits - 1))) >> share_bits;
+    const std::int64_t first = mean + part;
+    auto kept = [](std::int64_t m) {
+        return static_cast<std::int32_t>(std::clamp<std::int64_t>(m, -most_mean, most_mean));
+    };
+    return {kept(first), kept(first - difference)};
+}
+
+// Sets the means of the finer level from the level's predicted differences and quantised rests.
+void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means,
+                 std::span<const std::int32_t> predicted, std::uint32_t step, std::span<const std::int32_t> rests,
+                 std::vector<std::int32_t>& finer);
+
+// The magnitudes from which contexts are made, by node of one level.
+struct LevelMagnitudes {
+    std::span<const std::uint8_t> above;         // of the coarser level's difference that made the node
+    std::span<const std::uint8_t> before;        // of the frame before; may be empty
+    std::span<const std::int32_t> other, third;  // the same level's rests in the components before; may be empty
+};
+
+inline std::uint8_t magnitude_of(std::int32_t rest) {
+    return static_cast<std::uint8_t>(std::min<std::uint32_t>(static_cast<std::uint32_t>(std::abs(rest)), 255));
+}
+
+// How much a node adds to the activity round its neighbours: by what is above it until its difference is coded.
+inline std::uint8_t activity_above(std::uint8_t above) { return std::min<std::uint8_t>(above, 4); }
+inline std::uint8_t activity_coded(std::uint8_t own) { return static_cast<std::uint8_t>(2 * std::min<int>(own, 4)); }
+
+// active: what each node adds to the activity.
+inline SplitContext split_context(const HierarchyLevel& level, std::size_t k, std::size_t node,
+                                  const LevelMagnitudes& magnitudes, std::span<const std::uint8_t> active,
+                                  std::int32_t predicted, std::int64_t step) {
+    SplitContext c;
+    auto three = [](std::size_t magnitude) { return std::min<std::size_t>(magnitude, 2); };
+    c.level = std::min(k, SplitContext::levels - 1);
+    c.up = three(magnitudes.above[node]);
+    std::size_t activity = 0;
+    for (std::uint32_t i = level.first_neighbour[node]; i < level.first_neighbour[node + 1]; ++i)
+        activity += active[level.neighbours[i]];
+    c.activity = activity < 8 ? activity : std::min<std::size_t>(8 + (activity - 8) / 6, SplitContext::activities - 1);
+    if (!magnitudes.before.empty()) c.before = three(magnitudes.before[node]);
+    if (!magnitudes.other.empty()) {
+        c.other = three(static_cast<std::size_t>(std::abs(magnitudes.other[node])));
+        c.sign = magnitudes.other[node] == 0 ? 0 : magnitudes.other[node] > 0 ? 1 : 2;
+    }
+    if (!magnitudes.third.empty()) c.third = three(static_cast<std::size_t>(std::abs(magnitudes.third[node])));
+    // The bits of 8 * |predicted| / step, without dividing.
+    const std::int64_t steep = 8 * std::abs(std::int64_t{predicted});
+    while (c.steep < SplitContext::steeps - 1 && steep >= step << c.steep) ++c.steep;
+    c.slope = c.steep == 0 ? 0 : predicted > 0 ? 1 : 2;
+    return c;
+}
+
+// One component of a field while its levels are coded, from the top to the finest. Components know of each other what
+// the contexts need: the rests of those before at the same level.
+struct ComponentWalk {
+    const FieldPlane* before = nullptr;
+    std::uint32_t step = 0;
+    FieldPlane plane;
+    SplitModels models;
+    LevelMode last;                                // of the level above, which most levels repeat
+    std::vector<std::uint8_t> above;               // magnitudes by node of the level at hand
+    std::vector<std::vector<std::int32_t>> rests;  // by level and node
+    std::vector<std::uint8_t> active;              // of the level at hand, see split_context
+    LevelPrediction prediction;
+};
+
+// Everything that is known of a field while it is coded.
+struct FieldWalk {
+    FieldWalk(const VertexHierarchy& hierarchy, const FieldHeader& header, std::size_t components,
+              const FieldHistory* before);
+
+    const VertexHierarchy& hierarchy;
+    bool has_history;
+    std::array<BinaryModel, 2> coded;  // whether a level is, by whether the level above was
+    BinaryModel same;                  // whether its mode is that of the level above
+    std::vector<ComponentWalk> components;
+
+    void begin_level(std::size_t k, std::size_t c);                       // predicts its differences
+    void end_level(std::size_t k, std::size_t c, const LevelMode& mode);  // sets the means of the finer level
+    LevelMagnitudes magnitudes(std::size_t k, std::size_t c) const;
+};
+
+// Codes the differences of one level and component into its rests and magnitudes. choose(node, predicted, step,
+// context) gives the rest that is wanted; decoding, anything.
+template <class Coder, class Choose>
+void code_level(Coder& coder, FieldWalk& walk, std::size_t k, std::size_t c, const LevelMode& mode,
+                const Choose& choose) {
+    const HierarchyLevel& level = walk.hierarchy.levels[k];
+    ComponentWalk& component = walk.components[c];
+    component.prediction.choose(mode);
+    const std::span<const std::int32_t> chosen = component.prediction.chosen;
+    const LevelMagnitudes magnitudes = walk.magnitudes(k, c);
+    const std::span<std::uint8_t> own = component.plane.magnitude[k], active = component.active;
+    const std::span<std::int32_t> rests = component.rests[k];
+    for (std::size_t p = 0; p < level.size(); ++p) active[p] = activity_above(magnitudes.above[p]);
+    for (std::size_t p = 0; p < level.size(); ++p) {
+        if (level.second[p] != no_node) {
+            const std::int64_t unit = split_step(component.step, level.split_scale[p]);
+            const SplitContext context = split_context(level, k, p, magnitudes, active, chosen[p], unit);
+            rests[p] = code_split(coder, component.models, context, choose(p, chosen[p], unit, context));
+            own[p] = magnitude_of(rests[p]);
+        }
+        active[p] = activity_coded(own[p]);
+    }
+}
+
+// Codes how the differences of a level and component are coded.
+template <class Coder>
+LevelMode code_mode(Coder& coder, FieldWalk& walk, LevelMode& mode, const LevelMode& wanted) {
+    mode.coded = coder.bit(walk.coded[mode.coded], wanted.coded);
+    if (coder.bit(walk.same, wanted.slope == mode.slope && wanted.before == mode.before)) return mode;
+    mode.slope = coder.raw(wanted.slope, 3);
+    if (walk.has_history) mode.before = std::min(coder.raw(wanted.before, 3), 4u);
+    return mode;
+}
+
+// Codes the mean of all of one component.
+template <class Coder>
+void code_root(Coder& coder, ComponentWalk& component, std::size_t vertex_count, std::int32_t wanted) {
+    const std::int64_t unit = root_step(component.step, vertex_count);
+    const std::int64_t from = component.before ? component.before->mean.back()[0] : 0;
+    constexpr SplitContext context{.level = SplitContext::levels - 1};
+    const std::int32_t quantised = code_split(coder, component.models, context, wanted);
+    component.plane.mean.back()[0] =
+        static_cast<std::int32_t>(std::clamp<std::int64_t>(from + quantised * unit, -most_mean, most_mean));
+}
+
+// The history that a walk leaves; takes its planes.
+FieldHistory history_of(FieldWalk& walk, bool turned);
+
+// The values that planes stand for: rounded, turned back.
+std::vector<std::int32_t> field_values(const std::vector<FieldPlane>& planes, std::size_t vertex_count, bool turned);
+
+// True where the history is one of this hierarchy and as many components.
+bool history_fits(const FieldHistory& history, const VertexHierarchy& hierarchy, std::size_t components, bool turned);
+
+}  // namespace htvm::internal

@@ -1,0 +1,199 @@
+#include "surface/surface_distance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+
+namespace htvm::internal {
+namespace {
+
+using Level = std::array<float, 3>;  // a colour between two
+
+constexpr std::size_t block = 512;  // samples that are summed together, whatever the number of threads
+
+Level level(const Colour& c) { return {float(c[0]), float(c[1]), float(c[2])}; }
+
+// The surface that is measured to.
+struct Target {
+    const SurfaceView& surface;
+    const SurfaceSearch& search;
+    bool colours;  // compare them
+
+    Level colour_at(const SurfacePoint& p) const {
+        if (surface.triangles.empty()) return level(surface.colours[p.triangle]);
+        Level out{};
+        for (std::size_t i = 0; i < 3; ++i) {
+            const Level corner = level(surface.colours[surface.triangles[p.triangle][i]]);
+            for (std::size_t c = 0; c < 3; ++c) out[c] += p.barycentric[i] * corner[c];
+        }
+        return out;
+    }
+};
+
+struct Squares {
+    double distance = 0, colour = 0;
+};
+
+Squares measure(const Point3f& sample, const Level& colour, const Target& target) {
+    const auto found = target.search.closest(sample);
+    Squares out{found.squared_distance, 0};
+    if (!target.colours) return out;
+    const Level there = target.colour_at(found);
+    for (std::size_t c = 0; c < 3; ++c) out.colour += double{colour[c] - there[c]} * (colour[c] - there[c]);
+    return out;
+}
+
+struct Sums {
+    double weight = 0, distance = 0, colour = 0, largest = 0;
+
+    void add(double w, const Squares& squares) {
+        weight += w;
+        distance += w * squares.distance;
+        colour += w * squares.colour;
+        largest = std::max(largest, squares.distance);
+    }
+    void add(const Sums& more) {
+        weight += more.weight;
+        distance += more.distance;
+        colour += more.colour;
+        largest = std::max(largest, more.largest);
+    }
+};
+
+// Sums of body(i, sums) over [0, count), cut the same way for any number of threads.
+template <class Body>
+Sums sum_blocks(std::size_t count, unsigned threads, const Body& body) {
+    std::vector<Sums> parts((count + block - 1) / block);
+    parallel_for(parts.size(), thread_count(threads), 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t p = begin; p < end; ++p)
+            for (std::size_t i = p * block; i < std::min(count, (p + 1) * block); ++i) body(i, parts[p]);
+    });
+    Sums total;
+    for (const auto& part : parts) total.add(part);
+    return total;
+}
+
+double area_of(const SurfaceView& mesh, const Triangle& t) {
+    std::array<double, 3> ab{}, ac{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        ab[i] = double{mesh.positions[t[1]][i]} - mesh.positions[t[0]][i];
+        ac[i] = double{mesh.positions[t[2]][i]} - mesh.positions[t[0]][i];
+    }
+    return std::hypot(ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]) / 2;
+}
+
+struct Weights {
+    std::vector<double> vertices, triangles;
+};
+
+Weights weigh(const SurfaceView& mesh) {
+    Weights out{std::vector<double>(mesh.positions.size(), 0.0), {}};
+    out.triangles.reserve(mesh.triangles.size());
+    double whole = 0;
+    for (const auto& t : mesh.triangles) {
+        const double area = area_of(mesh, t);
+        out.triangles.push_back(area);
+        for (const auto v : t) out.vertices[v] += area;
+        whole += area;
+    }
+    if (whole > 0) return out;
+    for (const auto& t : mesh.triangles)
+        for (const auto v : t) out.vertices[v] = 1;
+    if (mesh.triangles.empty()) out.vertices.assign(mesh.positions.size(), 1.0);
+    return out;
+}
+
+Level colour_of(const SurfaceView& mesh, std::size_t vertex) {
+    return mesh.colours.empty() ? Level{} : level(mesh.colours[vertex]);
+}
+
+Sums measure_vertices(const SurfaceView& from, const std::vector<double>& weights, const Target& target,
+                      const SurfaceDistanceOptions& options) {
+    const std::size_t every = std::max(1u, options.every);
+    return sum_blocks((from.positions.size() + every - 1) / every, options.threads, [&](std::size_t i, Sums& sums) {
+        const std::size_t v = i * every;
+        if (weights[v] > 0) sums.add(weights[v], measure(from.positions[v], colour_of(from, v), target));
+    });
+}
+
+Sums measure_centres(const SurfaceView& from, const std::vector<double>& weights, const Target& target,
+                     const SurfaceDistanceOptions& options) {
+    const std::size_t every = std::max(1u, options.every);
+    return sum_blocks((from.triangles.size() + every - 1) / every, options.threads, [&](std::size_t i, Sums& sums) {
+        const std::size_t t = i * every;
+        if (!(weights[t] > 0)) return;
+        Point3f centre{};
+        Level colour{};
+        for (const auto v : from.triangles[t]) {
+            const Level corner = colour_of(from, v);
+            for (std::size_t c = 0; c < 3; ++c) {
+                centre[c] += from.positions[v][c] / 3;
+                colour[c] += corner[c] / 3;
+            }
+        }
+        sums.add(weights[t], measure(centre, colour, target));
+    });
+}
+
+}  // namespace
+
+OneSidedErrors one_sided_errors(const SurfaceView& from, const SurfaceView& to, const SurfaceSearch& search_to,
+                                const SurfaceDistanceOptions& options) {
+    if (from.positions.empty()) return {};
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    if (search_to.empty()) return {infinity, 0, infinity};
+    const Target target{to, search_to, !from.colours.empty() && !to.colours.empty()};
+    const auto weights = weigh(from);
+    const Sums vertices = measure_vertices(from, weights.vertices, target, options);
+    const Sums centres = measure_centres(from, weights.triangles, target, options);
+    double share = std::clamp(options.vertex_share, 0.0, 1.0);
+    if (!(centres.weight > 0)) share = 1;
+    if (!(vertices.weight > 0)) share = 0;
+    const double vertex_weight = share / std::max(vertices.weight, std::numeric_limits<double>::min());
+    const double centre_weight = (1 - share) / std::max(centres.weight, std::numeric_limits<double>::min());
+    return {vertex_weight * vertices.distance + centre_weight * centres.distance,
+            vertex_weight * vertices.colour + centre_weight * centres.colour,
+            std::sqrt(std::max(vertices.largest, centres.largest))};
+}
+
+SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceView& b, const SurfaceDistanceOptions& options) {
+    return surface_errors(a, SurfaceSearch(a.positions, a.triangles), b, options);
+}
+
+SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceSearch& search_a, const SurfaceView& b,
+                             const SurfaceDistanceOptions& options) {
+    const SurfaceSearch search_b(b.positions, b.triangles);
+    const auto forward = one_sided_errors(a, b, search_b, options);
+    const auto backward = one_sided_errors(b, a, search_a, options);
+    return {std::sqrt(std::max(forward.squared_distance, backward.squared_distance)),
+            std::sqrt(std::max(forward.squared_colour, backward.squared_colour))};
+}
+
+std::vector<RegionErrors> region_errors(const SurfaceView& from, std::span<const std::uint16_t> labels,
+                                        std::size_t regions, const SurfaceView& to, const SurfaceSearch& search_to,
+                                        const SurfaceDistanceOptions& options) {
+    std::vector<RegionErrors> out(regions);
+    const std::size_t every = std::max(1u, options.every), count = std::min(from.positions.size(), labels.size());
+    const Target target{to, search_to, !from.colours.empty() && !to.colours.empty()};
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    std::vector<Squares> squares((count + every - 1) / every, Squares{infinity, 0});
+    if (!search_to.empty())
+        parallel_for(squares.size(), thread_count(options.threads), block, [&](std::size_t begin, std::size_t end) {
+            for (std::size_t i = begin; i < end; ++i)
+                if (labels[i * every] < regions)
+                    squares[i] = measure(from.positions[i * every], colour_of(from, i * every), target);
+        });
+    for (std::size_t i = 0; i < squares.size(); ++i) {
+        if (labels[i * every] >= regions) continue;
+        auto& region = out[labels[i * every]];
+        ++region.samples;
+        region.squared_distance += squares[i].distance;
+        region.squared_colour += squares[i].colour;
+        region.largest_distance = std::max(region.largest_distance, std::sqrt(squares[i].distance));
+    }
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,324 @@
+#include "surface/deformation.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+namespace htvm::internal {
+namespace {
+
+using Eigen::Vector3d;
+using Surface = std::pair<std::vector<Point3f>, std::vector<Triangle>>;
+
+Point3f point(const Vector3d& v) {
+    return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
+}
+Vector3d vector(const Point3f& p) { return {p[0], p[1], p[2]}; }
+
+// A grid of rows x columns vertices, closed in the columns.
+Surface sweep(std::uint32_t rows, std::uint32_t columns, const std::function<Vector3d(double, double)>& place) {
+    Surface out;
+    for (std::uint32_t r = 0; r < rows; ++r)
+        for (std::uint32_t c = 0; c < columns; ++c)
+            out.first.push_back(point(place(static_cast<double>(r) / (rows - 1), static_cast<double>(c) / columns)));
+    for (std::uint32_t r = 0; r + 1 < rows; ++r)
+        for (std::uint32_t c = 0; c < columns; ++c) {
+            const std::uint32_t a = r * columns + c, b = r * columns + (c + 1) % columns;
+            out.second.push_back({a, b, a + columns});
+            out.second.push_back({b, b + columns, a + columns});
+        }
+    return out;
+}
+
+// A tube along x with an oval section (80 by 50 mm) and round ends, 600 mm long.
+Vector3d arm(double u, double v) {
+    const double x = 600 * u;
+    const double end = std::min({x, 600 - x, 40.0}) / 40;
+    const double size = std::max(0.02, std::sqrt(1 - (1 - end) * (1 - end)));
+    const double a = 2 * std::numbers::pi * v;
+    return {x, 40 * size * std::cos(a), 25 * size * std::sin(a)};
+}
+
+Surface moved(Surface surface, const std::function<Vector3d(const Vector3d&)>& motion) {
+    for (auto& p : surface.first) p = point(motion(vector(p)));
+    return surface;
+}
+
+// Handles along the x axis, each vertex between the two it lies between.
+DeformableMesh with_handles_along_x(const Surface& surface, double first, double last, std::size_t count,
+                                    const DeformationOptions& options) {
+    std::vector<Vector3d> handles;
+    std::vector<HandlePair> pairs;
+    const double apart = (last - first) / static_cast<double>(count - 1);
+    for (std::size_t h = 0; h < count; ++h) {
+        handles.emplace_back(first + apart * static_cast<double>(h), 0, 0);
+        const auto here = static_cast<std::uint16_t>(h);
+        if (h > 0)
+            pairs.push_back({static_cast<std::uint16_t>(h - 1), here, 0.5 * (handles[h - 1] + handles[h]), 1, 0.3});
+    }
+    HandleWeights weights;
+    for (const auto& p : surface.first) {
+        const double at = std::clamp((static_cast<double>(p[0]) - first) / apart, 0.0, static_cast<double>(count - 1));
+        const auto low = std::min(static_cast<std::size_t>(at), count - 2);
+        const auto upper =
+            static_cast<std::uint16_t>(std::lround((at - static_cast<double>(low)) * (1 << weight_bits)));
+        VertexWeights w;
+        w.handle = {static_cast<std::uint16_t>(low), static_cast<std::uint16_t>(low + 1)};
+        w.weight = {static_cast<std::uint16_t>((1 << weight_bits) - upper), upper};
+        if (upper > w.weight[0]) {
+            std::swap(w.handle[0], w.handle[1]);
+            std::swap(w.weight[0], w.weight[1]);
+        }
+        if (w.weight[1] == 0) w.handle[1] = 0;
+        weights.push_back(w);
+    }
+    return make_deformable(surface.first, surface.second, std::move(weights), handles, std::move(pairs), options);
+}
+
+struct Rest {
+    double rms = 0, largest = 0;  // of what is left to the target points, for the vertices that have one
+    double valid = 0;             // their share
+};
+
+Rest rest_after(const DeformableMesh& mesh, const TargetSurface& target, std::span<const RigidMotion> motions) {
+    const auto now = deform(mesh, motions, 1);
+    const auto targets = surface_targets(now, vertex_normals(now, mesh.triangles), target, {.reach = 60});
+    Rest out;
+    for (std::size_t v = 0; v < now.size(); ++v) {
+        if (!targets[v].valid) continue;
+        const double d = (vector(targets[v].point) - vector(now[v])).norm();
+        out.rms += d * d;
+        out.largest = std::max(out.largest, d);
+        out.valid += 1;
+    }
+    out.rms = std::sqrt(out.rms / std::max(out.valid, 1.0));
+    out.valid /= static_cast<double>(now.size());
+    return out;
+}
+
+TargetSurface target_of(const Surface& surface, const DeformationOptions& options) {
+    return make_target_surface(surface.first, surface.second, 20, options.back_samples, 1);
+}
+
+// Bent about z: a quarter circle per 600 mm.
+Vector3d bent(const Vector3d& p, double angle) {
+    const double radius = 600 / angle, at = p.x() / radius;
+    return {(radius - p.y()) * std::sin(at), radius - (radius - p.y()) * std::cos(at), p.z()};
+}
+
+TEST(RegisterDeformation, LaysAStraightTubeOnABentOne) {
+    const DeformationOptions options;
+    const auto reference = sweep(121, 40, arm);
+    const auto target = target_of(moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.8); }), options);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
+    const auto rest = rest_after(mesh, target, register_deformation(mesh, target, {}, options));
+    EXPECT_LT(rest.rms, 1.5);  // its tip moved 220 mm
+    EXPECT_GT(rest.valid, 0.98);
+}
+
+TEST(RegisterDeformation, FollowsASphereThatMovesFiveCentimetres) {
+    const DeformationOptions options;
+    auto ball = [](double u, double v) {
+        const double a = std::numbers::pi * (0.01 + 0.98 * u), b = 2 * std::numbers::pi * v;
+        return Vector3d(-150 * std::cos(a), 150 * std::sin(a) * std::cos(b), 150 * std::sin(a) * std::sin(b));
+    };
+    const Vector3d shift(30, 0, 40);
+    const auto reference = sweep(60, 70, ball);
+    const auto target = target_of(moved(sweep(71, 61, ball), [&](const Vector3d& p) { return p + shift; }), options);
+    const auto mesh = with_handles_along_x(reference, -150, 150, 4, options);
+    const auto motions = register_deformation(mesh, target, {}, options);
+    EXPECT_LT(rest_after(mesh, target, motions).rms, 0.3);
+    for (std::size_t h = 0; h < motions.size(); ++h)  // a ball may turn, its middle may not stay behind
+        EXPECT_LT((motions[h](Vector3d::Zero()) - shift).norm(), 3);
+}
+
+TEST(RegisterDeformation, TurnsATwistedArm) {
+    const DeformationOptions options;
+    const auto reference = sweep(121, 40, arm);
+    auto twist = [](const Vector3d& p) {
+        return Vector3d(Eigen::AngleAxisd(0.9 * p.x() / 600, Vector3d::UnitX()) * p);
+    };
+    const auto target = target_of(moved(sweep(111, 44, arm), twist), options);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
+    const auto motions = register_deformation(mesh, target, {}, options);
+    EXPECT_LT(rest_after(mesh, target, motions).rms, 0.8);
+    const Eigen::AngleAxisd tip(motions.back().rotation);
+    EXPECT_NEAR(tip.angle(), 0.9, 0.15);
+}
+
+TEST(RegisterDeformation, MovesNothingWhereNothingMoved) {
+    const DeformationOptions options;
+    const auto surface = sweep(121, 40, arm);
+    const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
+    const auto target = target_of(surface, options);
+    const auto rest = rest_after(mesh, target, register_deformation(mesh, target, {}, options));
+    EXPECT_LT(rest.rms, 0.05);
+    EXPECT_LT(rest.largest, 0.4);
+}
+
+TEST(RegisterDeformation, IsTheSameForAnyNumberOfThreads) {
+    DeformationOptions options;
+    const auto mesh = with_handles_along_x(sweep(121, 40, arm), 0, 600, 9, options);
+    const auto bent_arm = moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); });
+    const auto one = register_deformation(mesh, target_of(bent_arm, options), {}, options);
+    for (const unsigned threads : {2u, 3u, 7u}) {
+        options.threads = threads;
+        const auto target = make_target_surface(bent_arm.first, bent_arm.second, 20, options.back_samples, threads);
+        const auto many = register_deformation(mesh, target, {}, options);
+        for (std::size_t h = 0; h < one.size(); ++h) {
+            EXPECT_EQ(one[h].rotation, many[h].rotation);
+            EXPECT_EQ(one[h].shift, many[h].shift);
+        }
+    }
+}
+
+TEST(RegisterDeformation, WorksInLatticeUnitsAsInMillimetres) {
+    DeformationOptions options;
+    auto target = moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); });
+    const auto reference = sweep(121, 40, arm);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
+    const auto in_mm = register_deformation(mesh, target_of(target, options), {}, options);
+    auto scale = [](const Vector3d& p) { return Vector3d(16 * p); };
+    options.millimetre = 16;
+    const auto finer = with_handles_along_x(moved(reference, scale), 0, 9600, 9, options);
+    target = moved(target, scale);
+    const auto on_lattice = register_deformation(
+        finer, make_target_surface(target.first, target.second, 320, options.back_samples, 1), {}, options);
+    for (std::size_t h = 0; h < in_mm.size(); ++h) EXPECT_LT((in_mm[h].shift - on_lattice[h].shift / 16).norm(), 0.5);
+}
+
+TEST(RegisterDeformation, EmptyMeshesKeepTheStart) {
+    const DeformationOptions options;
+    const auto surface = sweep(21, 10, arm);
+    const auto mesh = with_handles_along_x(surface, 0, 600, 3, options);
+    const std::vector<RigidMotion> start(3, RigidMotion{Eigen::Matrix3d::Identity(), Vector3d(1, 2, 3)});
+    const auto nothing = target_of({}, options);
+    const auto kept = register_deformation(mesh, nothing, start, options);
+    EXPECT_EQ(kept[2].shift, start[2].shift);
+    EXPECT_EQ(deformation_error(mesh, nothing, start, options), 0);
+    const auto no_mesh = make_deformable({}, {}, {}, {}, {}, options);
+    EXPECT_TRUE(register_deformation(no_mesh, target_of(surface, options), {}, options).empty());
+    EXPECT_TRUE(deform(no_mesh, {}, 1).empty());
+}
+
+TEST(RegisterDeformation, SoupsOfTrianglesGiveFiniteMotions) {
+    const DeformationOptions options;
+    Surface soup;
+    std::uint32_t state = 1;
+    auto next = [&] { return state = state * 1664525 + 1013904223, static_cast<float>(state >> 8) / (1 << 15); };
+    for (std::uint32_t v = 0; v < 600; ++v) soup.first.push_back({next(), next() / 4, next() / 4});
+    for (std::uint32_t v = 0; v + 2 < 600; ++v) soup.second.push_back({v, (v * 7) % 600, (v * 31) % 600});
+    const auto mesh = with_handles_along_x(soup, 0, 512, 5, options);
+    const auto arm_target = target_of(sweep(31, 20, arm), options);
+    for (const auto& motion : register_deformation(mesh, arm_target, {}, options)) {
+        EXPECT_TRUE(motion.rotation.allFinite());
+        EXPECT_TRUE(motion.shift.allFinite());
+        EXPECT_NEAR(motion.rotation.determinant(), 1, 1e-6);
+    }
+}
+
+TEST(MovedOn, RepeatsTheLastStepOfEachHandle) {
+    const DeformationOptions options;
+    const auto mesh = with_handles_along_x(sweep(21, 10, arm), 0, 600, 2, options);
+    const auto step = [](double angle, double shift) {
+        return RigidMotion{Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix(), Vector3d(shift, 0, 0)};
+    };
+    const std::vector<RigidMotion> before = {step(0.1, 10), step(0, 5)}, last = {step(0.3, 30), step(0, 4)};
+    const auto next = moved_on(mesh, before, last);
+    EXPECT_LT((next[0].rotation - step(0.5, 0).rotation).norm(), 1e-9);
+    EXPECT_LT((next[0].shift - Vector3d(50, 0, 0)).norm(), 1e-9);
+    EXPECT_LT((next[1].shift - Vector3d(3, 0, 0)).norm(), 1e-9);
+}
+
+TEST(DeformationError, IsSmallerForTheBetterMotion) {
+    const DeformationOptions options;
+    const auto surface = sweep(121, 40, arm);
+    const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
+    const auto target =
+        target_of(moved(surface, [](const Vector3d& p) { return Vector3d(p + Vector3d(0, 30, 0)); }), options);
+    const std::vector<RigidMotion> still(9), right(9, RigidMotion{Eigen::Matrix3d::Identity(), Vector3d(0, 30, 0)});
+    EXPECT_LT(deformation_error(mesh, target, right, options), 0.5);
+    EXPECT_GT(deformation_error(mesh, target, still, options), 5);
+}
+
+TEST(SurfaceTargets, AreTheClosestPointsThatFaceTheSameWay) {
+    // Two sheets 10 mm apart, facing away from each other.
+    Surface sheets;
+    for (const float z : {0.0f, 10.0f})
+        for (int i = 0; i < 4; ++i)
+            sheets.first.push_back({static_cast<float>(i % 2) * 100, static_cast<float>(i / 2) * 100, z});
+    sheets.second = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}};
+    const auto target = make_target_surface(sheets.first, sheets.second, 20, 8, 1);
+    const std::vector<Point3f> at = {{20, 20, 2}, {20, 20, 2}, {20, 20, 2}, {20, 20, 900}};
+    const std::vector<Point3f> normals = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, 0, 1}};
+    const auto found = surface_targets(at, normals, target, {.reach = 150});
+    ASSERT_TRUE(found[0].valid && found[1].valid);
+    EXPECT_EQ(found[0].point, (Point3f{20, 20, 10}));
+    EXPECT_EQ(found[1].point, (Point3f{20, 20, 0}));
+    EXPECT_EQ(found[1].normal, (Point3f{0, 0, -1}));
+    EXPECT_FALSE(found[2].valid);
+    EXPECT_FALSE(found[3].valid);
+}
+
+TEST(OrientedPoints, AgreeWithASearchThroughAllWhateverTheGuess) {
+    std::uint32_t state = 7;
+    auto next = [&] { return state = state * 1664525 + 1013904223, static_cast<float>(state >> 8) / (1 << 24); };
+    std::vector<Point3f> points, normals;
+    for (int i = 0; i < 400; ++i) {
+        points.push_back({next() * 100, next() * 100, next() * 20});
+        normals.push_back(point(Vector3d(next() - 0.5, next() - 0.5, next() - 0.5).normalized()));
+    }
+    const OrientedPoints search(points, normals, 9);
+    for (int trial = 0; trial < 300; ++trial) {
+        const Point3f query = {next() * 140 - 20, next() * 140 - 20, next() * 60 - 20};
+        const Point3f normal = point(Vector3d(next() - 0.5, next() - 0.5, next() - 0.5).normalized());
+        const float reach = 5 + next() * 60;
+        OrientedMatch best{0, reach * reach, false};
+        for (std::uint32_t i = 0; i < points.size(); ++i) {
+            const float d = static_cast<float>((vector(points[i]) - vector(query)).squaredNorm());
+            if (vector(normals[i]).dot(vector(normal)) >= 0.3 && d < best.squared_distance) best = {i, d, true};
+        }
+        const auto guess = static_cast<std::uint32_t>(next() * 400);
+        for (const std::uint32_t first : {OrientedPoints::no_point, guess, 4000u}) {
+            const auto found = search.nearest(query, normal, reach, 0.3f, first);
+            EXPECT_EQ(found.found, best.found);
+            if (best.found) {
+                EXPECT_EQ(found.index, best.index);
+            }
+        }
+    }
+}
+
+TEST(OrientedPoints, PassOverWhatIsNotFinite) {
+    const std::vector<Point3f> points = {{NAN, 0, 0}, {INFINITY, 0, 0}, {3, 0, 0}}, normals(3);
+    const OrientedPoints search(points, normals, 1);
+    EXPECT_EQ(search.nearest({0, 0, 0}, {0, 0, 1}, 10, 0.5f).index, 2u);
+    EXPECT_FALSE(search.nearest({NAN, 0, 0}, {0, 0, 1}, 10, 0.5f).found);
+}
+
+TEST(Solve, FindsTheSolutionOfASystemOfBlocks) {
+    const auto pattern = make_pattern(5, {{0, 1}, {2, 1}, {3, 2}, {3, 4}, {0, 4}, {1, 1}, {1, 2}});
+    ASSERT_EQ(pattern.place.size(), 5u);
+    EXPECT_EQ(pattern.find(1, 2), 2u);
+    BlockSystem system(pattern);
+    std::srand(1);
+    for (auto& block : system.diagonal) block = 20 * Matrix6::Identity();
+    for (auto& block : system.above) block = Matrix6::Random();
+    std::vector<Vector6> truth;
+    for (int h = 0; h < 5; ++h) truth.push_back(Vector6::Random());
+    for (std::size_t h = 0; h < 5; ++h) system.right[h] = system.diagonal[h] * truth[h];
+    for (std::size_t i = 0; i < pattern.place.size(); ++i) {
+        const auto [row, column] = pattern.place[i];
+        system.right[row] += system.above[i] * truth[column];
+        system.right[column] += system.above[i].transpose() * truth[row];
+    }
+    const auto x = solve(pattern, system, 60, 1e-12);
+    for (std::size_t h = 0; h < 5; ++h) EXPECT_LT((x[h] - truth[h]).norm(), 1e-8);
+}
+
+}  // namespace
+}  // namespace htvm::internal
