@@ -21,14 +21,14 @@ struct Sequence {
 };
 
 htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
-    htvm::EncoderOptions options;
+    htvm::EncoderOptions options = htvm::default_options(htvm::Profile::topology);
     const auto steps = htvm::quality_steps(quality);
     options.geometry_step = steps.geometry_step;
     options.colour_step = steps.colour_step;
     options.threads = threads;
     options.skeleton = htvm::synth_skeleton();
     options.key_interval = 1000;
-    options.scene_changes = false;
+    options.topology.scene_changes = false;
     return options;
 }
 
@@ -40,16 +40,16 @@ enum class Kind { intra, enhanced, motion, predicted, tracked };
 void choose(htvm::EncoderOptions& options, Kind kind) {
     if (kind == Kind::enhanced || kind == Kind::intra) return;
     if (kind == Kind::tracked) {
-        options.tracked = true;
+        options.profile = htvm::Profile::tracked;
         options.least_key_interval = options.key_interval;
         return;
     }
-    options.animation_error = 0;
+    options.topology.animation_error = 0;
     if (kind == Kind::motion) {
-        options.still_below = 60;
+        options.topology.still_below = 60;
     } else {
-        options.frame_choice = htvm::FrameChoice::motion;
-        options.predicted_below = 1e6;
+        options.topology.frame_choice = htvm::FrameChoice::motion;
+        options.topology.predicted_below = 1e6;
     }
 }
 

@@ -103,7 +103,7 @@ Result<void> first_pass(Capture& capture, EncoderOptions& settings) {
     RateReport rate(settings);
     Summary unused;
     if (auto ok = encode_frames({capture, *encoder, nullptr, rate, "pass 1 of 2", false}, unused); !ok) return ok;
-    settings.first_pass = std::move(rate.costs);
+    settings.rate.first_pass = std::move(rate.costs);
     capture.rewind();
     return {};
 }

@@ -34,10 +34,10 @@ std::string beyond_reach(const RateReport& report) {
 }  // namespace
 
 RateReport::RateReport(const EncoderOptions& options)
-    : bits_per_second(options.bits_per_second),
-      buffer_seconds(options.bits_per_second > 0 ? options.buffer_seconds : 0),
-      target_error(options.target_error),
-      buffer(options.bits_per_second > 0 ? options.bits_per_second : 1, options.buffer_seconds) {}
+    : bits_per_second(options.rate.bits_per_second),
+      buffer_seconds(options.rate.bits_per_second > 0 ? options.rate.buffer_seconds : 0),
+      target_error(options.rate.target_error),
+      buffer(options.rate.bits_per_second > 0 ? options.rate.bits_per_second : 1, options.rate.buffer_seconds) {}
 
 void add_coded(RateReport& report, const FrameCost& cost) { report.costs.push_back(cost); }
 

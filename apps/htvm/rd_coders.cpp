@@ -91,16 +91,16 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
     out.description = description;
     out.settings = fmt::format(
         "keyint {}, reference {}, registration {}, weights {}, lambda {}, nearest {}", options.key_interval,
-        options.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
-        options.point_to_plane ? "plane" : "point", options.weight_width, options.lambda, options.nearest_vertices);
-    if (options.tracked)
+        options.topology.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
+        options.topology.point_to_plane ? "plane" : "point", options.topology.weight_width, options.lambda, options.topology.nearest_vertices);
+    if (options.profile == Profile::tracked)
         out.settings += fmt::format(", tracked from {}, nodes {}, simplify {}",
-                                    options.tracked_references == TrackedReferences::intra ? "I" : "the frame before",
-                                    options.node_spacing, options.simplify);
+                                    options.tracked.references == TrackedReferences::intra ? "I" : "the frame before",
+                                    options.tracked.node_spacing, options.tracked.simplify);
     out.settings +=
         fmt::format(", {}, P below {}, I above {}, still below {}, animation error {}{}",
-                    choice_name(options.frame_choice), options.predicted_below, options.intra_above,
-                    options.still_below, options.animation_error, options.scene_changes ? "" : ", no scene changes");
+                    choice_name(options.topology.frame_choice), options.topology.predicted_below, options.topology.intra_above,
+                    options.topology.still_below, options.topology.animation_error, options.topology.scene_changes ? "" : ", no scene changes");
     out.start = [options](const SequenceFacts& facts, const QualityPoint& quality) {
         return start_codec(options, facts, quality);
     };
@@ -110,21 +110,21 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
 EncoderOptions paper_options(int key_interval) {
     EncoderOptions out;
     out.key_interval = key_interval;
-    out.reference_vertices = ReferenceVertices::bone;
-    out.point_to_plane = false;
-    out.weight_width = 0;
+    out.topology.reference_vertices = ReferenceVertices::bone;
+    out.topology.point_to_plane = false;
+    out.topology.weight_width = 0;
     return out;
 }
 
 std::vector<CoderUnderTest> built_in_coders(int key_interval) {
-    EncoderOptions ours;
+    EncoderOptions ours = default_options(Profile::topology);
     ours.key_interval = key_interval;
     EncoderOptions motion = ours;
-    motion.still_below = default_still_below;
+    motion.topology.still_below = default_still_below;
     EncoderOptions chosen = ours;
-    chosen.frame_choice = FrameChoice::rate_distortion;
+    chosen.topology.frame_choice = FrameChoice::rate_distortion;
     EncoderOptions tracked = ours;
-    tracked.tracked = true;
+    tracked.profile = Profile::tracked;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
     return {

@@ -298,7 +298,7 @@ double mean_vertices(const SourceFrames& source) {
 // Means over at most five frames, evenly spread.
 Result<FactList> capture_facts(const Options& options, const SourceFrames& source, Findings& findings) {
     double triangles = 0, components = 0, boundary = 0, non_manifold = 0, looked_at = 0;
-    TopologyOptions topology_options;
+    TopologyMeasureOptions topology_options;
     topology_options.defects = false;
     findings.has_colour = true;
     const std::size_t every = measure_every(source.size(), 5);

@@ -118,8 +118,8 @@ std::vector<std::pair<double, const RdPoint*>> by_threshold(std::span<const RdPo
 
 CoderUnderTest motion_coder(int key_interval, double still_below) {
     auto options = paper_options(key_interval);
-    options.still_below = still_below;
-    options.animation_error = 0;
+    options.topology.still_below = still_below;
+    options.topology.animation_error = 0;
     return labelled(options, threshold_words(still_below_words, still_below));
 }
 
@@ -136,9 +136,9 @@ std::vector<Trial> intra_choice_trials(const ExperimentPlan& plan, const MotionT
         for (const double threshold : thresholds.intra_above) {
             // The threshold alone decides.
             auto options = paper_options(1000000);
-            options.frame_choice = FrameChoice::motion;
-            options.intra_above = threshold;
-            options.scene_changes = false;
+            options.topology.frame_choice = FrameChoice::motion;
+            options.topology.intra_above = threshold;
+            options.topology.scene_changes = false;
             out.push_back(
                 trial_of(without_colours(labelled(options, threshold_words(intra_above_words, threshold))), quality));
         }
@@ -152,9 +152,9 @@ std::vector<Trial> predicted_trials(const ExperimentPlan& plan, const MotionThre
         if (check && !checked) continue;
         for (const double threshold : thresholds.predicted_below) {
             auto options = paper_options(plan.key_interval);
-            options.frame_choice = FrameChoice::motion;
-            options.predicted_below = threshold;
-            if (!check) options.animation_error = 0;
+            options.topology.frame_choice = FrameChoice::motion;
+            options.topology.predicted_below = threshold;
+            if (!check) options.topology.animation_error = 0;
             const auto label = threshold_words(check ? checked_words : predicted_below_words, threshold);
             out.push_back(trial_of(without_colours(labelled(options, label)), plan.predicted_quality));
         }

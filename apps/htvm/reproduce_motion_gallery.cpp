@@ -244,8 +244,8 @@ Result<Figure> zippering_figure(const Mesh& original, const SeamStages& stages, 
 Result<Figure> seams(const SourceFrames& source, const ExperimentPlan& plan, const MotionShot& shot, double threshold,
                      double azimuth, const GalleryOptions& options, Findings& findings) {
     auto coder = paper_options(plan.key_interval);
-    coder.still_below = threshold;
-    coder.animation_error = 0;
+    coder.topology.still_below = threshold;
+    coder.topology.animation_error = 0;
     coder.geometry_step = plan.motion_step;
     coder.colour_step = plan.picture_colour_step;
     coder.threads = options.threads;

@@ -136,7 +136,7 @@ Result<std::vector<SeamStages>> code_in_stages(const std::vector<std::shared_ptr
                                                const SequenceFacts& facts, const EncoderOptions& options) {
     auto all = options;
     all.key_interval = 1000000;
-    all.scene_changes = false;
+    all.topology.scene_changes = false;
     all.skeleton = facts.skeleton;
     all.radii = facts.radii;
     auto encoder = Encoder::create(all);
@@ -159,7 +159,7 @@ Result<std::vector<SeamStages>> code_in_stages(const std::vector<std::shared_ptr
 }
 
 Result<SeamCounts> count_seams(const Mesh& original, const SeamStages& stages, unsigned threads) {
-    TopologyOptions options;
+    TopologyMeasureOptions options;
     options.crack_width = 2 * mean_edge_length(original);
     SeamCounts out;
     out.frame = stages.frame;

@@ -3,6 +3,7 @@
 
 #include "htvm/decoder.hpp"       // IWYU pragma: export
 #include "htvm/encoder.hpp"       // IWYU pragma: export
+#include "htvm/encoder_options.hpp"  // IWYU pragma: export
 #include "htvm/frame.hpp"         // IWYU pragma: export
 #include "htvm/intra_coder.hpp"   // IWYU pragma: export
 #include "htvm/lattice_mesh.hpp"  // IWYU pragma: export

@@ -20,7 +20,7 @@ using namespace internal;
 
 struct Decoder::State {
     DecoderOptions options;
-    unsigned threads = 1;
+    Threads threads = {};
     std::optional<SequenceHeader> header;
     std::vector<std::uint8_t> header_payload;
     std::optional<SequenceInfo> info;

@@ -25,7 +25,7 @@ using State = EncoderState;
 // 1/16 mm, or as fine as makes the step eight units.
 int lattice_bits(const EncoderOptions& options) {
     if (options.lattice_bits > 0) return options.lattice_bits;
-    const bool controlled = options.bits_per_second > 0 || options.target_error > 0;
+    const bool controlled = options.rate.bits_per_second > 0 || options.rate.target_error > 0;
     const double finest = controlled ? quality_steps(100).geometry_step : options.geometry_step;
     const int needed = static_cast<int>(std::ceil(3 - std::log2(finest)));
     return std::clamp(needed, 4, 16);
@@ -64,12 +64,12 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
     header.fps_numerator = state.options.fps_numerator;
     header.fps_denominator = state.options.fps_denominator;
     header.unit_micrometres = state.options.unit_micrometres;
-    header.nearest_vertices = static_cast<std::uint8_t>(state.options.nearest_vertices);
+    header.nearest_vertices = static_cast<std::uint8_t>(state.options.topology.nearest_vertices);
     header.weight_width =
-        static_cast<std::int32_t>(std::lround(std::min(state.options.weight_width * units, 1.0 * lattice_limit)));
-    if (state.options.tracked)
+        static_cast<std::int32_t>(std::lround(std::min(state.options.topology.weight_width * units, 1.0 * lattice_limit)));
+    if (state.options.profile == Profile::tracked)
         header.node_spacing = static_cast<std::int32_t>(
-            std::clamp(std::lround(state.options.node_spacing * units), 1L, static_cast<long>(lattice_limit)));
+            std::clamp(std::lround(state.options.tracked.node_spacing * units), 1L, static_cast<long>(lattice_limit)));
     return {};
 }
 
@@ -150,11 +150,11 @@ tl::unexpected<Error> take_back(State& state, const Queued& before) {
 
 RateControlOptions rate_options(const EncoderOptions& options) {
     RateControlOptions out;
-    out.bits_per_second = options.bits_per_second;
+    out.bits_per_second = options.rate.bits_per_second;
     out.frames_per_second = static_cast<double>(options.fps_numerator) / options.fps_denominator;
-    out.buffer_seconds = options.buffer_seconds;
+    out.buffer_seconds = options.rate.buffer_seconds;
     out.key_interval = options.key_interval;
-    if (options.tracked) out.intra_extra = 3;
+    if (options.profile == Profile::tracked) out.intra_extra = 3;
     return out;
 }
 
@@ -172,8 +172,8 @@ Result<Encoder> Encoder::create(const EncoderOptions& options) try {
     auto state = std::make_unique<Encoder::State>();
     state->options = options;
     state->threads = thread_count(options.threads);
-    if (options.bits_per_second > 0) state->rate.emplace(rate_options(options), options.first_pass);
-    if (options.target_error > 0) state->error.emplace(options.target_error);
+    if (options.rate.bits_per_second > 0) state->rate.emplace(rate_options(options), options.rate.first_pass);
+    if (options.rate.target_error > 0) state->error.emplace(options.rate.target_error);
     return Encoder(std::move(state));
 } catch (const std::bad_alloc&) {
     return out_of_memory();

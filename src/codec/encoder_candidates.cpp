@@ -23,7 +23,7 @@ std::int32_t step_for_reference(double edge, std::int32_t step) {
 
 RegistrationOptions registration_options(const State& state) {
     RegistrationOptions out;
-    out.point_to_plane = state.options.point_to_plane;
+    out.point_to_plane = state.options.topology.point_to_plane;
     if (!out.point_to_plane) {  // slower to settle
         out.iterations = 16;
         out.samples = 500;
@@ -40,9 +40,9 @@ EnhancedFrameOptions enhanced_options(const State& state, const FrameSteps& step
     out.colour.lambda = state.options.lambda;
     out.geometry.threads = out.colour.threads = out.threads = state.threads;
     out.reference_choice =
-        state.options.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone : ReferenceChoice::any;
-    out.merge_duplicates = state.options.merge_duplicates;
-    out.nearest_vertices = state.options.nearest_vertices;
+        state.options.topology.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone : ReferenceChoice::any;
+    out.merge_duplicates = state.options.topology.merge_duplicates;
+    out.nearest_vertices = state.options.topology.nearest_vertices;
     return out;
 }
 
@@ -129,7 +129,7 @@ SimplifiedReferenceOptions simplification(const State& state, const FrameSteps& 
     constexpr double colour_steps = 2.5;
     const double units = 1.0 / state.header.lattice.step();
     SimplifiedReferenceOptions out;
-    out.surface_error = state.options.simplify * steps.geometry;
+    out.surface_error = state.options.tracked.simplify * steps.geometry;
     out.colour_error = colour_steps * steps.colour;
     out.longest_edge = longest_edge * units;
     out.reach = reach * units;
@@ -180,8 +180,8 @@ const AnimationFit& fit_of(State& state, FrameUnderWay& frame) {
     if (!frame.fit) {
         const auto& predicted = motion_of(state, frame).predicted;
         StageClock clock(state.stages);
-        const bool checked = state.options.animation_error > 0 || state.options.target_error > 0 ||
-                             state.options.frame_choice == FrameChoice::rate_distortion;
+        const bool checked = state.options.topology.animation_error > 0 || state.options.rate.target_error > 0 ||
+                             state.options.topology.frame_choice == FrameChoice::rate_distortion;
         frame.fit = measure_animation(frame.mesh, state.group->reference, predicted, checked, state.threads);
         clock.done("fit of the animation");
     }
@@ -189,23 +189,23 @@ const AnimationFit& fit_of(State& state, FrameUnderWay& frame) {
 }
 
 Result<FrameCandidate> encode_intra(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
-    const bool tracked = state.options.tracked;
+    const bool tracked = state.options.profile == Profile::tracked;
     const auto asked = tracked ? tracked_steps(steps) : steps;
     LatticeMesh simplified;
-    if (tracked && state.options.simplify > 0) {
+    if (tracked && state.options.tracked.simplify > 0) {
         const auto& target = target_of(state, frame);
         StageClock clock(state.stages);
         simplified = simplified_reference(frame.mesh, target, simplification(state, steps));
         clock.done("simplification");
     }
-    const auto& mesh = tracked && state.options.simplify > 0 ? simplified : frame.mesh;
+    const auto& mesh = tracked && state.options.tracked.simplify > 0 ? simplified : frame.mesh;
     StageClock clock(state.stages);
     IntraFrameOptions options;
     const double edge = mean_edge(frame.mesh);
     options.geometry_step =
         state.options.key_interval == 1 ? asked.geometry : step_for_reference(mean_edge(mesh), asked.geometry);
     options.colour_step = asked.colour;
-    options.merge_duplicates = state.options.merge_duplicates;
+    options.merge_duplicates = state.options.topology.merge_duplicates;
     options.external = state.options.intra_coder ? &*state.options.intra_coder : nullptr;
     FramePayload payload;
     auto decoded = encode_intra_frame(mesh, options, payload);
@@ -292,7 +292,7 @@ Result<FrameCandidate> encode_tracked(State& state, FrameUnderWay& frame, const 
         group.tracked = make_tracked_group(std::move(*reference), options.deformation);
         clock.done("deformation graph");
     }
-    const bool refer_to_last = group.last_tracked && state.options.tracked_references == TrackedReferences::previous;
+    const bool refer_to_last = group.last_tracked && state.options.tracked.references == TrackedReferences::previous;
     auto encoded = encode_tracked_frame(frame.mesh, target_of(state, frame), *group.tracked, refer_to_last,
                                         skeletal_node_motion(state, frame), options, state.stages);
     if (!encoded) return tl::unexpected(encoded.error());

@@ -16,6 +16,7 @@
 #include "codec/tracked/tracked_frame_enc.h"
 #include "surface/surface_distance.h"
 #include "htvm/encoder.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -72,7 +73,7 @@ struct Group {
 
 struct EncoderState {
     EncoderOptions options;
-    unsigned threads = 1;
+    Threads threads = {};
     SequenceHeader header;
     bool begun = false, finished = false;
     PoseTracker poses;

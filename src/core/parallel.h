@@ -47,7 +47,7 @@ Thread start_or_run(const Work& work) {
 // there are several, each is at least half a `grain` long. Returns when all are done; where calls threw, all the others
 // are done too, and the first exception is thrown here.
 template <class Body>
-void parallel_for(std::size_t count, unsigned threads, std::size_t grain, const Body& body) {
+void parallel_for(std::size_t count, Threads threads, std::size_t grain, const Body& body) {
     if (count == 0) return;
     grain = std::max<std::size_t>(grain, 1);
     const std::size_t pieces = std::min<std::size_t>(threads, (count - 1) / grain + 1);
@@ -69,7 +69,7 @@ void parallel_for(std::size_t count, unsigned threads, std::size_t grain, const 
 // Runs the given functions, the last on this thread and the others beside it where threads > 1. Where one throws, the
 // other is done too, and the exception is thrown here; with one thread, what comes after it is not run.
 template <class First, class Second>
-void parallel_invoke(unsigned threads, const First& first, const Second& second) {
+void parallel_invoke(Threads threads, const First& first, const Second& second) {
     if (threads <= 1) {
         first();
         second();

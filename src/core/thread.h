@@ -9,6 +9,9 @@
 
 namespace htvm::internal {
 
+// How many threads a call may use: 0 and 1 are both the caller alone.
+using Threads = unsigned;
+
 #ifdef __STDCPP_THREADS__
 
 using Thread = std::thread;

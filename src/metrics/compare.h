@@ -23,7 +23,7 @@ struct CompareOptions {
     bool pictures = true;  // M3
     bool topology = true;  // counts
     SurfaceErrorOptions surface_options;
-    TopologyOptions topology_options;
+    TopologyMeasureOptions topology_options;
     ViewOptions views;
     RenderOptions render;         // colours are drawn only where both meshes have some
     std::optional<Box> view_box;  // what the cameras look at in every frame; empty: each original's own bounding box

@@ -265,7 +265,7 @@ Result<void> find_flaps(const Mesh& mesh, double distance, unsigned threads, Top
 
 }  // namespace
 
-Result<Topology> topology(const Mesh& mesh, const TopologyOptions& options, unsigned threads) {
+Result<Topology> topology(const Mesh& mesh, const TopologyMeasureOptions& options, unsigned threads) {
     Topology out;
     count_parts(mesh, out);
     if (!options.defects) return out;

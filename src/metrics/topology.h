@@ -11,7 +11,7 @@
 
 namespace htvm {
 
-struct TopologyOptions {
+struct TopologyMeasureOptions {
     bool defects = true;       // look for cracks and flaps too (slower than the counts)
     double crack_width = 0;    // mm, the widest gap that is a crack; 0: half of the mean edge length
     double flap_distance = 0;  // mm, the farthest apart that two layers of a flap are; 0: half of the mean edge length
@@ -48,6 +48,6 @@ struct Topology {
 };
 
 // The same for any number of threads (0: one per core). A limit error where Embree runs out of memory.
-Result<Topology> topology(const Mesh& mesh, const TopologyOptions& options = {}, unsigned threads = 0);
+Result<Topology> topology(const Mesh& mesh, const TopologyMeasureOptions& options = {}, unsigned threads = 0);
 
 }  // namespace htvm

@@ -44,7 +44,7 @@ Vector3d blended_turn(const SampleBlend& blend, const std::vector<RigidMotion>& 
     return length > 0 ? Vector3d(out / length) : direction;
 }
 
-Moved move_samples(const Stage& stage, unsigned threads) {
+Moved move_samples(const Stage& stage, Threads threads) {
     Moved out{std::vector<Point3f>(stage.rest.size()), std::vector<Point3f>(stage.rest.size())};
     parallel_for(stage.rest.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
@@ -299,7 +299,7 @@ Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
 }
 
 // Groups of handles move on from where `fine` has them.
-Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, unsigned threads) {
+Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, Threads threads) {
     Stage stage{mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size())};
     const Moved moved = move_samples(fine, threads);
     for (const std::uint32_t i : mesh.coarse.samples) {
@@ -397,7 +397,7 @@ double deformation_error(const DeformableMesh& mesh, const TargetSurface& target
     return reach - near / static_cast<double>(mesh.samples.size() / every + target.samples.size() / every);
 }
 
-std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, unsigned threads) {
+std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, Threads threads) {
     std::vector<Point3f> out(mesh.positions);
     if (motions.empty()) return out;
     const std::vector<RigidMotion> motion(motions.begin(), motions.end());

@@ -17,6 +17,7 @@
 #include "surface/registration.h"
 #include "surface/target_surface.h"
 #include "htvm/mesh.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -46,7 +47,7 @@ struct DeformationOptions {
     double last_point_share = 0.2;
     double agreement = 0.2;      // least product of the normals of a match
     int solver_iterations = 40;  // of conjugate gradients, at most, a round
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 // How some vertices follow the handles, with the blocks of the linear system that each touches.
@@ -102,6 +103,6 @@ double deformation_error(const DeformableMesh& mesh, const TargetSurface& target
                          const DeformationOptions& options);
 
 // The reference moved, in floats: to look ahead with. What is coded moves in integers.
-std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, unsigned threads);
+std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, Threads threads);
 
 }  // namespace htvm::internal

@@ -64,7 +64,7 @@ struct Sums {
 
 // Sums of body(i, sums) over [0, count), cut the same way for any number of threads.
 template <class Body>
-Sums sum_blocks(std::size_t count, unsigned threads, const Body& body) {
+Sums sum_blocks(std::size_t count, Threads threads, const Body& body) {
     std::vector<Sums> parts((count + block - 1) / block);
     parallel_for(parts.size(), thread_count(threads), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p)

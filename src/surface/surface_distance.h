@@ -14,6 +14,7 @@
 
 #include "surface/surface_search.h"
 #include "htvm/mesh.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -25,7 +26,7 @@ struct SurfaceView {
 };
 
 struct SurfaceDistanceOptions {
-    unsigned threads = 1;       // 0: one per core; any number gives the same bits
+    Threads threads = {};       // 0: one per core; any number gives the same bits
     std::uint32_t every = 1;    // take only every n-th vertex and every n-th triangle's centre; 0 counts as 1
     double vertex_share = 0.4;  // 0..1, weight of the vertices beside the centres
 };

@@ -121,7 +121,7 @@ float gap_of(double area, std::size_t count) {
 }  // namespace
 
 std::vector<Point3f> vertex_normals(std::span<const Point3f> positions, std::span<const Triangle> triangles,
-                                    unsigned threads) {
+                                    Threads threads) {
     std::vector<Vector> sum(positions.size(), Vector::Zero());
     for (const auto& t : triangles) {
         const Vector a = vector_of(positions[t[0]]);
@@ -148,7 +148,7 @@ float point_gap(std::span<const Point3f> positions, std::span<const Triangle> tr
 }
 
 TargetSurface make_target_surface(std::span<const Point3f> positions, std::span<const Triangle> triangles, float cell,
-                                  std::size_t samples, unsigned threads) {
+                                  std::size_t samples, Threads threads) {
     TriangleNormals of_triangles;
     std::vector<Point3f> normals;
     Around around;

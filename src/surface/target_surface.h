@@ -9,12 +9,13 @@
 
 #include "surface/oriented_points.h"
 #include "htvm/mesh.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
 // One a vertex: the normals of the triangles around it, weighted by area, unit length; zero where there are none.
 std::vector<Point3f> vertex_normals(std::span<const Point3f> positions, std::span<const Triangle> triangles,
-                                    unsigned threads = 1);
+                                    Threads threads = {});
 
 // About how far apart neighbours are where `count` points are spread over the surface.
 float point_gap(std::span<const Point3f> positions, std::span<const Triangle> triangles, std::size_t count);
@@ -33,7 +34,7 @@ struct TargetSurface {
 // Copies what it needs. Every index < positions.size(). cell: side of the fine search's cells, about two edges long;
 // samples: about how many vertices the coarse search knows.
 TargetSurface make_target_surface(std::span<const Point3f> positions, std::span<const Triangle> triangles, float cell,
-                                  std::size_t samples, unsigned threads);
+                                  std::size_t samples, Threads threads);
 
 // A point of the target's surface for a vertex of the deformed reference.
 struct SurfaceTarget {
@@ -46,7 +47,7 @@ struct SurfaceTarget {
 struct SurfaceTargetOptions {
     float reach = 30;         // the positions' units: further away there is no target
     float agreement = 0.35F;  // least product of the two normals
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 // Points on a mesh, and which way it faces there.

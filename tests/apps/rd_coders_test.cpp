@@ -88,26 +88,26 @@ TEST(BuiltInCoders, only_the_coders_with_references_code_enhanced_frames) {
 TEST(CodecUnderTest, settings_differ_where_options_do) {
     std::set<std::string> settings;
     auto add = [&](auto&& change) {
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         change(options);
         EXPECT_TRUE(settings.insert(codec_under_test("name", {}, options).settings).second);
     };
     add([](EncoderOptions&) {});
-    add([](EncoderOptions& o) { o.still_below = 5; });
-    add([](EncoderOptions& o) { o.animation_error = 0; });
-    add([](EncoderOptions& o) { o.weight_width = 0; });
-    add([](EncoderOptions& o) { o.frame_choice = FrameChoice::motion; });
-    add([](EncoderOptions& o) { o.frame_choice = FrameChoice::rate_distortion; });
-    add([](EncoderOptions& o) { o.predicted_below = 5; });
-    add([](EncoderOptions& o) { o.intra_above = 5; });
-    add([](EncoderOptions& o) { o.scene_changes = false; });
+    add([](EncoderOptions& o) { o.topology.still_below = 5; });
+    add([](EncoderOptions& o) { o.topology.animation_error = 0; });
+    add([](EncoderOptions& o) { o.topology.weight_width = 0; });
+    add([](EncoderOptions& o) { o.topology.frame_choice = FrameChoice::motion; });
+    add([](EncoderOptions& o) { o.topology.frame_choice = FrameChoice::rate_distortion; });
+    add([](EncoderOptions& o) { o.topology.predicted_below = 5; });
+    add([](EncoderOptions& o) { o.topology.intra_above = 5; });
+    add([](EncoderOptions& o) { o.topology.scene_changes = false; });
 }
 
 TEST(CodecUnderTest, tells_p_frames) {
-    EncoderOptions options;
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 1e6;
-    options.animation_error = 0;
+    EncoderOptions options = default_options(Profile::topology);
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 1e6;
+    options.topology.animation_error = 0;
     const auto start = codec_under_test("p", {}, options).start(facts_of(synthetic_frame(0)), quality_point(50));
     ASSERT_TRUE(start);
     EXPECT_EQ(FrameType::intra, (*start)(synthetic_frame(0))->type);

@@ -33,8 +33,8 @@ Shots walking() {
 
 EncoderOptions partly(double still_below) {
     auto options = paper_options(30);
-    options.still_below = still_below;
-    options.animation_error = 0;
+    options.topology.still_below = still_below;
+    options.topology.animation_error = 0;
     options.threads = 1;
     return options;
 }
@@ -49,7 +49,7 @@ TEST(SeamStages, the_last_is_what_the_decoder_shows) {
     auto options = partly(60);
     options.skeleton = shots.facts.skeleton;
     options.key_interval = 1000000;
-    options.scene_changes = false;
+    options.topology.scene_changes = false;
     auto encoder = Encoder::create(options);
     ASSERT_TRUE(encoder);
     Decoder decoder;

@@ -209,7 +209,7 @@ TEST(CDecoder, WritesToArraysThatAreLargeEnoughOnly) {
 }
 
 TEST(CDecoder, SaysWhichAttributesAFrameHas) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     const auto coded = encode(sequence_of(tfan_test::grid(4, 4), 1, none), options);
     const auto decoder = make_decoder();
     ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded.bytes.data(), coded.bytes.size()), HTVM_OK);

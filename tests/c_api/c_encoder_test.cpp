@@ -110,29 +110,29 @@ TEST(CEncoder, GivesTheBytesOfTheCppEncoder) {
 }
 
 TEST(CEncoder, EveryOptionReachesTheCppEncoder) {
-    EncoderOptions cpp;
+    EncoderOptions cpp = default_options(Profile::topology);
     auto options = default_options();
     cpp.geometry_step = options.geometry_step = 5;
     cpp.colour_step = options.colour_step = 9;
     cpp.lambda = options.lambda = 0.3;
     cpp.key_interval = options.key_interval = 3;
     cpp.least_key_interval = options.least_key_interval = 2;
-    cpp.scene_changes = false;
+    cpp.topology.scene_changes = false;
     options.scene_changes = 0;
-    cpp.frame_choice = FrameChoice::motion;
+    cpp.topology.frame_choice = FrameChoice::motion;
     options.frame_choice = HTVM_CHOICE_MOTION;
-    cpp.predicted_below = options.predicted_below = 30;
-    cpp.intra_above = options.intra_above = 3000;
-    cpp.still_below = options.still_below = 20;
-    cpp.animation_error = options.animation_error = 6;
-    cpp.merge_duplicates = false;
+    cpp.topology.predicted_below = options.predicted_below = 30;
+    cpp.topology.intra_above = options.intra_above = 3000;
+    cpp.topology.still_below = options.still_below = 20;
+    cpp.topology.animation_error = options.animation_error = 6;
+    cpp.topology.merge_duplicates = false;
     options.merge_duplicates = 0;
-    cpp.nearest_vertices = options.nearest_vertices = 5;
-    cpp.reference_vertices = ReferenceVertices::bone;
+    cpp.topology.nearest_vertices = options.nearest_vertices = 5;
+    cpp.topology.reference_vertices = ReferenceVertices::bone;
     options.reference_any = 0;
-    cpp.point_to_plane = false;
+    cpp.topology.point_to_plane = false;
     options.point_to_plane = 0;
-    cpp.weight_width = options.weight_width = 10;
+    cpp.topology.weight_width = options.weight_width = 10;
     cpp.lattice_bits = options.lattice_bits = 6;
     cpp.unit_micrometres = options.unit_micrometres = 10000;
     cpp.fps_numerator = options.fps_numerator = 25;
@@ -141,25 +141,25 @@ TEST(CEncoder, EveryOptionReachesTheCppEncoder) {
     const auto person = synthetic(true, 6, 300);
     EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
 
-    cpp = {};
+    cpp = default_options(Profile::topology);
     options = default_options();
-    cpp.tracked = true;
+    cpp.profile = Profile::tracked;
     options.tracked = 1;
-    cpp.tracked_references = TrackedReferences::intra;
+    cpp.tracked.references = TrackedReferences::intra;
     options.tracked_from_intra = 1;
-    cpp.simplify = options.simplify = 0.2;
-    cpp.node_spacing = options.node_spacing = 120;
+    cpp.tracked.simplify = options.simplify = 0.2;
+    cpp.tracked.node_spacing = options.node_spacing = 120;
     EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
 
-    cpp = {};
+    cpp = default_options(Profile::topology);
     options = default_options();
-    cpp.bits_per_second = options.bits_per_second = 4e6;
-    cpp.buffer_seconds = options.buffer_seconds = 0.5;
+    cpp.rate.bits_per_second = options.bits_per_second = 4e6;
+    cpp.rate.buffer_seconds = options.buffer_seconds = 0.5;
     EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
 
-    cpp = {};
+    cpp = default_options(Profile::topology);
     options = default_options();
-    cpp.target_error = options.target_error = 1.5;
+    cpp.rate.target_error = options.target_error = 1.5;
     EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
 }
 

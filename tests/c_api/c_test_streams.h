@@ -16,10 +16,10 @@ using namespace internal;
 // A person of some 300 vertices with skeleton, colours and normals; an I-frame, EP-frames, P-frames, T-frames.
 inline const CodedSequence& coded_person() {
     static const auto coded = [] {
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         options.key_interval = 3;
-        options.frame_choice = FrameChoice::motion;
-        options.predicted_below = 60;
+        options.topology.frame_choice = FrameChoice::motion;
+        options.topology.predicted_below = 60;
         return encode(synthetic(true, 6, 300), options);
     }();
     return coded;
@@ -28,7 +28,7 @@ inline const CodedSequence& coded_person() {
 // Without skeleton, with every attribute.
 inline const CodedSequence& coded_grid() {
     static const auto coded = [] {
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         options.key_interval = 2;
         return encode(sequence_of(tfan_test::grid(6, 6), 4, all), options);
     }();

@@ -51,7 +51,7 @@ void expect_closed_loop(const TestSequence& sequence, EncoderOptions options) {
 }
 
 EncoderOptions key_every_third() {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 3;
     return options;
 }
@@ -59,7 +59,7 @@ EncoderOptions key_every_third() {
 // Nothing merges, nothing is traded for rate, and colours are exact: every vertex can be known again by its colour.
 EncoderOptions traceable() {
     auto options = key_every_third();
-    options.merge_duplicates = false;
+    options.topology.merge_duplicates = false;
     options.lambda = 0;
     options.colour_step = 1;
     return options;
@@ -79,15 +79,15 @@ TEST(ClosedLoop, ASyntheticCaptureWithoutSkeleton) { expect_closed_loop(syntheti
 
 TEST(ClosedLoop, OtherOptions) {
     auto options = key_every_third();
-    options.reference_vertices = ReferenceVertices::bone;
-    options.point_to_plane = !options.point_to_plane;
-    options.nearest_vertices = 1;
+    options.topology.reference_vertices = ReferenceVertices::bone;
+    options.topology.point_to_plane = !options.topology.point_to_plane;
+    options.topology.nearest_vertices = 1;
     options.lambda = 1000;
     expect_closed_loop(synthetic(true, 4), options);
     options = key_every_third();
     options.geometry_step = 0.0001;
     options.colour_step = 255;
-    options.nearest_vertices = 64;
+    options.topology.nearest_vertices = 64;
     options.lattice_bits = 12;
     expect_closed_loop(synthetic(true, 4, 500), options);
     options.geometry_step = 1000;
@@ -125,7 +125,7 @@ TEST(ClosedLoop, VerticesAndPoseAtOppositeEndsOfTheLattice) {
     }
     for (const double lambda : {0.0, 0.12, 1000.0})
         for (const double step : {0.1, 2.0, 1000.0}) {
-            EncoderOptions options;
+            EncoderOptions options = default_options(Profile::topology);
             options.lattice_bits = 4;
             options.lambda = lambda;
             options.geometry_step = step;
@@ -145,22 +145,22 @@ TEST(ClosedLoop, NoChoiceOfCodewordLeavesTheLattice) {
     mesh.positions.assign(9, {-end, end - 0.1f, 0});
     mesh.positions.push_back({end, end, 0});
     sequence.frames.push_back({mesh, {}});
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.lattice_bits = 16;
     options.lambda = 1000;
     options.geometry_step = 100;
-    options.merge_duplicates = false;
+    options.topology.merge_duplicates = false;
     expect_closed_loop(sequence, options);
 }
 
 TEST(ClosedLoop, PredictedFrames) {
     auto options = motion_based(0);
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 1e6;
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 1e6;
     const auto sequence = walking(6, 800);
     EXPECT_EQ(frames_of(encode(sequence, options), FrameType::predicted), 4u) << "all but two I-frames";
     expect_closed_loop(sequence, options);
-    options.weight_width = 0;
+    options.topology.weight_width = 0;
     options.geometry_step = 0.1;
     expect_closed_loop(sequence, options);
 }
@@ -172,8 +172,8 @@ TEST(ClosedLoop, MotionBasedFramesByThreshold) {
         auto options = motion_based(still_below, 5);
         EXPECT_GT(frames_in_part(encode(sequence, options)), 0u);
         expect_closed_loop(sequence, options);
-        options.weight_width = 0;
-        options.merge_duplicates = false;
+        options.topology.weight_width = 0;
+        options.topology.merge_duplicates = false;
         expect_closed_loop(sequence, options);
     }
 }
@@ -181,7 +181,7 @@ TEST(ClosedLoop, MotionBasedFramesByThreshold) {
 TEST(ClosedLoop, MotionBasedFramesWhoseAnimationIsChecked) {
     auto options = motion_based(200);
     for (const double error : {0.5, 2.0, 20.0}) {
-        options.animation_error = error;
+        options.topology.animation_error = error;
         expect_closed_loop(walking(4, 800), options);
     }
 }
@@ -202,10 +202,10 @@ TEST(ClosedLoop, EveryChoiceOfFrames) {
     for (const auto choice : {FrameChoice::fixed, FrameChoice::motion, FrameChoice::rate_distortion})
         for (const double still_below : {0.0, 60.0}) {
             auto options = motion_based(still_below, 6);
-            options.frame_choice = choice;
-            options.predicted_below = 500;
-            options.intra_above = 2500;
-            options.animation_error = 2;
+            options.topology.frame_choice = choice;
+            options.topology.predicted_below = 500;
+            options.topology.intra_above = 2500;
+            options.topology.animation_error = 2;
             expect_closed_loop(walking(7, 500), options);
             // Slow, and half of the ways are other tests' already.
             if ((choice == FrameChoice::motion) != (still_below > 0) || choice == FrameChoice::fixed) continue;

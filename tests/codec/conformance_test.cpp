@@ -107,8 +107,8 @@ void write_stream(const std::string& name, const TestSequence& sequence, const E
 // and one of vertices without any triangle.
 void write_moving() {
     auto options = motion_based(40, 5);
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 800;
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 800;
     auto coded = encode(walking(5, 400), options);
     ASSERT_GE(frames_in_part(coded), 2u);
     ASSERT_GE(frames_of(coded, FrameType::predicted), 1u);
@@ -139,8 +139,8 @@ void write_moving() {
 
 // T-frames as the encoder writes them.
 void write_tracked() {
-    EncoderOptions options;
-    options.tracked = true;
+    EncoderOptions options = default_options(Profile::topology);
+    options.profile = Profile::tracked;
     options.key_interval = 4;
     write_stream("tracked", walking(6, 300, 20), options);
 }
@@ -153,9 +153,9 @@ void write_tracked_by_chance() {
     for (const auto& shape : tfan_test::special_meshes())
         if (shape.vertex_count <= 80) awkward.frames.push_back(sequence_of(shape, 1, attributes++ % 8).frames[0]);
     awkward.frames.push_back(synthetic(false, 1, 150).frames[0]);
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 1;
-    options.merge_duplicates = false;
+    options.topology.merge_duplicates = false;
     options.geometry_step = 6;
     const auto intra = encode(awkward, options).packets;
     std::vector<Packet> packets;
@@ -186,14 +186,14 @@ void write_corner_cases() {
                                    "another number of vertices in every frame", "isolated vertices"})
             if (sequence.name == wanted)
                 corners.frames.insert(corners.frames.end(), sequence.frames.begin(), sequence.frames.end());
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 2;
     options.geometry_step = 8;
     options.colour_step = 40;
     write_stream("corner_cases", corners, options);
     options.key_interval = 1;
-    options.merge_duplicates = false;
-    options.nearest_vertices = 64;
+    options.topology.merge_duplicates = false;
+    options.topology.nearest_vertices = 64;
     write_stream("corner_cases_intra", corners, options);
 }
 
@@ -201,31 +201,31 @@ void write_corner_cases() {
 void write_choices() {
     auto person = synthetic(true, 4, 500);
     for (auto& frame : person.frames) frame.mesh.normals.clear();
-    EncoderOptions paper;
+    EncoderOptions paper = default_options(Profile::topology);
     paper.key_interval = 4;
-    paper.weight_width = 0;
-    paper.reference_vertices = ReferenceVertices::bone;
-    paper.point_to_plane = false;
-    paper.nearest_vertices = 8;
+    paper.topology.weight_width = 0;
+    paper.topology.reference_vertices = ReferenceVertices::bone;
+    paper.topology.point_to_plane = false;
+    paper.topology.nearest_vertices = 8;
     write_stream("paper", person, paper);
 
-    EncoderOptions fine;
+    EncoderOptions fine = default_options(Profile::topology);
     fine.key_interval = 2;
     fine.geometry_step = 0.1;
     fine.colour_step = 1;
     fine.lattice_bits = 9;
     fine.unit_micrometres = 1000000;
-    fine.nearest_vertices = 1;
-    fine.weight_width = 1000;
+    fine.topology.nearest_vertices = 1;
+    fine.topology.weight_width = 1000;
     write_stream("fine_lattice", synthetic(true, 2, 300), fine);
 
     // EP-frames, whole and in part, whose steps change: the skeleton walks, and jumps.
     auto all = walking(6, 300, 20);
     for (const int later : {60, 61, 200}) all.frames.push_back(walking(1, 300, later).frames[0]);
-    EncoderOptions rate;
-    rate.frame_choice = FrameChoice::motion;
-    rate.predicted_below = 50;
-    rate.still_below = 40;
+    EncoderOptions rate = default_options(Profile::topology);
+    rate.topology.frame_choice = FrameChoice::motion;
+    rate.topology.predicted_below = 50;
+    rate.topology.still_below = 40;
     rate.bits_per_second = 600e3;
     write_stream("rate_controlled", all, rate);
 }
@@ -245,10 +245,10 @@ void write_all() {
     }
     spokes = with_spokes(std::move(spokes));
     auto moving = motion_based(40, 3);
-    moving.nearest_vertices = 5;
+    moving.topology.nearest_vertices = 5;
     write_stream("awkward_moving", spokes, moving);
 
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 3;
     auto person = synthetic(true, 5, 800);
     for (auto& frame : person.frames) frame.mesh.normals.clear();
@@ -272,8 +272,8 @@ void write_all() {
         for (auto& frame : sequence_of(shape, 2, none).frames) awkward.frames.push_back(std::move(frame));
     }
     options.key_interval = 2;
-    options.merge_duplicates = false;
-    options.nearest_vertices = 3;
+    options.topology.merge_duplicates = false;
+    options.topology.nearest_vertices = 3;
     write_stream("awkward", awkward, options);
 }
 

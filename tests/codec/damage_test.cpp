@@ -19,8 +19,8 @@ using namespace test;
 const std::vector<Packet>& animated() {
     static const std::vector<Packet> packets = [] {
         auto options = motion_based(40, 4);
-        options.frame_choice = FrameChoice::motion;
-        options.predicted_below = 800;
+        options.topology.frame_choice = FrameChoice::motion;
+        options.topology.predicted_below = 800;
         auto out = encode(walking(8, 100), options).packets;
         // The first EP-frames are in part: here is one of the whole mesh.
         auto whole = encode(walking(8, 100), motion_based(0, 4)).packets;
@@ -37,7 +37,7 @@ const std::vector<Packet>& animated() {
 // Header, I-frame and four T-frames, twice.
 const std::vector<Packet>& tracked() {
     static const std::vector<Packet> packets = [] {
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         options.key_interval = 1;
         return with_tracked_frames(encode(synthetic(true, 2, 100), options).packets, 1500, {}, 0, 1);
     }();

@@ -24,7 +24,7 @@ const CodedSequence& nine_frames() {
             give_attributes(frame.mesh, all, 1);
             frame.mesh.colours = original;
         }
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         options.key_interval = 3;
         return encode(sequence, options);
     }();
@@ -189,7 +189,7 @@ TEST(Decoder, LargerFramesThanAllowedAreRefused) {
 }
 
 TEST(Decoder, IntraFramesOfACoderThatIsNotThereAreUnsupported) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.intra_coder = draco_intra_coder();
     const auto decoded = decode_packets(encode(synthetic(false, 2, 200), options).packets);
     ASSERT_EQ(decoded.errors.size(), 2u);
@@ -200,7 +200,7 @@ TEST(Decoder, IntraFramesOfACoderThatIsNotThereAreUnsupported) {
 
 TEST(Decoder, ThePoseComesBack) {
     const auto sequence = synthetic(true, 3, 400);
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     const auto decoded = decode_packets(encode(sequence, options).packets);
     ASSERT_EQ(decoded.frames.size(), 3u);
     const auto& pose = decoded.frames[0].pose;
@@ -245,7 +245,7 @@ DecoderOptions small_limits() {
 
 CodedSequence small_stream(bool draco) {
     auto sequence = sequence_of(tfan_test::grid(7, 6), 2, all);
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     if (draco) options.intra_coder = draco_intra_coder();
     return encode(sequence, options);
 }
@@ -259,8 +259,8 @@ CodedSequence small_moving_stream() {
     const auto sequence = walking(3, 80);
     auto options = motion_based(40, 3);
     auto out = encode(sequence, options);
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 1e6;
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 1e6;
     auto predicted = encode(sequence, options);
     for (auto& packet : predicted.packets)
         if (packet.kind == PacketKind::predicted && packet.frame == 1) out.packets.push_back(std::move(packet));

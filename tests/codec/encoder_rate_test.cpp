@@ -53,7 +53,7 @@ Run coded_by(const TestSequence& sequence, EncoderOptions options) {
         ADD_FAILURE() << encoder.error().message;
         return run;
     }
-    const double per_frame = options.bits_per_second / frames_per_second;
+    const double per_frame = options.rate.bits_per_second / frames_per_second;
     double buffer = 0;
     std::int64_t time = 0;
     for (const auto& frame : sequence.frames) {
@@ -74,22 +74,22 @@ Run coded_by(const TestSequence& sequence, EncoderOptions options) {
         buffer += bits;
         run.bits += bits;
         if (per_frame > 0)
-            run.fullest = std::max(run.fullest, buffer / (options.bits_per_second * options.buffer_seconds));
+            run.fullest = std::max(run.fullest, buffer / (options.rate.bits_per_second * options.rate.buffer_seconds));
         buffer = std::max(0.0, buffer - per_frame);
     }
     return run;
 }
 
 EncoderOptions at_rate(double bits_per_second, double buffer_seconds = 0.5) {
-    EncoderOptions options;
-    options.bits_per_second = bits_per_second;
-    options.buffer_seconds = buffer_seconds;
+    EncoderOptions options = default_options(Profile::topology);
+    options.rate.bits_per_second = bits_per_second;
+    options.rate.buffer_seconds = buffer_seconds;
     options.key_interval = 10;
     return options;
 }
 
 double off_target(const Run& run, const EncoderOptions& options) {
-    return run.bits / (options.bits_per_second / frames_per_second * static_cast<double>(run.costs.size())) - 1;
+    return run.bits / (options.rate.bits_per_second / frames_per_second * static_cast<double>(run.costs.size())) - 1;
 }
 
 double quality_spread(const Run& run, std::size_t from) {
@@ -116,7 +116,7 @@ TEST(EncoderRate, TwoPassesAreNearerAndMoreEven) {
     const auto sequence = walking(90);
     auto options = at_rate(300e3);
     const auto first = coded_by(sequence, options);
-    options.first_pass = first.costs;
+    options.rate.first_pass = first.costs;
     const auto second = coded_by(sequence, options);
     EXPECT_NEAR(off_target(second, options), 0, 0.02);
     EXPECT_LE(second.fullest, 1);
@@ -200,9 +200,9 @@ TEST(EncoderRate, AllChoicesOfFramesStayWithinTheBuffer) {
     const auto sequence = walking(20);
     for (const auto choice : {FrameChoice::motion, FrameChoice::rate_distortion}) {
         auto options = at_rate(300e3);
-        options.frame_choice = choice;
-        options.predicted_below = 100;
-        options.still_below = 60;
+        options.topology.frame_choice = choice;
+        options.topology.predicted_below = 100;
+        options.topology.still_below = 60;
         const auto run = coded_by(sequence, options);
         EXPECT_LE(run.fullest, 1);
         EXPECT_TRUE(run.errors.empty());
@@ -218,8 +218,8 @@ double error_of(const Mesh& captured, const Mesh& shown) {
 TEST(EncoderError, EveryFrameComesNearTheTarget) {
     const auto sequence = walking(8);
     for (const double target : {0.4, 1.0}) {
-        EncoderOptions options;
-        options.target_error = target;
+        EncoderOptions options = default_options(Profile::topology);
+        options.rate.target_error = target;
         options.key_interval = 4;
         const auto run = coded_by(sequence, options);
         ASSERT_EQ(run.shown.size(), sequence.frames.size());

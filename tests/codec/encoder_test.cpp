@@ -25,7 +25,7 @@ TEST(EncoderOptions, DefaultsAreLegal) { EXPECT_TRUE(Encoder::create({}).has_val
 
 TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
     const auto with = [](const std::function<void(EncoderOptions&)>& change) {
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         change(options);
         return options;
     };
@@ -38,7 +38,7 @@ TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
         expect_refused(with([&](auto& o) { o.lambda = lambda; }), "lambda");
     for (const int interval : {0, -1})
         expect_refused(with([&](auto& o) { o.key_interval = interval; }), "key interval");
-    for (const int m : {0, -1, 65}) expect_refused(with([&](auto& o) { o.nearest_vertices = m; }), "nearest vertices");
+    for (const int m : {0, -1, 65}) expect_refused(with([&](auto& o) { o.topology.nearest_vertices = m; }), "nearest vertices");
     for (const int bits : {-1, 17}) expect_refused(with([&](auto& o) { o.lattice_bits = bits; }), "lattice bits");
     expect_refused(with([](auto& o) { o.fps_numerator = 0; }), "frame rate");
     expect_refused(with([](auto& o) { o.fps_denominator = 0; }), "frame rate");
@@ -109,7 +109,7 @@ std::vector<Fault> faults() {
 }
 
 EncoderOptions with_synthetic_skeleton() {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.skeleton = synth_skeleton();
     options.key_interval = 3;
     options.threads = 1;

@@ -33,51 +33,51 @@ CodedSequence expect_same_bytes(const TestSequence& sequence, EncoderOptions opt
 }
 
 TEST(EncoderThreads, IntraAndEnhancedFrames) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 3;
     expect_same_bytes(person(), options);
     expect_same_bytes(without_skeleton(), options);
 }
 
 TEST(EncoderThreads, ThePapersChoices) {
-    EncoderOptions options;
-    options.weight_width = 0;
-    options.reference_vertices = ReferenceVertices::bone;
-    options.point_to_plane = false;
-    options.merge_duplicates = false;
+    EncoderOptions options = default_options(Profile::topology);
+    options.topology.weight_width = 0;
+    options.topology.reference_vertices = ReferenceVertices::bone;
+    options.topology.point_to_plane = false;
+    options.topology.merge_duplicates = false;
     expect_same_bytes(person(), options);
 }
 
 TEST(EncoderThreads, PredictedFramesAndThoseCodedInPart) {
     auto options = motion_based(40, 5);
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 400;
-    options.animation_error = 8;
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 400;
+    options.topology.animation_error = 8;
     const auto coded = expect_same_bytes(person(), options);
     EXPECT_GE(frames_of(coded, FrameType::predicted) + frames_in_part(coded), 1u);
 }
 
 TEST(EncoderThreads, TrackedFrames) {
-    EncoderOptions options;
-    options.tracked = true;
+    EncoderOptions options = default_options(Profile::topology);
+    options.profile = Profile::tracked;
     const auto coded = expect_same_bytes(walking(4, 6000, 20), options);
     EXPECT_GE(frames_of(coded, FrameType::tracked), 2u);
-    options.tracked_references = TrackedReferences::intra;
+    options.tracked.references = TrackedReferences::intra;
     expect_same_bytes(without_skeleton(), options);
 }
 
 TEST(EncoderThreads, FramesChosenByRateAndDistortion) {
-    EncoderOptions options;
-    options.frame_choice = FrameChoice::rate_distortion;
-    options.still_below = 40;
-    options.tracked = true;
+    EncoderOptions options = default_options(Profile::topology);
+    options.topology.frame_choice = FrameChoice::rate_distortion;
+    options.topology.still_below = 40;
+    options.profile = Profile::tracked;
     expect_same_bytes(walking(4, 6000, 20), options);
 }
 
 TEST(EncoderThreads, RateControlInOnePassAndTwo) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 4;
-    options.bits_per_second = 8e6;
+    options.rate.bits_per_second = 8e6;
     expect_same_bytes(person(), options);
 
     options.threads = 1;
@@ -87,14 +87,14 @@ TEST(EncoderThreads, RateControlInOnePassAndTwo) {
     std::int64_t time = 0;
     for (const auto& frame : person().frames) {
         ASSERT_TRUE(first->push(frame.mesh, &*frame.pose, time += 33333).has_value());
-        options.first_pass.push_back(first->last_cost());
+        options.rate.first_pass.push_back(first->last_cost());
     }
     expect_same_bytes(person(), options);
 }
 
 TEST(EncoderThreads, AGivenError) {
-    EncoderOptions options;
-    options.target_error = 1.5;
+    EncoderOptions options = default_options(Profile::topology);
+    options.rate.target_error = 1.5;
     expect_same_bytes(person(), options);
 }
 

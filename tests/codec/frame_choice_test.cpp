@@ -33,10 +33,10 @@ std::vector<FrameType> types_of(const CodedSequence& coded) {
 }
 
 EncoderOptions by_motion() {
-    EncoderOptions options;
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 14 * 10;  // 14 bones that each moved 10 mm
-    options.intra_above = 14 * 40;
+    EncoderOptions options = default_options(Profile::topology);
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 14 * 10;  // 14 bones that each moved 10 mm
+    options.topology.intra_above = 14 * 40;
     return options;
 }
 
@@ -61,7 +61,7 @@ TEST(ChoiceByMotion, CodesAfterAllWhatDoesNotFitTheCapture) {
         if (p[1] < 900) p[2] += 30;
     EXPECT_EQ(types_of(encode(sequence, by_motion())), (std::vector{intra, enhanced, predicted}));
     auto unchecked = by_motion();
-    unchecked.animation_error = 0;
+    unchecked.topology.animation_error = 0;
     EXPECT_EQ(types_of(encode(sequence, unchecked)), (std::vector{intra, predicted, predicted}));
 }
 
@@ -83,9 +83,9 @@ TEST(SceneChanges, ForceAnIntraFrameUnlessSwitchedOff) {
     for (const auto& p : one.positions) mesh.positions.push_back({p[0], p[1], p[2] + 1200});
     for (const auto& t : one.triangles) mesh.triangles.push_back({t[0] + n, t[1] + n, t[2] + n});
     mesh.colours.insert(mesh.colours.end(), one.colours.begin(), one.colours.end());
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     EXPECT_EQ(types_of(encode(sequence, options)), (std::vector{intra, enhanced, intra}));
-    options.scene_changes = false;
+    options.topology.scene_changes = false;
     EXPECT_EQ(types_of(encode(sequence, options)), (std::vector{intra, enhanced, enhanced}));
 }
 
@@ -102,8 +102,8 @@ TEST(SceneChanges, AreMoreThanATenthOfEitherSurfaceFarFromTheOther) {
 }
 
 TEST(ChoiceByCost, TakesAPredictedFrameWhereNothingButThePlaceChanged) {
-    EncoderOptions options;
-    options.frame_choice = FrameChoice::rate_distortion;
+    EncoderOptions options = default_options(Profile::topology);
+    options.topology.frame_choice = FrameChoice::rate_distortion;
     options.geometry_step = 8;  // beside which the registration's own error is small
     auto sequence = carried({0, 30, 60});
     for (auto& frame : sequence.frames) frame.mesh.colours.clear();
@@ -117,10 +117,10 @@ TEST(ChoiceByCost, IsNeverWorseThanIntraFramesAtTheSameQuality) {
         return surface_errors({a.positions, a.triangles, a.colours}, {b.positions, b.triangles, b.colours});
     };
     for (const double quality : {25.0, 50.0}) {
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         options.geometry_step = quality_steps(quality).geometry_step;
         options.colour_step = quality_steps(quality).colour_step;
-        options.frame_choice = FrameChoice::rate_distortion;
+        options.topology.frame_choice = FrameChoice::rate_distortion;
         const auto chosen = encode(sequence, options);
         options.key_interval = 1;
         const auto plain = encode(sequence, options);

@@ -87,7 +87,7 @@ TEST(Limits, WhatWasRefusedChangesNothing) {
 }
 
 TEST(Limits, DracoIsNotAskedForMoreThanTheFramesHeaderSays) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.intra_coder = draco_intra_coder();
     DecoderOptions decoding;
     decoding.intra_coder = draco_intra_coder();
@@ -127,7 +127,7 @@ TestSequence flat_sheet(std::uint32_t side, int frames) {
 }
 
 TEST(LeastPayload, NoMeshIsCodedInLess) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.geometry_step = 50;
     const auto coded = encode(flat_sheet(200, 2), options);
     for (const auto& packet : coded.packets) {

@@ -26,8 +26,8 @@ const CodedSequence& ten_frames() {
     static const CodedSequence coded = [] {
         auto sequence = walking(10, 500);
         auto options = motion_based(40, 5);
-        options.frame_choice = FrameChoice::motion;
-        options.predicted_below = 800;
+        options.topology.frame_choice = FrameChoice::motion;
+        options.topology.predicted_below = 800;
         return encode(sequence, options);
     }();
     return coded;

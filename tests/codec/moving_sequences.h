@@ -69,11 +69,11 @@ inline std::size_t frames_of(const CodedSequence& coded, FrameType type) {
 
 // Whatever moved less than this is animated, however badly it fits.
 inline EncoderOptions motion_based(double still_below, int key_interval = 4) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = key_interval;
-    options.still_below = still_below;
-    options.animation_error = 0;
-    options.scene_changes = false;
+    options.topology.still_below = still_below;
+    options.topology.animation_error = 0;
+    options.topology.scene_changes = false;
     return options;
 }
 

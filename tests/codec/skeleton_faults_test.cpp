@@ -94,8 +94,8 @@ double root_mean_square(const std::vector<double>& values) {
 TEST(SkeletonFaults, LeaveTheErrorsOfFullyCodedFramesAsTheyAre) {
     const auto sequence = walking(6);
     for (const auto reference : {ReferenceVertices::any, ReferenceVertices::bone}) {
-        EncoderOptions options;
-        options.reference_vertices = reference;
+        EncoderOptions options = default_options(Profile::topology);
+        options.topology.reference_vertices = reference;
         const auto clean = encode(sequence, options);
         const double error = root_mean_square(surface_errors_of(sequence, clean));
         for (const auto& fault : faults(sequence.skeleton)) {
@@ -110,11 +110,11 @@ TEST(SkeletonFaults, LeaveTheErrorsOfFullyCodedFramesAsTheyAre) {
 
 TEST(SkeletonFaults, NeverLetAnAnimatedFrameOrPartOfOneBeFartherOffThanAllowed) {
     const auto sequence = walking(16);
-    EncoderOptions options;
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 600;
-    options.still_below = 100;
-    options.animation_error = 4;
+    EncoderOptions options = default_options(Profile::topology);
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 600;
+    options.topology.still_below = 100;
+    options.topology.animation_error = 4;
     const auto fully_coded = encode(sequence, {}).bytes.size();
     std::vector<Fault> all = faults(sequence.skeleton);
     all.insert(all.begin(), {"none", [](Pose&, std::size_t, const Pose&) {}});
@@ -127,7 +127,7 @@ TEST(SkeletonFaults, NeverLetAnAnimatedFrameOrPartOfOneBeFartherOffThanAllowed) 
             EXPECT_LT(coded.bytes.size(), fully_coded) << "something was animated";
         }
         for (std::size_t t = 0; t < errors.size(); ++t)
-            EXPECT_LE(errors[t], 1.2 * options.animation_error) << "frame " << t;  // asked by bone, measured by area
+            EXPECT_LE(errors[t], 1.2 * options.topology.animation_error) << "frame " << t;  // asked by bone, measured by area
         EXPECT_EQ(decode_packets(coded.packets).errors.size(), 0u);
     }
 }

@@ -10,7 +10,7 @@ namespace {
 using namespace test;
 
 std::vector<Packet> tracked_person() {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 1;
     const auto intra = encode(synthetic(false, 1, 150), options).packets;
     return with_tracked_frames(intra, 1500, {}, 0, 1);

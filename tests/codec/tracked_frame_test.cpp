@@ -15,9 +15,9 @@ namespace {
 using namespace test;
 
 EncoderOptions tracked(TrackedReferences references = TrackedReferences::previous) {
-    EncoderOptions options;
-    options.tracked = true;
-    options.tracked_references = references;
+    EncoderOptions options = default_options(Profile::topology);
+    options.profile = Profile::tracked;
+    options.tracked.references = references;
     options.key_interval = 6;
     return options;
 }
@@ -56,8 +56,8 @@ TEST(TrackedFrames, HaveASimplifiedIntraFrameUnlessToldNotTo) {
     const auto sequence = walking(2, true, 6000);
     auto options = tracked();
     const auto simplified = encode(sequence, options);
-    options.simplify = 0;
-    options.merge_duplicates = false;
+    options.tracked.simplify = 0;
+    options.topology.merge_duplicates = false;
     const auto whole = encode(sequence, options);
     const auto captured = sequence.frames[0].mesh.positions.size();
     EXPECT_EQ(whole.infos[0].vertices, captured);

@@ -156,11 +156,11 @@ void expect_encoder_survival(const TestSequence& sequence, EncoderOptions option
 
 TEST(EncoderOutOfMemory, AFrameIsLeftOutAndTheStreamGoesOn) {
     auto options = motion_based(40, 3);
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 800;
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 800;
     expect_encoder_survival(walking(3, 120), options, most_failures / 6);
     options = {};
-    options.tracked = true;
+    options.profile = Profile::tracked;
     expect_encoder_survival(walking(3, 120), options, 40);
 }
 

@@ -33,10 +33,10 @@ TestSequence soup(std::uint32_t vertices, std::uint32_t triangles, bool apart, i
 }
 
 EncoderOptions nothing_merged() {
-    EncoderOptions options;
-    options.merge_duplicates = false;
-    options.nearest_vertices = 64;
-    options.weight_width = 1000;
+    EncoderOptions options = default_options(Profile::topology);
+    options.topology.merge_duplicates = false;
+    options.topology.nearest_vertices = 64;
+    options.topology.weight_width = 1000;
     return options;
 }
 
@@ -179,7 +179,7 @@ TEST(DecoderMemory, DoesNotGrowWithTheStream) {
 TEST(EncoderMemory, GrowsWithTheIndexAlone) {
     const auto sequence = walking(6, 300);
     const auto most = [&](int times) {
-        EncoderOptions options;
+        EncoderOptions options = default_options(Profile::topology);
         options.skeleton = sequence.skeleton;
         options.key_interval = 3;
         options.threads = 1;

@@ -13,14 +13,14 @@ using namespace internal;
 // Header, I, then P- and EP-frames, whole and in part, twice over.
 inline std::vector<Packet> animated_stream(int vertices) {
     auto options = motion_based(40, 3);
-    options.frame_choice = FrameChoice::motion;
-    options.predicted_below = 800;
+    options.topology.frame_choice = FrameChoice::motion;
+    options.topology.predicted_below = 800;
     return encode(walking(6, vertices), options).packets;
 }
 
 // Header, I and four T-frames, from the I-frame and from the frame before.
 inline std::vector<Packet> tracked_stream(int vertices) {
-    EncoderOptions options;
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 1;
     ChanceMotion motion;
     motion.fields.turned = true;

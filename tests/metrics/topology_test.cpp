@@ -9,7 +9,7 @@
 namespace htvm {
 namespace {
 
-Topology of(const Mesh& mesh, const TopologyOptions& options = {}) {
+Topology of(const Mesh& mesh, const TopologyMeasureOptions& options = {}) {
     const auto found = topology(mesh, options, 2);
     EXPECT_TRUE(found.has_value());
     return found.value_or(Topology{});

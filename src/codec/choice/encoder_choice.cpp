@@ -38,28 +38,28 @@ bool cannot_refer(const State& state, const LatticeMesh& mesh) {
 }
 
 bool is_scene_change(State& state, FrameUnderWay& frame) {
-    if (!state.options.scene_changes || state.options.tracked) return false;
+    if (!state.options.topology.scene_changes || (state.options.profile == Profile::tracked)) return false;
     constexpr double far_mm = 150;
     return scene_changed(frame.mesh.positions, motion_of(state, frame).predicted, far_mm / state.header.lattice.step());
 }
 
 // What may be animated is at most this far off, lattice units; 0: unchecked.
 double largest_animation_error(const State& state) {
-    double largest = state.options.animation_error;
-    if (state.options.target_error > 0) largest = std::min(largest > 0 ? largest : 1e6, state.options.target_error);
+    double largest = state.options.topology.animation_error;
+    if (state.options.rate.target_error > 0) largest = std::min(largest > 0 ? largest : 1e6, state.options.rate.target_error);
     return largest / state.header.lattice.step();
 }
 
 // Motion-based coding where it is asked for and leaves something out; else all of the frame.
 FrameCandidate encode_what_moves(State& state, FrameUnderWay& frame, const FrameSteps& steps) {
     const auto& group = *state.group;
-    if (!(state.options.still_below > 0)) return encode_enhanced(state, frame, steps);
+    if (!(state.options.topology.still_below > 0)) return encode_enhanced(state, frame, steps);
     const double units = 1.0 / state.header.lattice.step();
     const auto shifts = bone_shifts(group.reference, state.header.skeleton.bones, frame.pose);
     if (std::all_of(shifts.begin(), shifts.end(),
-                    [&](double shift) { return shift >= state.options.still_below * units; }))
+                    [&](double shift) { return shift >= state.options.topology.still_below * units; }))
         return encode_enhanced(state, frame, steps);
-    const auto coded = choose_coded_bones(shifts, fit_of(state, frame), state.options.still_below * units,
+    const auto coded = choose_coded_bones(shifts, fit_of(state, frame), state.options.topology.still_below * units,
                                           largest_animation_error(state));
     return encode_coded_bones(state, frame, steps, coded);
 }
@@ -75,10 +75,10 @@ Result<FrameCandidate> choose_by_motion(State& state, FrameUnderWay& frame, cons
     const auto shifts = bone_shifts(state.group->reference, state.header.skeleton.bones, frame.pose);
     const double skeletal_motion = std::accumulate(shifts.begin(), shifts.end(), 0.0) * state.header.lattice.step();
     const auto& options = state.options;
-    if (options.intra_above > 0 && skeletal_motion > options.intra_above &&
+    if (options.topology.intra_above > 0 && skeletal_motion > options.topology.intra_above &&
         frames_since_intra(state) >= options.least_key_interval)
         return encode_intra(state, frame, steps);
-    if (skeletal_motion < options.predicted_below && animation_fits(state, frame))
+    if (skeletal_motion < options.topology.predicted_below && animation_fits(state, frame))
         return encode_predicted(state, frame);
     return encode_what_moves(state, frame, steps);
 }
@@ -114,10 +114,10 @@ bool is_due(const State& state, const LatticeMesh& mesh) {
 
 Result<FrameCandidate> choose(State& state, FrameUnderWay& frame, const FrameSteps& steps, bool force_intra) {
     if (force_intra || is_due(state, frame.mesh) || is_scene_change(state, frame))
-        return state.options.frame_choice == FrameChoice::rate_distortion ? encode_measured_intra(state, frame, steps)
+        return state.options.topology.frame_choice == FrameChoice::rate_distortion ? encode_measured_intra(state, frame, steps)
                                                                           : encode_intra(state, frame, steps);
-    if (state.options.tracked) return choose_tracked(state, frame, steps);
-    switch (state.options.frame_choice) {
+    if (state.options.profile == Profile::tracked) return choose_tracked(state, frame, steps);
+    switch (state.options.topology.frame_choice) {
         case FrameChoice::motion:
             return choose_by_motion(state, frame, steps);
         case FrameChoice::rate_distortion:
@@ -130,7 +130,7 @@ Result<FrameCandidate> choose(State& state, FrameUnderWay& frame, const FrameSte
 
 // Under rate control, of a frame that takes so many bits even at the lowest quality.
 tl::unexpected<Error> does_not_fit(const State& state, double bits) {
-    const double capacity = state.options.bits_per_second * state.options.buffer_seconds;
+    const double capacity = state.options.rate.bits_per_second * state.options.rate.buffer_seconds;
     const auto number = [](double x) {
         std::array<char, 32> text{};
         std::snprintf(text.data(), text.size(), "%.3g", x);
@@ -142,8 +142,8 @@ tl::unexpected<Error> does_not_fit(const State& state, double bits) {
     // Rounded up, as what is asked for must do.
     const auto enough = [&](double x) { return number(1.01 * x); };
     if (bits > capacity)
-        message += "a bitrate of at least " + enough(bits / state.options.buffer_seconds / 1e6) +
-                   " Mbit/s or a buffer of at least " + enough(bits / state.options.bits_per_second) + " s";
+        message += "a bitrate of at least " + enough(bits / state.options.rate.buffer_seconds / 1e6) +
+                   " Mbit/s or a buffer of at least " + enough(bits / state.options.rate.bits_per_second) + " s";
     else
         message += "a higher bitrate or a larger buffer";
     return fail(ErrorKind::limit, message);
@@ -151,7 +151,7 @@ tl::unexpected<Error> does_not_fit(const State& state, double bits) {
 
 FrameType expected_type(const State& state, const FrameUnderWay& frame, bool force_intra) {
     if (force_intra || is_due(state, frame.mesh)) return FrameType::intra;
-    return state.options.tracked ? FrameType::tracked : FrameType::enhanced;
+    return (state.options.profile == Profile::tracked) ? FrameType::tracked : FrameType::enhanced;
 }
 
 // Rate control: coarser until the frame fits into the buffer; a P-frame at the last. The first frames of a type are
@@ -204,7 +204,7 @@ Result<FrameCandidate> code_to_error(State& state, FrameUnderWay& frame, bool fo
         type = candidate->type;
         const double error = errors_of(state, frame, candidate->decoded).geometry_rms * state.header.lattice.step();
         if (state.error->accept(type, quality, error) || type == FrameType::predicted) return candidate;
-        const double off = std::abs(std::log2(error / state.options.target_error));
+        const double off = std::abs(std::log2(error / state.options.rate.target_error));
         if (!nearest || off < nearest_off) nearest_off = off, nearest = std::move(*candidate);
     }
     return std::move(*nearest);

@@ -82,7 +82,7 @@ Result<FrameCandidate> encode_measured_intra(State& state, FrameUnderWay& frame,
     IntraFrameOptions plain;
     plain.geometry_step = steps.geometry;
     plain.colour_step = steps.colour;
-    plain.merge_duplicates = state.options.merge_duplicates;
+    plain.merge_duplicates = state.options.topology.merge_duplicates;
     FramePayload payload;
     const auto decoded = encode_intra_frame(frame.mesh, plain, payload);
     if (!decoded) return tl::unexpected(decoded.error());

@@ -16,7 +16,7 @@ LatticeMesh animate(const ReferenceMesh& reference, std::span<const QuantisedTra
 }
 
 Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
-                                             unsigned threads) {
+                                             Threads threads) {
     const auto& mesh = reference.mesh;
     if (payload.header.vertices != mesh.positions.size() || payload.header.triangles != mesh.triangles.size())
         return fail(ErrorKind::corrupt_stream, "P-frame: it has other counts than its I-frame");

@@ -7,6 +7,7 @@
 
 #include "codec/stream/frame_payload.h"
 #include "codec/reference/prediction.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -22,7 +23,7 @@ struct AnimatedFrame {
 
 // A P-frame. corrupt_stream where its counts are not the reference's or its transforms are damaged.
 Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
-                                             unsigned threads);
+                                             Threads threads);
 
 // A P-frame's payload. source: the captured mesh's counts.
 FramePayload predicted_frame_payload(const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms,

@@ -7,6 +7,7 @@
 #include "codec/paper/codebook.h"
 #include "codec/stream/frame_payload.h"
 #include "codec/reference/prediction.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -15,7 +16,7 @@ struct EnhancedFrameContext {
     const Codebook* geometry_codebook;  // null where it did not arrive
     const Codebook* colour_codebook;    // likewise; needed only where the reference has colours
     int nearest_vertices;               // m
-    unsigned threads;
+    Threads threads;
 };
 
 struct DecodedEnhancedFrame {

@@ -169,7 +169,7 @@ EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Co
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);
     const auto& reference = *source.reference;
-    const unsigned threads = options.threads;
+    const Threads threads = options.threads;
     std::vector<std::uint8_t> eligible;
     if (!source.coded_bones.empty()) eligible = vertices_of_coded_bones(reference, source.coded_bones);
     auto residuals = quantise_residuals(source, eligible, codebooks, options, clock);

@@ -11,6 +11,7 @@
 #include "codec/paper/residual_mapping_enc.h"
 #include "codec/paper/vector_quantiser_enc.h"
 #include "htvm/encoder.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -28,7 +29,7 @@ struct EnhancedFrameOptions {
     ReferenceChoice reference_choice = ReferenceChoice::any;
     bool merge_duplicates = true;
     int nearest_vertices = 16;
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 // What of the frame is coded, and against what.

@@ -7,7 +7,7 @@
 namespace htvm::internal {
 
 FrameMotion find_frame_motion(std::span<const LatticePoint> positions, const CodedPose& pose,
-                              const MotionReference& against, const RegistrationOptions& options, unsigned threads,
+                              const MotionReference& against, const RegistrationOptions& options, Threads threads,
                               std::vector<StageTime>& stages) {
     StageClock clock(stages);
     const auto& reference = *against.reference;

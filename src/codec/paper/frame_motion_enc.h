@@ -5,6 +5,7 @@
 
 #include "codec/paper/motion_enc.h"
 #include "htvm/encoder.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -26,7 +27,7 @@ struct MotionReference {
 
 // Skinning of the frame, registration of its bones, quantisation, prediction (paper, section IV-A and IV-B).
 FrameMotion find_frame_motion(std::span<const LatticePoint> positions, const CodedPose& pose,
-                              const MotionReference& against, const RegistrationOptions& options, unsigned threads,
+                              const MotionReference& against, const RegistrationOptions& options, Threads threads,
                               std::vector<StageTime>& stages);
 
 // "Per-bone motion" (section III-B): how far the middle of each bone is from where it was in the reference's pose,

@@ -101,7 +101,7 @@ std::vector<RigidMotion> skeletal_motion(const ReferenceMesh& reference, const s
 std::vector<RigidMotion> register_bones(const ReferenceSearch& reference, std::span<const LatticePoint> frame,
                                         const SubMeshes& frame_sub_meshes, std::span<const RigidMotion> skeletal,
                                         std::span<const RigidMotion> before, const RegistrationOptions& options,
-                                        unsigned threads) {
+                                        Threads threads) {
     std::vector<RigidMotion> out(skeletal.begin(), skeletal.end());
     std::atomic<std::size_t> next{0};
     auto work = [&](std::size_t, std::size_t) {

@@ -8,6 +8,7 @@
 #include "codec/reference/prediction.h"
 #include "codec/reference/transforms.h"
 #include "surface/registration.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -32,7 +33,7 @@ std::vector<RigidMotion> skeletal_motion(const ReferenceMesh& reference, const s
 std::vector<RigidMotion> register_bones(const ReferenceSearch& reference, std::span<const LatticePoint> frame,
                                         const SubMeshes& frame_sub_meshes, std::span<const RigidMotion> skeletal,
                                         std::span<const RigidMotion> before, const RegistrationOptions& options,
-                                        unsigned threads);
+                                        Threads threads);
 
 QuantisedTransform quantise_motion(const RigidMotion& motion, LatticePoint pivot);
 RigidMotion motion_of(const QuantisedTransform& transform, LatticePoint pivot);

@@ -15,7 +15,7 @@ struct Planes {
     std::vector<Point3f> normals;
     float reach = 0;  // farther from the nearest vertex than this, the surface has ended
 
-    Planes(std::span<const Point3f> points, std::span<const Triangle> triangles, double edge, unsigned threads)
+    Planes(std::span<const Point3f> points, std::span<const Triangle> triangles, double edge, Threads threads)
         : tree(points), normals(vertex_normals(points, triangles, threads)), reach(static_cast<float>(3 * edge)) {}
     float distance(const Point3f& query, const Neighbour& nearest) const {
         const auto &point = tree.point(nearest.index), &normal = normals[nearest.index];
@@ -39,7 +39,7 @@ struct Sums {
 }  // namespace
 
 AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& reference,
-                               std::span<const LatticePoint> predicted, bool both_ways, unsigned threads) {
+                               std::span<const LatticePoint> predicted, bool both_ways, Threads threads) {
     constexpr std::size_t stride = 4;  // the way back is sampled
     const auto captured_points = points_of(mesh.positions), predicted_points = points_of(predicted);
     const double edge = mean_edge(reference.mesh);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "codec/paper/frame_motion_enc.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -20,7 +21,7 @@ struct AnimationFit {
 };
 // reference must have vertices. both_ways: else only from the captured mesh to the predicted one.
 AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& reference,
-                               std::span<const LatticePoint> predicted, bool both_ways, unsigned threads);
+                               std::span<const LatticePoint> predicted, bool both_ways, Threads threads);
 
 // Of each bone, whether it has to be coded: its shift is at least `still_below`, or its sub-mesh fits worse than
 // `largest_error` (0: not asked). Lattice units.

@@ -10,6 +10,7 @@
 #include "core/lattice.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -28,13 +29,13 @@ struct EncodedMtfan {
 // decoded_positions: as the decoder has them, on the lattice. m: 1 .. mtfan_max_nearest, the paper's are 8, 16, 32.
 // Every triangle index must be < decoded_positions.size(). The bytes do not depend on the number of threads.
 EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::span<const Triangle> triangles, int m,
-                          unsigned threads);
+                          Threads threads);
 
 // corrupt_stream where m is out of range, the bytes name a vertex that cannot be, or end early. Work and memory are
 // bounded by the counts, as in decode_tfan, and by a search for nearest vertices for each vertex.
 Result<std::vector<Triangle>> decode_mtfan(std::span<const std::uint8_t> fans,
                                            std::span<const std::uint8_t> distance_orders,
                                            std::span<const LatticePoint> positions, std::uint32_t triangle_count, int m,
-                                           unsigned threads);
+                                           Threads threads);
 
 }  // namespace htvm::internal

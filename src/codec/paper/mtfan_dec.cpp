@@ -50,7 +50,7 @@ struct DistanceOrders {
 Result<std::vector<Triangle>> decode_mtfan(std::span<const std::uint8_t> fans,
                                            std::span<const std::uint8_t> distance_orders,
                                            std::span<const LatticePoint> positions, std::uint32_t triangle_count, int m,
-                                           unsigned threads) {
+                                           Threads threads) {
     if (m < 1 || m > mtfan_max_nearest)
         return fail(ErrorKind::corrupt_stream,
                     "M-TFAN's number of nearest vertices must be 1 to 64, but the stream "

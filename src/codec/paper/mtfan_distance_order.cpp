@@ -68,7 +68,7 @@ FanHints VisitedPositions::hints(const FanState& fan) const {
     return hints;
 }
 
-UnvisitedNear::UnvisitedNear(std::span<const LatticePoint> positions, int m, unsigned threads)
+UnvisitedNear::UnvisitedNear(std::span<const LatticePoint> positions, int m, Threads threads)
     : positions_(positions),
       order_(positions),
       m_(static_cast<std::size_t>(m)),

@@ -63,7 +63,7 @@ class UnvisitedNear {
 public:
     // With more than one thread, another searches for the nearest ones of all vertices, ahead of the traversal, which
     // searches itself where it is there first: both find the same.
-    UnvisitedNear(std::span<const LatticePoint> positions, int m, unsigned threads);
+    UnvisitedNear(std::span<const LatticePoint> positions, int m, Threads threads);
     ~UnvisitedNear();
     UnvisitedNear(const UnvisitedNear&) = delete;
     UnvisitedNear& operator=(const UnvisitedNear&) = delete;

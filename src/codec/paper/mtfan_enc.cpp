@@ -40,7 +40,7 @@ struct DistanceOrders {
 }  // namespace
 
 EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::span<const Triangle> triangles, int m,
-                          unsigned threads) {
+                          Threads threads) {
     EncodedMtfan result;
     result.distance_order_counts.resize(static_cast<std::size_t>(m) + 1);
     if (triangles.empty()) return result;

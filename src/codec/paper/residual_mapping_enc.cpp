@@ -28,7 +28,7 @@ std::vector<std::uint32_t> find_reference_vertices(
     const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
     std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
     std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
-    std::span<const std::uint8_t> eligible, ReferenceChoice choice, unsigned threads) {
+    std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads) {
     std::vector<bool> own(transforms.size());  // bones whose vertices refer to the bone's own sub-mesh
     for (std::size_t bone = 0; bone < own.size(); ++bone)
         own[bone] = choice == ReferenceChoice::bone && is_eligible(reference, eligible, bone);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "codec/paper/motion_enc.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -22,7 +23,7 @@ std::vector<std::uint32_t> find_reference_vertices(
     const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
     std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
     std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
-    std::span<const std::uint8_t> eligible, ReferenceChoice choice, unsigned threads);
+    std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads);
 
 // E^ord: the frame's vertices by ascending reference vertex, and in their own order where that is the same.
 struct ResidualOrder {

@@ -7,6 +7,7 @@
 
 #include "codec/paper/codebook.h"
 #include "codec/paper/residual_layer.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -15,7 +16,7 @@ struct QuantiserOptions {
     double lambda = 0.12;          // squared error worth one bit, in units of step^2; 0 takes the nearest codeword
     int iterations = 2;            // rounds of the generalised Lloyd iteration
     std::size_t training = 16384;  // residuals trained on, evenly spread; 0: all
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 // Starts from the cells of a cubic lattice of the given step that hold at least three residuals, then alternates the

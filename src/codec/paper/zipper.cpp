@@ -93,7 +93,7 @@ std::vector<Triangle> stitches(const Surface& coded, const Surface& animated, co
 }  // namespace
 
 LatticeMesh zipper(const LatticeMesh& coded, const LatticeMesh& animated, std::span<const std::uint8_t> still,
-                   unsigned threads) {
+                   Threads threads) {
     if (coded.triangles.empty())
         return join(coded, animated, std::vector<std::uint8_t>(animated.triangles.size(), 1), {});
     const Surface coded_surface{coded.positions, coded.triangles},

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "codec/reference/lattice_mesh.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -17,6 +18,6 @@ namespace htvm::internal {
 // `coded`, then the animated ones that are kept, then the stitches. Any mesh is legal: open, non-manifold, in pieces,
 // empty. Work is bounded by a small multiple of the counts.
 LatticeMesh zipper(const LatticeMesh& coded, const LatticeMesh& animated, std::span<const std::uint8_t> still,
-                   unsigned threads);
+                   Threads threads);
 
 }  // namespace htvm::internal

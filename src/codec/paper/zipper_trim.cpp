@@ -179,7 +179,7 @@ std::vector<TriangleSide> border_of(const Surface& surface, std::span<const std:
 
 // The coded border sides that lie over the animated candidates, not beyond an edge of the captured surface itself.
 std::vector<TriangleSide> coded_seam_sides(const Surface& coded, const Surface& animated, const Near& near,
-                                           std::int64_t reach, unsigned threads) {
+                                           std::int64_t reach, Threads threads) {
     const std::vector<TriangleSide> border = border_of(coded, near.coded);
     const SurfaceGrid grid(animated.positions, animated.triangles, near.animated, reach);
     std::vector<SurfacePoint> under(border.size());
@@ -222,7 +222,7 @@ bool triangle_covered(const Surface& animated, std::uint32_t triangle, const Cov
 // Clears kept[t] of the listed triangles that are covered at a corner, or near the coded surface at the middle of a
 // side or at the centre.
 void drop_covered(const Surface& animated, std::span<const std::uint32_t> triangles, const Cover& cover,
-                  unsigned threads, std::vector<std::uint8_t>& kept) {
+                  Threads threads, std::vector<std::uint8_t>& kept) {
     std::vector<std::uint8_t> listed(animated.positions.size()), covered(animated.positions.size());
     for (const std::uint32_t t : triangles)
         for (const std::uint32_t v : animated.triangles[t]) listed[v] = 1;
@@ -330,7 +330,7 @@ double mean_side(const Surface& coded, const Surface& animated) {
 }
 
 Trimmed trim(const Surface& coded, const Surface& animated, std::span<const std::uint8_t> still, double unit,
-             unsigned threads) {
+             Threads threads) {
     const auto reach = static_cast<std::int64_t>(cover_reach * unit) + 1;
     Trimmed out;
     out.kept = candidates(animated, still, rings_beyond_still);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "codec/paper/zipper_surface.h"
+#include "core/thread.h"
 
 namespace htvm::internal::zipping {
 
@@ -36,6 +37,6 @@ double mean_side(const Surface& coded, const Surface& animated);
 
 // unit: mean_side() of both, > 0. still: one an animated vertex.
 Trimmed trim(const Surface& coded, const Surface& animated, std::span<const std::uint8_t> still, double unit,
-             unsigned threads);
+             Threads threads);
 
 }  // namespace htvm::internal::zipping

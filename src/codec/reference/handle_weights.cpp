@@ -156,7 +156,7 @@ VertexWeights weights_of(std::uint16_t own, const NearHandles& others, std::int3
 }  // namespace
 
 HandleWeights smooth_weights(std::span<const std::uint16_t> handle_of_vertex, std::span<const LatticePoint> positions,
-                             std::span<const Triangle> triangles, std::int32_t width, unsigned threads) {
+                             std::span<const Triangle> triangles, std::int32_t width, Threads threads) {
     static_cast<void>(threads);  // one pass of some milliseconds
     const auto count = positions.size();
     const auto others = near_handles(

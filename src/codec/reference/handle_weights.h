@@ -7,6 +7,7 @@
 #include "core/handles.h"
 #include "core/lattice.h"
 #include "htvm/mesh.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -18,6 +19,6 @@ namespace htvm::internal {
 // Vertices without triangles keep their handle. The same for any number of threads.
 // About 3 ms for 35,000 vertices and 14 bones.
 HandleWeights smooth_weights(std::span<const std::uint16_t> handle_of_vertex, std::span<const LatticePoint> positions,
-                             std::span<const Triangle> triangles, std::int32_t width, unsigned threads);
+                             std::span<const Triangle> triangles, std::int32_t width, Threads threads);
 
 }  // namespace htvm::internal

@@ -38,7 +38,7 @@ bool blends(const ReferenceMesh& reference, std::size_t vertex) {
 
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
-                             std::int32_t weight_width, std::uint32_t frame, unsigned threads) {
+                             std::int32_t weight_width, std::uint32_t frame, Threads threads) {
     ReferenceMesh out;
     out.mesh = std::move(mesh);
     out.joints = std::move(joints);
@@ -54,7 +54,7 @@ ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, s
 }
 
 std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
-                                            std::span<const QuantisedTransform> transforms, unsigned threads) {
+                                            std::span<const QuantisedTransform> transforms, Threads threads) {
     const auto rotation = rotation_matrices(transforms);
     std::vector<LatticePoint> out(reference.mesh.positions.size());
     parallel_for(out.size(), threads, 16384, [&](std::size_t begin, std::size_t end) {

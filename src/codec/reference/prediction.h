@@ -10,6 +10,7 @@
 #include "codec/reference/rigid_transform.h"
 #include "codec/reference/skinning.h"
 #include "core/handles.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -30,12 +31,12 @@ struct ReferenceMesh {
 // smooth_weights(); 0: rigid.
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
-                             std::int32_t weight_width, std::uint32_t frame, unsigned threads);
+                             std::int32_t weight_width, std::uint32_t frame, Threads threads);
 
 // M_P: the reference vertices moved by their bones' transforms, one transform a bone. A vertex of several bones goes to
 // the weighted mean of where they move it, rounded once and kept within the lattice.
 std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
-                                            std::span<const QuantisedTransform> transforms, unsigned threads);
+                                            std::span<const QuantisedTransform> transforms, Threads threads);
 
 // The reference's normals turned by their bones' transforms, blended likewise.
 std::vector<QuantisedNormal> predict_normals(const ReferenceMesh& reference,

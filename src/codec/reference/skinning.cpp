@@ -38,7 +38,7 @@ double distance_to_axis(LatticePoint vertex, const BoneCylinder& bone) {
 }
 
 std::vector<BoneIndex> skin(std::span<const LatticePoint> vertices, std::span<const BoneCylinder> bones,
-                            unsigned threads) {
+                            Threads threads) {
     std::vector<BoneIndex> out(vertices.size());
     parallel_for(vertices.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {

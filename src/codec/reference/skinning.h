@@ -8,6 +8,7 @@
 
 #include "core/lattice.h"
 #include "htvm/skeleton.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -28,7 +29,7 @@ double distance_to_axis(LatticePoint vertex, const BoneCylinder& bone);
 
 // The bone of each vertex: the nearest by eq. 2, of equally near ones the lowest. At least one bone.
 std::vector<BoneIndex> skin(std::span<const LatticePoint> vertices, std::span<const BoneCylinder> bones,
-                            unsigned threads);
+                            Threads threads);
 
 // A(b^i) for every bone: vertex indices grouped by bone, ascending within each.
 struct SubMeshes {

@@ -4,6 +4,7 @@
 
 #include "codec/reference/lattice_mesh.h"
 #include "surface/target_surface.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -12,7 +13,7 @@ struct SimplifiedReferenceOptions {
     double colour_error = 16;   // levels, > 0
     double longest_edge = 640;  // lattice units, > 0
     double reach = 480;         // lattice units: how far the captured surface is looked for
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 // Normals are made anew where the capture has them. Texture coordinates cannot be simplified: a mesh that has some, or

@@ -6,6 +6,7 @@
 
 #include "codec/reference/lattice_mesh.h"
 #include "surface/target_surface.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -21,7 +22,7 @@ struct TrackedFitOptions {
     double stray = 200;    // lattice units, > 0
     double reach = 400;    // likewise: on the captured surface nothing is looked for farther away
     double region = 1600;  // side of the cubes, likewise; those with few samples are left out
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 // captured: of the captured mesh. intra_squared: `squared` of the I-frame, whose connectivity `decoded` has; what its

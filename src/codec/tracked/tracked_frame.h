@@ -15,6 +15,7 @@
 #include "codec/reference/lattice_mesh.h"
 #include "codec/tracked/node_motion.h"
 #include "codec/tracked/vertex_field.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -48,12 +49,12 @@ struct DecodedTrackedFrame {
 
 // before: of the frame that the payload refers to; null where that is the I-frame.
 Result<DecodedTrackedFrame> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
-                                                 const TrackedState* before, unsigned threads);
+                                                 const TrackedState* before, Threads threads);
 
 // The pieces, which the encoder shares.
 // The reference moved by its nodes, one transform a node.
 std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
-                                         std::span<const QuantisedTransform> transforms, unsigned threads);
+                                         std::span<const QuantisedTransform> transforms, Threads threads);
 
 // Unit normals of a mesh's vertices, weighted by area; zero where there are no triangles. Doubles from + - * / sqrt.
 struct ExactNormal {

@@ -65,7 +65,7 @@ Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::in
 }
 
 std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
-                                         std::span<const QuantisedTransform> transforms, unsigned threads) {
+                                         std::span<const QuantisedTransform> transforms, Threads threads) {
     const auto rotation = rotation_matrices(transforms);
     std::vector<LatticePoint> out(reference.mesh.positions.size());
     parallel_for(out.size(), threads, 8192, [&](std::size_t begin, std::size_t end) {
@@ -133,7 +133,7 @@ std::vector<QuantisedNormal> quantised_normals(std::span<const ExactNormal> norm
 }
 
 Result<DecodedTrackedFrame> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
-                                                 const TrackedState* before, unsigned threads) {
+                                                 const TrackedState* before, Threads threads) {
     const auto& mesh = reference.mesh;
     if (payload.header.vertices != mesh.positions.size() || payload.header.triangles != mesh.triangles.size())
         return fail(ErrorKind::corrupt_stream, "tracked frame: it has other counts than its I-frame");

@@ -8,6 +8,7 @@
 #include "codec/tracked/tracked_frame.h"
 #include "surface/deformation.h"
 #include "htvm/encoder.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -16,7 +17,7 @@ struct TrackedFrameOptions {
     double colour_step = 11;    // levels
     double lambda = 0.12;       // squared steps that a bit is worth
     DeformationOptions deformation;
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 // What the encoder needs of a group besides what the decoder has.

@@ -171,7 +171,7 @@ std::array<double, 3> barycentric(const Point3f& p, const Point3f& a, const Poin
 // What the surface shows at each sample less what the reference shows there: a list of levels a component.
 std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const LatticeMesh& captured,
                                                   const TargetSurface& surface,
-                                                  const std::vector<SurfaceTarget>& targets, unsigned threads) {
+                                                  const std::vector<SurfaceTarget>& targets, Threads threads) {
     std::array<std::vector<double>, 3> out;
     for (auto& component : out) component.assign(targets.size(), 0);
     const std::size_t vertices = moved.positions.size();
@@ -200,7 +200,7 @@ std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, c
 }  // namespace
 
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const TargetSurface& surface, double reach, unsigned threads) {
+                                    const TargetSurface& surface, double reach, Threads threads) {
     const auto samples = samples_of(moved);
     SurfaceTargetOptions search;
     search.reach = static_cast<float>(reach);

@@ -8,6 +8,7 @@
 
 #include "codec/tracked/tracked_frame.h"
 #include "surface/target_surface.h"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -28,6 +29,6 @@ struct TrackedTargets {
 // neighbours. Least squares over the whole surface, not at the vertices alone: a coarse reference's vertices lie
 // outside a round limb, so that its triangles lie half outside and half inside.
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const TargetSurface& surface, double reach, unsigned threads);
+                                    const TargetSurface& surface, double reach, Threads threads);
 
 }  // namespace htvm::internal

@@ -20,6 +20,7 @@
 
 #include "codec/reference/vertex_hierarchy.h"
 #include "htvm/result.hpp"
+#include "core/thread.h"
 
 namespace htvm::internal {
 
@@ -69,7 +70,7 @@ struct DecodedField {
 // the second of them, done when the call returns, but for one that fails.
 Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values,
                                   std::size_t components, const FieldOptions& options = {},
-                                  const FieldHistory* before = nullptr, unsigned threads = 1,
+                                  const FieldHistory* before = nullptr, Threads threads = {},
                                   const std::function<void()>& beside = {});
 
 // `before`: as given to the encoder; needed where the layer says so. Errors: corrupt_stream where the bytes end too

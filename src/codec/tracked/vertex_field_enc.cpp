@@ -266,7 +266,7 @@ ComponentPlan plan_component(FieldWalk& walk, std::size_t c, const Means& means,
 
 // Plans all components, the first two on this thread and the third, behind `beside`, on another.
 std::vector<ComponentPlan> plan_field(FieldWalk& walk, std::span<const std::int32_t> values, bool turned, double lambda,
-                                      unsigned threads, const std::function<void()>& beside) {
+                                      Threads threads, const std::function<void()>& beside) {
     const std::size_t components = walk.components.size();
     std::vector<ComponentPlan> plans(components);
     std::array<Progress, most_field_components> progress;
@@ -324,7 +324,7 @@ Result<FieldHeader> header_of(std::span<const std::int32_t> values, std::size_t 
 
 Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values,
                                   std::size_t components, const FieldOptions& options, const FieldHistory* before,
-                                  unsigned threads, const std::function<void()>& beside) {
+                                  Threads threads, const std::function<void()>& beside) {
     if (components == 0 || components > most_field_components)
         return fail(ErrorKind::bad_input, "vertex field: there must be one to three components");
     if (values.size() != hierarchy.vertex_count * components)
