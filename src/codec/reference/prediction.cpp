@@ -36,6 +36,18 @@ bool blends(const ReferenceMesh& reference, std::size_t vertex) {
 
 }  // namespace
 
+void skin_reference(ReferenceMesh& reference, const std::vector<Bone>& bones, std::span<const std::int32_t> radii,
+                    std::int32_t weight_width, Threads threads) {
+    const auto& mesh = reference.mesh;
+    reference.bone_of_vertex = skin(mesh.positions, cylinders(bones, reference.joints, radii), threads);
+    reference.sub_meshes = group_by_bone(reference.bone_of_vertex, bones.size());
+    if (weight_width > 0)
+        reference.weights =
+            smooth_weights(reference.bone_of_vertex, mesh.positions, mesh.triangles, weight_width, threads);
+    reference.pivots = sub_mesh_means(reference, bones);
+    reference.mapping_prior = make_mapping_prior(mesh.positions, mesh.triangles);
+}
+
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
                              std::int32_t weight_width, std::uint32_t frame, Threads threads) {
@@ -44,12 +56,7 @@ ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, s
     out.joints = std::move(joints);
     out.orientations = std::move(orientations);
     out.frame = frame;
-    out.bone_of_vertex = skin(out.mesh.positions, cylinders(bones, out.joints, radii), threads);
-    out.sub_meshes = group_by_bone(out.bone_of_vertex, bones.size());
-    if (weight_width > 0)
-        out.weights = smooth_weights(out.bone_of_vertex, out.mesh.positions, out.mesh.triangles, weight_width, threads);
-    out.pivots = sub_mesh_means(out, bones);
-    out.mapping_prior = make_mapping_prior(out.mesh.positions, out.mesh.triangles);
+    skin_reference(out, bones, radii, weight_width, threads);
     return out;
 }
 
@@ -61,8 +68,9 @@ std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
         for (std::size_t k = begin; k < end; ++k) {
             const LatticePoint v = reference.mesh.positions[k];
             const auto bone = reference.bone_of_vertex[k];
-            out[k] = blends(reference, k) ? blended_move(v, reference.weights[k], rotation, reference.pivots, transforms)
-                                          : move(v, rotation[bone], reference.pivots[bone], transforms[bone].shift);
+            out[k] = blends(reference, k)
+                         ? blended_move(v, reference.weights[k], rotation, reference.pivots, transforms)
+                         : move(v, rotation[bone], reference.pivots[bone], transforms[bone].shift);
         }
     });
     return out;

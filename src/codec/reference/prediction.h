@@ -4,9 +4,9 @@
 #include <span>
 #include <vector>
 
+#include "codec/paper/mapping.h"
 #include "codec/reference/blending.h"
 #include "codec/reference/lattice_mesh.h"
-#include "codec/paper/mapping.h"
 #include "codec/reference/rigid_transform.h"
 #include "codec/reference/skinning.h"
 #include "core/handles.h"
@@ -27,8 +27,11 @@ struct ReferenceMesh {
     std::uint32_t frame = 0;
 };
 
-// Skins the decoded I-mesh and derives the pivots. bones must not be empty. weight_width, lattice units, is that of
-// smooth_weights(); 0: rigid.
+// Skins a reference that has its mesh, joints and orientations, and derives the pivots and the rest. bones must not be
+// empty; radii: one per bone. weight_width, lattice units, is that of smooth_weights(); 0: rigid.
+void skin_reference(ReferenceMesh& reference, const std::vector<Bone>& bones, std::span<const std::int32_t> radii,
+                    std::int32_t weight_width, Threads threads);
+// All at once.
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
                              std::int32_t weight_width, std::uint32_t frame, Threads threads);
