@@ -1,7 +1,6 @@
 // The range decoder and its symbol models: what any bytes decode to, encoded again, decodes to the same.
 #include "codec/intra/attribute_residual.h"
-#include "entropy/range_decoder.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 #include "fuzz_input.h"
 
 namespace {
@@ -26,6 +25,7 @@ struct Models {
 };
 
 std::int64_t decode(RangeDecoder& decoder, Models& models, Step step) {
+    ReadingCoder<RangeDecoder> reading{decoder};
     switch (step.kind) {
         case Kind::bit:
             return decoder.bit(models.bit);
@@ -38,11 +38,12 @@ std::int64_t decode(RangeDecoder& decoder, Models& models, Step step) {
         case Kind::signed_number:
             return decode_signed(decoder, models.signed_number);
         default:
-            return decode_residual(decoder, models.residual[0], models.residual[1], models.mantissa);
+            return code_residual(reading, models.residual[0], models.residual[1], models.mantissa, 0);
     }
 }
 
 void encode(RangeEncoder& encoder, Models& models, Step step, std::int64_t value) {
+    WritingCoder<RangeEncoder> writing{encoder};
     switch (step.kind) {
         case Kind::bit:
             return encoder.bit(models.bit, value != 0);
@@ -55,8 +56,9 @@ void encode(RangeEncoder& encoder, Models& models, Step step, std::int64_t value
         case Kind::signed_number:
             return encode_signed(encoder, models.signed_number, static_cast<std::int32_t>(value));
         default:
-            return encode_residual(encoder, models.residual[0], models.residual[1], models.mantissa,
-                                   static_cast<std::int32_t>(value));
+            code_residual(writing, models.residual[0], models.residual[1], models.mantissa,
+                          static_cast<std::int32_t>(value));
+            return;
     }
 }
 

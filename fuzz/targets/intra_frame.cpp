@@ -3,8 +3,8 @@
 #include <cstdlib>
 
 #include "codec/intra/attribute_values.h"
-#include "codec/intra/intra_colours.h"
-#include "codec/intra/intra_positions.h"
+#include "codec/intra/colours.h"
+#include "codec/intra/positions.h"
 #include "small_mesh.h"
 
 namespace {

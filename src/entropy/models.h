@@ -1,11 +1,18 @@
 // Adaptive models of the symbol streams, and how a symbol is cut into binary decisions.
 //
 // Every symbol is coded as binary decisions, each with its own adaptive probability: a small, fast and exact adaptive
-// arithmetic coder. The functions that code a symbol are templates over a Writer with
+// arithmetic coder. The functions that encode a symbol are templates over a Writer with
 //     void bit(BinaryModel&, bool)          one decision under a model, which adapts
 //     void raw(std::uint32_t value, int n)  the n low bits of value, equally likely, n <= 32
 // of which there are two: RangeEncoder (bytes) and CostCounter (bits that the bytes would take, nothing written).
-// Decoding has the same shape with RangeDecoder, in range_decoder.h.
+// Decoding has the same shape with a Reader, the RangeDecoder:
+//     bool bit(BinaryModel&)
+//     std::uint32_t raw(int n)
+//
+// A layer whose syntax is full of cases is better written once, for both directions: a function that codes a value
+// takes a coder and the value that is wanted. With a WritingCoder it writes that value and returns it; with a
+// ReadingCoder it ignores what is wanted and returns what it reads. What both sides derive from the value then cannot
+// differ.
 #pragma once
 
 #include <array>
@@ -70,6 +77,13 @@ void encode_symbol(Writer& writer, SymbolModel& model, std::uint32_t symbol) {
     }
 }
 
+template <class Reader>
+std::uint32_t decode_symbol(Reader& reader, SymbolModel& model) {
+    std::uint32_t node = 1;
+    for (int i = 0; i < model.bits(); ++i) node = node * 2 + reader.bit(model.node(node));
+    return node - (1u << model.bits());
+}
+
 // Whole numbers of any size up to 2^32 - 2: an adaptive exponential Golomb code. u + 1 = 2^k + m: k in unary, then the
 // k bits of m, the top three of them adaptive. Values up to 14 have a fully adaptive distribution.
 struct UnsignedModel {
@@ -93,6 +107,22 @@ void encode_unsigned(Writer& writer, UnsignedModel& model, std::uint32_t value) 
     if (left > 0) writer.raw(static_cast<std::uint32_t>(shifted & ((std::uint64_t{1} << left) - 1)), left);
 }
 
+template <class Reader>
+std::uint32_t decode_unsigned(Reader& reader, UnsignedModel& model) {
+    int k = 0;
+    while (k < 32 && reader.bit(model.prefix[static_cast<std::size_t>(k)])) ++k;
+    std::uint64_t shifted = 1;
+    std::uint32_t node = 1;
+    int left = k;
+    for (; left > 0 && left > k - 3; --left) {
+        const bool bit = reader.bit(model.mantissa[static_cast<std::size_t>(k)][node]);
+        node = node * 2 + bit;
+        shifted = shifted * 2 + bit;
+    }
+    if (left > 0) shifted = (shifted << left) | reader.raw(left);
+    return static_cast<std::uint32_t>(shifted - 1);  // k = 32 in a corrupt stream wraps, which is harmless
+}
+
 // Whole numbers of either sign, |v| <= 2^31 - 1: whether zero, the sign, then |v| - 1.
 struct SignedModel {
     BinaryModel zero;
@@ -107,5 +137,46 @@ void encode_signed(Writer& writer, SignedModel& model, std::int32_t value) {
     writer.bit(model.negative, value < 0);
     encode_unsigned(writer, model.magnitude, static_cast<std::uint32_t>(value < 0 ? -value : value) - 1);
 }
+
+template <class Reader>
+std::int32_t decode_signed(Reader& reader, SignedModel& model) {
+    if (reader.bit(model.zero)) return 0;
+    const bool negative = reader.bit(model.negative);
+    const std::uint32_t magnitude = (decode_unsigned(reader, model.magnitude) & 0x7FFFFFFFu) + 1u;
+    const std::uint32_t clamped = magnitude > 0x7FFFFFFFu ? 0x7FFFFFFFu : magnitude;
+    return negative ? -static_cast<std::int32_t>(clamped) : static_cast<std::int32_t>(clamped);
+}
+
+template <class Writer>
+struct WritingCoder {
+    static constexpr bool writes = true;
+    Writer& writer;
+    bool bit(BinaryModel& model, bool wanted) {
+        writer.bit(model, wanted);
+        return wanted;
+    }
+    std::uint32_t raw(std::uint32_t wanted, int n) {
+        writer.raw(wanted, n);
+        return wanted;
+    }
+    std::uint32_t number(UnsignedModel& model, std::uint32_t wanted) {
+        encode_unsigned(writer, model, wanted);
+        return wanted;
+    }
+    std::int32_t signed_number(SignedModel& model, std::int32_t wanted) {
+        encode_signed(writer, model, wanted);
+        return wanted;
+    }
+};
+
+template <class Reader>
+struct ReadingCoder {
+    static constexpr bool writes = false;
+    Reader& reader;
+    bool bit(BinaryModel& model, bool) { return reader.bit(model); }
+    std::uint32_t raw(std::uint32_t, int n) { return reader.raw(n); }
+    std::uint32_t number(UnsignedModel& model, std::uint32_t) { return decode_unsigned(reader, model); }
+    std::int32_t signed_number(SignedModel& model, std::int32_t) { return decode_signed(reader, model); }
+};
 
 }  // namespace htvm::internal

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "codec/paper/duplicates_enc.h"
+#include "codec/intra/duplicates.h"
 #include "codec/random_numbers.h"
 
 namespace htvm::internal {

@@ -1,4 +1,4 @@
-#include "codec/intra/intra_colours.h"
+#include "codec/intra/colours.h"
 
 #include <gtest/gtest.h>
 

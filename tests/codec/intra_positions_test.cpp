@@ -1,4 +1,4 @@
-#include "codec/intra/intra_positions.h"
+#include "codec/intra/positions.h"
 
 #include <gtest/gtest.h>
 

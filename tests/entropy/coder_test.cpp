@@ -3,8 +3,7 @@
 #include <random>
 
 #include "entropy/cost.h"
-#include "entropy/range_decoder.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 namespace {

@@ -1,6 +1,7 @@
 // The coding of one prediction residual: a whole number of either sign, under two contexts at once. The probability of
-// each binary decision is the mean of the two contexts' probabilities, and both adapt: many fine contexts can be tried
-// without waiting for each to learn.
+// each binary decision is the mean of the two contexts' probabilities, and both adapt: a coarse context that learns
+// fast steadies a fine one that has seen little yet. A mean, not logistic mixing (entropy/mixing.h): residuals are most
+// of an I-frame's decisions.
 #pragma once
 
 #include <array>
@@ -9,11 +10,10 @@
 #include <cstdint>
 
 #include "entropy/models.h"
-#include "entropy/range_decoder.h"
 
 namespace htvm::internal {
 
-inline constexpr int residual_bits = 30;  // |residual| < 2^30
+inline constexpr std::size_t residual_bits = 30;  // |residual| < 2^30
 
 // One context's share: whether zero, the sign, and the position of the magnitude's top bit in unary.
 struct ResidualContext {
@@ -26,73 +26,31 @@ struct ResidualMantissa {
     std::array<std::array<BinaryModel, 4>, residual_bits> node;
 };
 
-namespace residual_detail {
-
-inline BinaryModel mean(const BinaryModel& a, const BinaryModel& b) {
-    return {.one = static_cast<std::uint16_t>((std::uint32_t{a.one} + b.one) / 2), .seen = 0};
-}
-
-template <class Writer>
-void put(Writer& writer, BinaryModel& a, BinaryModel& b, bool bit) {
-    BinaryModel both = mean(a, b);
-    writer.bit(both, bit);
-    a.update(bit);
-    b.update(bit);
-}
-
-inline bool get(RangeDecoder& decoder, BinaryModel& a, BinaryModel& b) {
-    BinaryModel both = mean(a, b);
-    const bool bit = decoder.bit(both);
+template <class Coder>
+bool code_by_both(Coder& coder, BinaryModel& a, BinaryModel& b, bool wanted) {
+    BinaryModel mean{.one = static_cast<std::uint16_t>((std::uint32_t{a.one} + b.one) / 2), .seen = 0};
+    const bool bit = coder.bit(mean, wanted);
     a.update(bit);
     b.update(bit);
     return bit;
 }
 
-}  // namespace residual_detail
-
-// |value| < 2^residual_bits. a and b must be two different contexts.
-template <class Writer>
-void encode_residual(Writer& writer, ResidualContext& a, ResidualContext& b, ResidualMantissa& mantissa,
-                     std::int32_t value) {
-    using residual_detail::put;
-    put(writer, a.zero, b.zero, value == 0);
-    if (value == 0) return;
-    put(writer, a.negative, b.negative, value < 0);
-    const auto magnitude = static_cast<std::uint32_t>(value < 0 ? -value : value);
-    const int top = static_cast<int>(std::bit_width(magnitude)) - 1;
-    for (int i = 0; i < residual_bits - 1; ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        put(writer, a.top[at], b.top[at], i < top);
-        if (i >= top) break;
-    }
-    std::uint32_t node = 1;
-    int left = top;
-    for (; left > 0 && left > top - 2; --left) {
-        const bool bit = (magnitude >> (left - 1)) & 1;
-        writer.bit(mantissa.node[static_cast<std::size_t>(top)][node], bit);
-        node = node * 2 + bit;
-    }
-    if (left > 0) writer.raw(magnitude & ((1u << left) - 1), left);
-}
-
-// The counterpart; what a corrupt stream gives is also below 2^residual_bits.
-inline std::int32_t decode_residual(RangeDecoder& decoder, ResidualContext& a, ResidualContext& b,
-                                    ResidualMantissa& mantissa) {
-    using residual_detail::get;
-    if (get(decoder, a.zero, b.zero)) return 0;
-    const bool negative = get(decoder, a.negative, b.negative);
-    int top = 0;
-    while (top < residual_bits - 1 &&
-           get(decoder, a.top[static_cast<std::size_t>(top)], b.top[static_cast<std::size_t>(top)]))
-        ++top;
-    std::uint32_t magnitude = 1, node = 1;
-    int left = top;
-    for (; left > 0 && left > top - 2; --left) {
-        const bool bit = decoder.bit(mantissa.node[static_cast<std::size_t>(top)][node]);
-        node = node * 2 + bit;
-        magnitude = magnitude * 2 + bit;
-    }
-    if (left > 0) magnitude = (magnitude << left) | decoder.raw(left);
+// Writes the wanted residual and returns it, or returns the one that is read (models.h). |wanted| < 2^residual_bits,
+// and so is what a corrupt stream gives. a and b must be two different contexts.
+template <class Coder>
+std::int32_t code_residual(Coder& coder, ResidualContext& a, ResidualContext& b, ResidualMantissa& mantissa,
+                           std::int32_t wanted) {
+    if (code_by_both(coder, a.zero, b.zero, wanted == 0)) return 0;
+    const bool negative = code_by_both(coder, a.negative, b.negative, wanted < 0);
+    const auto wanted_magnitude = static_cast<std::uint32_t>(wanted < 0 ? -wanted : wanted);
+    const auto wanted_width = static_cast<std::size_t>(std::bit_width(wanted_magnitude));
+    std::size_t top = 0;
+    while (top < residual_bits - 1 && code_by_both(coder, a.top[top], b.top[top], top + 1 < wanted_width)) ++top;
+    std::uint32_t magnitude = 1;  // its bits so far, which also name the node of the mantissa's tree
+    int left = static_cast<int>(top);
+    for (; left > 0 && left > static_cast<int>(top) - 2; --left)
+        magnitude = magnitude * 2 + coder.bit(mantissa.node[top][magnitude], (wanted_magnitude >> (left - 1)) & 1);
+    if (left > 0) magnitude = (magnitude << left) | coder.raw(wanted_magnitude & ((1u << left) - 1), left);
     return negative ? -static_cast<std::int32_t>(magnitude) : static_cast<std::int32_t>(magnitude);
 }
 

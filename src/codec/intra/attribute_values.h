@@ -13,7 +13,7 @@
 #include <span>
 #include <vector>
 
-#include "codec/intra/intra_neighbours.h"
+#include "codec/intra/neighbours.h"
 #include "htvm/result.hpp"
 
 namespace htvm::internal {

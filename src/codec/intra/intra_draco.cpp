@@ -10,8 +10,8 @@
 #include <new>
 #include <string>
 
-#include "codec/stream/frame_payload.h"
 #include "codec/reference/lattice_mesh.h"
+#include "codec/stream/frame_payload.h"
 #include "core/bytes.h"
 #include "htvm/intra_coder.hpp"
 

@@ -2,8 +2,8 @@
 // predicted from its neighbours; or the whole mesh by another static coder.
 #pragma once
 
-#include "codec/stream/frame_payload.h"
 #include "codec/reference/lattice_mesh.h"
+#include "codec/stream/frame_payload.h"
 #include "htvm/intra_coder.hpp"
 
 namespace htvm::internal {
@@ -21,8 +21,5 @@ Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrame
 
 // external: of the number that the payload names, or null: unsupported then.
 Result<LatticeMesh> decode_intra_frame(const FramePayload& payload, const ExternalIntraCoder* external);
-
-// A grid point's place on the lattice, and a quantised colour's levels.
-inline LatticePoint from_grid(LatticePoint q, std::int32_t step) { return {q.x * step, q.y * step, q.z * step}; }
 
 }  // namespace htvm::internal

@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "codec/paper/codebook.h"
-#include "entropy/range_decoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 namespace {

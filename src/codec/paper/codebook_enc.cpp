@@ -3,7 +3,7 @@
 #include "codec/paper/codebook.h"
 #include "codec/stream/sequence_index.h"
 #include "core/bytes.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 

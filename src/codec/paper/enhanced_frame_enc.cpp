@@ -3,7 +3,7 @@
 #include "codec/paper/animated_frame.h"
 #include "codec/intra/attribute_values.h"
 #include "codec/paper/coded_bones.h"
-#include "codec/paper/duplicates_enc.h"
+#include "codec/intra/duplicates.h"
 #include "codec/paper/enhanced_frame.h"
 #include "codec/paper/mapping.h"
 #include "codec/paper/mtfan.h"

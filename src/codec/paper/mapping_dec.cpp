@@ -3,7 +3,7 @@
 
 #include "codec/paper/mapping.h"
 #include "codec/paper/mapping_models.h"
-#include "entropy/range_decoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 namespace {

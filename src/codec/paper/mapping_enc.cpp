@@ -1,6 +1,6 @@
 #include "codec/paper/mapping.h"
 #include "codec/paper/mapping_models.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 namespace {

@@ -2,7 +2,7 @@
 
 #include "codec/paper/mtfan.h"
 #include "codec/paper/mtfan_distance_order.h"
-#include "codec/intra/tfan_decode_fans.h"
+#include "codec/intra/triangle_fans.h"
 
 namespace htvm::internal {
 namespace {
@@ -30,7 +30,7 @@ struct DistanceOrders {
     }
     FanHints hints(const FanState& fan) const { return known.hints(fan); }
     bool discover(const FanState& fan) {
-        FanReader coder{decoder};
+        ReadingCoder<RangeDecoder> coder{decoder};
         const std::size_t place =
             code_distance_order(coder, models, unvisited, known, fan, order[fan.focus], OpenEdges::none);
         const auto candidates = unvisited.candidates();

@@ -13,7 +13,7 @@
 
 #include "codec/paper/mtfan.h"
 #include "codec/paper/nearest_order.h"
-#include "codec/intra/tfan_syntax.h"
+#include "codec/intra/triangle_fans.h"
 #include "core/lattice.h"
 #include "core/thread.h"
 

@@ -2,7 +2,7 @@
 
 #include "codec/paper/mtfan.h"
 #include "codec/paper/mtfan_distance_order.h"
-#include "codec/intra/tfan_encode_fans.h"
+#include "codec/intra/triangle_fans.h"
 
 namespace htvm::internal {
 namespace {
@@ -25,7 +25,7 @@ struct DistanceOrders {
     void seed(std::uint32_t vertex) { visit(vertex); }
     FanHints hints(const FanState& fan) const { return known.hints(fan); }
     void discover(const FanState& fan, std::uint32_t vertex) {
-        FanWriter coder{encoder};
+        WritingCoder<RangeEncoder> coder{encoder};
         const std::size_t place = code_distance_order(coder, models, unvisited, known, fan, order[fan.focus], vertex);
         if (place == unvisited.candidates().size()) {
             code_index_directly(coder, models, order[fan.current == OpenEdges::none ? fan.focus : fan.current], vertex);
@@ -45,7 +45,7 @@ EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::
     result.distance_order_counts.resize(static_cast<std::size_t>(m) + 1);
     if (triangles.empty()) return result;
     RangeEncoder encoder;
-    FanWriter coder{encoder};
+    WritingCoder<RangeEncoder> coder{encoder};
     const auto models = std::make_unique<FanModels>();
     const auto discovery =
         std::unique_ptr<DistanceOrders>(new DistanceOrders{decoded_positions,

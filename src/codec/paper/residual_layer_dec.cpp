@@ -1,6 +1,6 @@
 #include "codec/paper/residual_layer.h"
 #include "core/lattice.h"
-#include "entropy/range_decoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 

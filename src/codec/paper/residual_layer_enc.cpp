@@ -1,5 +1,5 @@
 #include "codec/paper/residual_layer.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "codec/reference/blending.h"
-#include "entropy/range_decoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 namespace {

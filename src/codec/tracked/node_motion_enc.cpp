@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "codec/tracked/node_motion.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 namespace {

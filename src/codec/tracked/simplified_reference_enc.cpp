@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "codec/paper/duplicates_enc.h"
+#include "codec/intra/duplicates.h"
 #include "codec/tracked/tracked_targets_enc.h"
 #include "surface/simplification.h"
 

@@ -1,6 +1,6 @@
 #include "codec/tracked/vertex_field_walk.h"
 #include "core/bytes.h"
-#include "entropy/range_decoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 

@@ -7,7 +7,7 @@
 #include "core/bytes.h"
 #include "core/parallel.h"
 #include "entropy/cost.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 

@@ -10,7 +10,7 @@
 
 #include "entropy/mixing.h"
 #include "entropy/models.h"
-#include "entropy/range_decoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 

@@ -1,13 +1,52 @@
-// The arithmetic decoder, and the decoding side of the symbol models in models.h.
+// The arithmetic coder under every layer: a byte-wise range coder with carry, after Martin (1979). Integers throughout.
+//
+// Both sides keep a range of 32 bits, cut at each decision in proportion to the model's probability, and shift a byte
+// out or in whenever the range falls below 2^24. Encoder and decoder stand side by side: each step of one is the
+// other's, read backwards.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "entropy/models.h"
 
 namespace htvm::internal {
+
+class RangeEncoder {
+public:
+    void bit(BinaryModel& model, bool bit);
+    void raw(std::uint32_t value, int n);
+    // Flushes and hands over the bytes; the encoder is then spent. An encoder that coded nothing gives no bytes.
+    std::vector<std::uint8_t> finish();
+
+private:
+    void shift_low();
+    std::uint64_t low_ = 0;
+    std::uint32_t range_ = 0xFFFFFFFFu;
+    std::uint8_t pending_ = 0;        // the last byte, which a carry may still change
+    std::uint64_t pending_ones_ = 0;  // 0xFF bytes that wait behind it
+    bool started_ = false;
+    bool used_ = false;
+    std::vector<std::uint8_t> bytes_;
+};
+
+inline void RangeEncoder::bit(BinaryModel& model, bool bit) {
+    const std::uint32_t bound = (range_ >> 16) * model.one;
+    if (bit) {
+        range_ = bound;
+    } else {
+        low_ += bound;
+        range_ -= bound;
+    }
+    model.update(bit);
+    used_ = true;
+    while (range_ < (1u << 24)) {
+        range_ <<= 8;
+        shift_low();
+    }
+}
 
 // Reads zeros past the end of the data. A stream that was not cut short never needs more than four of them:
 // exhausted() says that more were read, and a loop that decodes many symbols checks it to stop early.
@@ -64,34 +103,5 @@ private:
     std::uint32_t range_ = 0xFFFFFFFFu;
     std::uint32_t code_ = 0;
 };
-
-inline std::uint32_t decode_symbol(RangeDecoder& decoder, SymbolModel& model) {
-    std::uint32_t node = 1;
-    for (int i = 0; i < model.bits(); ++i) node = node * 2 + decoder.bit(model.node(node));
-    return node - (1u << model.bits());
-}
-
-inline std::uint32_t decode_unsigned(RangeDecoder& decoder, UnsignedModel& model) {
-    int k = 0;
-    while (k < 32 && decoder.bit(model.prefix[static_cast<std::size_t>(k)])) ++k;
-    std::uint64_t shifted = 1;
-    std::uint32_t node = 1;
-    int left = k;
-    for (; left > 0 && left > k - 3; --left) {
-        const bool bit = decoder.bit(model.mantissa[static_cast<std::size_t>(k)][node]);
-        node = node * 2 + bit;
-        shifted = shifted * 2 + bit;
-    }
-    if (left > 0) shifted = (shifted << left) | decoder.raw(left);
-    return static_cast<std::uint32_t>(shifted - 1);  // k = 32 in a corrupt stream wraps, which is harmless
-}
-
-inline std::int32_t decode_signed(RangeDecoder& decoder, SignedModel& model) {
-    if (decoder.bit(model.zero)) return 0;
-    const bool negative = decoder.bit(model.negative);
-    const std::uint32_t magnitude = (decode_unsigned(decoder, model.magnitude) & 0x7FFFFFFFu) + 1u;
-    const std::uint32_t clamped = magnitude > 0x7FFFFFFFu ? 0x7FFFFFFFu : magnitude;
-    return negative ? -static_cast<std::int32_t>(clamped) : static_cast<std::int32_t>(clamped);
-}
 
 }  // namespace htvm::internal

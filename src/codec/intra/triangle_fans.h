@@ -1,42 +1,121 @@
-// The syntax of triangle fans, for both sides: what is coded at a focus vertex, and in which context.
+// Triangle fans: what TFAN (tfan.h) and M-TFAN (paper/mtfan.h) have in common, which is all but what they say of a
+// vertex that a fan meets for the first time.
 //
-// Every function codes one thing: with a FanWriter it writes what is wanted and returns it, with a FanReader it ignores
-// what is wanted and returns what it read. A Coder has
-//     bool bit(BinaryModel&, bool wanted)
-//     std::uint32_t number(UnsignedModel&, std::uint32_t wanted)
-// Vertices are named by their visiting number. At the focus, an open half-edge that enters it comes from a vertex where
-// the coded triangles around the focus end and a fan may start (a start candidate); an open half-edge that leaves it
-// goes to a vertex where they start and a fan may end (an end candidate).
+// From top to bottom: the open edges of what is coded; where a fan stands among them; the contexts and the syntax of
+// its start and its steps; the decoder's traversal; the encoder's, which also chooses the fans.
+//
+// The syntax is written once for both directions: every function that codes one thing takes a coder and what is wanted
+// (entropy/models.h). Vertices are named by their visiting number. At the focus, an open half-edge that enters it comes
+// from a vertex where the coded triangles around the focus end and a fan may start (a start candidate); an open
+// half-edge that leaves it goes to a vertex where they start and a fan may end (an end candidate).
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "entropy/mixing.h"
-#include "codec/intra/tfan_open_edges.h"
 #include "entropy/models.h"
-#include "entropy/range_decoder.h"
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
+#include "htvm/mesh.hpp"
 
 namespace htvm::internal {
 
-struct FanWriter {
-    RangeEncoder& encoder;
-    bool bit(BinaryModel& model, bool wanted) {
-        encoder.bit(model, wanted);
-        return wanted;
-    }
-    std::uint32_t number(UnsignedModel& model, std::uint32_t wanted) {
-        encode_unsigned(encoder, model, wanted);
-        return wanted;
-    }
-};
+// The open half-edges of the triangles coded so far: those whose opposite half-edge no coded triangle has. They are all
+// that the fans' syntax needs to know of the past. Vertices are named by their visiting number.
+class OpenEdges {
+public:
+    static constexpr std::uint32_t none = 0xFFFFFFFFu;
 
-struct FanReader {
-    RangeDecoder& decoder;
-    bool bit(BinaryModel& model, bool) { return decoder.bit(model); }
-    std::uint32_t number(UnsignedModel& model, std::uint32_t) { return decode_unsigned(decoder, model); }
+    struct HalfEdge {
+        std::uint32_t from = none, to = none;
+        std::uint32_t apex = none;  // the third vertex of its triangle
+        // Doubly linked lists of the half-edges that leave `from` and of those that enter `to`, latest first.
+        std::uint32_t next_out = none, previous_out = none, next_in = none, previous_in = none;
+    };
+
+    // The next visiting number is now in use.
+    void add_vertex() { vertices_.push_back({}); }
+    std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(vertices_.size()); }
+
+    // How many of the coded triangles' corners are at the vertex.
+    std::uint32_t triangle_count(std::uint32_t vertex) const { return vertices_[vertex].triangles; }
+
+    // The latest open half-edge that leaves or enters the vertex, or none; follow next_out or next_in from there.
+    std::uint32_t first_out(std::uint32_t vertex) const { return vertices_[vertex].first_out; }
+    std::uint32_t first_in(std::uint32_t vertex) const { return vertices_[vertex].first_in; }
+    const HalfEdge& operator[](std::uint32_t half_edge) const { return half_edges_[half_edge]; }
+
+    void add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+        ++vertices_[a].triangles;
+        ++vertices_[b].triangles;
+        ++vertices_[c].triangles;
+        add(a, b, c);
+        add(b, c, a);
+        add(c, a, b);
+    }
+
+private:
+    struct Vertex {
+        std::uint32_t first_out = none, first_in = none, triangles = 0;
+    };
+    // How far the lists are searched for an opposite. Beyond it a half-edge counts as open though it is not, on both
+    // sides alike: that costs bits where two vertices both have many open edges, and bounds the work.
+    static constexpr int search_limit = 32;
+
+    void add(std::uint32_t from, std::uint32_t to, std::uint32_t apex) {
+        if (from == to) return;
+        const std::uint32_t opposite = find(to, from);
+        if (opposite != none) {
+            unlink(opposite);
+        } else {
+            link(from, to, apex);
+        }
+    }
+    // Both ends' lists side by side, so that the shorter one decides how long it takes.
+    std::uint32_t find(std::uint32_t from, std::uint32_t to) const {
+        std::uint32_t out = vertices_[from].first_out, in = vertices_[to].first_in;
+        for (int i = 0; i < search_limit && out != none && in != none; ++i) {
+            if (half_edges_[out].to == to) return out;
+            if (half_edges_[in].from == from) return in;
+            out = half_edges_[out].next_out;
+            in = half_edges_[in].next_in;
+        }
+        return none;
+    }
+    void link(std::uint32_t from, std::uint32_t to, std::uint32_t apex) {
+        std::uint32_t id = free_;
+        if (id == none) {
+            id = static_cast<std::uint32_t>(half_edges_.size());
+            half_edges_.push_back({});
+        } else {
+            free_ = half_edges_[id].next_out;
+        }
+        half_edges_[id] = {from, to, apex, vertices_[from].first_out, none, vertices_[to].first_in, none};
+        if (vertices_[from].first_out != none) half_edges_[vertices_[from].first_out].previous_out = id;
+        if (vertices_[to].first_in != none) half_edges_[vertices_[to].first_in].previous_in = id;
+        vertices_[from].first_out = id;
+        vertices_[to].first_in = id;
+    }
+    void unlink(std::uint32_t id) {
+        const HalfEdge edge = half_edges_[id];
+        if (edge.next_out != none) half_edges_[edge.next_out].previous_out = edge.previous_out;
+        if (edge.next_in != none) half_edges_[edge.next_in].previous_in = edge.previous_in;
+        (edge.previous_out != none ? half_edges_[edge.previous_out].next_out : vertices_[edge.from].first_out) =
+            edge.next_out;
+        (edge.previous_in != none ? half_edges_[edge.previous_in].next_in : vertices_[edge.to].first_in) = edge.next_in;
+        half_edges_[id].next_out = free_;
+        free_ = id;
+    }
+
+    std::vector<Vertex> vertices_;
+    std::vector<HalfEdge> half_edges_;
+    std::uint32_t free_ = none;
 };
 
 // How a fan's boundary goes on from its current vertex.
@@ -339,6 +418,225 @@ void code_start(Coder& coder, FanModels& models, const OpenEdges& edges, FanStat
     } else {
         fan.start = OpenEdges::none;
     }
+}
+
+// Decodes triangle_count triangles, in visiting numbers; false where the stream is corrupt. The Discovery says what is
+// coded besides the fans:
+//     static constexpr bool visits_isolated   whether vertices without triangles are visited as seeds
+//     bool seed()                             a seed takes the next visiting number; false where no vertex is left
+//     FanHints hints(const FanState&)         contexts for the fan's next step
+//     bool discover(const FanState&)          a vertex met by the fan takes it; false where it cannot
+template <class Discovery>
+bool decode_fans(RangeDecoder& decoder, std::uint32_t triangle_count, Discovery& discovery,
+                 std::vector<Triangle>& triangles) {
+    ReadingCoder<RangeDecoder> coder{decoder};
+    const auto models_owner = std::make_unique<FanModels>();
+    FanModels& models = *models_owner;
+    OpenEdges edges;
+    const auto discover = [&](const FanState& fan) {
+        edges.add_vertex();
+        return discovery.discover(fan);
+    };
+    const auto decode_fan = [&](FanState& fan) {
+        code_start(coder, models, edges, fan, OpenEdges::none);
+        if (fan.start == OpenEdges::none) {
+            fan.start = edges.vertex_count();
+            if (!discover(fan)) return false;
+        }
+        if (fan.start >= edges.vertex_count()) return false;
+        fan.current = fan.start;
+        find_ends(edges, fan);
+        while (triangles.size() < triangle_count) {
+            look_around(edges, fan);
+            CodedStep step = code_step(coder, models, edges, fan, discovery.hints(fan), {});
+            if (step.step == Step::stop) return true;
+            if (step.step == Step::new_vertex) {
+                step.vertex = edges.vertex_count();
+                if (!discover(fan)) return false;
+            }
+            if (step.vertex >= edges.vertex_count() || decoder.exhausted()) return false;
+            triangles.push_back({fan.focus, fan.current, step.vertex});
+            edges.add_triangle(fan.focus, fan.current, step.vertex);
+            advance(fan, step);
+            if (step.step == Step::close) return true;
+        }
+        return true;
+    };
+    for (std::uint32_t focus = 0; triangles.size() < triangle_count; ++focus) {
+        bool implied = false;
+        if (focus == edges.vertex_count()) {
+            if (!discovery.seed() || decoder.exhausted()) return false;
+            edges.add_vertex();
+            implied = !Discovery::visits_isolated;
+        }
+        for (; triangles.size() < triangle_count; implied = false) {
+            if (!implied && !code_more_fans(coder, models, edges, focus, false)) break;
+            FanState fan;
+            fan.focus = focus;
+            if (!decode_fan(fan)) return false;
+        }
+    }
+    return true;
+}
+
+// The triangles at a focus that are not coded yet, as links from one neighbour to the next: the triangle
+// (focus, a, b) links a to b. Vertices are input indices.
+class FocusLinks {
+public:
+    FocusLinks(std::uint32_t vertex_count, std::span<const Triangle> triangles)
+        : triangles_(triangles),
+          first_corner_(std::size_t{vertex_count} + 1),
+          corner_triangle_(triangles.size() * 3),
+          coded_(triangles.size()),
+          head_(vertex_count, none),
+          arriving_(vertex_count) {
+        for (const Triangle& triangle : triangles)
+            for (const std::uint32_t vertex : triangle) ++first_corner_[vertex + 1];
+        for (std::size_t v = 0; v < vertex_count; ++v) first_corner_[v + 1] += first_corner_[v];
+        std::vector<std::uint32_t> at(first_corner_.begin(), first_corner_.end() - 1);
+        for (std::uint32_t t = 0; t < triangles.size(); ++t)
+            for (const std::uint32_t vertex : triangles[t]) corner_triangle_[at[vertex]++] = t;
+    }
+
+    bool has_triangles(std::uint32_t vertex) const { return first_corner_[vertex] < first_corner_[vertex + 1]; }
+    // Takes the uncoded triangles at the vertex; they count as coded from then on.
+    void gather(std::uint32_t focus) {
+        links_.clear();
+        unled_cursor_ = cursor_ = 0;
+        for (std::uint32_t c = first_corner_[focus]; c < first_corner_[focus + 1]; ++c) {
+            const std::uint32_t t = corner_triangle_[c];
+            if (coded_[t]) continue;  // also the second corner that a degenerate triangle has here
+            coded_[t] = true;
+            const Triangle& triangle = triangles_[t];
+            const std::size_t corner = triangle[0] == focus ? 0 : triangle[1] == focus ? 1 : 2;
+            links_.push_back({triangle[(corner + 1) % 3], triangle[(corner + 2) % 3], none});
+        }
+        remaining_ = links_.size();
+        for (std::size_t i = links_.size(); i-- > 0;) {  // backwards, so that each vertex's first link is found first
+            links_[i].next = head_[links_[i].from];
+            head_[links_[i].from] = static_cast<std::uint32_t>(i);
+            ++arriving_[links_[i].to];
+        }
+    }
+    std::size_t remaining() const { return remaining_; }
+    bool leads_on(std::uint32_t vertex) const { return head_[vertex] != none; }
+    // A vertex from which a link leads on, one that no link leads to where there is one. Needs remaining() > 0.
+    std::uint32_t any_start() {
+        for (; unled_cursor_ < links_.size(); ++unled_cursor_) {
+            const std::uint32_t from = links_[unled_cursor_].from;
+            if (head_[from] != none && arriving_[from] == 0) return from;
+        }
+        while (head_[links_[cursor_].from] == none) ++cursor_;
+        return links_[cursor_].from;
+    }
+    // Follows (and removes) a link from the vertex. Needs leads_on(vertex).
+    std::uint32_t follow(std::uint32_t vertex) {
+        const Link& link = links_[head_[vertex]];
+        head_[vertex] = link.next;
+        --arriving_[link.to];
+        --remaining_;
+        return link.to;
+    }
+
+private:
+    static constexpr std::uint32_t none = 0xFFFFFFFFu;
+    struct Link {
+        std::uint32_t from, to, next;
+    };
+    std::span<const Triangle> triangles_;
+    std::vector<std::uint32_t> first_corner_, corner_triangle_;  // the triangles at each vertex
+    std::vector<bool> coded_;
+    std::vector<Link> links_;              // of the focus
+    std::vector<std::uint32_t> head_;      // by vertex: its first link, or none
+    std::vector<std::uint32_t> arriving_;  // by vertex: how many links lead to it
+    std::size_t remaining_ = 0, unled_cursor_ = 0, cursor_ = 0;
+};
+
+struct FanOrder {
+    std::vector<std::uint32_t> order;  // input index by visiting number
+    std::vector<Triangle> triangles;   // in visiting numbers, as decoded
+};
+
+// Where the next fan at the focus starts: at a start candidate if a link leads on from one. An input index.
+inline std::uint32_t choose_start(FocusLinks& links, const OpenEdges& edges, std::uint32_t focus,
+                                  const std::vector<std::uint32_t>& order) {
+    std::uint32_t edge = edges.first_in(focus);
+    for (std::uint32_t i = 0; edge != OpenEdges::none && i < most_candidates; edge = edges[edge].next_in, ++i)
+        if (links.leads_on(order[edges[edge].from])) return order[edges[edge].from];
+    return links.any_start();
+}
+
+// Codes all triangles. The Discovery says what is coded besides the fans:
+//     static constexpr bool visits_isolated   whether vertices without triangles are visited as seeds
+//     void seed(vertex)                       a seed (input index) takes the next visiting number
+//     FanHints hints(const FanState&)         contexts for the fan's next step
+//     void discover(const FanState&, vertex)  a vertex met by the fan takes it
+template <class Coder, class Discovery>
+FanOrder encode_fans(Coder& coder, FanModels& models, std::uint32_t vertex_count, std::span<const Triangle> triangles,
+                     Discovery& discovery) {
+    FanOrder result;
+    result.order.reserve(vertex_count);
+    result.triangles.reserve(triangles.size());
+    FocusLinks links(vertex_count, triangles);
+    OpenEdges edges;
+    std::vector<std::uint32_t> number_of(vertex_count, OpenEdges::none);
+    const auto visit = [&](std::uint32_t vertex) {
+        number_of[vertex] = edges.vertex_count();
+        result.order.push_back(vertex);
+        edges.add_vertex();
+        return number_of[vertex];
+    };
+    // One fan at the focus: its start, then its steps.
+    const auto code_fan = [&](FanState& fan) {
+        std::uint32_t vertex = choose_start(links, edges, fan.focus, result.order);
+        code_start(coder, models, edges, fan, number_of[vertex]);
+        if (fan.start == OpenEdges::none) {
+            discovery.discover(fan, vertex);
+            fan.start = visit(vertex);
+        }
+        fan.current = fan.start;
+        find_ends(edges, fan);
+        while (result.triangles.size() < triangles.size()) {
+            look_around(edges, fan);
+            if (!links.leads_on(vertex)) {
+                code_step(coder, models, edges, fan, discovery.hints(fan), {Step::stop, OpenEdges::none});
+                return;
+            }
+            vertex = links.follow(vertex);
+            CodedStep step =
+                code_step(coder, models, edges, fan, discovery.hints(fan), classify_step(fan, number_of[vertex]));
+            if (step.step == Step::new_vertex) {
+                discovery.discover(fan, vertex);
+                step.vertex = visit(vertex);
+            }
+            result.triangles.push_back({fan.focus, fan.current, step.vertex});
+            edges.add_triangle(fan.focus, fan.current, step.vertex);
+            advance(fan, step);
+            if (step.step == Step::close) return;
+        }
+    };
+    std::uint32_t next_seed = 0;
+    for (std::uint32_t focus = 0; result.triangles.size() < triangles.size(); ++focus) {
+        bool implied = false;
+        if (focus == edges.vertex_count()) {
+            while (number_of[next_seed] != OpenEdges::none ||
+                   (!Discovery::visits_isolated && !links.has_triangles(next_seed)))
+                ++next_seed;
+            discovery.seed(next_seed);
+            visit(next_seed);
+            implied = !Discovery::visits_isolated;
+        }
+        links.gather(result.order[focus]);
+        for (; result.triangles.size() < triangles.size(); implied = false) {
+            const bool more = links.remaining() > 0;
+            if (!implied) code_more_fans(coder, models, edges, focus, more);
+            if (!more) break;
+            FanState fan;
+            fan.focus = focus;
+            code_fan(fan);
+        }
+    }
+    return result;
 }
 
 }  // namespace htvm::internal

@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "codec/intra/intra_neighbours.h"
+#include "codec/intra/neighbours.h"
 #include "core/lattice.h"
 
 namespace htvm::internal {

@@ -1,4 +1,4 @@
-#include "codec/intra/intra_neighbours.h"
+#include "codec/intra/neighbours.h"
 
 #include <algorithm>
 #include <array>

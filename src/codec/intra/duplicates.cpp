@@ -1,4 +1,4 @@
-#include "codec/paper/duplicates_enc.h"
+#include "codec/intra/duplicates.h"
 
 #include <bit>
 

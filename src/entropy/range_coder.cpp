@@ -1,4 +1,4 @@
-#include "entropy/range_encoder.h"
+#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 
