@@ -41,9 +41,12 @@ htvm_tests(io htvm_io)
 htvm_tests(synth htvm_synth)
 htvm_tests(metrics htvm_metrics)
 htvm_tests(apps htvm_app)
+htvm_tests(lab htvm_laboratory htvm_synth)
 add_test(NAME command_line COMMAND ${PROJECT_SOURCE_DIR}/tests/apps/command_line.sh $<TARGET_FILE:htvm>)
+add_test(NAME lab_command_line COMMAND ${PROJECT_SOURCE_DIR}/tests/lab/command_line.sh $<TARGET_FILE:htvm-lab>
+                                       $<TARGET_FILE:htvm>)
 add_test(NAME real_captures COMMAND ${PROJECT_SOURCE_DIR}/tests/apps/real_captures.sh $<TARGET_FILE:htvm>)
-set_tests_properties(command_line real_captures PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+set_tests_properties(command_line lab_command_line real_captures PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
 add_test(NAME c_examples COMMAND ${PROJECT_SOURCE_DIR}/tests/c_api/examples.sh $<TARGET_FILE:example_encode>
                                  $<TARGET_FILE:example_decode> ${PROJECT_SOURCE_DIR}/tests/data/conformance)
 # Compares formats, in Python: sanitizers would only make it slow.

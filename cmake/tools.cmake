@@ -1,4 +1,4 @@
-# What the command line is made of besides the codec.
+# What the programs are made of besides the codec.
 find_package(nlohmann_json 3.10 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
@@ -22,17 +22,24 @@ htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PN
 file(GLOB_RECURSE draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
 htvm_floor(draco SOURCES ${draco_sources} LINKS htvm_decoder htvm_libdraco)
 
-# The command line: everything but main.cpp is a library, so that tests reach it.
-file(GLOB app_sources CONFIGURE_DEPENDS apps/htvm/*.cpp)
-list(FILTER app_sources EXCLUDE REGEX "/main\\.cpp$")
-add_library(htvm_app STATIC ${app_sources})
-target_include_directories(htvm_app PUBLIC apps/htvm)
-target_link_libraries(htvm_app PUBLIC htvm_encoder htvm_decoder htvm_draco htvm_io htvm_synth htvm_metrics
-                                      CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
-htvm_precompile(htvm_app <CLI/CLI.hpp> <fmt/core.h> <nlohmann/json.hpp> <filesystem> <string> <vector>)
-# The work is in the libraries; optimising the options and tables would take a quarter of the whole build.
-target_compile_options(htvm_app PRIVATE $<IF:$<CONFIG:Debug>,-O0,-O1>)
-target_compile_definitions(htvm_app PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
+# The programs: everything but their main.cpp is a library, so that tests reach it. htvm_app is what users run,
+# htvm_laboratory what experiments need; both stand on htvm_command_line.
+function(htvm_program_library name folder)
+  file(GLOB sources CONFIGURE_DEPENDS apps/${folder}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")
+  add_library(htvm_${name} STATIC ${sources})
+  target_include_directories(htvm_${name} PUBLIC apps apps/${folder})
+  target_link_libraries(htvm_${name} PUBLIC ${ARGN})
+  htvm_precompile(htvm_${name} <CLI/CLI.hpp> <fmt/core.h> <nlohmann/json.hpp> <filesystem> <string> <vector>)
+  # The work is in the libraries; optimising the options and tables would take a quarter of the whole build.
+  target_compile_options(htvm_${name} PRIVATE $<IF:$<CONFIG:Debug>,-O0,-O1>)
+endfunction()
+htvm_program_library(command_line command_line htvm_core htvm_io CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
+target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
+htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_synth htvm_metrics)
+htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_metrics)
 add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)
-install(TARGETS htvm)
+add_executable(htvm-lab apps/lab/main.cpp)
+target_link_libraries(htvm-lab PRIVATE htvm_laboratory)
+install(TARGETS htvm htvm-lab)

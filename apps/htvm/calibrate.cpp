@@ -6,10 +6,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "capture.h"
+#include "command_line/capture.h"
+#include "command_line/terminal.h"
 #include "commands.h"
 #include "htvm/encoder.hpp"
-#include "terminal.h"
 
 namespace htvm::app {
 namespace {

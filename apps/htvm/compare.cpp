@@ -1,4 +1,4 @@
-#include "compare.h"
+#include "metrics/compare.h"
 
 #include <fmt/core.h>
 
@@ -13,13 +13,13 @@
 #include <string>
 #include <vector>
 
+#include "command_line/terminal.h"
+#include "commands.h"
 #include "compare_report.h"
 #include "frame_pairs.h"
 #include "io/sequence.h"
 #include "mesh_source.h"
-#include "metrics/compare.h"
 #include "stream_limits.h"
-#include "terminal.h"
 
 namespace htvm::app {
 namespace {

@@ -13,16 +13,16 @@
 #include <set>
 #include <string>
 
-#include "capture.h"
+#include "command_line/capture.h"
+#include "command_line/layer_table.h"
+#include "command_line/terminal.h"
 #include "commands.h"
 #include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
 #include "io/ply.h"
 #include "io/sequence.h"
-#include "layer_table.h"
 #include "stream_file.h"
 #include "stream_limits.h"
-#include "terminal.h"
 
 namespace htvm::app {
 namespace {

@@ -6,12 +6,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "command_line/layer_table.h"
+#include "command_line/terminal.h"
 #include "commands.h"
 #include "encoder_options.h"
-#include "layer_table.h"
 #include "rate_report.h"
 #include "stream_file.h"
-#include "terminal.h"
 
 namespace htvm::app {
 namespace {

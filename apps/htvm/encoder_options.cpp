@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "command_line/terminal.h"
 #include "io/mesh_file.h"
-#include "terminal.h"
 
 namespace htvm::app {
 namespace {

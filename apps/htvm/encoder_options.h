@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "capture.h"
+#include "command_line/capture.h"
 #include "htvm/encoder.hpp"
 
 namespace CLI {

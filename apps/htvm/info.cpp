@@ -6,12 +6,12 @@
 #include <nlohmann/json.hpp>
 
 #include "buffer_model.h"
+#include "command_line/layer_table.h"
+#include "command_line/terminal.h"
 #include "commands.h"
 #include "htvm/decoder.hpp"
-#include "layer_table.h"
 #include "stream_file.h"
 #include "stream_limits.h"
-#include "terminal.h"
 
 namespace htvm::app {
 namespace {

@@ -13,11 +13,11 @@
 #include <string>
 #include <vector>
 
+#include "command_line/terminal.h"
 #include "commands.h"
 #include "core/parallel.h"
 #include "io/mesh_file.h"
 #include "io/skeleton_file.h"
-#include "terminal.h"
 
 namespace htvm::app {
 

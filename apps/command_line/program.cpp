@@ -1,0 +1,110 @@
+#include "command_line/program.h"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <new>
+
+#include "command_line/terminal.h"
+
+namespace htvm::app {
+namespace {
+
+int exit_code(ErrorKind kind) {
+    switch (kind) {
+        case ErrorKind::bad_input:
+            return 1;
+        case ErrorKind::corrupt_stream:
+            return 3;
+        case ErrorKind::unsupported:
+            return 4;
+        case ErrorKind::limit:
+            return 5;
+    }
+    return 1;
+}
+
+// What was wrong with the command line, and where to read on.
+std::string usage_message(const CLI::App* app, const CLI::Error& error) {
+    std::string command = app->get_name();
+    for (const auto* named : app->get_subcommands()) command += " " + named->get_name();
+    return fmt::format("{}: error: {}; '{} --help' tells more\n", app->get_name(), error.what(), command);
+}
+
+// Output that is still buffered may fail to arrive: a full disk must not look like success.
+bool output_arrived() { return std::fflush(stdout) == 0 && std::ferror(stdout) == 0; }
+
+// CLI11 takes "nan" for a number within any range, and "-1" for a very large one.
+void refuse_odd_numbers(const CLI::App& command) {
+    for (const auto* option : command.get_options())
+        for (const auto& text : option->results()) {
+            const auto type = option->get_type_name();
+            if (type.starts_with("FLOAT") && std::isnan(std::strtod(text.c_str(), nullptr)))
+                throw CLI::ValidationError(option->get_name(), text + " is not a number");
+            if (type.starts_with("UINT") && text.starts_with('-'))
+                throw CLI::ValidationError(option->get_name(), text + " is less than 0");
+        }
+}
+
+// CLI11 says of an unknown command only that one is missing.
+bool names_no_command(const CLI::App& app, const std::string& word) {
+    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+    return !word.starts_with('-') && std::none_of(commands.begin(), commands.end(),
+                                                  [&](const CLI::App* command) { return command->get_name() == word; });
+}
+
+void say_no_such_command(const Program& program, const std::string& word) {
+    const auto found = program.elsewhere.find(word);
+    const std::string hint = found == program.elsewhere.end() ? fmt::format("'{} --help' lists them", program.name)
+                                                              : fmt::format("it is '{}'", found->second);
+    fmt::print(stderr, "{}: error: there is no command '{}'; {}\n", program.name, word, hint);
+}
+
+}  // namespace
+
+int run_program(const Program& program, int argc, char** argv) {
+    speak_as(program.name);
+    CLI::App app{program.description, program.name};
+    app.footer(
+        fmt::format("Exit codes: 0 done, 1 bad input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit exceeded.\n"
+                    "'{} COMMAND --help' explains a command.{}{}",
+                    program.name, program.footer.empty() ? "" : "\n", program.footer));
+    app.set_version_flag("--version", program.name + " " HTVM_VERSION);
+    app.failure_message(usage_message);
+    app.require_subcommand(1);
+    Run run;
+    for (const auto add : program.commands) add(app, run);
+    if (argc > 1 && names_no_command(app, argv[1])) {
+        say_no_such_command(program, argv[1]);
+        return 2;
+    }
+    try {
+        app.parse(argc, argv);
+        for (const auto* command : app.get_subcommands()) refuse_odd_numbers(*command);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
+    try {
+        const auto done = run();
+        if (done && output_arrived()) return 0;
+        if (done) {
+            fmt::print(stderr, "{}: error: standard output cannot be written\n", program.name);
+            return 1;
+        }
+        fmt::print(stderr, "{}: error: {}\n", program.name, done.error().message);
+        return exit_code(done.error().kind);
+    } catch (const std::bad_alloc&) {
+        fmt::print(stderr, "{}: error: out of memory\n", program.name);
+        return 5;
+    } catch (const std::exception& error) {
+        fmt::print(stderr, "{}: error: {}\n", program.name, error.what());
+        return 1;
+    }
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,35 @@
+// A program of subcommands: what `htvm` and `htvm-lab` have in common from main() on.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace htvm::app {
+
+// What the chosen subcommand does once its options are parsed; an error becomes a line on stderr and an exit code.
+using Run = std::function<Result<void>()>;
+
+// Adds one subcommand to the parser; its callback sets the Run.
+using AddCommand = void (*)(CLI::App& app, Run& run);
+
+struct Program {
+    std::string name;         // as people type it
+    std::string description;  // one sentence, at the top of --help
+    std::string footer;       // at the end of --help, behind the exit codes; may be empty
+    std::vector<AddCommand> commands;
+    std::map<std::string, std::string> elsewhere;  // commands of another program, by what to type for them
+};
+
+// Parses, runs the chosen subcommand and says on stderr what went wrong. The exit code: 0 done, 1 bad input, 2 usage,
+// 3 corrupt stream, 4 unsupported, 5 limit exceeded.
+int run_program(const Program& program, int argc, char** argv);
+
+}  // namespace htvm::app

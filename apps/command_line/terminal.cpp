@@ -1,0 +1,47 @@
+#include "command_line/terminal.h"
+
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+
+namespace htvm::app {
+namespace {
+
+long long now_ms() {
+    using namespace std::chrono;
+    return duration_cast<milliseconds>(steady_clock::now().time_since_epoch()).count();
+}
+
+std::string speaker = "htvm";
+
+}  // namespace
+
+void speak_as(const std::string& program) { speaker = program; }
+void note(const std::string& line) { fmt::print(stderr, "{}: {}\n", speaker, line); }
+void warn(const std::string& line) { fmt::print(stderr, "{}: warning: {}\n", speaker, line); }
+
+Progress::Progress(std::string what, std::size_t total) : what_(std::move(what)), total_(total), start_ms_(now_ms()) {}
+
+void Progress::step(const std::string& detail) {
+    ++done_;
+    const long long now = now_ms();
+    if (!isatty(STDERR_FILENO) || (now - last_ms_ < 100 && done_ != total_)) return;
+    last_ms_ = now;
+    shown_ = true;
+    const double seconds = static_cast<double>(now - start_ms_) / 1000.0;
+    const double rate = seconds > 0 ? static_cast<double>(done_) / seconds : 0;
+    std::string line = total_ > 0 ? fmt::format("{} {}/{}", what_, done_, total_) : fmt::format("{} {}", what_, done_);
+    line += fmt::format("  {:.1f}/s", rate);
+    if (total_ > done_ && rate > 0) line += fmt::format("  {:.0f} s left", static_cast<double>(total_ - done_) / rate);
+    if (!detail.empty()) line += "  " + detail;
+    fmt::print(stderr, "\r\033[K{}", line);
+    std::fflush(stderr);
+}
+
+Progress::~Progress() {
+    if (shown_) fmt::print(stderr, "\r\033[K");
+}
+
+}  // namespace htvm::app

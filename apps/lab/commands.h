@@ -1,0 +1,11 @@
+// The commands of htvm-lab: one file each, with one function that adds it to the parser.
+#pragma once
+
+#include "command_line/program.h"
+
+namespace htvm::lab {
+
+void add_rd(CLI::App& app, app::Run& run);
+void add_reproduce(CLI::App& app, app::Run& run);
+
+}  // namespace htvm::lab

@@ -1,0 +1,46 @@
+#!/usr/bin/env bash
+# htvm-lab from end to end on a small synthetic capture: what it writes, what it says, how it exits.
+set -u
+lab=$1 htvm=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+
+# expect CODE WORDS COMMAND...: the command exits with CODE and says WORDS on its standard error or output.
+expect() {
+    local code=$1 words=$2 said
+    shift 2
+    said=$("$@" 2>&1 </dev/null)
+    local got=$?
+    if [ $got -ne "$code" ] || ! grep -qF -- "$words" <<<"$said"; then
+        printf 'FAILED: %s\n  exit %d, expected %d; said, without "%s":\n%s\n' "$*" $got "$code" "$words" "$said"
+        failures=$((failures + 1))
+    fi
+}
+
+"$htvm" synth capture --frames 2 --vertices 400 >/dev/null 2>&1
+
+# It teaches how to begin, and where what is not its own is found.
+expect 0 "htvm-lab rd CAPTURE -o out/rd" "$lab" --help
+expect 0 "Rate-distortion" "$lab" --help
+expect 0 "htvm-lab " "$lab" --version
+expect 2 "" "$lab"
+expect 2 "htvm-lab: error: there is no command 'nonsense'; 'htvm-lab --help' lists them" "$lab" nonsense
+expect 2 "it is 'htvm encode'" "$lab" encode capture -o x.htvm
+for command in rd reproduce; do expect 0 "Usage" "$lab" $command --help; done
+
+# The sweep: tables, or JSON alone on standard output; kept results are used again.
+expect 2 "--output is required" "$lab" rd capture
+expect 2 "is not a number" "$lab" rd capture -o rd -q nan
+expect 1 "there is no coder 'none-such'; there are paper" "$lab" rd capture -o rd --coders none-such
+expect 1 "nowhere" "$lab" rd nowhere -o rd
+expect 0 "bpvf" "$lab" rd capture -o rd -q 40 --coders tfan,draco10
+[ -s rd/rd.csv ] && [ -s rd/rd.json ] || { echo "FAILED: no rd.csv, or no rd.json"; failures=$((failures + 1)); }
+expect 0 "2 of 2 results are kept from earlier runs" "$lab" rd capture -o rd -q 40 --coders tfan,draco10
+"$lab" rd capture -o rd -q 40 --coders tfan,draco10 --json 2>/dev/null | cmp -s - rd/rd.json ||
+    { echo "FAILED: --json does not print rd.json alone"; failures=$((failures + 1)); }
+expect 0 "htvm-lab: 2 of 2 results" "$lab" rd capture -o rd -q 40 --coders tfan,draco10
+
+[ $failures -eq 0 ] && echo "the laboratory's command line does what it should"
+exit $failures
