@@ -110,11 +110,8 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
 }
 
 EncoderOptions paper_options(int key_interval) {
-    EncoderOptions out;
+    EncoderOptions out = default_options(Profile::paper);
     out.key_interval = key_interval;
-    out.topology.reference_vertices = ReferenceVertices::bone;
-    out.topology.point_to_plane = false;
-    out.topology.weight_width = 0;
     return out;
 }
 
@@ -125,8 +122,8 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
     motion.topology.still_below = default_still_below;
     EncoderOptions chosen = ours;
     chosen.topology.frame_choice = FrameChoice::rate_distortion;
-    EncoderOptions tracked = ours;
-    tracked.profile = Profile::tracked;
+    EncoderOptions tracked = default_options(Profile::tracked);
+    tracked.key_interval = key_interval;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
     return {

@@ -10,7 +10,6 @@
 
 namespace htvm::lab {
 
-using namespace app;
 namespace {
 
 using ::testing::HasSubstr;
