@@ -5,12 +5,10 @@
 #include "codec/intra/intra_frame.h"
 #include "codec/paper/animated_frame.h"
 #include "codec/paper/codebook.h"
-#include "codec/paper/coded_bones.h"
 #include "codec/paper/enhanced_frame.h"
-#include "codec/paper/zipper_trim.h"
+#include "codec/paper/zipper.h"
 #include "codec/reference/transforms.h"
-#include "codec/stream/sequence_header.h"
-#include "codec/stream/sequence_index.h"
+#include "codec/stream/sequence.h"
 
 namespace htvm::lab {
 
@@ -95,13 +93,9 @@ Result<std::optional<SeamStages>> take_apart(const OpenDecoder& decoder, const P
     const auto animated =
         animate(reference, decoded->transforms, predict_positions(reference, decoded->transforms, decoder.threads));
     const auto coded = coded_part(decoded->mesh, payload->header);
-    const zipping::Surface coded_surface{coded.positions, coded.triangles},
-        animated_surface{animated.positions, animated.triangles};
-    std::vector<std::uint8_t> touching, kept(animated.triangles.size(), 1);
+    std::vector<std::uint8_t> touching;
     for (const auto& t : animated.triangles) touching.push_back(still[t[0]] || still[t[1]] || still[t[2]] ? 1 : 0);
-    const double unit = zipping::mean_side(coded_surface, animated_surface);
-    if (unit > 0 && !coded.triangles.empty())
-        kept = zipping::trim(coded_surface, animated_surface, still, unit, decoder.threads).kept;
+    const auto kept = kept_by_zippering(coded, animated, still, decoder.threads);
     SeamStages out;
     out.frame = packet.frame;
     out.coded_triangles = coded.triangles.size();

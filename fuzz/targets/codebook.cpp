@@ -1,6 +1,6 @@
 // Codebooks and the packets they come in, and residual layers coded with them.
-#include "codec/paper/residual_layer.h"
-#include "codec/stream/sequence_index.h"
+#include "codec/paper/codebook.h"
+
 #include "core/lattice.h"
 #include "fuzz_input.h"
 

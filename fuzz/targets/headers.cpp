@@ -1,7 +1,6 @@
 // The sequence header, the index and the payload of frames: what can be read comes back when written.
 #include "codec/stream/frame_payload.h"
-#include "codec/stream/sequence_header.h"
-#include "codec/stream/sequence_index.h"
+#include "codec/stream/sequence.h"
 #include "fuzz_input.h"
 
 namespace {

@@ -1,12 +1,12 @@
 // Zippering of any two meshes: the result names vertices that are there, and begins with what was coded.
 #include "codec/paper/zipper.h"
 
-#include "codec/paper/coded_bones.h"
+#include "codec/paper/enhanced_frame.h"
 #include "small_mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
-using namespace htvm::internal;
+    using namespace htvm::internal;
     using fuzz::require;
     fuzz::FuzzInput input(data, size);
     const std::size_t bones = input.u8();

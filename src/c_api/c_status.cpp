@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence.h"
 
 namespace htvm::c_api {
 

@@ -6,7 +6,7 @@
 #include <functional>
 #include <limits>
 
-#include "codec/stream/sequence_index.h"
+#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 
 namespace htvm::internal {

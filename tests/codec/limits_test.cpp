@@ -5,7 +5,7 @@
 
 #include "codec/stream/frame_payload.h"
 #include "codec/moving_sequences.h"
-#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 
 namespace htvm::internal {

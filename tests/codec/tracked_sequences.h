@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "codec/intra/intra_frame.h"
-#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "codec/tracked/tracked_frame.h"
 

@@ -15,6 +15,17 @@ LatticeMesh animate(const ReferenceMesh& reference, std::span<const QuantisedTra
     return out;
 }
 
+FramePayload predicted_frame_payload(const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms,
+                                     std::uint32_t source_vertices, std::uint32_t source_triangles) {
+    FramePayload out;
+    out.header.source_vertices = source_vertices;
+    out.header.source_triangles = source_triangles;
+    out.header.vertices = static_cast<std::uint32_t>(reference.mesh.positions.size());
+    out.header.triangles = static_cast<std::uint32_t>(reference.mesh.triangles.size());
+    out.set(Layer::transforms, encode_transforms(transforms));
+    return out;
+}
+
 Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
                                              Threads threads) {
     const auto& mesh = reference.mesh;

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "codec/stream/frame_payload.h"
 #include "codec/reference/prediction.h"
+#include "codec/stream/frame_payload.h"
 #include "core/thread.h"
 
 namespace htvm::internal {

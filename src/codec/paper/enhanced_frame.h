@@ -1,12 +1,13 @@
-// EP-frames, decoding side (paper, section IV): the reference mesh moved bone by bone, corrected by quantised
-// residuals.
+// EP-frames (paper, section IV): the reference mesh moved bone by bone, corrected by quantised residuals, with a
+// connectivity of its own. This is the decoder, and the arithmetic that the encoder shares with it so that both see the
+// same mesh; the encoder is in enhanced_frame_enc.h.
 #pragma once
 
 #include <span>
 
 #include "codec/paper/codebook.h"
-#include "codec/stream/frame_payload.h"
 #include "codec/reference/prediction.h"
+#include "codec/stream/frame_payload.h"
 #include "core/thread.h"
 
 namespace htvm::internal {
@@ -25,6 +26,16 @@ struct DecodedEnhancedFrame {
 };
 
 Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, const EnhancedFrameContext& context);
+
+// Motion-based coding (paper, section V): which bones' sub-meshes the frame codes; the rest is animated, and zippered
+// to what is coded. One bit per bone, bone i in bit i % 8 of byte i / 8.
+std::vector<std::uint8_t> write_coded_bones(const std::vector<bool>& coded);
+Result<std::vector<bool>> read_coded_bones(std::span<const std::uint8_t> bytes, std::size_t bones);
+
+// One per reference vertex: 1 where its bone is coded. Residuals refer to such vertices alone.
+std::vector<std::uint8_t> vertices_of_coded_bones(const ReferenceMesh& reference, const std::vector<bool>& coded);
+// The opposite: 1 where the vertex stands for a part that is animated.
+std::vector<std::uint8_t> still_vertices(const ReferenceMesh& reference, const std::vector<bool>& coded);
 
 // The reference vertex of each residual in E^ord, from how many residuals each reference vertex has.
 std::vector<std::uint32_t> references_of_residuals(std::span<const std::uint32_t> residuals_of, std::size_t residuals);

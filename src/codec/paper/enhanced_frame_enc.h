@@ -1,19 +1,26 @@
-// EP-frames, encoding side (paper, section IV and Fig. 2).
+// EP-frames, encoding side (paper, section IV and Fig. 2): each vertex of the frame finds its reference vertex on the
+// predicted mesh (eq. 6), the residuals are put in the order E^ord and quantised, duplicates merge, and what is left is
+// coded layer by layer.
 #pragma once
 
 #include <optional>
 #include <span>
 
 #include "codec/paper/codebook.h"
-#include "codec/paper/frame_motion_enc.h"
-#include "codec/stream/frame_payload.h"
-#include "codec/reference/prediction.h"
-#include "codec/paper/residual_mapping_enc.h"
+#include "codec/paper/motion_enc.h"
 #include "codec/paper/vector_quantiser_enc.h"
-#include "htvm/encoder.hpp"
+#include "codec/reference/prediction.h"
+#include "codec/stream/frame_payload.h"
 #include "core/thread.h"
+#include "htvm/encoder.hpp"
 
 namespace htvm::internal {
+
+// Which reference vertices a vertex may be coded against.
+enum class ReferenceChoice : std::uint8_t {
+    bone,  // the paper's: the nearest vertex of A(b_P), the last correspondence of the registration
+    any,   // the nearest vertex of the whole predicted mesh: mis-skinned vertices cost less
+};
 
 // A codebook in use: kept from frame to frame as long as that is cheaper than a new one.
 struct CodebookInUse {
@@ -60,5 +67,23 @@ struct EncodedEnhancedFrame {
 // stages: times are added.
 EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages);
+
+// The first two steps by themselves.
+
+// The reference vertex of each vertex of the frame. The reference mesh must have a vertex; where A(b_P) is empty, the
+// nearest of all is taken. eligible: empty, or one a reference vertex: those with 0 are never chosen (motion-based
+// coding); at least one must be eligible. nearest: empty, or of each frame vertex the nearest predicted one.
+std::vector<std::uint32_t> find_reference_vertices(
+    const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
+    std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
+    std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
+    std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads);
+
+// E^ord: the frame's vertices by ascending reference vertex, and in their own order where that is the same.
+struct ResidualOrder {
+    std::vector<std::uint32_t> vertex;     // of the frame, one a residual
+    std::vector<std::uint32_t> reference;  // its reference vertex
+};
+ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex, std::size_t references);
 
 }  // namespace htvm::internal

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "codec/stage_clock_enc.h"
 #include "core/parallel.h"
 
 namespace htvm::internal {
@@ -132,6 +133,36 @@ RigidMotion motion_of(const QuantisedTransform& transform, LatticePoint pivot) {
     RigidMotion out;
     out.rotation = matrix_of(transform.rotation);
     out.shift = vector_of(pivot) + vector_of(transform.shift) - out.rotation * vector_of(pivot);
+    return out;
+}
+
+FrameMotion find_frame_motion(std::span<const LatticePoint> positions, const CodedPose& pose,
+                              const MotionReference& against, const RegistrationOptions& options, Threads threads,
+                              std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    const auto& reference = *against.reference;
+    FrameMotion out;
+    out.bone_of_vertex = skin(positions, cylinders(*against.bones, pose.joints, against.radii), threads);
+    const auto sub_meshes = group_by_bone(out.bone_of_vertex, against.bones->size());
+    clock.done("skinning");
+    const auto skeletal = skeletal_motion(reference, *against.bones, pose);
+    out.motion = register_bones(*against.search, positions, sub_meshes, skeletal, against.before, options, threads);
+    for (std::size_t i = 0; i < out.motion.size(); ++i)
+        out.transforms.push_back(quantise_motion(out.motion[i], reference.pivots[i]));
+    clock.done("registration");
+    out.predicted = predict_positions(reference, out.transforms, threads);
+    clock.done("prediction");
+    return out;
+}
+
+std::vector<double> bone_shifts(const ReferenceMesh& reference, const std::vector<Bone>& bones, const CodedPose& pose) {
+    std::vector<double> out;
+    for (const auto& bone : bones) {
+        const LatticePoint first = pose.joints[bone.first] - reference.joints[bone.first];
+        const LatticePoint second = pose.joints[bone.second] - reference.joints[bone.second];
+        const double x = (first.x + second.x) / 2.0, y = (first.y + second.y) / 2.0, z = (first.z + second.z) / 2.0;
+        out.push_back(std::sqrt(x * x + y * y + z * z));
+    }
     return out;
 }
 

@@ -7,8 +7,9 @@
 
 #include "codec/reference/prediction.h"
 #include "codec/reference/transforms.h"
-#include "surface/registration.h"
 #include "core/thread.h"
+#include "htvm/encoder.hpp"
+#include "surface/registration.h"
 
 namespace htvm::internal {
 
@@ -39,5 +40,31 @@ QuantisedTransform quantise_motion(const RigidMotion& motion, LatticePoint pivot
 RigidMotion motion_of(const QuantisedTransform& transform, LatticePoint pivot);
 QuantisedRotation quantise_orientation(const Rotation& orientation);
 Eigen::Matrix3d matrix_of(const QuantisedRotation& rotation);
+
+// How a frame moved against its reference: what P- and EP-frames of it have in common.
+struct FrameMotion {
+    std::vector<BoneIndex> bone_of_vertex;       // of the captured mesh
+    std::vector<RigidMotion> motion;             // of each bone, as registered; the next frame's may start from it
+    std::vector<QuantisedTransform> transforms;  // the same as it is sent
+    std::vector<LatticePoint> predicted;         // M_P
+};
+
+// What a frame's motion is found against.
+struct MotionReference {
+    const ReferenceMesh* reference = nullptr;
+    const ReferenceSearch* search = nullptr;
+    const std::vector<Bone>* bones = nullptr;
+    std::span<const std::int32_t> radii;  // lattice units
+    std::span<const RigidMotion> before;  // of the frame before; empty behind an I-frame
+};
+
+// Skinning of the frame, registration of its bones, quantisation, prediction (paper, section IV-A and IV-B).
+FrameMotion find_frame_motion(std::span<const LatticePoint> positions, const CodedPose& pose,
+                              const MotionReference& against, const RegistrationOptions& options, Threads threads,
+                              std::vector<StageTime>& stages);
+
+// "Per-bone motion" (section III-B): how far the middle of each bone is from where it was in the reference's pose,
+// lattice units. Their sum is the "skeletal motion".
+std::vector<double> bone_shifts(const ReferenceMesh& reference, const std::vector<Bone>& bones, const CodedPose& pose);
 
 }  // namespace htvm::internal

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "codec/paper/frame_motion_enc.h"
+#include "codec/paper/motion_enc.h"
 #include "core/thread.h"
 
 namespace htvm::internal {

@@ -7,14 +7,13 @@
 #include <span>
 #include <vector>
 
+#include "codec/stream/sequence.h"
 #include "core/lattice.h"
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
-#include "core/thread.h"
 
 namespace htvm::internal {
-
-inline constexpr int mtfan_max_nearest = 64;
 
 struct EncodedMtfan {
     std::vector<std::uint8_t> fans;             // the layer that TFAN has too

@@ -6,7 +6,6 @@
 #include <span>
 
 #include "codec/paper/codebook.h"
-#include "codec/paper/residual_layer.h"
 #include "core/thread.h"
 
 namespace htvm::internal {

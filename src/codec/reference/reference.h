@@ -7,7 +7,7 @@
 
 #include "codec/reference/prediction.h"
 #include "codec/reference/transforms.h"
-#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/thread.h"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "codec/stream/frame_payload.h"
-#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 
 namespace htvm::internal {

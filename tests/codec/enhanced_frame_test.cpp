@@ -3,7 +3,7 @@
 #include <random>
 
 #include "codec/random_numbers.h"
-#include "codec/paper/residual_mapping_enc.h"
+#include "codec/paper/enhanced_frame_enc.h"
 
 namespace htvm::internal {
 namespace {

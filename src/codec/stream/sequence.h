@@ -1,4 +1,5 @@
-// The sequence header: what a decoder must know before any frame.
+// What is said once of a sequence: its header, which a decoder must know before any frame, and the index at a file's
+// end, which says where the I-frames are.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +15,10 @@ namespace htvm::internal {
 
 inline constexpr std::uint16_t stream_version = 1;
 
+// The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (paper/mtfan.h). The
+// paper's are 8, 16 and 32.
+inline constexpr int mtfan_max_nearest = 64;
+
 struct SequenceHeader {
     Lattice lattice;
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
@@ -28,5 +33,15 @@ struct SequenceHeader {
 
 std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header);
 Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payload);
+
+// Where an I-frame's packet begins: bytes from the start of the stream. Seek there, once the sequence header is known.
+struct IndexEntry {
+    std::uint32_t frame = 0;
+    std::int64_t timestamp_us = 0;
+    std::uint64_t offset = 0;
+    bool operator==(const IndexEntry&) const = default;
+};
+std::vector<std::uint8_t> write_sequence_index(std::span<const IndexEntry> entries);
+Result<std::vector<IndexEntry>> read_sequence_index(std::span<const std::uint8_t> payload);
 
 }  // namespace htvm::internal

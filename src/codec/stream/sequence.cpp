@@ -1,8 +1,8 @@
-#include "codec/stream/sequence_header.h"
+#include "codec/stream/sequence.h"
 
+#include <algorithm>
 #include <array>
 
-#include "codec/paper/mtfan.h"
 #include "core/bytes.h"
 
 namespace htvm::internal {
@@ -90,6 +90,37 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
             return fail(ErrorKind::corrupt_stream, "sequence header: the nodes' spacing is out of range");
         out.node_spacing = static_cast<std::int32_t>(spacing);
     }
+    return out;
+}
+
+std::vector<std::uint8_t> write_sequence_index(std::span<const IndexEntry> entries) {
+    ByteWriter out;
+    out.varint(entries.size());
+    IndexEntry last;
+    for (const auto& entry : entries) {
+        out.varint(entry.frame - last.frame);
+        // Unsigned: any two timestamps have a difference that wraps, and stays defined.
+        out.signed_varint(static_cast<std::int64_t>(static_cast<std::uint64_t>(entry.timestamp_us) -
+                                                    static_cast<std::uint64_t>(last.timestamp_us)));
+        out.varint(entry.offset - last.offset);
+        last = entry;
+    }
+    return out.take();
+}
+
+Result<std::vector<IndexEntry>> read_sequence_index(std::span<const std::uint8_t> payload) {
+    ByteReader in(payload);
+    std::vector<IndexEntry> out;
+    IndexEntry entry;
+    // Sums of what may be an attacker's numbers: unsigned, so that they wrap and stay defined.
+    for (std::uint64_t left = in.varint(); left > 0 && in.ok(); --left) {
+        entry.frame += static_cast<std::uint32_t>(in.varint());
+        entry.timestamp_us = static_cast<std::int64_t>(static_cast<std::uint64_t>(entry.timestamp_us) +
+                                                       static_cast<std::uint64_t>(in.signed_varint()));
+        entry.offset += in.varint();
+        if (in.ok()) out.push_back(entry);
+    }
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "index: it ends too early");
     return out;
 }
 
