@@ -49,7 +49,6 @@ static int write_obj(const char* prefix, const htvm_frame_info* info, const fram
 
 /* Takes all frames that are whole so far. Gives the number of packets that could not be decoded. */
 static int receive_frames(htvm_decoder* decoder, frame_buffers* buffers, const char* prefix) {
-    static const char* const types[] = {"I", "EP", "P", "T"};
     htvm_frame_info info;
     htvm_status status;
     int errors = 0;
@@ -67,7 +66,7 @@ static int receive_frames(htvm_decoder* decoder, frame_buffers* buffers, const c
             continue;
         }
         printf("frame %" PRIu32 ": %s, %" PRIu32 " vertices, %" PRIu32 " triangles, %" PRIu64 " bytes\n", info.frame,
-               types[info.type], info.vertices, info.triangles, info.bytes);
+               htvm_frame_kind_letter(info.type), info.vertices, info.triangles, info.bytes);
         if (prefix && !write_obj(prefix, &info, buffers)) {
             fprintf(stderr, "frame %" PRIu32 " cannot be written\n", info.frame);
             ++errors;

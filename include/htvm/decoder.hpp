@@ -73,7 +73,7 @@ public:
     // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh moved as the last frame
     // was, or, where that much of a frame could be read, as it is itself; after T-frames, the last of them again.
     // Nothing before an I-frame, or where memory ran out.
-    std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us) const;
+    std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us);
     // Known once a sequence header was pushed.
     const std::optional<SequenceInfo>& sequence() const;
 

@@ -4,19 +4,41 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 namespace htvm {
 
+// The kinds of frames; their order is that of frame_kinds.
 enum class FrameType : std::uint8_t {
-    intra,      // I: by itself
-    enhanced,   // EP: against the last I-frame
-    predicted,  // P: the last I-frame's mesh moved, nothing else
-    tracked,    // T: the last I-frame's mesh laid on the captured surface
+    intra,      // by itself
+    enhanced,   // against the last I-frame, with connectivity of its own
+    predicted,  // the last I-frame's mesh moved, nothing else
+    tracked,    // the last I-frame's mesh laid on the captured surface
 };
 
+// What people call them. What the codec must know of each besides is in src/codec/frame_kinds.cpp.
+struct FrameKind {
+    FrameType type;
+    const char* letter;  // as in tables and on the command line
+    const char* name;
+};
+inline constexpr std::array frame_kinds = {
+    FrameKind{FrameType::intra, "I", "intra"},
+    FrameKind{FrameType::enhanced, "EP", "enhanced"},
+    FrameKind{FrameType::predicted, "P", "predicted"},
+    FrameKind{FrameType::tracked, "T", "tracked"},
+};
+inline constexpr std::size_t frame_type_count = frame_kinds.size();
 inline constexpr std::array all_frame_types = {FrameType::intra, FrameType::enhanced, FrameType::predicted,
                                                FrameType::tracked};
-inline constexpr std::size_t frame_type_count = all_frame_types.size();
+
+constexpr const FrameKind& kind_of(FrameType type) { return frame_kinds[static_cast<std::size_t>(type)]; }
+// The kind of this letter, or null.
+constexpr const FrameKind* kind_of_letter(std::string_view letter) {
+    for (const auto& kind : frame_kinds)
+        if (kind.letter == letter) return &kind;
+    return nullptr;
+}
 
 // Bytes of one frame by layer. The paper's layers: geometry, colour, mapping, and connectivity = fans +
 // distance_orders.

@@ -92,8 +92,14 @@ enum {
     HTVM_FRAME_INTRA = 0,     /* by itself */
     HTVM_FRAME_ENHANCED = 1,  /* against the last I-frame, with connectivity of its own */
     HTVM_FRAME_PREDICTED = 2, /* the last I-frame's mesh moved */
-    HTVM_FRAME_TRACKED = 3    /* the last I-frame's mesh laid on the captured surface */
+    HTVM_FRAME_TRACKED = 3,   /* the last I-frame's mesh laid on the captured surface */
+    HTVM_FRAME_KINDS = 4      /* how many there are in this version */
 };
+
+/* What people call a type: "intra" and "I", "enhanced" and "EP", "predicted" and "P", "tracked" and "T"; "unknown" and
+ * "?" for a number that this version does not know. Never NULL. */
+const char* htvm_frame_kind_name(uint32_t type);
+const char* htvm_frame_kind_letter(uint32_t type);
 
 /* attributes of a mesh beside positions: bits */
 enum { HTVM_COLOURS = 1, HTVM_NORMALS = 2, HTVM_TEXCOORDS = 4 };

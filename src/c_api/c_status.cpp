@@ -68,23 +68,16 @@ std::uint32_t attributes_of(const Mesh& mesh) {
     return out;
 }
 
+static_assert(HTVM_FRAME_INTRA == static_cast<int>(FrameType::intra));
+static_assert(HTVM_FRAME_ENHANCED == static_cast<int>(FrameType::enhanced));
+static_assert(HTVM_FRAME_PREDICTED == static_cast<int>(FrameType::predicted));
+static_assert(HTVM_FRAME_TRACKED == static_cast<int>(FrameType::tracked));
+static_assert(HTVM_FRAME_KINDS == frame_type_count);
+
 htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes) {
     htvm_frame_info out{};
     out.attributes = attributes;
-    switch (info.type) {
-        case FrameType::intra:
-            out.type = HTVM_FRAME_INTRA;
-            break;
-        case FrameType::enhanced:
-            out.type = HTVM_FRAME_ENHANCED;
-            break;
-        case FrameType::predicted:
-            out.type = HTVM_FRAME_PREDICTED;
-            break;
-        case FrameType::tracked:
-            out.type = HTVM_FRAME_TRACKED;
-            break;
-    }
+    out.type = static_cast<std::uint32_t>(info.type);
     out.frame = info.frame;
     out.reference = info.reference;
     out.timestamp_us = info.timestamp_us;
@@ -103,6 +96,14 @@ uint32_t htvm_version() { return HTVM_VERSION_MAJOR << 16 | HTVM_VERSION_MINOR <
 const char* htvm_version_string() { return "0.1.0"; }
 
 uint32_t htvm_stream_version() { return htvm::internal::stream_version; }
+
+const char* htvm_frame_kind_name(uint32_t type) {
+    return type < htvm::frame_kinds.size() ? htvm::frame_kinds[type].name : "unknown";
+}
+
+const char* htvm_frame_kind_letter(uint32_t type) {
+    return type < htvm::frame_kinds.size() ? htvm::frame_kinds[type].letter : "?";
+}
 
 const char* htvm_status_text(htvm_status status) {
     switch (status) {

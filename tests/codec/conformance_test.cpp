@@ -48,8 +48,7 @@ std::uint32_t digest(const Mesh& mesh) {
 }
 
 std::string line_of(const DecodedFrame& frame) {
-    constexpr std::array letters = {'I', 'E', 'P', 'T'};
-    const char letter = letters.at(static_cast<std::size_t>(frame.info.type));
+    const char letter = kind_of(frame.info.type).letter[0];
     char line[80];
     std::snprintf(line, sizeof line, "%u %c %zu %zu %08x", frame.info.frame, letter, frame.mesh.positions.size(),
                   frame.mesh.triangles.size(), digest(frame.mesh));

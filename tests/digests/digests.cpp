@@ -34,29 +34,28 @@ std::optional<Bytes> bytes_of(const std::string& path) {
 }
 
 template <class Values>
-void add_floats(htvm::ByteWriter& out, const Values& values) {
+void add_floats(htvm::internal::ByteWriter& out, const Values& values) {
     for (const auto& value : values)
         for (const float c : value) out.u32(std::bit_cast<std::uint32_t>(c));
 }
 
 std::uint32_t digest(const htvm::Mesh& mesh) {
-    htvm::ByteWriter out;
+    htvm::internal::ByteWriter out;
     add_floats(out, mesh.positions);
     for (const auto& triangle : mesh.triangles)
         for (const auto v : triangle) out.u32(v);
     for (const auto& colour : mesh.colours) out.bytes(colour);
     add_floats(out, mesh.normals);
     add_floats(out, mesh.texcoords);
-    return htvm::crc32(out.data());
+    return htvm::internal::crc32(out.data());
 }
 
 std::string line_of(const htvm::DecodedFrame& frame) {
-    constexpr std::array letters = {'I', 'E', 'P', 'T'};
     std::array<char, 80> line{};
-    std::snprintf(
-        line.data(), line.size(), "%lu %c %lu %lu %08lx\n", static_cast<unsigned long>(frame.info.frame),
-        letters[static_cast<std::size_t>(frame.info.type)], static_cast<unsigned long>(frame.mesh.positions.size()),
-        static_cast<unsigned long>(frame.mesh.triangles.size()), static_cast<unsigned long>(digest(frame.mesh)));
+    std::snprintf(line.data(), line.size(), "%lu %c %lu %lu %08lx\n", static_cast<unsigned long>(frame.info.frame),
+                  htvm::kind_of(frame.info.type).letter[0], static_cast<unsigned long>(frame.mesh.positions.size()),
+                  static_cast<unsigned long>(frame.mesh.triangles.size()),
+                  static_cast<unsigned long>(digest(frame.mesh)));
     return line.data();
 }
 
@@ -91,7 +90,7 @@ void print_difference(const std::string& name, const std::string& expected, cons
                 expected.c_str(), got.c_str());
 }
 
-std::uint32_t crc32_of(const std::string& text) { return htvm::crc32(Bytes(text.begin(), text.end())); }
+std::uint32_t crc32_of(const std::string& text) { return htvm::internal::crc32(Bytes(text.begin(), text.end())); }
 
 }  // namespace
 

@@ -58,7 +58,7 @@ for source in "${c_api[@]}"; do
     printf 'build %s: compile %s\n  compiler = clang++\n  flags = %s\n' "$out/wasm-O2/${source//\//_}.o" "$source" \
         "$wasi -O2"
 done
-exports=$(grep -oE '\bhtvm_(decoder_[a-z_]+|version|version_string|stream_version|status_text) ?\(' include/htvm/htvm.h |
+exports=$(grep -oE '\bhtvm_(decoder_[a-z_]+|frame_kind_[a-z]+|version|version_string|stream_version|status_text) ?\(' include/htvm/htvm.h |
     tr -d ' (' | sort -u | sed 's/^/-Wl,--export=/' | tr '\n' ' ')
 printf 'build build/wasm/htvm_decoder.wasm: link%s\n  compiler = clang++\n  flags = %s\n' "$objects" \
     "--target=wasm32-wasi -mexec-model=reactor -Wl,--strip-all -Wl,--export=malloc -Wl,--export=free $exports"

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "codec/stream/decoder_limits.h"
+#include "codec/frame_kinds.h"
 #include "core/crc32.h"
 #include "memory/counted_allocations.h"
 #include "memory/memory_streams.h"
@@ -55,21 +55,21 @@ void expect_within_estimate(const std::vector<Packet>& packets, const std::strin
             const auto frame = decoder.push(packet);
             ASSERT_TRUE(frame.has_value()) << frame.error().message;
         }
+        if (packet.kind == PacketKind::sequence) tracking = read_sequence_header(packet.payload)->node_spacing > 0;
         const auto type = frame_type(packet.kind);
         if (!type) continue;
         const auto header = read_frame_payload(packet.payload)->header;
         const MeshCounts coded{header.vertices, header.triangles};
-        tracking = tracking || *type == FrameType::tracked;
-        const auto kept = memory_of_reference(reference) + (tracking ? memory_of_tracking(reference) : 0);
-        const auto estimate =
-            kept + memory_of_frame(*type, coded, *type == FrameType::intra ? MeshCounts{} : reference);
+        const auto& rules = rules_of(*type);
+        const bool refers = rules.refers_to != RefersTo::nothing;
+        const auto kept =
+            memory_of_reference(reference) +
+            (tracking ? memory_of_tracking(reference) + memory_of_tracking(refers ? MeshCounts{} : coded) : 0);
+        const auto estimate = kept + memory_of_frame(rules.memory, coded, refers ? reference : MeshCounts{});
         const auto taken = static_cast<std::uint64_t>(allocations().most_live - live);
         EXPECT_LE(taken, estimate) << "frame " << packet.frame << ", kind " << static_cast<int>(packet.kind);
         EXPECT_GE(taken, estimate / 20) << "frame " << packet.frame << ", kind " << static_cast<int>(packet.kind);
-        if (*type == FrameType::intra) {
-            reference = coded;
-            tracking = false;
-        }
+        if (!refers) reference = coded;
     }
 }
 

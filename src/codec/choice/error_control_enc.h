@@ -11,7 +11,7 @@ namespace htvm::internal {
 class ErrorController {
 public:
     // target: mm, > 0.
-    explicit ErrorController(double target) : target_(target) {}
+    explicit ErrorController(double target) : target_(target) { log_ratio_.fill(-2.15); }
     // The quality, 0..100, to code a frame of this type with.
     double quality(FrameType type) const;
     // A frame of this type at this quality has this error, mm: learns how error goes with quality. Gives whether the
@@ -21,7 +21,7 @@ public:
 private:
     double target_;
     // log2 of a frame's error over its step, by type: about 2/9 of the step at first, as measured.
-    std::array<double, frame_type_count> log_ratio_{-2.15, -2.15, -2.15, -2.15};
+    std::array<double, frame_type_count> log_ratio_;
 };
 
 }  // namespace htvm::internal

@@ -4,17 +4,19 @@
 #include <cmath>
 
 #include "codec/choice/rate_plan_enc.h"
+#include "codec/frame_kinds.h"
 
 namespace htvm::internal {
 namespace {
 
 std::size_t index_of(FrameType type) { return static_cast<std::size_t>(type); }
-bool is_intra(FrameType type) { return type == FrameType::intra; }
 
-// Frames that were seen of this type, EP and T counted as one.
-int seen_like(const FrameSizeModel& model, FrameType type) {
-    if (is_intra(type) || type == FrameType::predicted) return model.seen[index_of(type)];
-    return model.seen[index_of(FrameType::enhanced)] + model.seen[index_of(FrameType::tracked)];
+// Frames that were seen of a class.
+int seen_of(const FrameSizeModel& model, RateClass rate) {
+    int seen = 0;
+    for (const auto& rules : frame_rules)
+        if (rules.rate == rate) seen += model.seen[index_of(rules.type)];
+    return seen;
 }
 
 // How much of a surprise is believed: little of the usual noise; half of a jump, and nearly all when it comes again.
@@ -48,22 +50,23 @@ RateControlOptions sane(RateControlOptions o) {
 
 }  // namespace
 
-double expected_bits(const FrameSizeModel& model, FrameType type, double quality) {
-    if (type == FrameType::predicted) return model.predicted_bits;
-    return std::exp2(model.content + (is_intra(type) ? model.intra_extra : 0) + model.slope * quality);
+double expected_bits(const FrameSizeModel& model, RateClass rate, double quality) {
+    if (rate == RateClass::moved) return model.moved_bits;
+    return std::exp2(model.content + (rate == RateClass::intra ? model.intra_extra : 0) + model.slope * quality);
 }
 
 void learn(FrameSizeModel& model, const FrameCost& frame) {
     if (!(frame.bits > 0)) return;
     const bool first = model.seen[index_of(frame.type)]++ == 0;
-    if (frame.type == FrameType::predicted) {
-        model.predicted_bits += (first ? 1 : 0.2) * (frame.bits - model.predicted_bits);
+    const auto rate = rules_of(frame.type).rate;
+    if (rate == RateClass::moved) {
+        model.moved_bits += (first ? 1 : 0.2) * (frame.bits - model.moved_bits);
         return;
     }
-    const double surprise = std::log2(frame.bits / expected_bits(model, frame.type, frame.quality));
+    const double surprise = std::log2(frame.bits / expected_bits(model, rate, frame.quality));
     if (first) {
-        const bool other = seen_like(model, is_intra(frame.type) ? FrameType::enhanced : FrameType::intra) > 0;
-        if (is_intra(frame.type) && other) {
+        const bool other = seen_of(model, rate == RateClass::intra ? RateClass::between : RateClass::intra) > 0;
+        if (rate == RateClass::intra && other) {
             model.intra_extra += surprise;
         } else {
             model.content += surprise;
@@ -72,10 +75,10 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
     } else {
         learn_slope(model, model.last[index_of(frame.type)], frame);
         // The slope turns about the quality of now, where the sizes are known.
-        const double again = std::log2(frame.bits / expected_bits(model, frame.type, frame.quality));
+        const double again = std::log2(frame.bits / expected_bits(model, rate, frame.quality));
         const double believed = belief(model, again) * again;
         // Of I-frames alone nobody can tell how much more they take than others.
-        const bool compared = is_intra(frame.type) && seen_like(model, FrameType::enhanced) > 0;
+        const bool compared = rate == RateClass::intra && seen_of(model, RateClass::between) > 0;
         model.content += compared ? believed / 2 : believed;
         if (compared) model.intra_extra += believed;
         model.last_surprise = again;
@@ -92,8 +95,8 @@ RateController::RateController(const RateControlOptions& options, std::vector<Fr
     // What a large buffer can take need not be followed.
     model_.usual_belief = std::clamp(3 * per_frame_ / capacity_, 0.05, 0.15);
     // Before anything is seen: as many I-frames as the key interval asks for.
-    recent_.assign(static_cast<std::size_t>(std::clamp(options_.key_interval, 1, 1000)), FrameType::enhanced);
-    recent_[0] = FrameType::intra;
+    recent_.assign(static_cast<std::size_t>(std::clamp(options_.key_interval, 1, 1000)), RateClass::between);
+    recent_[0] = RateClass::intra;
     if (first_pass_.empty()) return;
     for (auto& cost : first_pass_) cost.bits = std::isfinite(cost.bits) ? std::max(cost.bits, 0.0) : 0.0;
     // What the first pass taught counts little against what this one will.
@@ -103,21 +106,25 @@ RateController::RateController(const RateControlOptions& options, std::vector<Fr
     rest_.assign(first_pass_.size() + 1, {});
     for (std::size_t i = first_pass_.size(); i-- > 0;) {
         rest_[i] = rest_[i + 1];
-        rest_[i][first_pass_[i].type == FrameType::predicted ? 0 : 1] += bits_at(first_pass_[i], plan_[i], plan_slope_);
+        rest_[i][rules_of(first_pass_[i].type).rate == RateClass::moved ? 0 : 1] +=
+            bits_at(first_pass_[i], plan_[i], plan_slope_);
     }
 }
 
 double RateController::room() const { return capacity_ - buffer_; }
 
 bool RateController::is_guess(FrameType type) const {
-    return type != FrameType::predicted && first_pass_.empty() && (frames_ == 0 || (!is_intra(type) && !sent_between_));
+    const auto rate = rules_of(type).rate;
+    return rate != RateClass::moved && first_pass_.empty() &&
+           (frames_ == 0 || (rate == RateClass::between && !sent_between_));
 }
 
 double RateController::quality(FrameType type) const {
     double q = frames_ < plan_.size() ? planned_quality() : live_quality(type);
-    if (type != FrameType::predicted) {
-        const double most = 0.9 * room(), expected = expected_bits(model_, type, q);
-        const bool known = seen_like(model_, FrameType::intra) + seen_like(model_, FrameType::enhanced) > 0;
+    const auto rate = rules_of(type).rate;
+    if (rate != RateClass::moved) {
+        const double most = 0.9 * room(), expected = expected_bits(model_, rate, q);
+        const bool known = seen_of(model_, RateClass::intra) + seen_of(model_, RateClass::between) > 0;
         if (known && expected > most) q -= std::log2(expected / std::max(most, 1.0)) / model_.slope;
     }
     return std::clamp(q, options_.lowest_quality, options_.highest_quality);
@@ -128,7 +135,7 @@ double RateController::quality(FrameType type) const {
 double RateController::wanted_bits() const {
     const double frames = capacity_ / per_frame_, horizon = std::clamp(1.5 * frames, 4.0, 60.0);
     const double phase = 1 - static_cast<double>(since_intra_) / options_.key_interval;
-    const double of_intra = std::max(0.0, expected_bits(model_, FrameType::intra, level_) - per_frame_);
+    const double of_intra = std::max(0.0, expected_bits(model_, RateClass::intra, level_) - per_frame_);
     const double before_intra = buffer_ - (since_intra_ > 0 ? of_intra * std::max(0.0, phase) : 0);
     const double least = std::min(capacity_ / 5, 4 * per_frame_);
     const double most = std::max(least, std::min(capacity_ / 2, 0.85 * capacity_ - of_intra));
@@ -140,7 +147,7 @@ double RateController::live_quality(FrameType type) const {
     const double wanted = wanted_bits();
     const auto average = [&](double q) {
         double bits = 0;
-        for (const auto t : recent_) bits += expected_bits(model_, t, q);
+        for (const auto rate : recent_) bits += expected_bits(model_, rate, q);
         return bits / static_cast<double>(recent_.size());
     };
     double low = options_.lowest_quality, high = options_.highest_quality;
@@ -150,10 +157,10 @@ double RateController::live_quality(FrameType type) const {
         (average(middle) <= wanted ? low : high) = middle;
     }
     // The first frames know little, and may go far from each other.
-    const int seen = seen_like(model_, FrameType::enhanced) + seen_like(model_, FrameType::intra);
+    const int seen = seen_of(model_, RateClass::between) + seen_of(model_, RateClass::intra);
     if (is_guess(type)) return low;
     // An I-frame and the frame behind it may both move at no cost.
-    const bool free = since_intra_ == 1 || is_intra(type);
+    const bool free = since_intra_ == 1 || rules_of(type).rate == RateClass::intra;
     const double change = low - level_, step = std::max(options_.largest_step / (free ? 2 : 1), 20.0 / seen);
     if (std::abs(change) < (free ? 0.5 : options_.stay)) return level_;
     return level_ + std::clamp(change, -step, step);
@@ -162,7 +169,9 @@ double RateController::live_quality(FrameType type) const {
 double RateController::planned_bits(std::size_t frame, double correction) const {
     const auto& cost = first_pass_[frame];
     const double bits = bits_at(cost, plan_[frame], plan_slope_);
-    return cost.type == FrameType::predicted ? bits : bits * std::exp2(planned_surprise_ + model_.slope * correction);
+    return rules_of(cost.type).rate == RateClass::moved
+               ? bits
+               : bits * std::exp2(planned_surprise_ + model_.slope * correction);
 }
 
 // The correction with which the rest of the sequence spends what is left.
@@ -205,7 +214,7 @@ double RateController::lower_quality(FrameType type, double quality, double bits
     const double range = options_.highest_quality - options_.lowest_quality;
     const double least = range / 20 * std::exp2(calls_++);
     const double excess = bits > 0 ? std::log2(bits / std::max(room(), 1.0)) + 0.15 : 0;
-    const double needed = type == FrameType::predicted ? 0 : excess / model_.slope;
+    const double needed = rules_of(type).rate == RateClass::moved ? 0 : excess / model_.slope;
     if (calls_ >= 5) return options_.lowest_quality;
     return std::max(options_.lowest_quality, quality - std::max(least, needed));
 }
@@ -213,30 +222,31 @@ double RateController::lower_quality(FrameType type, double quality, double bits
 void RateController::coded(FrameType type, double quality, double bits) {
     bits = std::isfinite(bits) ? std::max(bits, 0.0) : 0.0;
     // An I-frame that had to be cut to fit does not pull the EP-frames after it down.
-    const bool between = !is_intra(type) && type != FrameType::predicted;
+    const auto rate = rules_of(type).rate;
+    const bool between = rate == RateClass::between;
     if (between || !sent_between_) level_ = quality;
     sent_between_ = sent_between_ || between;
-    if (is_intra(type) && std::abs(quality - level_) <= options_.largest_step) level_ = quality;
-    if (frames_ < plan_.size() && type == first_pass_[frames_].type && type != FrameType::predicted && bits > 0) {
+    if (rate == RateClass::intra && std::abs(quality - level_) <= options_.largest_step) level_ = quality;
+    if (frames_ < plan_.size() && type == first_pass_[frames_].type && rate != RateClass::moved && bits > 0) {
         const double planned = planned_bits(frames_, quality - plan_[frames_]);
         if (planned > 0)
             planned_surprise_ += std::max(0.05, 1.0 / static_cast<double>(frames_ + 5)) * std::log2(bits / planned);
     }
     learn(model_, {type, quality, bits});
-    recent_[frames_ % recent_.size()] = type;
-    since_intra_ = is_intra(type) ? 1 : since_intra_ + (since_intra_ > 0 ? 1 : 0);
+    recent_[frames_ % recent_.size()] = rate;
+    since_intra_ = rate == RateClass::intra ? 1 : since_intra_ + (since_intra_ > 0 ? 1 : 0);
     total_bits_ += bits;
     buffer_ += bits;
     idle_bits_ += std::max(0.0, per_frame_ - buffer_);
     buffer_ = std::max(0.0, buffer_ - per_frame_);
     ++frames_;
     calls_ = 0;
-    if (frames_ + 10 <= plan_.size()) correct_plan(type);
+    if (frames_ + 10 <= plan_.size()) correct_plan(rate);
 }
 
-void RateController::correct_plan(FrameType type) {
+void RateController::correct_plan(RateClass rate) {
     const double change = remaining_correction() - correction_;
-    if (std::abs(change) < (is_intra(type) ? options_.stay / 4 : options_.stay)) return;
+    if (std::abs(change) < (rate == RateClass::intra ? options_.stay / 4 : options_.stay)) return;
     const double step = frames_ < 15 ? 4 * options_.largest_step : options_.largest_step;
     correction_ += std::clamp(change, -step, step);
 }

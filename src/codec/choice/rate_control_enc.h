@@ -16,6 +16,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "codec/frame_kinds.h"
 #include "htvm/frame.hpp"
 
 namespace htvm::internal {
@@ -36,7 +37,7 @@ struct RateControlOptions {
 struct FrameSizeModel {
     double content = 17;                       // log2(bits) of an EP-frame at quality 0, of the content as it is now
     double intra_extra = 0.25;                 // how much more an I-frame's is
-    double predicted_bits = 4e3;               // of a P-frame
+    double moved_bits = 4e3;                   // of a P-frame
     double slope = 0.04;                       // of log2(bits) over quality
     double slope_weight = 100, slope_sum = 4;  // squared quality steps seen and their products with those of log2(bits)
     double last_surprise = 0;                  // log2, of the last I- or EP-frame
@@ -45,8 +46,8 @@ struct FrameSizeModel {
     std::array<FrameCost, frame_type_count> last{};  // by type
 };
 
-// Bits that a frame of this type should take at this quality.
-double expected_bits(const FrameSizeModel& model, FrameType type, double quality);
+// Bits that a frame of this class should take at this quality.
+double expected_bits(const FrameSizeModel& model, RateClass rate, double quality);
 // Learns from a frame that was coded; frames without bits teach nothing.
 void learn(FrameSizeModel& model, const FrameCost& frame);
 
@@ -77,7 +78,7 @@ private:
     double planned_quality() const;
     double planned_bits(std::size_t frame, double correction) const;
     double remaining_correction() const;
-    void correct_plan(FrameType type);
+    void correct_plan(RateClass rate);
     double peak_of_plan(double correction) const;
 
     RateControlOptions options_;
@@ -91,7 +92,7 @@ private:
     int since_intra_ = 0;
     bool sent_between_ = false;                // an EP- or T-frame
     double level_ = 0;                         // the quality that I- and EP-frames share
-    std::vector<FrameType> recent_;            // types of the last key_interval frames, a ring
+    std::vector<RateClass> recent_;            // classes of the last key_interval frames, a ring
     std::vector<double> plan_;                 // quality of each frame of the first pass
     std::vector<std::array<double, 2>> rest_;  // bits planned from each frame on: of P-frames, of others
     double plan_slope_ = 0.04;                 // of log2(bits) over quality in the first pass

@@ -69,7 +69,8 @@ double peak(std::span<const FrameCost> costs, double quality, double slope, cons
 }  // namespace
 
 double bits_at(const FrameCost& cost, double quality, double slope) {
-    return cost.type == FrameType::predicted ? cost.bits : cost.bits * std::exp2(slope * (quality - cost.quality));
+    return rules_of(cost.type).rate == RateClass::moved ? cost.bits
+                                                        : cost.bits * std::exp2(slope * (quality - cost.quality));
 }
 
 std::vector<double> plan_qualities(std::span<const FrameCost> costs, const RateControlOptions& options, double slope) {

@@ -26,6 +26,15 @@ FramePayload predicted_frame_payload(const ReferenceMesh& reference, std::span<c
     return out;
 }
 
+AnimatedFrame animated_frame(const ReferenceMesh& reference, std::vector<QuantisedTransform> transforms,
+                             Threads threads) {
+    AnimatedFrame out;
+    out.positions = predict_positions(reference, transforms, threads);
+    out.normals = predict_normals(reference, transforms);
+    out.transforms = std::move(transforms);
+    return out;
+}
+
 Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
                                              Threads threads) {
     const auto& mesh = reference.mesh;
@@ -33,10 +42,7 @@ Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const 
         return fail(ErrorKind::corrupt_stream, "P-frame: it has other counts than its I-frame");
     auto transforms = decode_transforms(payload.of(Layer::transforms), reference.pivots.size());
     if (!transforms) return tl::unexpected(transforms.error());
-    AnimatedFrame out;
-    out.mesh = animate(reference, *transforms, predict_positions(reference, *transforms, threads));
-    out.transforms = std::move(*transforms);
-    return out;
+    return animated_frame(reference, std::move(*transforms), threads);
 }
 
 }  // namespace htvm::internal

@@ -16,10 +16,14 @@ namespace htvm::internal {
 LatticeMesh animate(const ReferenceMesh& reference, std::span<const QuantisedTransform> transforms,
                     std::vector<LatticePoint> predicted);
 
+// What of such a mesh is not the reference's own.
 struct AnimatedFrame {
-    LatticeMesh mesh;
-    std::vector<QuantisedTransform> transforms;  // one a bone
+    std::vector<LatticePoint> positions;
+    std::vector<QuantisedNormal> normals;
+    std::vector<QuantisedTransform> transforms;  // one per bone
 };
+AnimatedFrame animated_frame(const ReferenceMesh& reference, std::vector<QuantisedTransform> transforms,
+                             Threads threads);
 
 // A P-frame. corrupt_stream where its counts are not the reference's or its transforms are damaged.
 Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,

@@ -109,24 +109,40 @@ std::array<double, 3> to_millimetres(LatticePoint p, const Lattice& lattice) {
     return {lattice.origin[0] + p.x * step, lattice.origin[1] + p.y * step, lattice.origin[2] + p.z * step};
 }
 
-Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice) {
-    Mesh out;
-    out.triangles = mesh.triangles;
-    out.colours = mesh.colours;
-    out.positions.reserve(mesh.positions.size());
-    for (const auto& p : mesh.positions) {
+void to_millimetres(std::span<const LatticePoint> positions, const Lattice& lattice, std::vector<Vector3f>& out) {
+    out.clear();
+    out.reserve(positions.size());
+    for (const auto& p : positions) {
         const auto mm = to_millimetres(p, lattice);
-        out.positions.push_back({static_cast<float>(mm[0]), static_cast<float>(mm[1]), static_cast<float>(mm[2])});
+        out.push_back({static_cast<float>(mm[0]), static_cast<float>(mm[1]), static_cast<float>(mm[2])});
     }
-    for (const auto& n : mesh.normals) {
+}
+
+void to_unit_normals(std::span<const QuantisedNormal> normals, std::vector<Vector3f>& out) {
+    out.clear();
+    out.reserve(normals.size());
+    for (const auto& n : normals) {
         const double x = n[0], y = n[1], z = n[2];
         const double length = std::sqrt(x * x + y * y + z * z);
         const double scale = length > 0 ? 1.0 / length : 0.0;
-        out.normals.push_back(
-            {static_cast<float>(x * scale), static_cast<float>(y * scale), static_cast<float>(z * scale)});
+        out.push_back({static_cast<float>(x * scale), static_cast<float>(y * scale), static_cast<float>(z * scale)});
     }
-    for (const auto& t : mesh.texcoords)
-        out.texcoords.push_back({static_cast<float>(t[0] / texcoord_scale), static_cast<float>(t[1] / texcoord_scale)});
+}
+
+void to_texcoords(std::span<const QuantisedTexcoord> texcoords, std::vector<Vector2f>& out) {
+    out.clear();
+    out.reserve(texcoords.size());
+    for (const auto& t : texcoords)
+        out.push_back({static_cast<float>(t[0] / texcoord_scale), static_cast<float>(t[1] / texcoord_scale)});
+}
+
+Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice) {
+    Mesh out;
+    to_millimetres(mesh.positions, lattice, out.positions);
+    to_unit_normals(mesh.normals, out.normals);
+    to_texcoords(mesh.texcoords, out.texcoords);
+    out.triangles = mesh.triangles;
+    out.colours = mesh.colours;
     return out;
 }
 

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "core/lattice.h"
 #include "htvm/lattice_mesh.hpp"
@@ -27,7 +29,12 @@ Result<std::array<std::int32_t, 3>> lattice_origin(const Mesh& mesh);
 Result<LatticeMesh> to_lattice(const Mesh& mesh, const Lattice& lattice);
 Result<LatticePoint> to_lattice(const std::array<double, 3>& point, const Lattice& lattice);
 
-// The mesh in millimetres, in floats.
+// Parts of a mesh as it is shown, in floats, into arrays that may have been used before: positions in millimetres,
+// normals of unit length (of no length, where they have none), texture coordinates as they were captured.
+void to_millimetres(std::span<const LatticePoint> positions, const Lattice& lattice, std::vector<Vector3f>& out);
+void to_unit_normals(std::span<const QuantisedNormal> normals, std::vector<Vector3f>& out);
+void to_texcoords(std::span<const QuantisedTexcoord> texcoords, std::vector<Vector2f>& out);
+// All of it.
 Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice);
 std::array<double, 3> to_millimetres(LatticePoint point, const Lattice& lattice);
 

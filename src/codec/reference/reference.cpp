@@ -4,21 +4,32 @@
 
 namespace htvm::internal {
 
+void derive_bones(Reference& reference, const SequenceHeader& header, Threads threads) {
+    if (reference.has_bones) return;
+    skin_reference(reference.skinned, header.skeleton.bones, header.radii, header.weight_width, threads);
+    reference.has_bones = true;
+}
+
+Result<void> derive_nodes(Reference& reference, const SequenceHeader& header) {
+    if (reference.tracked) return {};
+    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step);
+    if (!tracked) return tl::unexpected(tracked.error());
+    reference.tracked = std::move(*tracked);
+    return {};
+}
+
 Result<Reference> make_reference(const SequenceHeader& header, std::uint32_t number, LatticeMesh mesh, CodedPose pose,
                                  std::int32_t step, Derived derived, Threads threads) {
     Reference out;
     out.number = number;
     out.step = step;
-    if (derived.nodes && header.node_spacing > 0) {
-        auto tracked = make_tracked_reference(mesh, header.node_spacing, step);
-        if (!tracked) return tl::unexpected(tracked.error());
-        out.tracked = std::move(*tracked);
-    }
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);
     out.skinned.orientations = std::move(pose.orientations);
     out.skinned.frame = number;
-    if (derived.bones) skin_reference(out.skinned, header.skeleton.bones, header.radii, header.weight_width, threads);
+    if (derived.nodes && header.node_spacing > 0)
+        if (auto ok = derive_nodes(out, header); !ok) return tl::unexpected(ok.error());
+    if (derived.bones) derive_bones(out, header, threads);
     return out;
 }
 

@@ -17,6 +17,7 @@ struct Reference {
     std::uint32_t number = 0;  // of the I-frame
     std::int32_t step = 1;     // of its positions, lattice units
     ReferenceMesh skinned;     // the mesh and its pose; what follows from the bones only where that was derived
+    bool has_bones = false;    // whether it was
     std::optional<TrackedReference> tracked;  // likewise what follows from the nodes
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
@@ -30,5 +31,10 @@ struct Derived {
 // mesh: as decoded. Errors: as of make_tracked_reference().
 Result<Reference> make_reference(const SequenceHeader& header, std::uint32_t number, LatticeMesh mesh, CodedPose pose,
                                  std::int32_t step, Derived derived, Threads threads);
+
+// What was not derived at once, for whoever finds out later that it is needed. Nothing where it is there already.
+void derive_bones(Reference& reference, const SequenceHeader& header, Threads threads);
+// Needs a header with a node spacing.
+Result<void> derive_nodes(Reference& reference, const SequenceHeader& header);
 
 }  // namespace htvm::internal

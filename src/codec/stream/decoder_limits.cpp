@@ -19,18 +19,9 @@ std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes >> 20)
 std::uint64_t memory_of_reference(MeshCounts mesh) { return each(mesh, 128, 48); }
 std::uint64_t memory_of_tracking(MeshCounts mesh) { return each(mesh, 320, 48); }
 
-std::uint64_t memory_of_frame(FrameType type, MeshCounts coded, MeshCounts reference) {
-    switch (type) {
-        case FrameType::intra:
-            return memory_of_models + each(coded, 256, 320) + memory_of_reference(coded);
-        case FrameType::enhanced:
-            return memory_of_models + each(coded, 384, 320) + each(reference, 256, 96);
-        case FrameType::predicted:
-            return memory_of_models + each(reference, 224, 32);
-        case FrameType::tracked:
-            break;
-    }
-    return memory_of_models + each(reference, 384, 192);
+std::uint64_t memory_of_frame(const MemoryBound& bound, MeshCounts coded, MeshCounts reference) {
+    return memory_of_models + each(coded, bound.coded_vertex, bound.coded_triangle) +
+           each(reference, bound.reference_vertex, bound.reference_triangle);
 }
 
 Result<void> check_limits(const Packet& packet, const DecoderOptions& options) {
@@ -48,18 +39,18 @@ Result<void> check_limits(const SequenceHeader& header, const DecoderOptions& op
                                       " bones, more than this decoder accepts; raise its max_joints or max_bones");
 }
 
-Result<void> check_limits(FrameType type, const FrameHeader& header, MeshCounts reference, std::uint64_t kept,
+Result<void> check_limits(const MemoryBound& bound, MeshCounts coded, MeshCounts reference, std::uint64_t kept,
                           const DecoderOptions& options) {
-    if (header.vertices > options.max_vertices || header.triangles > options.max_triangles)
-        return fail(ErrorKind::limit, "the frame has " + std::to_string(header.vertices) + " vertices and " +
-                                          std::to_string(header.triangles) +
+    if (coded.vertices > options.max_vertices || coded.triangles > options.max_triangles)
+        return fail(ErrorKind::limit, "the frame has " + std::to_string(coded.vertices) + " vertices and " +
+                                          std::to_string(coded.triangles) +
                                           " triangles, more than this decoder accepts; raise its max_vertices or "
                                           "max_triangles");
-    const auto needed = kept + memory_of_frame(type, {header.vertices, header.triangles}, reference);
+    const auto needed = kept + memory_of_frame(bound, coded, reference);
     if (needed <= options.max_memory) return {};
-    return fail(ErrorKind::limit, "the frame has " + std::to_string(header.vertices) + " vertices and " +
-                                      std::to_string(header.triangles) + " triangles and may need " +
-                                      megabytes(needed) + ", more than this decoder may take; raise its max_memory");
+    return fail(ErrorKind::limit, "the frame has " + std::to_string(coded.vertices) + " vertices and " +
+                                      std::to_string(coded.triangles) + " triangles and may need " + megabytes(needed) +
+                                      ", more than this decoder may take; raise its max_memory");
 }
 
 }  // namespace htvm::internal

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 
-#include "codec/stream/frame_payload.h"
 #include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 
@@ -16,16 +15,20 @@ struct MeshCounts {
 // The most memory, bytes, that meshes of so many vertices and triangles take, with all attributes, of any
 // connectivity: about half as much again as was measured of the worst (tests/memory).
 std::uint64_t memory_of_reference(MeshCounts mesh);  // what an I-frame leaves for the frames that refer to it
-std::uint64_t memory_of_tracking(MeshCounts mesh);   // what the first T-frame adds to it
-// What decoding a frame takes besides, the frame itself included. `coded`: as its header says; `reference`: of what it
-// refers to, empty for an I-frame.
-std::uint64_t memory_of_frame(FrameType type, MeshCounts coded, MeshCounts reference);
+std::uint64_t memory_of_tracking(MeshCounts mesh);   // what T-frames add to it
+
+// What decoding a frame of some kind takes besides, the frame itself included; in frame_kinds.cpp for each kind.
+struct MemoryBound {
+    std::uint64_t coded_vertex, coded_triangle;          // bytes for each that the frame's header says
+    std::uint64_t reference_vertex, reference_triangle;  // for each of what it refers to
+};
+std::uint64_t memory_of_frame(const MemoryBound& bound, MeshCounts coded, MeshCounts reference);
 
 // Each an error of kind limit that says which option is too low for what.
 Result<void> check_limits(const Packet& packet, const DecoderOptions& options);
 Result<void> check_limits(const SequenceHeader& header, const DecoderOptions& options);
-// kept: bytes that the decoder holds already. reference: as above.
-Result<void> check_limits(FrameType type, const FrameHeader& header, MeshCounts reference, std::uint64_t kept,
+// A frame's. reference: empty where it refers to nothing. kept: bytes that the decoder holds besides.
+Result<void> check_limits(const MemoryBound& bound, MeshCounts coded, MeshCounts reference, std::uint64_t kept,
                           const DecoderOptions& options);
 
 }  // namespace htvm::internal

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "codec/reference/deformation_nodes.h"
-#include "codec/stream/frame_payload.h"
 #include "codec/reference/lattice_mesh.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/tracked/node_motion.h"
 #include "codec/tracked/vertex_field.h"
 #include "core/thread.h"
@@ -42,14 +42,18 @@ struct TrackedState {
     FieldHistory displacement, colour;
 };
 
+// What is not the reference's own: triangles and texture coordinates are.
 struct DecodedTrackedFrame {
-    LatticeMesh mesh;
+    std::vector<LatticePoint> positions;
+    std::vector<Colour> colours;           // where the reference has them
+    std::vector<QuantisedNormal> normals;  // likewise
     TrackedState state;
 };
 
-// before: of the frame that the payload refers to; null where that is the I-frame.
-Result<DecodedTrackedFrame> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
-                                                 const TrackedState* before, Threads threads);
+// before: of the frame that the payload refers to; null where that is the I-frame. out: an earlier frame's, whose
+// arrays serve again, but not that of `before`; of no use after an error.
+Result<void> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
+                                  const TrackedState* before, Threads threads, DecodedTrackedFrame& out);
 
 // The pieces, which the encoder shares.
 // The reference moved by its nodes, one transform a node.

@@ -132,19 +132,16 @@ std::vector<QuantisedNormal> quantised_normals(std::span<const ExactNormal> norm
     return out;
 }
 
-Result<DecodedTrackedFrame> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
-                                                 const TrackedState* before, Threads threads) {
+Result<void> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
+                                  const TrackedState* before, Threads threads, DecodedTrackedFrame& out) {
     const auto& mesh = reference.mesh;
     if (payload.header.vertices != mesh.positions.size() || payload.header.triangles != mesh.triangles.size())
         return fail(ErrorKind::corrupt_stream, "tracked frame: it has other counts than its I-frame");
-    DecodedTrackedFrame out;
     auto transforms = decode_node_motion(
         payload.of(Layer::transforms), reference.parents, reference.pivots,
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{});
     if (!transforms) return tl::unexpected(transforms.error());
     out.state.transforms = std::move(*transforms);
-    out.mesh.triangles = mesh.triangles;
-    out.mesh.texcoords = mesh.texcoords;
 
     Result<void> colours;
     Result<DecodedField> displacement;
@@ -158,7 +155,7 @@ Result<DecodedTrackedFrame> decode_tracked_frame(const FramePayload& payload, co
                 colours = tl::unexpected(field.error());
                 return;
             }
-            out.mesh.colours = recoloured(mesh.colours, field->values);
+            out.colours = recoloured(mesh.colours, field->values);
             out.state.colour = std::move(field->history);
         },
         [&] {
@@ -166,13 +163,13 @@ Result<DecodedTrackedFrame> decode_tracked_frame(const FramePayload& payload, co
                                         before ? &before->displacement : nullptr);
             if (!displacement) return;
             const auto moved = moved_by_nodes(reference, out.state.transforms, 1);
-            out.mesh.positions = displaced(moved, exact_normals(moved, mesh.triangles), displacement->values);
+            out.positions = displaced(moved, exact_normals(moved, mesh.triangles), displacement->values);
         });
     if (!colours) return tl::unexpected(colours.error());
     if (!displacement) return tl::unexpected(displacement.error());
     out.state.displacement = std::move(displacement->history);
-    if (!mesh.normals.empty()) out.mesh.normals = quantised_normals(exact_normals(out.mesh.positions, mesh.triangles));
-    return out;
+    if (!mesh.normals.empty()) out.normals = quantised_normals(exact_normals(out.positions, mesh.triangles));
+    return {};
 }
 
 }  // namespace htvm::internal

@@ -1,0 +1,71 @@
+#include "codec/frame_kinds.h"
+
+#include "htvm/decoder.hpp"
+
+namespace htvm {
+namespace internal {
+
+using enum Layer;
+
+// Memory: about half as much again as was measured of the worst meshes (tests/memory), bytes per coded vertex and
+// triangle, per vertex and triangle of the reference.
+constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
+    {.type = FrameType::intra,
+     .packet = PacketKind::intra,
+     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra},
+     .refers_to = RefersTo::nothing,
+     .codebooks = false,
+     .codes_mesh = true,
+     .memory = {384, 368, 0, 0},
+     .rate = RateClass::intra,
+     .decode = decode_intra},
+    {.type = FrameType::enhanced,
+     .packet = PacketKind::enhanced,
+     .layers = {transforms, geometry, colour, normals, texcoords, mapping, fans, distance_orders, coded_bones},
+     .refers_to = RefersTo::intra,
+     .codebooks = true,
+     .codes_mesh = true,
+     .memory = {384, 320, 256, 96},
+     .rate = RateClass::between,
+     .decode = decode_enhanced},
+    {.type = FrameType::predicted,
+     .packet = PacketKind::predicted,
+     .layers = {transforms},
+     .refers_to = RefersTo::intra,
+     .codebooks = false,
+     .codes_mesh = false,
+     .memory = {0, 0, 224, 32},
+     .rate = RateClass::moved,
+     .decode = decode_predicted},
+    {.type = FrameType::tracked,
+     .packet = PacketKind::tracked,
+     .layers = {transforms, geometry, colour},
+     .refers_to = RefersTo::intra_or_before,
+     .codebooks = false,
+     .codes_mesh = false,
+     .memory = {0, 0, 384, 192},
+     .rate = RateClass::between,
+     .decode = decode_tracked},
+}};
+
+namespace {
+
+// Rows are found by their place.
+constexpr bool in_order() {
+    for (std::size_t i = 0; i < frame_type_count; ++i)
+        if (frame_kinds[i].type != static_cast<FrameType>(i) || frame_rules[i].type != static_cast<FrameType>(i))
+            return false;
+    return true;
+}
+static_assert(in_order());
+
+}  // namespace
+}  // namespace internal
+
+std::optional<FrameType> frame_type(PacketKind kind) {
+    for (const auto& rules : internal::frame_rules)
+        if (rules.packet == kind) return rules.type;
+    return std::nullopt;
+}
+
+}  // namespace htvm

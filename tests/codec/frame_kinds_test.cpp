@@ -1,0 +1,87 @@
+// The table of frame kinds holds what the streams do.
+#include "codec/frame_kinds.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <string>
+
+#include "codec/test_sequences.h"
+#include "htvm/decoder.hpp"
+
+namespace htvm::internal {
+namespace {
+
+std::vector<Packet> packets_of(const std::filesystem::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
+    PacketReader reader;
+    reader.push(bytes);
+    std::vector<Packet> out;
+    while (auto packet = reader.pull()) out.push_back(std::move(*packet));
+    return out;
+}
+
+std::vector<std::filesystem::path> conformance_streams() {
+    std::vector<std::filesystem::path> out;
+    for (const auto& entry : std::filesystem::directory_iterator(HTVM_TEST_DATA "/conformance"))
+        if (entry.path().extension() == ".htvm") out.push_back(entry.path());
+    return out;
+}
+
+TEST(FrameKinds, AreFoundByTypeLetterAndPacket) {
+    std::set<std::string> letters;
+    for (const auto& kind : frame_kinds) {
+        EXPECT_EQ(kind_of(kind.type).name, kind.name);
+        EXPECT_EQ(kind_of_letter(kind.letter), &kind);
+        EXPECT_EQ(frame_type(rules_of(kind.type).packet), kind.type);
+        letters.insert(kind.letter);
+    }
+    EXPECT_EQ(letters, (std::set<std::string>{"I", "EP", "P", "T"}));
+    EXPECT_EQ(kind_of_letter("E"), nullptr);
+    EXPECT_EQ(frame_type(PacketKind::codebook), std::nullopt);
+}
+
+TEST(FrameKinds, HaveNoLayersButTheirRows) {
+    std::set<FrameType> seen;
+    for (const auto& stream : conformance_streams())
+        for (const auto& packet : packets_of(stream)) {
+            const auto type = frame_type(packet.kind);
+            if (!type) continue;
+            seen.insert(*type);
+            const auto payload = *read_frame_payload(packet.payload);
+            for (std::size_t i = 0; i < layer_count; ++i)
+                EXPECT_TRUE(!payload.has(static_cast<Layer>(i)) || rules_of(*type).layers.has(static_cast<Layer>(i)))
+                    << stream << ": layer " << i << " in a frame of kind " << kind_of(*type).letter;
+        }
+    EXPECT_EQ(seen.size(), frame_type_count);
+}
+
+TEST(FrameKinds, ReferToFramesOfWhichTheirRowsSpeak) {
+    for (const auto& stream : conformance_streams()) {
+        std::uint32_t intra = 0, before = 0;
+        for (const auto& packet : packets_of(stream)) {
+            const auto type = frame_type(packet.kind);
+            if (!type) continue;
+            switch (rules_of(*type).refers_to) {
+                case RefersTo::nothing:
+                    EXPECT_EQ(packet.reference, packet.frame) << stream;
+                    intra = packet.frame;
+                    break;
+                case RefersTo::intra:
+                    EXPECT_EQ(packet.reference, intra) << stream;
+                    break;
+                case RefersTo::intra_or_before:
+                    EXPECT_TRUE(packet.reference == intra || packet.reference == before) << stream;
+                    break;
+            }
+            before = packet.frame;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace htvm::internal
