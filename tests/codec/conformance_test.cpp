@@ -225,7 +225,7 @@ void write_choices() {
     rate.topology.frame_choice = FrameChoice::motion;
     rate.topology.predicted_below = 50;
     rate.topology.still_below = 40;
-    rate.bits_per_second = 600e3;
+    rate.rate.bits_per_second = 600e3;
     write_stream("rate_controlled", all, rate);
 }
 
