@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "codec/paper/codebook.h"
 #include "codec/reference/reference.h"
 #include "codec/stream/sequence.h"
 #include "codec/tracked/tracked_frame.h"

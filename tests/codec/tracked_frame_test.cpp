@@ -70,7 +70,7 @@ TEST(TrackedFrames, TakeAFractionOfTheBitsForTheSameSurface) {
     for (const bool skeleton : {false, true}) {
         const auto sequence = walking(5, skeleton);
         const auto coded = encode(sequence, tracked());
-        const auto enhanced = encode(sequence, {});
+        const auto enhanced = encode(sequence, default_options(Profile::topology));
         for (std::size_t t = 1; t < 5; ++t) {
             EXPECT_EQ(coded.infos[t].type, FrameType::tracked);
             EXPECT_LT(coded.infos[t].bytes.total() * 2, enhanced.infos[t].bytes.total());
