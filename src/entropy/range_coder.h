@@ -2,7 +2,8 @@
 //
 // Both sides keep a range of 32 bits, cut at each decision in proportion to the model's probability, and shift a byte
 // out or in whenever the range falls below 2^24. Encoder and decoder stand side by side: each step of one is the
-// other's, read backwards.
+// other's, read backwards. Decisions rather than symbols: a binary model adapts in a few instructions, and several can
+// be mixed (mixing.h).
 #pragma once
 
 #include <cstddef>

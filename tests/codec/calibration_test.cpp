@@ -14,7 +14,7 @@ Skeleton one_bone() {
     return skeleton;
 }
 
-// The side of a cylinder of the given radius round the y axis, from y = 0 to y = 1000; no vertex on the axis.
+// The side of a cylinder of the given radius around the y axis, from y = 0 to y = 1000; no vertex on the axis.
 Mesh cylinder(double radius) {
     Mesh mesh;
     for (int y = 0; y <= 1000; y += 50)

@@ -29,7 +29,7 @@ LatticePoint rounded(const Vector3d& v) {
     return {c(v.x()), c(v.y()), c(v.z())};
 }
 
-// An ellipsoid round the given middle, lattice units.
+// An ellipsoid around the given middle, lattice units.
 void add_limb(LatticeMesh& mesh, LatticePoint middle) {
     const auto sphere = tfan_test::perturbed_sphere(38, 40, 1);  // of radius 5000
     const auto base = static_cast<std::uint32_t>(mesh.positions.size());

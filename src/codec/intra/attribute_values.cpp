@@ -164,7 +164,8 @@ Result<std::vector<Value>> decode_from(std::span<const std::uint8_t> bytes, cons
     if (bytes.empty()) return fail(ErrorKind::corrupt_stream, "attribute values: the layer is empty");
     const auto predictor = static_cast<AttributePredictor>(bytes[0]);
     if (!source.offers(predictor))
-        return fail(ErrorKind::corrupt_stream, "attribute values: the layer names a predictor that this frame has not");
+        return fail(ErrorKind::corrupt_stream,
+                    "attribute values: the layer names a predictor that this frame does not have");
     RangeDecoder decoder(bytes.subspan(1));
     const bool complete = code_values(ReadingCoder<RangeDecoder>{decoder}, values, source, predictor, values.size());
     if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "attribute values: the layer ends too early");

@@ -212,7 +212,7 @@ Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> b
     if (step < 1 || step > 255)
         return fail(ErrorKind::corrupt_stream, "intra colours: the colour step is not within 1..255");
     if (positions.size() != vertex_count)
-        return fail(ErrorKind::corrupt_stream, "intra colours: the frame has not one position a vertex");
+        return fail(ErrorKind::corrupt_stream, "intra colours: the frame does not have one position per vertex");
     std::vector<Colour> colours(vertex_count);
     if (vertex_count == 0) return colours;
     ByteReader reader(bytes);

@@ -1,4 +1,5 @@
-// Removal of duplicate vertices (paper, section IV-C2): vertices that decode to the same point and attributes merge.
+// Removal of duplicate vertices (paper, section IV-C2): vertices that decode to the same point and attributes merge. I-
+// and EP-frames do this before their layers are coded; simplified references weld by the same code.
 #pragma once
 
 #include <cstdint>

@@ -69,8 +69,10 @@ Corners make_corners(std::span<const Triangle> triangles, std::size_t vertex_cou
     return corners;
 }
 
-// A vertex waits in the queue of its score: the number of parallelograms it completes, at most score_limit. The queues
-// are last in, first out. It may wait in several; the entries that are out of date are passed over.
+// The vertex that completes most parallelograms goes first: one that completes none yet is better put off until it can
+// be predicted from several sides. A vertex waits in the queue of its score: the number of parallelograms it completes,
+// at most score_limit. The queues are last in, first out. It may wait in several; the entries that are out of date are
+// passed over.
 constexpr std::size_t score_limit = 4;
 
 struct Traversal {

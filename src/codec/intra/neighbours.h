@@ -42,7 +42,7 @@ struct Neighbours {
     }
 };
 
-inline constexpr std::size_t row_limit = 8;  // parallelograms, and neighbours, kept a vertex
+inline constexpr std::size_t row_limit = 8;  // parallelograms, and neighbours, kept for a vertex
 
 // The coding order and the candidates of each vertex. Any triangles will do (non-manifold, duplicate, open, none);
 // degenerate ones are passed over, and of the triangles at an edge the first pairs with the second, the third with the

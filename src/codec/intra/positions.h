@@ -1,9 +1,10 @@
 // The positions of an intra frame, coded without loss given its connectivity.
 //
-// A vertex is predicted from the vertices known round it: a combination of the mean of its neighbours, its
+// A vertex is predicted from the vertices known around it: a combination of the mean of its neighbours, its
 // parallelograms and the mean of its neighbours' neighbours, whose weights the encoder fits to the frame and sends. The
 // residual is coded component by component, the one most across the surface last: it is predicted to lie in the plane
-// of the known triangles, given the other two.
+// of the known triangles, given the other two. The contexts are how large the residuals around were, along and across
+// the surface apart, and where within a step the prediction fell.
 //
 // Layer: six signed bytes (weights in 1/64), then the range-coded residuals in the order of Neighbours::order.
 #pragma once
@@ -17,7 +18,7 @@
 
 namespace htvm::internal {
 
-// q: one point a vertex, q.size() == neighbours.vertex_count(), every point on_lattice(). No vertices give no bytes.
+// q: one point per vertex, q.size() == neighbours.vertex_count(), every point on_lattice(). No vertices give no bytes.
 std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours);
 
 // The points that were encoded. Errors: corrupt_stream where the bytes end too early or lead off the lattice.

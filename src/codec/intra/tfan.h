@@ -5,6 +5,10 @@
 // (focus, a0, a1), (focus, a1, a2), ... A vertex met for the first time joins the queue and takes the next number, so
 // the decoder gives the vertices in visiting order. Any set of triangles comes back exactly: non-manifold, of mixed
 // orientation, degenerate or duplicate, with isolated vertices. docs/bitstream.md has the syntax.
+//
+// MPEG-4's TFAN writes degrees, configurations, operations and indices into separate streams. Here each step of a fan
+// is a decision or two among the few vertices that the open edges offer, in contexts of how full its surroundings are:
+// about a third fewer bits. The traversal is in triangle_fans.h, which M-TFAN shares.
 #pragma once
 
 #include <cstdint>

@@ -51,7 +51,7 @@ Result<std::vector<double>> calibrate(const Mesh& mesh, const Skeleton& skeleton
     }
     for (const auto& bone : skeleton.bones)
         if (bone.first >= joints.size() || bone.second >= joints.size())
-            return fail(ErrorKind::bad_input, "a bone names a joint that the pose has not");
+            return fail(ErrorKind::bad_input, "a bone names a joint that the pose does not have");
     const std::vector<std::int32_t> no_radii(skeleton.bones.size(), 0);
     std::vector<double> radii;
     for (auto& distances : axis_distances(on_lattice->positions, cylinders(skeleton.bones, joints, no_radii))) {

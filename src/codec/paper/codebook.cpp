@@ -20,6 +20,8 @@ std::uint64_t probability_of_length(std::uint16_t length) {
 
 }  // namespace
 
+// The code lengths say how often each index is expected: with them as starting probabilities no table is sent twice,
+// and a codebook kept from an earlier frame still adapts to this one.
 SymbolModel index_model(const Codebook& codebook) {
     const auto symbols = static_cast<std::uint32_t>(codebook.lengths.size());
     auto model = SymbolModel::for_alphabet(symbols);

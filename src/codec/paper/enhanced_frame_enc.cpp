@@ -30,6 +30,63 @@ NearestPoints tree_of(std::span<const LatticePoint> positions, std::span<const s
     return NearestPoints(points);
 }
 
+}  // namespace
+
+std::vector<std::uint32_t> find_reference_vertices(
+    const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
+    std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
+    std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
+    std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads) {
+    std::vector<bool> own(transforms.size());  // bones whose vertices refer to the bone's own sub-mesh
+    for (std::size_t bone = 0; bone < own.size(); ++bone)
+        own[bone] = choice == ReferenceChoice::bone && is_eligible(reference, eligible, bone);
+    std::vector<std::uint32_t> candidates;
+    std::optional<NearestPoints> all;
+    if (!std::all_of(bone_of_vertex.begin(), bone_of_vertex.end(), [&](BoneIndex bone) { return own[bone]; })) {
+        candidates = eligible_references(eligible, predicted.size());
+        all.emplace(tree_of(predicted, candidates));
+    }
+    // The trees stand in the reference's own space: a vertex is taken back there, not the sub-mesh forth.
+    std::vector<RigidMotion> back;
+    for (std::size_t bone = 0; bone < transforms.size(); ++bone)
+        back.push_back(motion_of(transforms[bone], reference.pivots[bone]).inverse());
+    std::vector<std::uint32_t> out(frame.size());
+    parallel_for(frame.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t k = begin; k < end; ++k) {
+            const auto bone = bone_of_vertex[k];
+            if (!own[bone] && !nearest.empty() && (eligible.empty() || eligible[nearest[k]] != 0)) {
+                out[k] = nearest[k];
+                continue;
+            }
+            if (!own[bone]) {
+                out[k] = candidates[all->nearest(point_of(frame[k])).index];
+                continue;
+            }
+            const Eigen::Vector3d v(frame[k].x, frame[k].y, frame[k].z);
+            const Eigen::Vector3f x = back[bone](v).cast<float>();
+            out[k] = reference.sub_meshes.of(bone)[search.sub_mesh[bone].nearest({x.x(), x.y(), x.z()}).index];
+        }
+    });
+    return out;
+}
+
+ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex, std::size_t references) {
+    std::vector<std::uint32_t> next(references + 1, 0);
+    for (const auto r : reference_of_vertex) ++next[r + 1];
+    for (std::size_t r = 0; r < references; ++r) next[r + 1] += next[r];
+    ResidualOrder out;
+    out.vertex.resize(reference_of_vertex.size());
+    out.reference.resize(reference_of_vertex.size());
+    for (std::size_t k = 0; k < reference_of_vertex.size(); ++k) {
+        const auto at = next[reference_of_vertex[k]]++;
+        out.vertex[at] = static_cast<std::uint32_t>(k);
+        out.reference[at] = reference_of_vertex[k];
+    }
+    return out;
+}
+
+namespace {
+
 // Everything of the frame's vertices in the order E^ord, one entry a residual.
 struct OrderedResiduals {
     ResidualOrder order;
@@ -105,6 +162,26 @@ LatticeMesh decode_vertices(const LatticeMesh& mesh, const ReferenceMesh& refere
     return out;
 }
 
+// Residuals against the predicted mesh, quantised, and what they decode to.
+OrderedResiduals quantise_residuals(const EnhancedFrameSource& source, std::span<const std::uint8_t> eligible,
+                                    Codebooks& codebooks, const EnhancedFrameOptions& options, StageClock& clock) {
+    const auto& mesh = *source.mesh;
+    const auto& reference = *source.reference;
+    const auto& predicted = source.motion->predicted;
+    const auto reference_of_vertex = find_reference_vertices(
+        reference, *source.search, predicted, source.motion->transforms, mesh.positions, source.bone_of_vertex,
+        source.nearest, eligible, options.reference_choice, options.threads);
+    OrderedResiduals out;
+    out.order = order_residuals(reference_of_vertex, predicted.size());
+    clock.done("reference vertices");
+    out.geometry = quantise_with(codebooks.geometry, position_residuals(mesh, predicted, out.order), options.geometry);
+    if (!reference.mesh.colours.empty())
+        out.colour = quantise_with(codebooks.colour, colour_residuals(mesh, reference.mesh, out.order), options.colour);
+    out.decoded = decode_vertices(mesh, reference, predicted, out);
+    clock.done("quantisation");
+    return out;
+}
+
 template <class Value>
 std::vector<Value> selected(const std::vector<Value>& values, const std::vector<std::uint32_t>& kept) {
     std::vector<Value> out;
@@ -114,7 +191,8 @@ std::vector<Value> selected(const std::vector<Value>& values, const std::vector<
     return out;
 }
 
-// Leaves out the residuals of merged vertices; the triangles follow into the numbering of E^ord.
+// Leaves out the residuals of merged vertices, before any layer is coded, so that they cost nothing in any; the
+// triangles follow into the numbering of E^ord.
 std::vector<Triangle> remove_duplicates(OrderedResiduals& residuals, const std::vector<Triangle>& triangles,
                                         bool merge) {
     auto& order = residuals.order;
@@ -157,80 +235,7 @@ void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrame
     }
 }
 
-// Residuals against the predicted mesh, quantised, and what they decode to.
-OrderedResiduals quantise_residuals(const EnhancedFrameSource& source, std::span<const std::uint8_t> eligible,
-                                    Codebooks& codebooks, const EnhancedFrameOptions& options, StageClock& clock) {
-    const auto& mesh = *source.mesh;
-    const auto& reference = *source.reference;
-    const auto& predicted = source.motion->predicted;
-    const auto reference_of_vertex = find_reference_vertices(
-        reference, *source.search, predicted, source.motion->transforms, mesh.positions, source.bone_of_vertex,
-        source.nearest, eligible, options.reference_choice, options.threads);
-    OrderedResiduals out;
-    out.order = order_residuals(reference_of_vertex, predicted.size());
-    clock.done("reference vertices");
-    out.geometry = quantise_with(codebooks.geometry, position_residuals(mesh, predicted, out.order), options.geometry);
-    if (!reference.mesh.colours.empty())
-        out.colour = quantise_with(codebooks.colour, colour_residuals(mesh, reference.mesh, out.order), options.colour);
-    out.decoded = decode_vertices(mesh, reference, predicted, out);
-    clock.done("quantisation");
-    return out;
-}
-
 }  // namespace
-
-std::vector<std::uint32_t> find_reference_vertices(
-    const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
-    std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
-    std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
-    std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads) {
-    std::vector<bool> own(transforms.size());  // bones whose vertices refer to the bone's own sub-mesh
-    for (std::size_t bone = 0; bone < own.size(); ++bone)
-        own[bone] = choice == ReferenceChoice::bone && is_eligible(reference, eligible, bone);
-    std::vector<std::uint32_t> candidates;
-    std::optional<NearestPoints> all;
-    if (!std::all_of(bone_of_vertex.begin(), bone_of_vertex.end(), [&](BoneIndex bone) { return own[bone]; })) {
-        candidates = eligible_references(eligible, predicted.size());
-        all.emplace(tree_of(predicted, candidates));
-    }
-    // The trees stand in the reference's own space: a vertex is taken back there, not the sub-mesh forth.
-    std::vector<RigidMotion> back;
-    for (std::size_t bone = 0; bone < transforms.size(); ++bone)
-        back.push_back(motion_of(transforms[bone], reference.pivots[bone]).inverse());
-    std::vector<std::uint32_t> out(frame.size());
-    parallel_for(frame.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            const auto bone = bone_of_vertex[k];
-            if (!own[bone] && !nearest.empty() && (eligible.empty() || eligible[nearest[k]] != 0)) {
-                out[k] = nearest[k];
-                continue;
-            }
-            if (!own[bone]) {
-                out[k] = candidates[all->nearest(point_of(frame[k])).index];
-                continue;
-            }
-            const Eigen::Vector3d v(frame[k].x, frame[k].y, frame[k].z);
-            const Eigen::Vector3f x = back[bone](v).cast<float>();
-            out[k] = reference.sub_meshes.of(bone)[search.sub_mesh[bone].nearest({x.x(), x.y(), x.z()}).index];
-        }
-    });
-    return out;
-}
-
-ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex, std::size_t references) {
-    std::vector<std::uint32_t> next(references + 1, 0);
-    for (const auto r : reference_of_vertex) ++next[r + 1];
-    for (std::size_t r = 0; r < references; ++r) next[r + 1] += next[r];
-    ResidualOrder out;
-    out.vertex.resize(reference_of_vertex.size());
-    out.reference.resize(reference_of_vertex.size());
-    for (std::size_t k = 0; k < reference_of_vertex.size(); ++k) {
-        const auto at = next[reference_of_vertex[k]]++;
-        out.vertex[at] = static_cast<std::uint32_t>(k);
-        out.reference[at] = reference_of_vertex[k];
-    }
-    return out;
-}
 
 EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages) {

@@ -16,10 +16,11 @@
 
 namespace htvm::internal {
 
-// Which reference vertices a vertex may be coded against.
+// Which reference vertices a vertex may be coded against. The stream does not care how the encoder chose.
 enum class ReferenceChoice : std::uint8_t {
     bone,  // the paper's: the nearest vertex of A(b_P), the last correspondence of the registration
-    any,   // the nearest vertex of the whole predicted mesh: mis-skinned vertices cost less
+    any,   // the nearest vertex of the whole predicted mesh: a vertex whose bone was guessed wrong does not refer to
+           // another limb by a long residual
 };
 
 // A codebook in use: kept from frame to frame as long as that is cheaper than a new one.
@@ -48,7 +49,7 @@ struct EnhancedFrameSource {
     const ReferenceSearch* search = nullptr;
     std::span<const std::uint32_t>
         nearest;                    // of each vertex the nearest of the predicted mesh, where known; else empty
-    std::vector<bool> coded_bones;  // motion-based coding: one a bone; empty: all of the frame is coded
+    std::vector<bool> coded_bones;  // motion-based coding: one per bone; empty: all of the frame is coded
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
 };
 
@@ -71,7 +72,7 @@ EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Co
 // The first two steps by themselves.
 
 // The reference vertex of each vertex of the frame. The reference mesh must have a vertex; where A(b_P) is empty, the
-// nearest of all is taken. eligible: empty, or one a reference vertex: those with 0 are never chosen (motion-based
+// nearest of all is taken. eligible: empty, or one per reference vertex: those with 0 are never chosen (motion-based
 // coding); at least one must be eligible. nearest: empty, or of each frame vertex the nearest predicted one.
 std::vector<std::uint32_t> find_reference_vertices(
     const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
@@ -79,9 +80,10 @@ std::vector<std::uint32_t> find_reference_vertices(
     std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
     std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads);
 
-// E^ord: the frame's vertices by ascending reference vertex, and in their own order where that is the same.
+// E^ord: the frame's vertices by ascending reference vertex, and in their own order where that is the same. It is set
+// by the geometry, not by the connectivity, and lets the mapping layer say by counts alone where each residual belongs.
 struct ResidualOrder {
-    std::vector<std::uint32_t> vertex;     // of the frame, one a residual
+    std::vector<std::uint32_t> vertex;     // of the frame, one per residual
     std::vector<std::uint32_t> reference;  // its reference vertex
 };
 ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex, std::size_t references);

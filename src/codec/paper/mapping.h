@@ -17,11 +17,11 @@
 
 namespace htvm::internal {
 
-// What the reference mesh says of its vertices, once an I-frame.
+// What the reference mesh says of its vertices, once per I-frame.
 struct MappingPrior {
     std::vector<std::uint8_t> area_class;        // 0..9: a third of the area of the triangles around, against the mean
     std::vector<std::uint32_t> first_neighbour;  // vertices + 1 offsets
-    std::vector<std::uint32_t> neighbours;       // of lower index, from triangles; at most 8 a vertex, may repeat
+    std::vector<std::uint32_t> neighbours;       // of lower index, from triangles; at most 8 each, may repeat
 };
 MappingPrior make_mapping_prior(std::span<const LatticePoint> positions, std::span<const Triangle> triangles);
 
@@ -34,7 +34,7 @@ std::vector<std::uint32_t> eligible_references(std::span<const std::uint8_t> eli
 std::vector<std::uint8_t> encode_mapping(std::span<const std::uint32_t> residuals_of, const MappingPrior& prior,
                                          std::span<const std::uint8_t> eligible = {});
 
-// Gives residuals_of, one a reference vertex, with sum `residuals`; where no reference vertex is eligible, all 0.
+// Gives residuals_of, one per reference vertex, with sum `residuals`; where no reference vertex is eligible, all 0.
 Result<std::vector<std::uint32_t>> decode_mapping(std::span<const std::uint8_t> bytes, std::size_t residuals,
                                                   const MappingPrior& prior,
                                                   std::span<const std::uint8_t> eligible = {});

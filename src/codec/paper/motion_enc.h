@@ -13,9 +13,9 @@
 
 namespace htvm::internal {
 
-// The reference's sub-meshes, ready for nearest-neighbour search; built once an I-frame. Lattice units.
+// The reference's sub-meshes, ready for nearest-neighbour search; built once per I-frame. Lattice units.
 struct ReferenceSearch {
-    std::vector<NearestPoints> sub_mesh;                // one a bone
+    std::vector<NearestPoints> sub_mesh;                // one per bone
     std::vector<std::vector<Eigen::Vector3f>> normals;  // of the sub-mesh's vertices, from the triangles around them
 };
 ReferenceSearch make_reference_search(const ReferenceMesh& reference);

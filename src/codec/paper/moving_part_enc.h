@@ -2,7 +2,7 @@
 // captured mesh that stands for them.
 //
 // The paper thresholds the bones' motion alone. Here a bone whose animated sub-mesh is not where the capture's surface
-// is, is coded whatever its motion: a tracker that freezes or errs costs bits, not correctness.
+// is, is coded whatever its motion: a tracker that freezes or goes wrong costs bits, not correctness.
 #pragma once
 
 #include <span>
@@ -35,7 +35,7 @@ struct MovingPart {
 };
 // A captured vertex belongs to a coded bone where the nearest predicted vertex does: both sides of the seam are cut
 // along the same line, however differently the two frames were skinned. So does one farther than `stray` lattice units
-// from the predicted mesh: what the reference has not is coded.
+// from the predicted mesh: what the reference does not have is coded.
 MovingPart cut_moving_part(const LatticeMesh& mesh, std::span<const BoneIndex> bone_of_vertex,
                            const ReferenceMesh& reference, const AnimationFit& fit,
                            const std::vector<bool>& coded_bones, double stray);
