@@ -1,11 +1,20 @@
 // Speed of a frame, by kind and by stage, on the default synthetic person: about 35,000 vertices with colour.
 //
 // Real time, on all cores; frames per second beside it. HTVM_BENCH_VERTICES changes the size.
+//
+// The benchmarks `..._two_threads` take each frame on one thread and on two, in turn, so that whatever else the machine
+// does falls on both alike: the counter `one/two` is the ratio of the median times, above 1 where two threads are
+// faster.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <array>
+#include <chrono>
 #include <cstdlib>
 #include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "htvm/decoder.hpp"
 #include "htvm/encoder.hpp"
@@ -116,32 +125,104 @@ void encode(benchmark::State& state, Kind kind) {
     state.counters["bpv"] = bits / static_cast<double>(state.iterations());
 }
 
+// The frames' times on one thread and on two, ms.
+using Times = std::array<std::vector<double>, 2>;
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+// Takes the next frame on one thread and on two, each first by turns, with code(threads - 1).
+template <class Code>
+void take_both(Times& times, const Code& code) {
+    const std::size_t first = times[0].size() % 2;
+    for (const std::size_t which : {first, 1 - first}) {
+        const auto begin = std::chrono::steady_clock::now();
+        code(which);
+        const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
+        times[which].push_back(time.count());
+    }
+}
+
+void report(benchmark::State& state, const Times& times) {
+    const double one = median(times[0]), two = median(times[1]);
+    state.counters["one, ms"] = one;
+    state.counters["two, ms"] = two;
+    state.counters["one/two"] = one / two;
+}
+
+void encode_two_threads(benchmark::State& state, Kind kind) {
+    const auto quality = static_cast<double>(state.range(0));
+    std::array<htvm::Encoder, 2> encoders{primed(kind, quality, 1), primed(kind, quality, 2)};
+    Times times;
+    std::int64_t frame = 0;
+    for (auto _ : state) {
+        ++frame;
+        const auto& input = input_of(frame);
+        take_both(times, [&](std::size_t which) {
+            auto& encoder = encoders[which];
+            if (!encoder.push(input.mesh, &input.pose, frame, kind == Kind::intra)) std::abort();
+            while (auto packet = encoder.pull()) benchmark::DoNotOptimize(packet->payload.data());
+        });
+        if (!is_kind(state, encoders[0].last_frame().type, kind)) return;
+    }
+    report(state, times);
+}
+
 void encode_intra(benchmark::State& state) { encode(state, Kind::intra); }
 void encode_enhanced(benchmark::State& state) { encode(state, Kind::enhanced); }
 void encode_motion(benchmark::State& state) { encode(state, Kind::motion); }
 void encode_predicted(benchmark::State& state) { encode(state, Kind::predicted); }
 void encode_tracked(benchmark::State& state) { encode(state, Kind::tracked); }
 
-void decode(benchmark::State& state, Kind kind) {
-    auto encoder = primed(kind, static_cast<double>(state.range(0)), 0);
+// The packets up to a frame of that kind, which is the last of it among them.
+std::pair<std::vector<htvm::Packet>, htvm::Packet> coded(Kind kind, double quality) {
+    auto encoder = primed(kind, quality, 0);
     const auto& input = capture()[2];
     if (!encoder.push(input.mesh, &input.pose, 1)) std::abort();
-    htvm::DecoderOptions options;
-    options.threads = static_cast<unsigned>(state.range(1));
-    htvm::Decoder decoder(options);
-    htvm::Packet measured;
+    std::pair<std::vector<htvm::Packet>, htvm::Packet> out;
     while (auto packet = encoder.pull()) {
-        if (!decoder.push(*packet)) std::abort();
         const auto type = htvm::frame_type(packet->kind);
-        if (type && (*type == htvm::FrameType::intra) == (kind == Kind::intra)) measured = *packet;
+        if (type && (*type == htvm::FrameType::intra) == (kind == Kind::intra)) out.second = *packet;
+        out.first.push_back(std::move(*packet));
     }
+    return out;
+}
+
+htvm::Decoder primed_decoder(const std::vector<htvm::Packet>& packets, unsigned threads) {
+    htvm::DecoderOptions options;
+    options.threads = threads;
+    htvm::Decoder decoder(options);
+    for (const auto& packet : packets)
+        if (!decoder.push(packet)) std::abort();
+    return decoder;
+}
+
+void decode_frame(htvm::Decoder& decoder, const htvm::Packet& packet) {
+    auto frame = decoder.push(packet);
+    if (!frame || !*frame) std::abort();
+    benchmark::DoNotOptimize((*frame)->mesh.positions.data());
+}
+
+void decode(benchmark::State& state, Kind kind) {
+    const auto [packets, measured] = coded(kind, static_cast<double>(state.range(0)));
+    auto decoder = primed_decoder(packets, static_cast<unsigned>(state.range(1)));
     if (!is_kind(state, *htvm::frame_type(measured.kind), kind)) return;
-    for (auto _ : state) {
-        auto frame = decoder.push(measured);
-        if (!frame || !*frame) std::abort();
-        benchmark::DoNotOptimize((*frame)->mesh.positions.data());
-    }
-    report(state, {});
+    for (auto _ : state) decode_frame(decoder, measured);
+    report(state, std::map<std::string, double>{});
+}
+
+void decode_two_threads(benchmark::State& state, Kind kind) {
+    const auto sequence = coded(kind, static_cast<double>(state.range(0)));
+    const auto& packets = sequence.first;
+    const auto& measured = sequence.second;
+    std::array<htvm::Decoder, 2> decoders{primed_decoder(packets, 1), primed_decoder(packets, 2)};
+    if (!is_kind(state, *htvm::frame_type(measured.kind), kind)) return;
+    Times times;
+    for (auto _ : state) take_both(times, [&](std::size_t which) { decode_frame(decoders[which], measured); });
+    report(state, times);
 }
 
 void decode_intra(benchmark::State& state) { decode(state, Kind::intra); }
@@ -157,6 +238,10 @@ void arguments(benchmark::internal::Benchmark* benchmark) {
     benchmark->Unit(benchmark::kMillisecond)->UseRealTime();
 }
 
+void one_quality(benchmark::internal::Benchmark* benchmark) {
+    benchmark->ArgName("quality")->Arg(50)->Unit(benchmark::kMillisecond)->UseRealTime();
+}
+
 BENCHMARK(encode_intra)->Apply(arguments);
 BENCHMARK(encode_enhanced)->Apply(arguments);
 BENCHMARK(encode_motion)->Apply(arguments);
@@ -167,5 +252,15 @@ BENCHMARK(decode_enhanced)->Apply(arguments);
 BENCHMARK(decode_motion)->Apply(arguments);
 BENCHMARK(decode_predicted)->Apply(arguments);
 BENCHMARK(decode_tracked)->Apply(arguments);
+BENCHMARK_CAPTURE(encode_two_threads, intra, Kind::intra)->Apply(one_quality);
+BENCHMARK_CAPTURE(encode_two_threads, enhanced, Kind::enhanced)->Apply(one_quality);
+BENCHMARK_CAPTURE(encode_two_threads, motion, Kind::motion)->Apply(one_quality);
+BENCHMARK_CAPTURE(encode_two_threads, predicted, Kind::predicted)->Apply(one_quality);
+BENCHMARK_CAPTURE(encode_two_threads, tracked, Kind::tracked)->Apply(one_quality);
+BENCHMARK_CAPTURE(decode_two_threads, intra, Kind::intra)->Apply(one_quality);
+BENCHMARK_CAPTURE(decode_two_threads, enhanced, Kind::enhanced)->Apply(one_quality);
+BENCHMARK_CAPTURE(decode_two_threads, motion, Kind::motion)->Apply(one_quality);
+BENCHMARK_CAPTURE(decode_two_threads, predicted, Kind::predicted)->Apply(one_quality);
+BENCHMARK_CAPTURE(decode_two_threads, tracked, Kind::tracked)->Apply(one_quality);
 
 }  // namespace

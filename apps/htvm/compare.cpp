@@ -16,6 +16,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "compare_report.h"
+#include "core/thread.h"
 #include "frame_pairs.h"
 #include "io/sequence.h"
 #include "mesh_source.h"
@@ -29,6 +30,7 @@ struct Options {
     std::size_t frames = 0;  // 0: all
     std::vector<std::string> only;
     CompareOptions compare;
+    unsigned threads = 0;
     DecoderOptions limits;  // of streams
     bool grey = false, follow_sequence = false, json = false;
     double peak_mm = 0;
@@ -242,6 +244,8 @@ Result<void> compare(Options options) {
         if (!box) return tl::unexpected(box.error());
         options.compare.view_box = *box;
     }
+    const internal::ThreadPool pool(options.threads);
+    options.compare.threads = pool.threads();
     const auto measured = measure(options);
     if (!measured) return tl::unexpected(measured.error());
     // The frames' PSNR takes the sequence's peak, so that they can be compared with each other.
@@ -316,8 +320,7 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("--flap-distance", o.compare.topology_options.flap_distance,
                         "Farthest apart that a flap's layers are, mm (default: the same)");
     add_picture_options(*command, o);
-    command->add_option("--threads", o.compare.threads,
-                        "Threads to use (default: one per core); the result is the same");
+    command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
     add_decoder_limits(*command, o.limits);
     command->add_option("--csv", o.csv,

@@ -58,13 +58,14 @@ void add_pose(SkeletonTrack& track, Pose pose) {
 
 // Makes as many frames at once as there are threads, so that memory does not grow with the number of frames.
 Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, SkeletonTrack& exact) {
-    const unsigned threads = std::min(thread_count(options.threads), 64u);
+    const ThreadPool pool(std::min(thread_count(options.threads), 64u));
+    const Threads threads = pool.threads();
     Written written;
     Progress progress("synth", static_cast<std::size_t>(options.frames));
     for (int done = 0; done < options.frames;) {
-        const int count = std::min(static_cast<int>(threads), options.frames - done);
+        const int count = std::min(static_cast<int>(threads.count), options.frames - done);
         std::vector<SynthFrame> made(static_cast<std::size_t>(count));
-        const unsigned inner = std::max(1u, threads / static_cast<unsigned>(count));
+        const Threads inner = threads.at_most(std::max(1u, threads.count / static_cast<unsigned>(count)));
         parallel_for(made.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
                 made[i] = synth_frame(options.synth, options.first_frame + done + static_cast<int>(i), inner);

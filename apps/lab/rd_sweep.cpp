@@ -87,7 +87,9 @@ void sweep(const std::vector<SweepJob>& jobs, const SourceFrames& source, const 
     const auto workers =
         static_cast<unsigned>(std::clamp<std::size_t>(options.threads, 1, std::max<std::size_t>(jobs.size(), 1)));
     SweepOptions each = options;
-    each.compare.threads = std::max(1u, options.threads / workers);  // where there are more cores than jobs
+    const ThreadPool pool(std::max(1u, options.threads));
+    each.compare.threads =
+        pool.threads().at_most(std::max(1u, options.threads / workers));  // where there are more cores than jobs
     std::atomic<std::size_t> next = 0;
     std::mutex mutex;
     auto work = [&](std::size_t, std::size_t) {
@@ -100,7 +102,7 @@ void sweep(const std::vector<SweepJob>& jobs, const SourceFrames& source, const 
             done(i, std::move(result));
         }
     };
-    parallel_for(workers, workers, 1, work);
+    parallel_for(workers, pool.threads().at_most(workers), 1, work);
 }
 
 }  // namespace htvm::lab

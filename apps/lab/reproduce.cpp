@@ -302,10 +302,11 @@ Result<FactList> capture_facts(const Options& options, const SourceFrames& sourc
     topology_options.defects = false;
     findings.has_colour = true;
     const std::size_t every = measure_every(source.size(), 5);
+    const ThreadPool pool(options.threads);
     for (std::size_t i = 0; i < source.size(); i += every) {
         const auto frame = source.frame(i);
         if (!frame) return tl::unexpected(frame.error());
-        const auto counted = topology((*frame)->mesh, topology_options, options.threads);
+        const auto counted = topology((*frame)->mesh, topology_options, pool.threads());
         if (!counted) return tl::unexpected(counted.error());
         findings.has_colour = findings.has_colour && !(*frame)->mesh.colours.empty();
         triangles += static_cast<double>(counted->triangles);

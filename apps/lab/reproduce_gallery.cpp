@@ -49,7 +49,6 @@ Result<double> surface_error_of(const SourceFrames& source, std::size_t index, c
     CompareOptions options;
     options.points = options.cloud = options.pictures = options.topology = false;
     options.surface_options.samples = 100000;
-    options.threads = 1;
     const auto compared = compare_frame((*frame)->mesh, decoded, options);
     if (!compared) return tl::unexpected(compared.error());
     return m2(compared->surface);
@@ -93,8 +92,8 @@ Result<std::vector<Match>> match_rates(const SourceFrames& source, const std::ve
     }
     std::vector<Result<void>> results(jobs.size());
     std::atomic<std::size_t> next = 0;
-    const unsigned workers = thread_count(options.threads);
-    parallel_for(workers, workers, 1, [&](std::size_t, std::size_t) {
+    const ThreadPool pool(options.threads);
+    parallel_for(pool.threads().count, pool.threads(), 1, [&](std::size_t, std::size_t) {
         for (std::size_t i = next++; i < jobs.size(); i = next++)
             results[i] = run_one(source, jobs[i], i % 2, matches[i / 2]);
     });

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/thread.h"
 #include "metrics/compare.h"
 
 namespace htvm::lab {
@@ -73,7 +74,8 @@ Result<double> surface_error(const Mesh& original, const Mesh& decoded, unsigned
     CompareOptions options;
     options.points = options.cloud = options.pictures = options.topology = false;
     options.surface_options.samples = 100000;
-    options.threads = threads;
+    const internal::ThreadPool pool(threads);
+    options.threads = pool.threads();
     const auto compared = compare_frame(original, decoded, options);
     if (!compared) return tl::unexpected(compared.error());
     return m2(compared->surface);
@@ -165,9 +167,10 @@ Result<std::vector<Picture>> draw_spot(const std::vector<Mesh>& meshes, const Se
     if (!cameras) return tl::unexpected(cameras.error());
     RenderOptions options;
     options.shading = Shading::flat;
+    const internal::ThreadPool pool(threads);
     std::vector<Picture> out;
     for (const auto& mesh : meshes)
-        out.push_back(halved(render(around(mesh, spot, radius), cameras->front(), options, threads)));
+        out.push_back(halved(render(around(mesh, spot, radius), cameras->front(), options, pool.threads())));
     return out;
 }
 

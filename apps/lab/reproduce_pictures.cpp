@@ -172,8 +172,9 @@ Result<std::vector<Picture>> draw_tiles(const std::vector<const Mesh*>& meshes, 
     if (!cameras) return tl::unexpected(cameras.error());
     std::vector<Picture> out;
     std::optional<Crop> crop;
+    const internal::ThreadPool pool(threads);
     for (const auto* mesh : meshes) {
-        const Picture picture = render(*mesh, cameras->front(), options, threads);
+        const Picture picture = render(*mesh, cameras->front(), options, pool.threads());
         if (!crop) crop = view.close_up ? Crop{0, 0, picture.width, picture.height} : covered_part(picture);
         out.push_back(halved(cropped(picture, *crop)));
     }

@@ -9,6 +9,7 @@
 #include "codec/paper/zipper.h"
 #include "codec/reference/transforms.h"
 #include "codec/stream/sequence.h"
+#include "core/thread.h"
 
 namespace htvm::lab {
 
@@ -20,7 +21,7 @@ struct OpenDecoder {
     std::optional<SequenceHeader> header;
     std::optional<ReferenceMesh> reference;
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
-    unsigned threads = 1;
+    Threads threads = {};
 };
 
 const Codebook* book_of(const std::optional<NumberedCodebook>& codebook) {
@@ -135,8 +136,9 @@ Result<std::vector<SeamStages>> code_in_stages(const std::vector<std::shared_ptr
     all.radii = facts.radii;
     auto encoder = Encoder::create(all);
     if (!encoder) return tl::unexpected(encoder.error());
+    const ThreadPool pool(options.threads, options.runner);
     OpenDecoder decoder;
-    decoder.threads = options.threads;
+    decoder.threads = pool.threads();
     std::vector<SeamStages> out;
     for (const auto& frame : frames) {
         const auto pushed = encoder->push(frame->mesh, frame->pose ? &*frame->pose : nullptr, frame->timestamp_us);
@@ -162,8 +164,9 @@ Result<SeamCounts> count_seams(const Mesh& original, const SeamStages& stages, u
                                                         {&stages.overlapping, &out.overlapping},
                                                         {&stages.trimmed, &out.trimmed},
                                                         {&stages.zippered, &out.zippered}};
+    const ThreadPool pool(threads);
     for (const auto& [mesh, counts] : meshes) {
-        auto counted = topology(*mesh, options, threads);
+        auto counted = topology(*mesh, options, pool.threads());
         if (!counted) return tl::unexpected(counted.error());
         *counts = *counted;
     }

@@ -52,7 +52,7 @@ void check_reference(const fuzz::SmallMesh& mesh, fuzz::FuzzInput& input) {
     lattice_mesh.triangles = mesh.triangles;
     lattice_mesh.normals.assign(mesh.positions.size(), {100, -20, 70});
     const auto reference = make_reference(lattice_mesh, bones, joints, std::vector<QuantisedRotation>(bones.size()),
-                                          radii, std::abs(input.number(lattice_limit)), 0, 1);
+                                          radii, std::abs(input.number(lattice_limit)), 0, {});
     if (!reference.weights.empty()) check_weights(reference.weights, mesh.positions.size(), bones.size());
     std::vector<QuantisedTransform> transforms(bones.size());
     for (auto& transform : transforms) {
@@ -60,7 +60,7 @@ void check_reference(const fuzz::SmallMesh& mesh, fuzz::FuzzInput& input) {
         for (auto& c : transform.rotation.others) c = static_cast<std::int16_t>(input.number(1 << rotation_bits));
         transform.shift = {input.number(2 * lattice_limit), input.number(2 * lattice_limit), input.number(99)};
     }
-    const auto moved = predict_positions(reference, transforms, 1);
+    const auto moved = predict_positions(reference, transforms, {});
     require(moved.size() == mesh.positions.size() && fuzz::all_on_lattice(moved), "predictions are on the lattice");
     (void)predict_normals(reference, transforms);
 }
@@ -78,7 +78,7 @@ void check_tracked(const fuzz::SmallMesh& mesh, fuzz::FuzzInput& input) {
         for (auto& c : transform.rotation.others) c = static_cast<std::int16_t>(input.number(1 << rotation_bits));
         transform.shift.x = input.number(2 * lattice_limit);
     }
-    const auto moved = moved_by_nodes(*reference, transforms, 1);
+    const auto moved = moved_by_nodes(*reference, transforms, {});
     require(fuzz::all_on_lattice(moved), "moved vertices are on the lattice");
     const auto normals = exact_normals(moved, mesh.triangles);
     std::vector<std::int32_t> displacement;

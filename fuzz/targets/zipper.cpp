@@ -29,7 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::vector<std::uint8_t> still;
     for (std::size_t v = 0; v < b.positions.size(); ++v)
         still.push_back(v < 64 ? input.flag() : v >= from % 300 && v < to % 300);
-    const auto joined = zipper(coded, animated, still, 1);
+    const auto joined = zipper(coded, animated, still, {});
     require(fuzz::names_vertices(joined.triangles, joined.positions.size()), "triangles of vertices that are there");
     require(joined.positions.size() >= a.positions.size() && joined.triangles.size() >= a.triangles.size() &&
                 std::equal(a.positions.begin(), a.positions.end(), joined.positions.begin()) &&

@@ -4,10 +4,10 @@
 //   for each packet:  auto frame = decoder.push(packet);   // Result<std::optional<DecodedFrame>>
 //                     if (frame && *frame) show((*frame)->mesh);
 //
-// EP- and P-frames refer to I-frames (and to codebook packets) alone: any of them may be left out, but a lost codebook costs
-// the frames that name it, until the next one. T-frames refer to the I-frame or, by default, to the T-frame before: a lost
-// one then costs those up to the next that refers to an I-frame. A decoder may start at any I-frame once it has seen the
-// sequence header.
+// EP- and P-frames refer to I-frames (and to codebook packets) alone: any of them may be left out, but a lost codebook
+// costs the frames that name it, until the next one. T-frames refer to the I-frame or, by default, to the T-frame
+// before: a lost one then costs those up to the next that refers to an I-frame. A decoder may start at any I-frame once
+// it has seen the sequence header.
 #pragma once
 
 #include <cstdint>
@@ -21,6 +21,7 @@
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
 #include "htvm/skeleton.hpp"
+#include "htvm/threads.hpp"
 
 namespace htvm {
 
@@ -35,7 +36,8 @@ struct DecoderOptions {
     // counts of vertices and triangles: about 1 KB a vertex of an ordinary mesh. A coder of I-frames that is plugged in
     // takes its own besides.
     std::uint64_t max_memory = std::uint64_t{1} << 32;
-    unsigned threads = 0;                           // 0: one a core; the meshes are the same for any number
+    unsigned threads = 0;  // at work at once; 0: one per core; the meshes are the same for any number
+    TaskRunner runner;     // gives the threads; none: a pool of the decoder's own
     std::optional<ExternalIntraCoder> intra_coder;  // for I-frames of another coder; none: they are unsupported
 };
 

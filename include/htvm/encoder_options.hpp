@@ -1,6 +1,6 @@
 // What an encoder can be told. Every option is listed once, here with its default and meaning, and in
-// src/codec/encoder_options.cpp with its range; the checks, the C interface, the command line and docs/options.md follow
-// from that list.
+// src/codec/encoder_options.cpp with its range; the checks, the C interface, the command line and docs/options.md
+// follow from that list.
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include "htvm/frame.hpp"
 #include "htvm/intra_coder.hpp"
 #include "htvm/skeleton.hpp"
+#include "htvm/threads.hpp"
 
 namespace htvm {
 
@@ -39,8 +40,8 @@ enum class TrackedReferences : std::uint8_t {
 // Profile::tracked alone.
 struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
-    double simplify = 0.4;     // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
-                               // their surface, in geometry steps; 0: they keep every vertex and their connectivity
+    double simplify = 0.4;  // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
+                            // their surface, in geometry steps; 0: they keep every vertex and their connectivity
     double node_spacing = 80;  // mm, between the nodes of the deformation graph
 };
 
@@ -51,9 +52,9 @@ struct TopologyOptions {
     double intra_above = 0;        // mm, choice by motion: with more, an I-frame; 0: never
     double still_below = 0;        // mm, motion-based coding (section V): bones that moved less since the I-frame are
                                    // animated, not coded; 0: all are coded
-    double animation_error = 2;    // mm: what is animated is coded after all where it is farther (root mean square, bone
-                                   // by bone) from the capture's surface; 0: unchecked, as in the paper
-    bool scene_changes = true;     // an I-frame where much of the mesh is nowhere near the reference's
+    double animation_error = 2;  // mm: what is animated is coded after all where it is farther (root mean square, bone
+                                 // by bone) from the capture's surface; 0: unchecked, as in the paper
+    bool scene_changes = true;   // an I-frame where much of the mesh is nowhere near the reference's
     bool merge_duplicates = true;  // merge vertices that decode to the same, drop triangles that collapse
     int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
     ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured better than the paper's, see docs
@@ -63,8 +64,8 @@ struct TopologyOptions {
 
 // Quality that follows from a rate or an error, instead of from the steps.
 struct RateOptions {
-    double bits_per_second = 0;  // > 0: the rate to keep to
-    double buffer_seconds = 1;   // of the receiver: what a frame may come late against a constant rate
+    double bits_per_second = 0;         // > 0: the rate to keep to
+    double buffer_seconds = 1;          // of the receiver: what a frame may come late against a constant rate
     std::vector<FrameCost> first_pass;  // with bits_per_second: last_cost() of every frame of a first run over the same
                                         // capture; the quality then stays as even as the buffer allows
     double target_error = 0;            // mm (M2), > 0: the error that every frame comes near to
@@ -78,7 +79,8 @@ struct EncoderOptions {
     int key_interval = 30;       // most frames from one I-frame to the next; 1: I-frames only
     int least_key_interval = 1;  // fewest, unless the frame cannot refer to the I-frame or the scene changes
     int lattice_bits = 0;        // decoded positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is
-    unsigned threads = 0;        // 0: one a core; the bytes are the same for any number
+    unsigned threads = 0;        // at work at once; 0: one per core; the bytes are the same for any number
+    TaskRunner runner;           // gives the threads; none: a pool of the encoder's own
     std::uint32_t fps_numerator = 30, fps_denominator = 1;  // frames a second, for players
     std::uint32_t unit_micrometres = 1000;  // the capture's own unit, kept so that a decoder can give it back
     Skeleton skeleton;          // no bones: the capture has no skeleton, and one bone that spans the mesh serves

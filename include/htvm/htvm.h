@@ -85,6 +85,13 @@ typedef struct htvm_allocator {
     void (*release)(void* user, void* memory);   /* memory is never NULL */
 } htvm_allocator;
 
+/* ---- threads -------------------------------------------------------------------------------------------------- */
+
+/* Runs tasks on threads of the caller's: must call task(context, 0), ..., task(context, tasks - 1), each once, on any
+ * threads and in any order, and return when all have returned. No task needs another to run beside it. It is called
+ * from several threads at once where the tasks have tasks of their own. user is handed to it as it is. */
+typedef void (*htvm_run_tasks)(void* user, size_t tasks, void (*task)(void* context, size_t index), void* context);
+
 /* ---- frames --------------------------------------------------------------------------------------------------- */
 
 /* type of a frame */
@@ -124,7 +131,7 @@ typedef struct htvm_decoder htvm_decoder;
 
 typedef struct htvm_decoder_options {
     uint32_t struct_size; /* set by htvm_decoder_options_init() */
-    uint32_t threads;     /* 0: one a core; the meshes are the same for any number. 0 */
+    uint32_t threads;     /* at work at once; 0: one per core; the meshes are the same for any number. 0 */
     /* What is larger is refused with HTVM_LIMIT before memory is taken for it. */
     uint32_t max_vertices;     /* of a frame. 2^22 */
     uint32_t max_triangles;    /* of a frame. 2^23 */
@@ -133,6 +140,8 @@ typedef struct htvm_decoder_options {
     uint64_t max_packet_bytes; /* in a stream sent as bytes, larger packets count as damage. 2^28 */
     uint64_t max_memory;       /* bytes, for what is kept and the frame under way, by an upper bound. 2^32 */
     htvm_allocator allocator;  /* malloc and free */
+    htvm_run_tasks run_tasks;  /* gives the threads. NULL: a pool of the decoder's own, whose threads stay */
+    void* run_tasks_user;      /* for run_tasks */
 } htvm_decoder_options;
 
 /* Sets the first struct_size bytes of options to the defaults above. HTVM_BAD_INPUT where struct_size is less than 8.
@@ -234,7 +243,7 @@ typedef struct htvm_skeleton {
 /* What each option means in full, with measurements: include/htvm/encoder.hpp, docs/algorithm.md. */
 typedef struct htvm_encoder_options {
     uint32_t struct_size;        /* set by htvm_encoder_options_init() */
-    uint32_t threads;            /* 0: one a core; the bytes are the same for any number. 0 */
+    uint32_t threads;            /* at work at once; 0: one per core; the bytes are the same for any number. 0 */
     double geometry_step;        /* mm, > 0: cell of the position quantiser; errors are about half of it. 2 */
     double colour_step;          /* levels of 255, >= 1. 6 */
     double lambda;               /* squared error worth one bit, in units of step^2. 0.12 */
@@ -263,6 +272,8 @@ typedef struct htvm_encoder_options {
     uint32_t fps_numerator, fps_denominator; /* 30, 1 */
     const htvm_skeleton* skeleton;           /* NULL: the capture has none */
     htvm_allocator allocator;                /* malloc and free */
+    htvm_run_tasks run_tasks;                /* gives the threads. NULL: a pool of the encoder's own */
+    void* run_tasks_user;                    /* for run_tasks */
 } htvm_encoder_options;
 
 /* A frame to code. Attributes are NULL where the mesh has none. Nothing is assumed of the triangles but that their
@@ -309,9 +320,9 @@ void htvm_encoder_destroy(htvm_encoder* encoder);
 const char* htvm_encoder_last_error(const htvm_encoder* encoder);
 
 /* Codes one frame; the arrays are read during the call only. pose: of the options' skeleton; NULL where the tracker
- * lost it, but not in the first frame, or where there is no skeleton. Timestamps must ascend. force_intra: 1 for an I-frame. HTVM_BAD_INPUT: the mesh or pose is
- * wrong; HTVM_LIMIT: under rate control, a frame that the buffer cannot hold. After an error the frame is not part of
- * the stream, and the next may be sent. */
+ * lost it, but not in the first frame, or where there is no skeleton. Timestamps must ascend. force_intra: 1 for an
+ * I-frame. HTVM_BAD_INPUT: the mesh or pose is wrong; HTVM_LIMIT: under rate control, a frame that the buffer cannot
+ * hold. After an error the frame is not part of the stream, and the next may be sent. */
 htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh, const htvm_pose* pose,
                                    int64_t timestamp_us, int force_intra);
 

@@ -52,6 +52,7 @@ htvm_decoder_options default_options() {
 htvm::DecoderOptions cpp_options(const htvm_decoder_options& options) {
     htvm::DecoderOptions out;
     out.threads = options.threads;
+    out.runner = htvm::c_api::task_runner(options.run_tasks, options.run_tasks_user);
     out.max_vertices = options.max_vertices;
     out.max_triangles = options.max_triangles;
     out.max_joints = options.max_joints;

@@ -69,6 +69,7 @@ htvm_encoder_options default_options() {
 htvm::EncoderOptions cpp_options(const htvm_encoder_options& options) {
     htvm::EncoderOptions out;
     out.threads = options.threads;
+    out.runner = htvm::c_api::task_runner(options.run_tasks, options.run_tasks_user);
     out.geometry_step = options.geometry_step;
     out.colour_step = options.colour_step;
     out.lambda = options.lambda;
@@ -90,7 +91,8 @@ htvm::EncoderOptions cpp_options(const htvm_encoder_options& options) {
     out.rate.target_error = options.target_error;
     out.topology.merge_duplicates = options.merge_duplicates != 0;
     out.topology.nearest_vertices = options.nearest_vertices;
-    out.topology.reference_vertices = options.reference_any != 0 ? htvm::ReferenceVertices::any : htvm::ReferenceVertices::bone;
+    out.topology.reference_vertices =
+        options.reference_any != 0 ? htvm::ReferenceVertices::any : htvm::ReferenceVertices::bone;
     out.topology.point_to_plane = options.point_to_plane != 0;
     out.topology.weight_width = options.weight_width;
     out.lattice_bits = options.lattice_bits;

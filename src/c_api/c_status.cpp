@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -45,6 +46,15 @@ bool complete(htvm_allocator& allocator) {
         allocator.release = release_by_free;
     }
     return allocator.allocate && allocator.release;
+}
+
+TaskRunner task_runner(htvm_run_tasks run, void* user) {
+    if (!run) return {};
+    return [run, user](std::size_t tasks, const std::function<void(std::size_t)>& task) {
+        const auto* one = &task;
+        const auto call = [](void* context, std::size_t index) { (**static_cast<decltype(one)*>(context))(index); };
+        run(user, tasks, call, &one);
+    };
 }
 
 htvm_status check_struct(LastError& error, StructSize size, const char* name) {

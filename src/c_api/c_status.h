@@ -14,6 +14,7 @@
 #include "htvm/htvm.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "htvm/threads.hpp"
 
 namespace htvm::c_api {
 
@@ -43,6 +44,9 @@ htvm_status guarded(LastError& error, const Work& work) noexcept {
 
 // The allocator with malloc and free in place of what is not given. False where one function is and the other is not.
 bool complete(htvm_allocator& allocator);
+
+// The caller's function as a runner; none where it is NULL.
+TaskRunner task_runner(htvm_run_tasks run, void* user);
 
 // A T made from the arguments in the caller's memory, or null where there is none. Exceptions of T's constructor pass.
 template <class T, class... Arguments>

@@ -211,7 +211,8 @@ Result<std::optional<DecodedFrame>> out_of_memory(const Packet& packet) {
 
 Decoder::Decoder(const DecoderOptions& options) : state_(std::make_unique<State>()) {
     state_->options = options;
-    state_->threads = thread_count(options.threads);
+    state_->pool = ThreadPool(options.threads, options.runner);
+    state_->threads = state_->pool.threads();
 }
 Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;

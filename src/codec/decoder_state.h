@@ -56,7 +56,8 @@ struct TrackedHistory {
 
 struct DecoderState {
     DecoderOptions options;
-    Threads threads = {};
+    ThreadPool pool;
+    Threads threads = {};  // of the pool
     std::optional<SequenceHeader> header;
     std::vector<std::uint8_t> header_payload;
     std::optional<SequenceInfo> info;

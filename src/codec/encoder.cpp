@@ -7,8 +7,8 @@
 #include <new>
 #include <stdexcept>
 
-#include "codec/encoder_check.h"
 #include "codec/choice/encoder_choice.h"
+#include "codec/encoder_check.h"
 #include "codec/encoder_state.h"
 #include "codec/stage_clock_enc.h"
 #include "core/parallel.h"
@@ -65,8 +65,8 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
     header.fps_denominator = state.options.fps_denominator;
     header.unit_micrometres = state.options.unit_micrometres;
     header.nearest_vertices = static_cast<std::uint8_t>(state.options.topology.nearest_vertices);
-    header.weight_width =
-        static_cast<std::int32_t>(std::lround(std::min(state.options.topology.weight_width * units, 1.0 * lattice_limit)));
+    header.weight_width = static_cast<std::int32_t>(
+        std::lround(std::min(state.options.topology.weight_width * units, 1.0 * lattice_limit)));
     if (state.options.profile == Profile::tracked)
         header.node_spacing = static_cast<std::int32_t>(
             std::clamp(std::lround(state.options.tracked.node_spacing * units), 1L, static_cast<long>(lattice_limit)));
@@ -171,7 +171,8 @@ Result<Encoder> Encoder::create(const EncoderOptions& options) try {
     if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
     auto state = std::make_unique<Encoder::State>();
     state->options = options;
-    state->threads = thread_count(options.threads);
+    state->pool = ThreadPool(options.threads, options.runner);
+    state->threads = state->pool.threads();
     if (options.rate.bits_per_second > 0) state->rate.emplace(rate_options(options), options.rate.first_pass);
     if (options.rate.target_error > 0) state->error.emplace(options.rate.target_error);
     return Encoder(std::move(state));

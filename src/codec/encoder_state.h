@@ -6,16 +6,16 @@
 #include <optional>
 #include <vector>
 
-#include "codec/encoder_pose.h"
-#include "codec/paper/enhanced_frame_enc.h"
 #include "codec/choice/error_control_enc.h"
 #include "codec/choice/rate_control_enc.h"
+#include "codec/encoder_pose.h"
+#include "codec/paper/enhanced_frame_enc.h"
 #include "codec/stream/sequence.h"
 #include "codec/tracked/tracked_fit_enc.h"
 #include "codec/tracked/tracked_frame_enc.h"
-#include "surface/surface_distance.h"
-#include "htvm/encoder.hpp"
 #include "core/thread.h"
+#include "htvm/encoder.hpp"
+#include "surface/surface_distance.h"
 
 namespace htvm::internal {
 
@@ -72,7 +72,8 @@ struct Group {
 
 struct EncoderState {
     EncoderOptions options;
-    Threads threads = {};
+    ThreadPool pool;
+    Threads threads = {};  // of the pool
     SequenceHeader header;
     bool begun = false, finished = false;
     PoseTracker poses;

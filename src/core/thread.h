@@ -1,42 +1,38 @@
-// std::thread; in a build without threads (WebAssembly) a stand-in, so that the same code serves both.
+// Who runs the pieces of a loop (core/parallel.h): Threads, the handle that every function with loops takes, and
+// ThreadPool, the owner of what it points to.
 #pragma once
 
 #include <algorithm>
+#include <memory>
 
-#ifdef __STDCPP_THREADS__
-#include <thread>
-#endif
+#include "htvm/threads.hpp"
 
 namespace htvm::internal {
 
-// How many threads a call may use: 0 and 1 are both the caller alone.
-using Threads = unsigned;
+// How many threads a call may use, its own among them, and who runs their tasks. The default is the caller's alone.
+struct Threads {
+    const TaskRunner* runner = nullptr;  // set where count > 1; outlives the handle
+    unsigned count = 1;
 
-#ifdef __STDCPP_THREADS__
-
-using Thread = std::thread;
-
-// Threads to use for a requested count; 0 asks for one per core.
-inline unsigned thread_count(unsigned requested) {
-    return requested > 0 ? requested : std::max(1u, std::thread::hardware_concurrency());
-}
-
-#else
-
-// Has done its work before the next statement.
-class Thread {
-public:
-    Thread() = default;
-    template <class Work>
-    explicit Thread(const Work& work) {
-        work();
-    }
-    bool joinable() const { return false; }
-    void join() {}
+    // The same, but no more than `most`.
+    Threads at_most(unsigned most) const { return {runner, std::min(count, most)}; }
 };
 
-inline unsigned thread_count(unsigned) { return 1; }
+// Threads to use for a requested count; 0 asks for one per core. 1 in a build without threads (WebAssembly).
+unsigned thread_count(unsigned requested);
 
-#endif
+// Of an encoder, a decoder or a command: the caller's runner, or one whose threads stay as long as this and its copies.
+class ThreadPool {
+public:
+    ThreadPool() = default;  // the caller's thread alone
+    explicit ThreadPool(unsigned requested, TaskRunner runner = {});
+
+    Threads threads() const { return {runner_.get(), count_}; }
+    operator Threads() const { return threads(); }  // valid as long as this and its copies
+
+private:
+    std::shared_ptr<const TaskRunner> runner_;
+    unsigned count_ = 1;
+};
 
 }  // namespace htvm::internal

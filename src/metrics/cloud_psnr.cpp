@@ -42,7 +42,7 @@ CloudErrorSums sum_cloud_errors(const Mesh& from, const Mesh& to, std::span<cons
     return sums;
 }
 
-CloudError cloud_error(const Mesh& original, const Mesh& decoded, unsigned threads) {
+CloudError cloud_error(const Mesh& original, const Mesh& decoded, internal::Threads threads) {
     const auto forward = nearest_vertices(original.positions, decoded.positions, threads);
     const auto backward = nearest_vertices(decoded.positions, original.positions, threads);
     return {sum_cloud_errors(original, decoded, forward), sum_cloud_errors(decoded, original, backward)};

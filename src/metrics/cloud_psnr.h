@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 
 namespace htvm {
@@ -36,7 +37,7 @@ CloudError& operator+=(CloudError& sums, const CloudError& frame);
 CloudErrorSums sum_cloud_errors(const Mesh& from, const Mesh& to, std::span<const std::uint32_t> nearest);
 
 // One frame, both directions.
-CloudError cloud_error(const Mesh& original, const Mesh& decoded, unsigned threads = 0);
+CloudError cloud_error(const Mesh& original, const Mesh& decoded, internal::Threads threads = {});
 
 // 10 log10(peak^2 / error) in dB. Infinity where the error is 0, minus infinity where it is infinite or the peak 0.
 double psnr(double peak, double mean_squared_error);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "metrics/cloud_psnr.h"
@@ -25,9 +26,9 @@ struct CompareOptions {
     SurfaceErrorOptions surface_options;
     TopologyMeasureOptions topology_options;
     ViewOptions views;
-    RenderOptions render;         // colours are drawn only where both meshes have some
-    std::optional<Box> view_box;  // what the cameras look at in every frame; empty: each original's own bounding box
-    unsigned threads = 0;         // 0: one per core; any number gives the same numbers (overrides surface_options')
+    RenderOptions render;            // colours are drawn only where both meshes have some
+    std::optional<Box> view_box;     // what the cameras look at in every frame; empty: each original's own bounding box
+    internal::Threads threads = {};  // any number gives the same numbers (overrides surface_options')
 };
 
 // One frame. What was not asked for is left zero.

@@ -49,9 +49,9 @@ Picture difference_picture(const Picture& original, const Picture& decoded, int 
 }
 
 PictureErrorSums compare_views(const DrawableMesh& original, const DrawableMesh& decoded,
-                               const std::vector<Camera>& cameras, unsigned threads) {
+                               const std::vector<Camera>& cameras, Threads threads) {
     std::vector<PictureErrorSums> views(cameras.size());
-    parallel_for(cameras.size(), thread_count(threads), 1, [&](std::size_t begin, std::size_t end) {
+    parallel_for(cameras.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
         Canvas first, second;
         for (std::size_t i = begin; i < end; ++i) {
             draw(original, cameras[i], first);

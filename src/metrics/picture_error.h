@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/thread.h"
 #include "metrics/render.h"
 
 namespace htvm {
@@ -28,9 +29,9 @@ PictureErrorSums picture_error(const Picture& original, const Picture& decoded);
 // a pixel's three channels.
 Picture difference_picture(const Picture& original, const Picture& decoded, int gain = 4);
 
-// Draws both meshes from every camera and sums up. The same for any number of threads (0: one per core).
+// Draws both meshes from every camera and sums up. The same for any number of threads.
 PictureErrorSums compare_views(const DrawableMesh& original, const DrawableMesh& decoded,
-                               const std::vector<Camera>& cameras, unsigned threads = 0);
+                               const std::vector<Camera>& cameras, internal::Threads threads = {});
 
 // dB; infinity where there is no difference, also where there are no pixels.
 double psnr_foreground(const PictureErrorSums& sums);

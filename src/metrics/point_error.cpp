@@ -47,13 +47,13 @@ struct NearestWithLowestIndex {
 }  // namespace
 
 std::vector<std::uint32_t> nearest_vertices(std::span<const Vector3f> from, std::span<const Vector3f> to,
-                                            unsigned threads) {
+                                            Threads threads) {
     if (from.empty() || to.empty()) return {};
     const Cloud cloud{to};
     Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(12));
     tree.buildIndex();
     std::vector<std::uint32_t> nearest(from.size());
-    parallel_for(from.size(), thread_count(threads), 1024, [&](std::size_t begin, std::size_t end) {
+    parallel_for(from.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             const std::array<double, 3> query{from[i][0], from[i][1], from[i][2]};
             NearestWithLowestIndex best;
@@ -106,7 +106,7 @@ PointErrorSums sum_point_errors(const Mesh& from, const Mesh& to, std::span<cons
     return sums;
 }
 
-PointError point_error(const Mesh& original, const Mesh& decoded, unsigned threads) {
+PointError point_error(const Mesh& original, const Mesh& decoded, Threads threads) {
     const auto forward = nearest_vertices(original.positions, decoded.positions, threads);
     const auto backward = nearest_vertices(decoded.positions, original.positions, threads);
     return {sum_point_errors(original, decoded, forward), sum_point_errors(decoded, original, backward)};

@@ -9,15 +9,15 @@
 #include <span>
 #include <vector>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 
 namespace htvm {
 
 // Per point of `from`, the index of its nearest point in `to` (Euclidean, computed in double); of several at the same
-// distance the one with the lowest index. Empty where either is empty. The same for any number of threads (0: one per
-// core).
+// distance the one with the lowest index. Empty where either is empty. The same for any number of threads.
 std::vector<std::uint32_t> nearest_vertices(std::span<const Vector3f> from, std::span<const Vector3f> to,
-                                            unsigned threads = 0);
+                                            internal::Threads threads = {});
 
 // Sums of eq. 9 in one direction; the sums of several frames add up.
 struct PointErrorSums {
@@ -40,7 +40,7 @@ PointErrorSums sum_point_errors(const Mesh& from, const Mesh& to, std::span<cons
 
 // Sums of one frame in both directions. Meshes without vertices: nothing is added in the direction from them, an
 // infinite distance in the direction to them.
-PointError point_error(const Mesh& original, const Mesh& decoded, unsigned threads = 0);
+PointError point_error(const Mesh& original, const Mesh& decoded, internal::Threads threads = {});
 
 // Root mean squared difference of eq. 9; 0 where nothing was compared.
 double rms_distance(const PointErrorSums& sums);  // mm

@@ -200,23 +200,22 @@ DrawableMesh make_drawable(const Mesh& mesh, const RenderOptions& options) {
     return drawable;
 }
 
-void draw(const DrawableMesh& drawable, const Camera& camera, Canvas& canvas, unsigned threads) {
+void draw(const DrawableMesh& drawable, const Camera& camera, Canvas& canvas, Threads threads) {
     const Mesh& mesh = *drawable.mesh;
     clear(camera, drawable.options.background, canvas);
     canvas.vertices.resize(mesh.positions.size());
-    parallel_for(mesh.positions.size(), thread_count(threads), 4096, [&](std::size_t begin, std::size_t end) {
+    parallel_for(mesh.positions.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) canvas.vertices[v] = project(mesh.positions[v], camera);
     });
     const Light light(camera);
     // Every thread draws all triangles into rows of its own, in the same order.
-    parallel_for(static_cast<std::size_t>(camera.height), thread_count(threads), 64,
-                 [&](std::size_t begin, std::size_t end) {
-                     const Rows rows{static_cast<int>(begin), static_cast<int>(end)};
-                     for (const auto& t : mesh.triangles) draw_triangle(drawable, t, camera, light, rows, canvas);
-                 });
+    parallel_for(static_cast<std::size_t>(camera.height), threads, 64, [&](std::size_t begin, std::size_t end) {
+        const Rows rows{static_cast<int>(begin), static_cast<int>(end)};
+        for (const auto& t : mesh.triangles) draw_triangle(drawable, t, camera, light, rows, canvas);
+    });
 }
 
-Picture render(const Mesh& mesh, const Camera& camera, const RenderOptions& options, unsigned threads) {
+Picture render(const Mesh& mesh, const Camera& camera, const RenderOptions& options, Threads threads) {
     Canvas canvas;
     draw(make_drawable(mesh, options), camera, canvas, threads);
     return std::move(canvas.picture);

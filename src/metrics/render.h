@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "metrics/mesh_measures.h"
@@ -83,10 +84,11 @@ struct Canvas {
 };
 
 // Draws into canvas.picture, whatever the canvas held before.
-void draw(const DrawableMesh& drawable, const Camera& camera, Canvas& canvas, unsigned threads = 1);
+void draw(const DrawableMesh& drawable, const Camera& camera, Canvas& canvas, internal::Threads threads = {});
 
 // One picture of a mesh.
-Picture render(const Mesh& mesh, const Camera& camera, const RenderOptions& options = {}, unsigned threads = 1);
+Picture render(const Mesh& mesh, const Camera& camera, const RenderOptions& options = {},
+               internal::Threads threads = {});
 
 // Pictures of the same height side by side, from the left; rows below a lower picture stay white.
 Picture side_by_side(const std::vector<Picture>& pictures);

@@ -130,11 +130,11 @@ struct DistanceToSurface {
 // Runs measure(item, distance, sums) over [0, count) in blocks that do not depend on the number of threads, and adds
 // the blocks' sums up in their order.
 template <class Measure>
-void measure_blocks(std::size_t count, const SurfaceIndex& index, unsigned threads, DistanceSums& total,
+void measure_blocks(std::size_t count, const SurfaceIndex& index, Threads threads, DistanceSums& total,
                     const Measure& measure) {
     constexpr std::size_t block = 512;
     std::vector<DistanceSums> sums((count + block - 1) / block);
-    parallel_for(sums.size(), thread_count(threads), 1, [&](std::size_t begin, std::size_t end) {
+    parallel_for(sums.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
         DistanceToSurface distance{&index};
         for (std::size_t b = begin; b < end; ++b)
             for (std::size_t i = b * block; i < std::min(count, (b + 1) * block); ++i) measure(i, distance, sums[b]);
@@ -171,7 +171,7 @@ DistanceSums measure_plan(const Mesh& from, const SamplingPlan& plan, const Surf
 }
 
 // Where `to` has no triangles: the samples are the vertices of `from`, the surface the vertices of `to`.
-SurfaceDistances distances_to_vertices(const Mesh& from, const Mesh& to, unsigned threads) {
+SurfaceDistances distances_to_vertices(const Mesh& from, const Mesh& to, Threads threads) {
     DistanceSums sums;
     const auto nearest = nearest_vertices(from.positions, to.positions, threads);
     for (std::uint32_t v = 0; v < from.positions.size(); ++v) {

@@ -20,18 +20,19 @@
 
 #include <cstdint>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 
 namespace htvm {
 
 struct SurfaceErrorOptions {
-    std::uint64_t samples = 0;  // target in each direction; 0: METRO's default, 10 times the larger triangle count
-    std::uint64_t seed = 1;     // of the face samples
-    bool vertices = true;       // sample the vertices
-    bool edges = true;          // sample the edges
-    bool faces = true;          // sample the faces
-    unsigned threads = 0;       // 0: one per core; any number gives the same bits
+    std::uint64_t samples = 0;       // target in each direction; 0: METRO's default, 10 times the larger triangle count
+    std::uint64_t seed = 1;          // of the face samples
+    bool vertices = true;            // sample the vertices
+    bool edges = true;               // sample the edges
+    bool faces = true;               // sample the faces
+    internal::Threads threads = {};  // any number gives the same bits
 };
 
 // Point-to-surface distances of one direction of one frame.

@@ -137,11 +137,11 @@ Point3 closest_point_on_triangle(const Point3& p, const Point3& a, const Point3&
     return best;
 }
 
-Result<SurfaceIndex> SurfaceIndex::build(const Mesh& mesh, unsigned threads) {
+Result<SurfaceIndex> SurfaceIndex::build(const Mesh& mesh, Threads threads) {
     if (mesh.triangles.empty()) return fail(ErrorKind::bad_input, "A mesh without triangles has no surface to index.");
     auto impl = std::make_shared<Impl>();
     impl->mesh = &mesh;
-    impl->device = rtcNewDevice(("threads=" + std::to_string(thread_count(threads))).c_str());
+    impl->device = rtcNewDevice(("threads=" + std::to_string(threads.count)).c_str());
     impl->scene = impl->device ? rtcNewScene(impl->device) : nullptr;
     if (!impl->scene) return fail(ErrorKind::limit, "Embree could not start: no memory or threads left.");
     rtcSetSceneFlags(impl->scene, RTC_SCENE_FLAG_ROBUST);

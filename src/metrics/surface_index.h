@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "metrics/mesh_measures.h"
@@ -25,7 +26,7 @@ class SurfaceIndex {
 public:
     // Indexes the triangles of `mesh`, which must have at least one and must outlive the index. A limit error if
     // Embree cannot start or runs out of memory.
-    static Result<SurfaceIndex> build(const Mesh& mesh, unsigned threads = 0);
+    static Result<SurfaceIndex> build(const Mesh& mesh, internal::Threads threads = {});
 
     // The triangle nearest to p, which lies within +-2 * largest_coordinate. `hint` is any triangle, best one that is
     // expected near: the search starts with its distance; the answer does not depend on it. Threads may call it at

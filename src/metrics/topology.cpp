@@ -196,7 +196,7 @@ std::uint32_t across_the_crack(const Mesh& lines, const OpenEdge& edge, std::uin
     return best.index;
 }
 
-Result<void> find_cracks(const Mesh& mesh, double width, unsigned threads, Topology& out) {
+Result<void> find_cracks(const Mesh& mesh, double width, Threads threads, Topology& out) {
     const auto edges = open_edges(mesh);
     out.open_edges = edges.size();
     if (edges.empty()) return {};
@@ -206,7 +206,7 @@ Result<void> find_cracks(const Mesh& mesh, double width, unsigned threads, Topol
     const auto index = SurfaceIndex::build(lines, threads);
     if (!index) return tl::unexpected(index.error());
     std::vector<std::uint32_t> across(edges.size(), none);
-    parallel_for(edges.size(), thread_count(threads), 256, [&](std::size_t begin, std::size_t end) {
+    parallel_for(edges.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t e = begin; e < end; ++e)
             across[e] = across_the_crack(lines, edges[e], static_cast<std::uint32_t>(e), *index, width);
     });
@@ -245,12 +245,12 @@ std::uint32_t other_layer(const Mesh& mesh, const SurfaceIndex& index, std::uint
     return best.index;
 }
 
-Result<void> find_flaps(const Mesh& mesh, double distance, unsigned threads, Topology& out) {
+Result<void> find_flaps(const Mesh& mesh, double distance, Threads threads, Topology& out) {
     if (mesh.triangles.empty()) return {};
     const auto index = SurfaceIndex::build(mesh, threads);
     if (!index) return tl::unexpected(index.error());
     std::vector<std::uint32_t> other(mesh.triangles.size(), none);
-    parallel_for(mesh.triangles.size(), thread_count(threads), 256, [&](std::size_t begin, std::size_t end) {
+    parallel_for(mesh.triangles.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t t = begin; t < end; ++t)
             other[t] = other_layer(mesh, *index, static_cast<std::uint32_t>(t), distance);
     });
@@ -265,7 +265,7 @@ Result<void> find_flaps(const Mesh& mesh, double distance, unsigned threads, Top
 
 }  // namespace
 
-Result<Topology> topology(const Mesh& mesh, const TopologyMeasureOptions& options, unsigned threads) {
+Result<Topology> topology(const Mesh& mesh, const TopologyMeasureOptions& options, Threads threads) {
     Topology out;
     count_parts(mesh, out);
     if (!options.defects) return out;

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 
@@ -47,7 +48,7 @@ struct Topology {
     double flap_area = 0;
 };
 
-// The same for any number of threads (0: one per core). A limit error where Embree runs out of memory.
-Result<Topology> topology(const Mesh& mesh, const TopologyMeasureOptions& options = {}, unsigned threads = 0);
+// The same for any number of threads. A limit error where Embree runs out of memory.
+Result<Topology> topology(const Mesh& mesh, const TopologyMeasureOptions& options = {}, internal::Threads threads = {});
 
 }  // namespace htvm

@@ -66,7 +66,7 @@ struct Sums {
 template <class Body>
 Sums sum_blocks(std::size_t count, Threads threads, const Body& body) {
     std::vector<Sums> parts((count + block - 1) / block);
-    parallel_for(parts.size(), thread_count(threads), 1, [&](std::size_t begin, std::size_t end) {
+    parallel_for(parts.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t p = begin; p < end; ++p)
             for (std::size_t i = p * block; i < std::min(count, (p + 1) * block); ++i) body(i, parts[p]);
     });
@@ -180,7 +180,7 @@ std::vector<RegionErrors> region_errors(const SurfaceView& from, std::span<const
     constexpr double infinity = std::numeric_limits<double>::infinity();
     std::vector<Squares> squares((count + every - 1) / every, Squares{infinity, 0});
     if (!search_to.empty())
-        parallel_for(squares.size(), thread_count(options.threads), block, [&](std::size_t begin, std::size_t end) {
+        parallel_for(squares.size(), options.threads, block, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i)
                 if (labels[i * every] < regions)
                     squares[i] = measure(from.positions[i * every], colour_of(from, i * every), target);

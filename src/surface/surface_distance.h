@@ -12,9 +12,9 @@
 #include <span>
 #include <vector>
 
-#include "surface/surface_search.h"
-#include "htvm/mesh.hpp"
 #include "core/thread.h"
+#include "htvm/mesh.hpp"
+#include "surface/surface_search.h"
 
 namespace htvm::internal {
 
@@ -26,7 +26,7 @@ struct SurfaceView {
 };
 
 struct SurfaceDistanceOptions {
-    Threads threads = {};       // 0: one per core; any number gives the same bits
+    Threads threads = {};       // any number gives the same bits
     std::uint32_t every = 1;    // take only every n-th vertex and every n-th triangle's centre; 0 counts as 1
     double vertex_share = 0.4;  // 0..1, weight of the vertices beside the centres
 };

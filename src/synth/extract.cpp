@@ -200,7 +200,7 @@ PartSet BrickMap::at(const Vector3d& world) const {
     return found == candidates.end() ? all_parts : found->second;
 }
 
-Extraction extract_surface(const PosedBody& body, const Grid& grid, unsigned threads) {
+Extraction extract_surface(const PosedBody& body, const Grid& grid, Threads threads) {
     std::vector<Brick> bricks = find_all_bricks(body, grid);
     std::unordered_map<std::uint64_t, std::int32_t> index;
     index.reserve(2 * bricks.size());

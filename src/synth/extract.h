@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "synth/body.h"
 
@@ -42,6 +43,6 @@ struct Extraction {
 
 // The surface of the posed body over a grid; the same for any number of threads. About 4.5 vertices per squared cell of
 // surface. Details thinner than a cell are lost.
-Extraction extract_surface(const PosedBody& body, const Grid& grid, unsigned threads);
+Extraction extract_surface(const PosedBody& body, const Grid& grid, internal::Threads threads);
 
 }  // namespace htvm::synth

@@ -251,7 +251,7 @@ void flip_to_delaunay(HalfEdgeMesh& mesh) {
     }
 }
 
-std::vector<Vector3d> vertex_normals(const HalfEdgeMesh& mesh, unsigned threads) {
+std::vector<Vector3d> vertex_normals(const HalfEdgeMesh& mesh, Threads threads) {
     std::vector<Vector3d> normals(mesh.positions.size(), Vector3d::Zero());
     parallel_for(normals.size(), threads, 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
@@ -266,7 +266,7 @@ std::vector<Vector3d> vertex_normals(const HalfEdgeMesh& mesh, unsigned threads)
     return normals;
 }
 
-void relax(HalfEdgeMesh& mesh, double share, unsigned threads) {
+void relax(HalfEdgeMesh& mesh, double share, Threads threads) {
     const auto normals = vertex_normals(mesh, threads);
     std::vector<Vector3d> moved = mesh.positions;
     parallel_for(moved.size(), threads, 512, [&](std::size_t begin, std::size_t end) {

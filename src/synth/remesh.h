@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 
 namespace htvm::synth {
@@ -37,10 +38,10 @@ void collapse_to(HalfEdgeMesh& mesh, std::size_t vertices);
 void flip_to_delaunay(HalfEdgeMesh& mesh);
 
 // Area-weighted unit normals; zero for dead vertices.
-std::vector<Eigen::Vector3d> vertex_normals(const HalfEdgeMesh& mesh, unsigned threads);
+std::vector<Eigen::Vector3d> vertex_normals(const HalfEdgeMesh& mesh, internal::Threads threads);
 
 // Moves every vertex along the surface by `share` of the way to the mean of its neighbours.
-void relax(HalfEdgeMesh& mesh, double share, unsigned threads);
+void relax(HalfEdgeMesh& mesh, double share, internal::Threads threads);
 
 // Leaves out what is dead and renumbers.
 void compact(HalfEdgeMesh& mesh);

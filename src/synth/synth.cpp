@@ -62,7 +62,7 @@ void descend(Vector3d& position, const PosedBody& body, const BrickMap& bricks, 
 
 // Moves every vertex onto the surface: along its normal, and where a crumpled neighbourhood's normal does not lead
 // there, by the distance's own slope.
-void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, int rounds, unsigned threads) {
+void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, int rounds, Threads threads) {
     const auto normals = vertex_normals(mesh, threads);
     const double longest_step = 0.5 * bricks.grid.cell;
     constexpr double near_enough = 0.5;  // mm
@@ -102,7 +102,7 @@ double mean_edge_length(const HalfEdgeMesh& mesh) {
 // Moves every vertex along the surface at random, by about `share` of the spacing in each direction, unless
 // that would fold the surface.
 void jitter(HalfEdgeMesh& mesh, double share, RandomKey key) {
-    const auto normals = vertex_normals(mesh, 1);
+    const auto normals = vertex_normals(mesh, {});
     const double size = share * mean_edge_length(mesh);
     for (std::size_t v = 0; v < normals.size(); ++v) {
         if (mesh.outgoing[v] == dead_half_edge) continue;
@@ -117,7 +117,7 @@ void jitter(HalfEdgeMesh& mesh, double share, RandomKey key) {
 
 // As many vertices as wanted, evenly but randomly spread over the surface.
 void remesh(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, std::size_t vertices, RandomKey key,
-            unsigned threads) {
+            Threads threads) {
     // What is collapsed depends on the lengths of the edges: once the vertices have moved, no longer on the grid.
     jitter(mesh, 0.3, derive_key(key, 0));
     collapse_to(mesh, vertices);
@@ -168,7 +168,7 @@ std::vector<double> reconstruction_noise(const HalfEdgeMesh& mesh, double power,
     return fine;
 }
 
-void add_noise_along_normals(HalfEdgeMesh& mesh, const std::vector<double>& noise, unsigned threads) {
+void add_noise_along_normals(HalfEdgeMesh& mesh, const std::vector<double>& noise, Threads threads) {
     const auto normals = vertex_normals(mesh, threads);
     for (std::size_t v = 0; v < normals.size(); ++v) mesh.positions[v] += noise[v] * normals[v];
 }
@@ -176,7 +176,7 @@ void add_noise_along_normals(HalfEdgeMesh& mesh, const std::vector<double>& nois
 // Moves lattice vertices along their edges by as much as changes their distance to the surface by the noise, and never
 // past the edge's ends.
 void add_noise_along_edges(HalfEdgeMesh& mesh, const std::vector<EdgePlace>& places, const std::vector<double>& noise,
-                           unsigned threads) {
+                           Threads threads) {
     const auto normals = vertex_normals(mesh, threads);
     for (std::size_t v = 0; v < normals.size(); ++v) {
         const double rise = places[v].edge.dot(normals[v]);  // of the distance, over the whole edge
@@ -191,7 +191,7 @@ Vector3f to_float(const Vector3d& p) {
 }
 
 std::vector<Colour> sample_colours(const HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks,
-                                   unsigned threads) {
+                                   Threads threads) {
     std::vector<Colour> colours(mesh.positions.size());
     parallel_for(colours.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
@@ -202,7 +202,7 @@ std::vector<Colour> sample_colours(const HalfEdgeMesh& mesh, const PosedBody& bo
     return colours;
 }
 
-Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey key, unsigned threads) {
+Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey key, Threads threads) {
     const double vertices = std::clamp(options.vertices, fewest_vertices, most_vertices);
     const double wanted = vertices * (0.97 + 0.06 * random_uniform(derive_key(key, count_stream), 0));
     Grid grid;
@@ -263,7 +263,7 @@ Result<void> check_synth_options(const SynthOptions& options) {
     return {};
 }
 
-SynthFrame synth_frame(const SynthOptions& options, int frame, unsigned threads) {
+SynthFrame synth_frame(const SynthOptions& options, int frame, Threads threads) {
     const double fps = options.fps >= 0.1 ? std::min(options.fps, 10000.0) : 0.1;
     const PosedBody body = pose_body(std::max(0, frame) / fps);
     const RandomKey key = frame_key(options, frame);

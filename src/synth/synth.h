@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "htvm/skeleton.hpp"
@@ -41,6 +42,6 @@ Result<void> check_synth_options(const SynthOptions& options);
 
 // The frame at frame / fps seconds. Frame 0 is a T-pose that faces +z; negative frames are frame 0's pose. Options out
 // of their ranges are clamped to them.
-SynthFrame synth_frame(const SynthOptions& options, int frame, unsigned threads = 1);
+SynthFrame synth_frame(const SynthOptions& options, int frame, internal::Threads threads = {});
 
 }  // namespace htvm

@@ -87,6 +87,27 @@ TEST(CDecoder, PacketsGiveTheFramesOfTheCppDecoder) {
     EXPECT_EQ(next, expected.size());
 }
 
+TEST(CDecoder, RunsItsTasksOnTheCallersThreads) {
+    const auto expected = decode_packets(coded_person().packets).frames;
+    auto options = default_options();
+    options.threads = 3;
+    std::size_t calls = 0;
+    options.run_tasks_user = &calls;
+    options.run_tasks = [](void* user, size_t tasks, void (*task)(void*, size_t), void* context) {
+        ++*static_cast<std::size_t*>(user);
+        for (std::size_t t = tasks; t-- > 0;) task(context, t);
+    };
+    const auto decoder = make_decoder(&options);
+    std::size_t next = 0;
+    for (const auto& packet : coded_person().packets) {
+        const auto bytes = write_packet(packet);
+        ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
+        receive_all(decoder.get(), expected, next);
+    }
+    EXPECT_EQ(next, expected.size());
+    EXPECT_GT(calls, 0u);
+}
+
 TEST(CDecoder, TellsWhatTheSequenceHeaderSays) {
     const auto decoder = make_decoder();
     htvm_sequence_info info;
@@ -151,7 +172,8 @@ TEST(CDecoder, DamagedPacketsAreErrorsWithASentenceAndCostThemselvesOnly) {
     std::size_t frames = 0, errors = 0;
     for (const auto& packet : coded_grid().packets) {
         auto broken = packet;
-        if (packet.kind == PacketKind::enhanced && errors == 0) broken.payload.resize(broken.payload.size() / 3);  // with a good checksum
+        if (packet.kind == PacketKind::enhanced && errors == 0)
+            broken.payload.resize(broken.payload.size() / 3);  // with a good checksum
         const auto sent = write_packet(broken);
         ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), sent.data(), sent.size()), HTVM_OK);
         const auto status = htvm_decoder_receive_frame(decoder.get(), nullptr, 0);

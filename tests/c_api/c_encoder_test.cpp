@@ -163,6 +163,21 @@ TEST(CEncoder, EveryOptionReachesTheCppEncoder) {
     EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
 }
 
+TEST(CEncoder, RunsItsTasksOnTheCallersThreads) {
+    const auto person = synthetic(true, 3, 300);
+    auto options = default_options();
+    options.threads = 3;
+    const auto expected = bytes_of(person, options);
+    std::size_t calls = 0;
+    options.run_tasks_user = &calls;
+    options.run_tasks = [](void* user, size_t tasks, void (*task)(void*, size_t), void* context) {
+        ++*static_cast<std::size_t*>(user);
+        for (std::size_t t = tasks; t-- > 0;) task(context, t);
+    };
+    EXPECT_EQ(bytes_of(person, options), expected);
+    EXPECT_GT(calls, 0u);
+}
+
 TEST(CEncoder, TellsOfTheLastFrame) {
     const auto encoder = make_encoder();
     htvm_frame_info info;

@@ -2,6 +2,10 @@
 // them, rate control in one pass and two, with and without skeleton.
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <thread>
+#include <vector>
+
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 
@@ -72,6 +76,41 @@ TEST(EncoderThreads, FramesChosenByRateAndDistortion) {
     options.topology.still_below = 40;
     options.profile = Profile::tracked;
     expect_same_bytes(walking(4, 6000, 20), options);
+}
+
+// Tasks one after the other, the last first.
+void in_reverse(std::size_t tasks, const std::function<void(std::size_t)>& task) {
+    for (std::size_t t = tasks; t-- > 0;) task(t);
+}
+
+TEST(EncoderThreads, ThoseOfTheCallersRunnerGiveTheSameBytesAndMeshes) {
+    for (const auto profile : {Profile::topology, Profile::tracked}) {
+        auto options = default_options(profile);
+        options.threads = 1;
+        const auto one = encode(person(), options);
+        options.threads = 3;
+        for (const auto& runner : {TaskRunner(in_reverse), thread_pool(2)}) {
+            options.runner = runner;
+            EXPECT_EQ(encode(person(), options).bytes, one.bytes);
+            DecoderOptions decoder;
+            decoder.threads = 3;
+            decoder.runner = runner;
+            const auto decoded = decode_packets(one.packets, decoder);
+            ASSERT_EQ(decoded.frames.size(), one.reconstructions.size());
+            for (std::size_t t = 0; t < decoded.frames.size(); ++t)
+                expect_same_mesh(decoded.frames[t].mesh, one.reconstructions[t]);
+        }
+    }
+}
+
+TEST(EncoderThreads, EncodersThatShareAPoolMayRunAtOnce) {
+    auto options = default_options(Profile::tracked);
+    const auto one = encode(person(), options);
+    options.runner = thread_pool(3);
+    options.threads = 3;
+    std::vector<std::thread> callers;
+    for (int i = 0; i < 2; ++i) callers.emplace_back([&] { EXPECT_EQ(encode(person(), options).bytes, one.bytes); });
+    for (auto& caller : callers) caller.join();
 }
 
 TEST(EncoderThreads, RateControlInOnePassAndTwo) {

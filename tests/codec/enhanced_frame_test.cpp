@@ -2,8 +2,8 @@
 
 #include <random>
 
-#include "codec/random_numbers.h"
 #include "codec/paper/enhanced_frame_enc.h"
+#include "codec/random_numbers.h"
 
 namespace htvm::internal {
 namespace {
@@ -21,7 +21,7 @@ ReferenceMesh random_reference(std::size_t vertices, std::mt19937& random) {
     const std::vector<std::int32_t> radii = {100, 100, 0};
     return make_reference(std::move(mesh), {{0, 1}, {2, 3}, {4, 4}},
                           {{-2000, -3000, 0}, {-2000, 3000, 0}, {2000, -3000, 0}, {2000, 3000, 0}, {900000, 0, 0}},
-                          std::vector<QuantisedRotation>(3), radii, 0, 0, 1);
+                          std::vector<QuantisedRotation>(3), radii, 0, 0, {});
 }
 
 struct Case {
@@ -39,7 +39,7 @@ Case random_case(std::size_t references, std::size_t vertices, unsigned seed) {
         out.transforms.push_back(
             {quantise_rotation({1, between(random, -3, 3) / 10.0, between(random, -3, 3) / 10.0, 0}),
              random_point(random, 200)});
-    out.predicted = predict_positions(out.reference, out.transforms, 1);
+    out.predicted = predict_positions(out.reference, out.transforms, {});
     for (std::size_t k = 0; k < vertices; ++k) {
         out.frame.push_back(random_point(random, 3000));
         out.bone_of_vertex.push_back(static_cast<BoneIndex>(test::below(random, 3)));
@@ -49,7 +49,7 @@ Case random_case(std::size_t references, std::size_t vertices, unsigned seed) {
 
 double distance(LatticePoint a, LatticePoint b) { return std::sqrt(static_cast<double>(squared_distance(a, b))); }
 
-std::vector<std::uint32_t> find(const Case& c, ReferenceChoice choice, unsigned threads = 1) {
+std::vector<std::uint32_t> find(const Case& c, ReferenceChoice choice, Threads threads = {}) {
     return find_reference_vertices(c.reference, make_reference_search(c.reference), c.predicted, c.transforms, c.frame,
                                    c.bone_of_vertex, {}, {}, choice, threads);
 }
@@ -87,7 +87,7 @@ TEST(ReferenceVertices, OfTheBoneAreTheNearestOfItsSubMeshOrOfAllWhereItIsBare) 
 TEST(ReferenceVertices, AreTheSameForAnyNumberOfThreads) {
     const auto c = random_case(2000, 5000, 9);
     for (const auto choice : {ReferenceChoice::any, ReferenceChoice::bone})
-        EXPECT_EQ(find(c, choice, 1), find(c, choice, 7));
+        EXPECT_EQ(find(c, choice, {}), find(c, choice, ThreadPool(7)));
 }
 
 TEST(ReferenceVertices, OfNoVerticesAreNone) {

@@ -34,7 +34,7 @@ Patch grid(std::uint32_t columns, std::uint32_t rows, std::int32_t edge) {
     return out;
 }
 
-HandleWeights weights_on(const Patch& patch, const Handles& own, std::int32_t width, unsigned threads = 1) {
+HandleWeights weights_on(const Patch& patch, const Handles& own, std::int32_t width, Threads threads = {}) {
     return smooth_weights(own, patch.positions, patch.triangles, width, threads);
 }
 
@@ -69,7 +69,7 @@ std::uint16_t weight_of(const VertexWeights& weights, std::uint16_t handle) {
     return 0;
 }
 
-TEST(SmoothWeights, OfNothingAreNone) { EXPECT_TRUE(smooth_weights({}, {}, {}, 100, 2).empty()); }
+TEST(SmoothWeights, OfNothingAreNone) { EXPECT_TRUE(smooth_weights({}, {}, {}, 100, ThreadPool(2)).empty()); }
 
 TEST(SmoothWeights, OfOneHandleAreThatHandleAlone) {
     const auto patch = grid(5, 4, 10);
@@ -187,7 +187,7 @@ TEST(SmoothWeights, AreSoundOnHostileMeshesForAnyNumberOfThreads) {
         for (const std::int32_t width : {1, 50, 5000, lattice_limit}) {
             const auto weights = weights_on(soup, own, width);
             expect_sound(weights, own);
-            EXPECT_EQ(weights_on(soup, own, width, 5), weights);
+            EXPECT_EQ(weights_on(soup, own, width, ThreadPool(5)), weights);
             std::reverse(soup.triangles.begin(), soup.triangles.end());
             EXPECT_EQ(weights_on(soup, own, width), weights) << "the order of the triangles does not matter";
         }

@@ -46,7 +46,7 @@ ReferenceMesh two_limbs() {
     LatticeMesh mesh;
     add_limb(mesh, {-8000, 0, 0});
     add_limb(mesh, {8000, 0, 0});
-    return make_reference(std::move(mesh), bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 0, 1);
+    return make_reference(std::move(mesh), bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 0, {});
 }
 
 TEST(QuantisedMotion, IsTheMotionToWithinHalfAUnitAndTwoQuantaOfTurning) {
@@ -122,7 +122,8 @@ TEST(BoneRegistration, RecoversTheMotionOfEachBone) {
         options.iterations = 60;
         options.point_to_plane = planes;
         for (const unsigned threads : {1u, 3u}) {
-            const auto found = register_bones(search, frame, reference.sub_meshes, none, {}, options, threads);
+            const auto found =
+                register_bones(search, frame, reference.sub_meshes, none, {}, options, ThreadPool(threads));
             for (std::size_t bone = 0; bone < 2; ++bone) {
                 const Vector3d middle = real(reference.pivots[bone]);
                 EXPECT_LT((found[bone](middle) - truth[bone](middle)).norm(), 60) << planes;
@@ -138,7 +139,7 @@ TEST(BoneRegistration, NormalsThatMeanNothingDoNotLeadAstray) {
     const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
     for (auto& t : mesh.triangles)
         for (auto& v : t) v = test::below(random, vertices);
-    const auto reference = make_reference(mesh, bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 0, 1);
+    const auto reference = make_reference(mesh, bones, joints, std::vector<QuantisedRotation>(2), radii, 0, 0, {});
     const auto search = make_reference_search(reference);
     std::vector<LatticePoint> frame;
     for (const auto p : reference.mesh.positions) frame.push_back(p + LatticePoint{60, 40, -30});
@@ -146,7 +147,7 @@ TEST(BoneRegistration, NormalsThatMeanNothingDoNotLeadAstray) {
     options.iterations = 60;
     options.point_to_plane = true;
     const std::vector<RigidMotion> none(2);
-    const auto found = register_bones(search, frame, reference.sub_meshes, none, {}, options, 1);
+    const auto found = register_bones(search, frame, reference.sub_meshes, none, {}, options, {});
     for (std::size_t bone = 0; bone < 2; ++bone) {
         const Vector3d middle = real(reference.pivots[bone]);
         EXPECT_LT((found[bone](middle) - middle).norm(), 1000);
@@ -161,7 +162,7 @@ TEST(BoneRegistration, StartsFromTheMotionBeforeWhereThatFitsBetter) {
     std::vector<LatticePoint> frame;
     for (const auto p : reference.mesh.positions) frame.push_back(p + LatticePoint{0, 60000, 0});
     const std::vector<RigidMotion> lost(2), before(2, far);
-    const auto found = register_bones(search, frame, reference.sub_meshes, lost, before, {}, 1);
+    const auto found = register_bones(search, frame, reference.sub_meshes, lost, before, {}, {});
     for (const auto& motion : found) EXPECT_LT((motion.shift - far.shift).norm(), 1.0);
 }
 
@@ -172,7 +173,7 @@ TEST(BoneRegistration, ABoneWithTooFewVerticesKeepsItsSkeletalMotion) {
     const std::vector<RigidMotion> skeletal = {random_motion(random, 1, 500), random_motion(random, 1, 500)};
     const std::vector<LatticePoint> frame(11, LatticePoint{-8000, 0, 0});
     const auto sub_meshes = group_by_bone(std::vector<BoneIndex>(11, 0), 2);
-    const auto found = register_bones(search, frame, sub_meshes, skeletal, {}, {}, 1);
+    const auto found = register_bones(search, frame, sub_meshes, skeletal, {}, {}, {});
     for (std::size_t bone = 0; bone < 2; ++bone) {
         EXPECT_EQ(found[bone].rotation, skeletal[bone].rotation);
         EXPECT_EQ(found[bone].shift, skeletal[bone].shift);

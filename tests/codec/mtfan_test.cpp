@@ -18,9 +18,9 @@ using tfan_test::TestMesh;
 void expect_comes_back(const TestMesh& mesh, int m, unsigned seed) {
     SCOPED_TRACE(mesh.name + " with m = " + std::to_string(m));
     const auto positions = tfan_test::positions_of(mesh, seed);
-    const auto encoded = encode_mtfan(positions, mesh.triangles, m, 1);
+    const auto encoded = encode_mtfan(positions, mesh.triangles, m, {});
     const auto decoded = decode_mtfan(encoded.fans, encoded.distance_orders, positions,
-                                      static_cast<std::uint32_t>(mesh.triangles.size()), m, 1);
+                                      static_cast<std::uint32_t>(mesh.triangles.size()), m, {});
     ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
     EXPECT_EQ(*decoded, encoded.triangles);
     EXPECT_EQ(as_multiset(*decoded), as_multiset(mesh.triangles));
@@ -30,34 +30,34 @@ void expect_comes_back(const TestMesh& mesh, int m, unsigned seed) {
 TEST(Mtfan, NothingTakesNoBytes) {
     const std::vector<LatticePoint> positions(3);
     for (const auto& points : {std::vector<LatticePoint>{}, positions}) {
-        const auto encoded = encode_mtfan(points, {}, 16, 1);
+        const auto encoded = encode_mtfan(points, {}, 16, {});
         EXPECT_TRUE(encoded.fans.empty());
         EXPECT_TRUE(encoded.distance_orders.empty());
-        EXPECT_EQ(decode_mtfan({}, {}, points, 0, 16, 1).value().size(), 0u);
+        EXPECT_EQ(decode_mtfan({}, {}, points, 0, 16, {}).value().size(), 0u);
     }
 }
 
 TEST(Mtfan, VerticesKeepTheirNumbers) {
     const std::vector<LatticePoint> positions = {{9, 0, 0}, {0, 0, 0}, {0, 9, 0}, {99, 0, 0}};
     const std::vector<Triangle> triangles = {{2, 1, 3}};
-    EXPECT_EQ(encode_mtfan(positions, triangles, 8, 1).triangles, (std::vector<Triangle>{{1, 3, 2}}));
+    EXPECT_EQ(encode_mtfan(positions, triangles, 8, {}).triangles, (std::vector<Triangle>{{1, 3, 2}}));
 }
 
 TEST(Mtfan, TheDistanceOrderCountsOnlyVerticesNotYetVisited) {
     // From vertex 0, the others are ever farther: each is the nearest of those that are left.
     const std::vector<LatticePoint> positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {-3, 0, 0}, {0, -4, 0}};
     const std::vector<Triangle> triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}};
-    EXPECT_EQ(encode_mtfan(positions, triangles, 4, 1).distance_order_counts,
+    EXPECT_EQ(encode_mtfan(positions, triangles, 4, {}).distance_order_counts,
               (std::vector<std::uint32_t>{4, 0, 0, 0, 0}));
     const std::vector<Triangle> backwards = {{0, 4, 3}, {0, 3, 2}, {0, 2, 1}};
-    EXPECT_EQ(encode_mtfan(positions, backwards, 4, 1).distance_order_counts,
+    EXPECT_EQ(encode_mtfan(positions, backwards, 4, {}).distance_order_counts,
               (std::vector<std::uint32_t>{1, 1, 1, 1, 0}));
 }
 
 TEST(Mtfan, AVertexBeyondTheNearestIsCodedByItsIndex) {
     const std::vector<LatticePoint> positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {-3, 0, 0}, {0, -4, 0}};
     const std::vector<Triangle> backwards = {{0, 4, 3}, {0, 3, 2}, {0, 2, 1}};
-    EXPECT_EQ(encode_mtfan(positions, backwards, 2, 1).distance_order_counts, (std::vector<std::uint32_t>{1, 1, 2}));
+    EXPECT_EQ(encode_mtfan(positions, backwards, 2, {}).distance_order_counts, (std::vector<std::uint32_t>{1, 1, 2}));
 }
 
 TEST(Mtfan, EveryKindOfMeshComesBackExactly) {
@@ -91,13 +91,14 @@ TEST(Mtfan, AHubOfTwentyThousandTrianglesComesBackExactly) {
 
 TEST(Mtfan, BytesDoNotDependOnTheNumberOfThreads) {
     const auto mesh = tfan_test::perturbed_sphere(80, 90, 1);
-    const auto one = encode_mtfan(mesh.positions, mesh.triangles, 16, 1);
+    const auto one = encode_mtfan(mesh.positions, mesh.triangles, 16, {});
     for (const unsigned threads : {0u, 2u, 5u}) {
-        const auto many = encode_mtfan(mesh.positions, mesh.triangles, 16, threads);
+        const ThreadPool pool(threads);
+        const auto many = encode_mtfan(mesh.positions, mesh.triangles, 16, pool);
         EXPECT_EQ(many.fans, one.fans);
         EXPECT_EQ(many.distance_orders, one.distance_orders);
         const auto decoded = decode_mtfan(one.fans, one.distance_orders, mesh.positions,
-                                          static_cast<std::uint32_t>(mesh.triangles.size()), 16, threads);
+                                          static_cast<std::uint32_t>(mesh.triangles.size()), 16, pool);
         ASSERT_TRUE(decoded.has_value());
         EXPECT_EQ(*decoded, one.triangles);
     }
@@ -106,14 +107,14 @@ TEST(Mtfan, BytesDoNotDependOnTheNumberOfThreads) {
 TEST(Mtfan, AnImpossibleNumberOfNearestIsReportedAsCorrupt) {
     const std::vector<LatticePoint> positions(3);
     for (const int m : {-1, 0, 65, 1 << 30}) {
-        const auto decoded = decode_mtfan({}, {}, positions, 1, m, 1);
+        const auto decoded = decode_mtfan({}, {}, positions, 1, m, {});
         ASSERT_FALSE(decoded.has_value());
         EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
     }
 }
 
 TEST(Mtfan, TrianglesWithoutVerticesAreReportedAsCorrupt) {
-    const auto decoded = decode_mtfan({}, {}, {}, 5, 8, 1);
+    const auto decoded = decode_mtfan({}, {}, {}, 5, 8, {});
     ASSERT_FALSE(decoded.has_value());
     EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
 }
@@ -123,13 +124,13 @@ TEST(Mtfan, DamagedBytesNeverNameAVertexThatDoesNotExist) {
     for (unsigned seed = 0; seed < 200; ++seed) {
         const auto mesh = seed % 2 == 0 ? tfan_test::perturbed_sphere(10, 12, seed) : tfan_test::random_soup(seed);
         const auto positions = tfan_test::positions_of(mesh, seed);
-        const auto encoded = encode_mtfan(positions, mesh.triangles, 8, 1);
+        const auto encoded = encode_mtfan(positions, mesh.triangles, 8, {});
         const auto count = static_cast<std::uint32_t>(mesh.triangles.size());
         for (int i = 0; i < 20; ++i) {
             const auto fans = i % 3 == 0 ? encoded.fans : tfan_test::damage(encoded.fans, random);
             const auto orders =
                 i % 3 == 1 ? encoded.distance_orders : tfan_test::damage(encoded.distance_orders, random);
-            const auto decoded = decode_mtfan(fans, orders, positions, count, 8, 1);
+            const auto decoded = decode_mtfan(fans, orders, positions, count, 8, {});
             if (!decoded) continue;
             EXPECT_EQ(decoded->size(), count);
             for (const auto& triangle : *decoded)

@@ -5,8 +5,8 @@
 #include <Eigen/Geometry>
 #include <random>
 
-#include "codec/reference/handle_weights.h"
 #include "codec/random_numbers.h"
+#include "codec/reference/handle_weights.h"
 
 namespace htvm::internal {
 namespace {
@@ -40,7 +40,7 @@ ReferenceMesh two_bones() {
     const std::vector<std::int32_t> radii = {10, 10, 10};
     return make_reference(std::move(mesh), {{0, 1}, {2, 3}, {4, 4}},
                           {{-100, 0, 0}, {-100, 100, 0}, {100, 0, 0}, {100, 100, 0}, {9000, 9000, 9000}},
-                          std::vector<QuantisedRotation>(3), radii, 0, 7, 1);
+                          std::vector<QuantisedRotation>(3), radii, 0, 7, {});
 }
 
 TEST(ReferenceMesh, IsSkinnedAndItsPivotsAreTheSubMeshesMeans) {
@@ -55,14 +55,14 @@ TEST(ReferenceMesh, IsSkinnedAndItsPivotsAreTheSubMeshesMeans) {
 
 TEST(ReferenceMesh, OfNothingIsLegal) {
     const std::vector<std::int32_t> radii = {10};
-    const auto reference = make_reference({}, {{0, 1}}, {{0, 0, 0}, {1, 1, 1}}, {{}}, radii, 0, 0, 1);
-    EXPECT_TRUE(predict_positions(reference, std::vector<QuantisedTransform>(1), 1).empty());
+    const auto reference = make_reference({}, {{0, 1}}, {{0, 0, 0}, {1, 1, 1}}, {{}}, radii, 0, 0, {});
+    EXPECT_TRUE(predict_positions(reference, std::vector<QuantisedTransform>(1), {}).empty());
 }
 
 TEST(Prediction, TransformsThatDoNothingLeaveTheReference) {
     const auto reference = two_bones();
     const std::vector<QuantisedTransform> none(3);
-    EXPECT_EQ(predict_positions(reference, none, 1), reference.mesh.positions);
+    EXPECT_EQ(predict_positions(reference, none, {}), reference.mesh.positions);
     EXPECT_EQ(predict_normals(reference, none), reference.mesh.normals);
 }
 
@@ -71,7 +71,7 @@ TEST(Prediction, EachBoneMovesItsOwnVerticesAboutItsPivot) {
     std::vector<QuantisedTransform> transforms(3);
     transforms[0].rotation = quantise_rotation({1, 0, 0, 1});  // a quarter turn about z
     transforms[0].shift = {0, 0, 1000};
-    const auto moved = predict_positions(reference, transforms, 1);
+    const auto moved = predict_positions(reference, transforms, {});
     EXPECT_EQ(moved[0], (LatticePoint{-50, 50, 1000}));
     EXPECT_EQ(moved[2], (LatticePoint{-100, 30, 1000}));
     EXPECT_EQ(moved[1], reference.mesh.positions[1]);
@@ -97,7 +97,7 @@ TEST(Prediction, WeightsThatAreWholeChangeNothing) {
     for (const auto bone : rigid.bone_of_vertex) whole.weights.push_back({{bone}, {4096}});
     std::vector<QuantisedTransform> transforms(3);
     for (auto& t : transforms) t = {random_rotation(random), random_point(random, 1000)};
-    EXPECT_EQ(predict_positions(whole, transforms, 1), predict_positions(rigid, transforms, 1));
+    EXPECT_EQ(predict_positions(whole, transforms, {}), predict_positions(rigid, transforms, {}));
     EXPECT_EQ(predict_normals(whole, transforms), predict_normals(rigid, transforms));
 }
 
@@ -106,7 +106,7 @@ TEST(Prediction, SharedVerticesGoToTheWeightedMean) {
     std::vector<QuantisedTransform> transforms(3);
     transforms[0].shift = {400, 0, 0};
     transforms[1].shift = {0, 800, 1};
-    const auto moved = predict_positions(reference, transforms, 1);
+    const auto moved = predict_positions(reference, transforms, {});
     EXPECT_EQ(moved[0], (LatticePoint{-100 + 300, 200, 0}));
     EXPECT_EQ(moved[3], (LatticePoint{-80 + 200, 100 + 400, 1})) << "halves are rounded up";
     EXPECT_EQ(moved[2], (LatticePoint{-120 + 400, 50, 0}));
@@ -124,7 +124,7 @@ TEST(Prediction, RoundsTheRealBlendOnce) {
         for (auto& p : reference.pivots) p = random_point(random, 1 << 20);
         std::vector<QuantisedTransform> transforms(3);
         for (auto& t : transforms) t = {random_rotation(random), random_point(random, 1 << 20)};
-        const auto moved = predict_positions(reference, transforms, 1);
+        const auto moved = predict_positions(reference, transforms, {});
         Eigen::Vector3d expected = Eigen::Vector3d::Zero();
         for (const std::size_t bone : {0, 1}) {
             const Eigen::Vector3d pivot = real(reference.pivots[bone]);
@@ -148,7 +148,7 @@ TEST(Prediction, OfSharedVerticesNeverLeavesTheLattice) {
         for (auto& p : reference.pivots) p = corner(lattice_limit);
         std::vector<QuantisedTransform> transforms(3);
         for (auto& t : transforms) t = {random_rotation(random), corner(2 * lattice_limit)};  // the most of a stream
-        const auto moved = predict_positions(reference, transforms, 1);
+        const auto moved = predict_positions(reference, transforms, {});
         for (const auto p : moved) ASSERT_TRUE(on_lattice(p));
         // Where the sum overflowed, it would land on the other side.
         const double x =
@@ -169,12 +169,12 @@ TEST(ReferenceMesh, OfSomeWidthHasWeightsWhereItsBonesMeet) {
     const std::vector<std::int32_t> radii = {1, 1};
     const auto make = [&](std::int32_t width) {
         return make_reference(mesh, {{0, 1}, {2, 3}}, {{-100, -9, 0}, {-100, 200, 0}, {100, -9, 0}, {100, 200, 0}},
-                              std::vector<QuantisedRotation>(2), radii, width, 0, 1);
+                              std::vector<QuantisedRotation>(2), radii, width, 0, {});
     };
     EXPECT_TRUE(make(0).weights.empty());
     const auto reference = make(1000);
     ASSERT_EQ(reference.weights.size(), 4u);
-    EXPECT_EQ(reference.weights, smooth_weights(reference.bone_of_vertex, mesh.positions, mesh.triangles, 1000, 1));
+    EXPECT_EQ(reference.weights, smooth_weights(reference.bone_of_vertex, mesh.positions, mesh.triangles, 1000, {}));
     EXPECT_GT(reference.weights[0].weight[1], 0);
     EXPECT_EQ(reference.weights[3].weight[0], 4096);
 }
@@ -209,10 +209,10 @@ TEST(Prediction, IsTheSameForAnyNumberOfThreads) {
     for (int i = 0; i < 50000; ++i) mesh.positions.push_back(random_point(random, 5000));
     const std::vector<std::int32_t> radii = {100, 100};
     const auto reference = make_reference(std::move(mesh), {{0, 1}, {1, 2}}, {{0, 0, 0}, {0, 999, 0}, {999, 0, 0}},
-                                          std::vector<QuantisedRotation>(2), radii, 0, 0, 3);
+                                          std::vector<QuantisedRotation>(2), radii, 0, 0, ThreadPool(3));
     const std::vector<QuantisedTransform> transforms = {{random_rotation(random), {5, 6, 7}},
                                                         {random_rotation(random), {-5, 6, 700}}};
-    EXPECT_EQ(predict_positions(reference, transforms, 1), predict_positions(reference, transforms, 7));
+    EXPECT_EQ(predict_positions(reference, transforms, {}), predict_positions(reference, transforms, ThreadPool(7)));
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST(Skinning, GivesEachVertexItsNearestBone) {
             const auto bones = random_bones(random, count, reach);
             std::vector<LatticePoint> vertices;
             for (int i = 0; i < 2000; ++i) vertices.push_back(random_point(random, reach));
-            const auto bone_of = skin(vertices, bones, 1);
+            const auto bone_of = skin(vertices, bones, {});
             for (std::size_t k = 0; k < vertices.size(); ++k) {
                 long double best = by_equation_2(vertices[k], bones[0]);
                 for (const auto& bone : bones) best = std::min(best, by_equation_2(vertices[k], bone));
@@ -110,7 +110,7 @@ TEST(Skinning, TiesGoToTheLowerBone) {
                                              {{20, 0, 0}, {20, 100, 0}, 5},
                                              {{0, 100, 0}, {0, 0, 0}, 5}};
     const std::vector<LatticePoint> vertices = {{10, 50, 0}, {0, 50, 3}, {35, 50, 0}, {10, 150, 0}};
-    EXPECT_EQ(skin(vertices, twins, 1), (std::vector<BoneIndex>{1, 1, 0, 1}));
+    EXPECT_EQ(skin(vertices, twins, {}), (std::vector<BoneIndex>{1, 1, 0, 1}));
 }
 
 TEST(Skinning, IsTheSameForAnyNumberOfThreads) {
@@ -118,8 +118,8 @@ TEST(Skinning, IsTheSameForAnyNumberOfThreads) {
     const auto bones = random_bones(random, 14, 5000);
     std::vector<LatticePoint> vertices;
     for (int i = 0; i < 30000; ++i) vertices.push_back(random_point(random, 6000));
-    EXPECT_EQ(skin(vertices, bones, 1), skin(vertices, bones, 7));
-    EXPECT_TRUE(skin({}, bones, 4).empty());
+    EXPECT_EQ(skin(vertices, bones, {}), skin(vertices, bones, ThreadPool(7)));
+    EXPECT_TRUE(skin({}, bones, ThreadPool(4)).empty());
 }
 
 TEST(SubMeshes, HoldEveryVertexOnceByBoneAndAscending) {

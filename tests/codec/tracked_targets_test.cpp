@@ -36,11 +36,11 @@ double flat(double, double) { return 0; }
 double bowl(double x, double y) { return -(x * x + y * y) / 4000; }
 
 TargetSurface surface_of(const LatticeMesh& mesh) {
-    return make_target_surface(points_of(mesh.positions), mesh.triangles, 80, 1000, 1);
+    return make_target_surface(points_of(mesh.positions), mesh.triangles, 80, 1000, {});
 }
 
 TrackedTargets targets_of(const LatticeMesh& reference, const LatticeMesh& captured, double reach = 500,
-                          unsigned threads = 1) {
+                          Threads threads = {}) {
     const auto normals = exact_normals(reference.positions, reference.triangles);
     return find_tracked_targets({reference.positions, normals, reference.triangles, reference.colours}, captured,
                                 surface_of(captured), reach, threads);
@@ -92,8 +92,8 @@ TEST(TrackedTargets, ask_for_the_colours_that_are_there_whatever_the_sampling) {
 TEST(TrackedTargets, are_the_same_for_any_number_of_threads) {
     const auto captured = height_field(64, 25, bowl);
     const auto reference = height_field(20, 80, flat);
-    EXPECT_EQ(targets_of(reference, captured, 500, 1).displacement,
-              targets_of(reference, captured, 500, 3).displacement);
+    EXPECT_EQ(targets_of(reference, captured, 500).displacement,
+              targets_of(reference, captured, 500, ThreadPool(3)).displacement);
 }
 
 TEST(TrackedTargets, of_nothing_are_nothing) {

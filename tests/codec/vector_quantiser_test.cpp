@@ -5,8 +5,8 @@
 #include <random>
 #include <string>
 
-#include "codec/random_numbers.h"
 #include "codec/paper/vector_quantiser_enc.h"
+#include "codec/random_numbers.h"
 
 namespace htvm::internal {
 namespace {
@@ -154,7 +154,8 @@ TEST(Quantiser, RaisingLambdaNeverRaisesTheBits) {
 TEST(Quantiser, IsTheSameForAnyNumberOfThreads) {
     const auto residuals = gaussian(20000, 200, 5);
     QuantiserOptions one, seven;
-    seven.threads = 7;
+    const ThreadPool pool(7);
+    seven.threads = pool.threads();
     const auto codebook = train_codebook(residuals, one);
     EXPECT_EQ(train_codebook(residuals, seven), codebook);
     const auto a = quantise(residuals, codebook, one), b = quantise(residuals, codebook, seven);

@@ -155,8 +155,8 @@ TEST(VertexField, HasTheSameBytesFromTwoThreadsAndDoesTheOtherWorkBesideOnce) {
             const auto alone = encode_field(hierarchy, values, components, options, &first->history);
             for (const unsigned threads : {1u, 2u, 4u}) {
                 int beside = 0;
-                const auto both =
-                    encode_field(hierarchy, values, components, options, &first->history, threads, [&] { ++beside; });
+                const auto both = encode_field(hierarchy, values, components, options, &first->history,
+                                               ThreadPool(threads), [&] { ++beside; });
                 EXPECT_EQ(both->bytes, alone->bytes);
                 expect_same(both->history, alone->history);
                 EXPECT_EQ(beside, 1);
@@ -169,7 +169,7 @@ TEST(VertexField, HandsOnWhatTheOtherWorkThrows) {
     const VertexHierarchy hierarchy = hierarchy_of(mesh);
     const auto values = field(mesh.vertex_count, 3, 1);
     for (const unsigned threads : {1u, 2u})
-        EXPECT_THROW(static_cast<void>(encode_field(hierarchy, values, 3, {}, nullptr, threads,
+        EXPECT_THROW(static_cast<void>(encode_field(hierarchy, values, 3, {}, nullptr, ThreadPool(threads),
                                                     [] { throw std::runtime_error("other work"); })),
                      std::runtime_error);
 }

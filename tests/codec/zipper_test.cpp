@@ -132,7 +132,7 @@ TEST(Zipper, HalvesOfDifferentSamplingBecomeOneClosedSurface) {
         for (const double displacement : {0.0, 100.0, 200.0, -100.0, -200.0}) {
             SCOPED_TRACE(std::to_string(around) + " around, displaced by " + std::to_string(displacement));
             const Cut cut = cut_capsule(around, displacement);
-            const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, 1);
+            const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, {});
             EXPECT_EQ(edges_of(joined).open, 0);
             EXPECT_EQ(edges_of(joined).non_manifold, 0);
             EXPECT_NEAR(area_of(joined), whole + displacement * 2 * pi * 1000, 0.03 * whole);
@@ -142,7 +142,7 @@ TEST(Zipper, HalvesOfDifferentSamplingBecomeOneClosedSurface) {
 TEST(Zipper, TheSameSamplingOnBothSidesIsClosedToo) {
     Cut cut = cut_capsule(32, 0);
     cut.coded = above(cut.animated, 2000);
-    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, 1);
+    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, {});
     EXPECT_EQ(edges_of(joined).open, 0);
     EXPECT_EQ(edges_of(joined).non_manifold, 0);
     EXPECT_NEAR(area_of(joined), area_of(cut.animated), 0.001 * area_of(cut.animated));
@@ -153,14 +153,14 @@ TEST(Zipper, ACodedPieceInTheMiddleIsJoinedAtBothEnds) {
     std::vector<std::uint8_t> still;
     for (const LatticePoint p : animated.positions) still.push_back(p.z < 1500 || p.z > 2500);
     LatticeMesh coded = above(tube(28, 9, 1300, 2700, 0.2), -1);
-    const LatticeMesh joined = zipper(coded, animated, still, 1);
+    const LatticeMesh joined = zipper(coded, animated, still, {});
     EXPECT_EQ(edges_of(joined).open, 0);
     EXPECT_EQ(edges_of(joined).non_manifold, 0);
 }
 
 TEST(Zipper, TheCodedVerticesAndTrianglesComeFirstAndUnchanged) {
     const Cut cut = cut_capsule(24, 100);
-    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, 1);
+    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, {});
     ASSERT_GT(joined.positions.size(), cut.coded.positions.size());
     EXPECT_TRUE(std::equal(cut.coded.positions.begin(), cut.coded.positions.end(), joined.positions.begin()));
     EXPECT_TRUE(std::equal(cut.coded.triangles.begin(), cut.coded.triangles.end(), joined.triangles.begin()));
@@ -171,7 +171,7 @@ TEST(Zipper, ColoursStayWithTheirVertices) {
     cut.coded.colours.assign(cut.coded.positions.size(), Colour{1, 1, 1});
     for (std::size_t v = 0; v < cut.animated.positions.size(); ++v)
         cut.animated.colours.push_back({static_cast<std::uint8_t>(cut.animated.positions[v].z / 20), 2, 2});
-    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, 1);
+    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, {});
     ASSERT_EQ(joined.colours.size(), joined.positions.size());
     for (std::size_t v = 0; v < joined.positions.size(); ++v) {
         if (v < cut.coded.positions.size())
@@ -183,15 +183,15 @@ TEST(Zipper, ColoursStayWithTheirVertices) {
 
 TEST(Zipper, NothingCodedGivesTheAnimatedMesh) {
     const Cut cut = cut_capsule(32, 0);
-    EXPECT_TRUE(same(zipper({}, cut.animated, cut.still, 1), cut.animated));
+    EXPECT_TRUE(same(zipper({}, cut.animated, cut.still, {}), cut.animated));
 }
 
 TEST(Zipper, NothingStillGivesTheCodedMesh) {
     const Cut cut = cut_capsule(24, 0);
     const std::vector<std::uint8_t> none(cut.still.size(), 0);
-    EXPECT_TRUE(same(zipper(cut.coded, cut.animated, none, 1), cut.coded));
-    EXPECT_TRUE(same(zipper(cut.coded, {}, {}, 1), cut.coded));
-    EXPECT_TRUE(same(zipper({}, {}, {}, 1), {}));
+    EXPECT_TRUE(same(zipper(cut.coded, cut.animated, none, {}), cut.coded));
+    EXPECT_TRUE(same(zipper(cut.coded, {}, {}, {}), cut.coded));
+    EXPECT_TRUE(same(zipper({}, {}, {}, {}), {}));
 }
 
 TEST(Zipper, TheOpenEndsOfACaptureStayOpen) {
@@ -199,7 +199,7 @@ TEST(Zipper, TheOpenEndsOfACaptureStayOpen) {
     for (const double displacement : {0.0, 100.0, -100.0}) {
         LatticeMesh coded = above(tube(40, 30, 0, 4000, 0.3), 2000);
         for (LatticePoint& p : coded.positions) p.z += static_cast<std::int32_t>(displacement);
-        const LatticeMesh joined = zipper(coded, animated, still_below(animated, 2000), 1);
+        const LatticeMesh joined = zipper(coded, animated, still_below(animated, 2000), {});
         EXPECT_EQ(edges_of(joined).open, 32 + 40);
         EXPECT_EQ(edges_of(joined).non_manifold, 0);
     }
@@ -210,7 +210,7 @@ TEST(Zipper, AnEdgeOfThreeTrianglesInTheInputHarmsNothing) {
     const Triangle t = cut.coded.triangles[cut.coded.triangles.size() / 2];
     cut.coded.positions.push_back({0, 0, 3000});
     cut.coded.triangles.push_back({t[0], t[1], static_cast<std::uint32_t>(cut.coded.positions.size() - 1)});
-    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, 1);
+    const LatticeMesh joined = zipper(cut.coded, cut.animated, cut.still, {});
     EXPECT_EQ(edges_of(joined).open, 2);
     EXPECT_EQ(edges_of(joined).non_manifold, 1);
 }
@@ -236,16 +236,17 @@ TEST(Zipper, AnyTriangleSoupGivesAValidMeshForAnyNumberOfThreads) {
         const LatticeMesh coded = soup(random, size), animated = soup(random, size);
         std::vector<std::uint8_t> still;
         for (std::size_t v = 0; v < animated.positions.size(); ++v) still.push_back(test::below(random, 2) != 0);
-        const LatticeMesh joined = zipper(coded, animated, still, 1);
+        const LatticeMesh joined = zipper(coded, animated, still, {});
         for (const Triangle& t : joined.triangles)
             for (const std::uint32_t v : t) ASSERT_LT(v, joined.positions.size());
-        EXPECT_TRUE(same(joined, zipper(coded, animated, still, 3)));
+        EXPECT_TRUE(same(joined, zipper(coded, animated, still, ThreadPool(3))));
     }
 }
 
 TEST(Zipper, TheNumberOfThreadsChangesNothing) {
     const Cut cut = cut_capsule(64, 100);
-    EXPECT_TRUE(same(zipper(cut.coded, cut.animated, cut.still, 1), zipper(cut.coded, cut.animated, cut.still, 3)));
+    EXPECT_TRUE(same(zipper(cut.coded, cut.animated, cut.still, {}),
+                     zipper(cut.coded, cut.animated, cut.still, ThreadPool(3))));
 }
 
 }  // namespace

@@ -75,9 +75,9 @@ TEST(Compare, IsTheSameForAnyThreadCount) {
     std::mt19937 random(31);
     const Mesh a = shapes::soup(random, 200, 300), b = shapes::soup(random, 200, 300);
     CompareOptions options = small_pictures();
-    options.threads = 1;
     const ComparisonSummary one = summarise(as_sequence(*compare_frame(a, b, options)));
-    options.threads = 4;
+    const internal::ThreadPool pool(4);
+    options.threads = pool;
     const ComparisonSummary four = summarise(as_sequence(*compare_frame(a, b, options)));
     EXPECT_EQ(one.m1_mm, four.m1_mm);
     EXPECT_EQ(one.m1_colour, four.m1_colour);

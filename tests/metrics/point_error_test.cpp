@@ -44,8 +44,8 @@ TEST(NearestVertices, EqualBruteForceWithTiesToTheLowestIndexForAnyThreadCount) 
         const Mesh from = random_cloud(random, 1 + random() % 400, 1 + random() % 30);
         const Mesh to = random_cloud(random, 1 + random() % 400, 1 + random() % 30);
         const auto expected = nearest_by_brute_force(from, to);
-        EXPECT_EQ(nearest_vertices(from.positions, to.positions, 1), expected);
-        EXPECT_EQ(nearest_vertices(from.positions, to.positions, 5), expected);
+        EXPECT_EQ(nearest_vertices(from.positions, to.positions, {}), expected);
+        EXPECT_EQ(nearest_vertices(from.positions, to.positions, internal::ThreadPool(5)), expected);
     }
 }
 

@@ -129,11 +129,13 @@ TEST(Render, IsTheSameForAnyThreadCount) {
         ASSERT_TRUE(cameras.has_value());
         RenderOptions options;
         options.shading = shading;
-        EXPECT_EQ(render(mesh, cameras->at(1), options, 1).rgb, render(mesh, cameras->at(1), options, 3).rgb);
+        EXPECT_EQ(render(mesh, cameras->at(1), options, {}).rgb,
+                  render(mesh, cameras->at(1), options, internal::ThreadPool(3)).rgb);
         EXPECT_GT(covered_pixels(render(mesh, cameras->at(1), options)), 1000u);
         const Mesh shifted = shapes::moved(mesh, 1, 0, 0);
         const DrawableMesh a = make_drawable(mesh, options), b = make_drawable(shifted, options);
-        EXPECT_EQ(compare_views(a, b, *cameras, 1).squared, compare_views(a, b, *cameras, 4).squared);
+        EXPECT_EQ(compare_views(a, b, *cameras, {}).squared,
+                  compare_views(a, b, *cameras, internal::ThreadPool(4)).squared);
     }
 }
 

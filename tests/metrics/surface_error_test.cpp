@@ -45,7 +45,7 @@ TEST(SurfaceIndex, FindsTheClosestPointThatBruteForceFinds) {
     std::uniform_real_distribution<double> coordinate(-100, 100);
     for (int round = 0; round < 40; ++round) {
         const Mesh mesh = shapes::soup(random, 1 + random() % 60, 1 + random() % 200);
-        const auto index = SurfaceIndex::build(mesh, 1);
+        const auto index = SurfaceIndex::build(mesh, {});
         ASSERT_TRUE(index.has_value());
         for (int q = 0; q < 50; ++q) {
             const Point3 p{{coordinate(random), coordinate(random), coordinate(random)}};
@@ -58,7 +58,7 @@ TEST(SurfaceIndex, FindsTheClosestPointThatBruteForceFinds) {
 
 TEST(SurfaceIndex, IsAccurateToNanometresFarFromTheOrigin) {
     const Mesh mesh = shapes::moved(shapes::plane(100, 10, 0), 100000, 100000, 100000);
-    const auto index = SurfaceIndex::build(mesh, 1);
+    const auto index = SurfaceIndex::build(mesh, {});
     ASSERT_TRUE(index.has_value());
     const Point3 p{{100033.3, 100071.7, 100000.0001}};
     EXPECT_NEAR(std::sqrt(index->closest(p).squared_distance), 0.0001, 1e-6 * 0.0001 + 1e-10);
@@ -69,7 +69,7 @@ TEST(SurfaceIndex, VisitsEveryTriangleThatComesNearerThanTheRadius) {
     std::uniform_real_distribution<double> coordinate(-60, 60);
     for (int round = 0; round < 30; ++round) {
         const Mesh mesh = shapes::soup(random, 3 + random() % 40, 1 + random() % 100);
-        const auto index = SurfaceIndex::build(mesh, 1);
+        const auto index = SurfaceIndex::build(mesh, {});
         ASSERT_TRUE(index.has_value());
         const Point3 p{{coordinate(random), coordinate(random), coordinate(random)}};
         std::vector<bool> visited(mesh.triangles.size(), false);
@@ -162,9 +162,9 @@ TEST(SurfaceError, IsTheSameForAnyThreadCountAndChangesWithTheSeed) {
     const Mesh a = shapes::soup(random, 300, 500), b = shapes::soup(random, 300, 500);
     SurfaceErrorOptions options;
     options.edges = false;  // on so few triangles they would take all samples
-    options.threads = 1;
     const auto one = surface_distances(a, b, options);
-    options.threads = 7;
+    const internal::ThreadPool pool(7);
+    options.threads = pool;
     const auto seven = surface_distances(a, b, options);
     options.seed = 2;
     const auto other = surface_distances(a, b, options);

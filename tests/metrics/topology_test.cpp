@@ -10,7 +10,7 @@ namespace htvm {
 namespace {
 
 Topology of(const Mesh& mesh, const TopologyMeasureOptions& options = {}) {
-    const auto found = topology(mesh, options, 2);
+    const auto found = topology(mesh, options, internal::ThreadPool(2));
     EXPECT_TRUE(found.has_value());
     return found.value_or(Topology{});
 }

@@ -85,7 +85,7 @@ struct Rest {
 };
 
 Rest rest_after(const DeformableMesh& mesh, const TargetSurface& target, std::span<const RigidMotion> motions) {
-    const auto now = deform(mesh, motions, 1);
+    const auto now = deform(mesh, motions, {});
     const auto targets = surface_targets(now, vertex_normals(now, mesh.triangles), target, {.reach = 60});
     Rest out;
     for (std::size_t v = 0; v < now.size(); ++v) {
@@ -101,7 +101,7 @@ Rest rest_after(const DeformableMesh& mesh, const TargetSurface& target, std::sp
 }
 
 TargetSurface target_of(const Surface& surface, const DeformationOptions& options) {
-    return make_target_surface(surface.first, surface.second, 20, options.back_samples, 1);
+    return make_target_surface(surface.first, surface.second, 20, options.back_samples, {});
 }
 
 // Bent about z: a quarter circle per 600 mm.
@@ -166,8 +166,9 @@ TEST(RegisterDeformation, IsTheSameForAnyNumberOfThreads) {
     const auto bent_arm = moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); });
     const auto one = register_deformation(mesh, target_of(bent_arm, options), {}, options);
     for (const unsigned threads : {2u, 3u, 7u}) {
-        options.threads = threads;
-        const auto target = make_target_surface(bent_arm.first, bent_arm.second, 20, options.back_samples, threads);
+        const ThreadPool pool(threads);
+        options.threads = pool;
+        const auto target = make_target_surface(bent_arm.first, bent_arm.second, 20, options.back_samples, pool);
         const auto many = register_deformation(mesh, target, {}, options);
         for (std::size_t h = 0; h < one.size(); ++h) {
             EXPECT_EQ(one[h].rotation, many[h].rotation);
@@ -187,7 +188,7 @@ TEST(RegisterDeformation, WorksInLatticeUnitsAsInMillimetres) {
     const auto finer = with_handles_along_x(moved(reference, scale), 0, 9600, 9, options);
     target = moved(target, scale);
     const auto on_lattice = register_deformation(
-        finer, make_target_surface(target.first, target.second, 320, options.back_samples, 1), {}, options);
+        finer, make_target_surface(target.first, target.second, 320, options.back_samples, {}), {}, options);
     for (std::size_t h = 0; h < in_mm.size(); ++h) EXPECT_LT((in_mm[h].shift - on_lattice[h].shift / 16).norm(), 0.5);
 }
 
@@ -202,7 +203,7 @@ TEST(RegisterDeformation, EmptyMeshesKeepTheStart) {
     EXPECT_EQ(deformation_error(mesh, nothing, start, options), 0);
     const auto no_mesh = make_deformable({}, {}, {}, {}, {}, options);
     EXPECT_TRUE(register_deformation(no_mesh, target_of(surface, options), {}, options).empty());
-    EXPECT_TRUE(deform(no_mesh, {}, 1).empty());
+    EXPECT_TRUE(deform(no_mesh, {}, {}).empty());
 }
 
 TEST(RegisterDeformation, SoupsOfTrianglesGiveFiniteMotions) {
@@ -252,7 +253,7 @@ TEST(SurfaceTargets, AreTheClosestPointsThatFaceTheSameWay) {
         for (int i = 0; i < 4; ++i)
             sheets.first.push_back({static_cast<float>(i % 2) * 100, static_cast<float>(i / 2) * 100, z});
     sheets.second = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}};
-    const auto target = make_target_surface(sheets.first, sheets.second, 20, 8, 1);
+    const auto target = make_target_surface(sheets.first, sheets.second, 20, 8, {});
     const std::vector<Point3f> at = {{20, 20, 2}, {20, 20, 2}, {20, 20, 2}, {20, 20, 900}};
     const std::vector<Point3f> normals = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, 0, 1}};
     const auto found = surface_targets(at, normals, target, {.reach = 150});

@@ -73,8 +73,8 @@ TEST(SurfaceErrors, MeshesWithoutTrianglesAreTheirVertices) {
 TEST(SurfaceErrors, AreTheSameForAnyNumberOfThreads) {
     std::mt19937 random(3);
     const Mesh a = shapes::soup(random, 3000, 5000), b = shapes::soup(random, 3000, 5000);
-    const auto one = surface_errors(view(a), view(b), {.threads = 1});
-    const auto three = surface_errors(view(a), view(b), {.threads = 3});
+    const auto one = surface_errors(view(a), view(b), {});
+    const auto three = surface_errors(view(a), view(b), {.threads = ThreadPool(3)});
     EXPECT_EQ(one.geometry_rms, three.geometry_rms);
     EXPECT_EQ(one.colour_rms, three.colour_rms);
     EXPECT_TRUE(std::isfinite(one.geometry_rms));
@@ -92,7 +92,8 @@ TEST(RegionErrors, AreSummedByLabel) {
     from.colours = {{0, 0, 0}, {0, 0, 0}, {3, 4, 0}, {0, 0, 0}};
     const Mesh to = painted(shapes::plane(100, 10, 0), {0, 0, 0});
     const std::vector<std::uint16_t> labels = {0, 2, 2, 7};  // 7: of no region
-    const auto regions = region_errors(view(from), labels, 3, view(to), {to.positions, to.triangles}, {.threads = 2});
+    const auto regions =
+        region_errors(view(from), labels, 3, view(to), {to.positions, to.triangles}, {.threads = ThreadPool(2)});
     ASSERT_EQ(regions.size(), 3u);
     EXPECT_EQ(regions[0].samples, 1u);
     EXPECT_NEAR(regions[0].squared_distance, 1, 1e-5);

@@ -158,11 +158,11 @@ Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, 
     Result<void> attributes;
     parallel_invoke(
         context.threads,
-        [&] { attributes = decode_attributes(payload, context, out.transforms, reference_of, out.mesh); },
         [&] {
             triangles = decode_mtfan(payload.of(Layer::fans), payload.of(Layer::distance_orders), out.mesh.positions,
                                      payload.header.triangles, context.nearest_vertices, context.threads);
-        });
+        },
+        [&] { attributes = decode_attributes(payload, context, out.transforms, reference_of, out.mesh); });
     if (!attributes) return tl::unexpected(attributes.error());
     if (!triangles) return tl::unexpected(triangles.error());
     out.mesh.triangles = std::move(*triangles);

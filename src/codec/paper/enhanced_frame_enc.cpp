@@ -251,10 +251,9 @@ EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Co
     EncodedEnhancedFrame out;
     EncodedMtfan connectivity;
     parallel_invoke(
-        threads, [&] { encode_vertex_layers(residuals, source, eligible, codebooks, out.payload); },
-        [&] {
-            connectivity = encode_mtfan(residuals.decoded.positions, triangles, options.nearest_vertices, threads);
-        });
+        threads,
+        [&] { connectivity = encode_mtfan(residuals.decoded.positions, triangles, options.nearest_vertices, threads); },
+        [&] { encode_vertex_layers(residuals, source, eligible, codebooks, out.payload); });
     clock.done("connectivity and entropy coding");
 
     out.payload.set(Layer::fans, std::move(connectivity.fans));

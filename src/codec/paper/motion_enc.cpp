@@ -117,7 +117,7 @@ std::vector<RigidMotion> register_bones(const ReferenceSearch& reference, std::s
         }
     };
     // Each piece takes the next bone that is left: sub-meshes differ much in size.
-    parallel_for(std::min<std::size_t>(threads, out.size()), threads, 1, work);
+    parallel_for(std::min<std::size_t>(threads.count, out.size()), threads, 1, work);
     return out;
 }
 

@@ -1,8 +1,8 @@
 #include <memory>
 
+#include "codec/intra/triangle_fans.h"
 #include "codec/paper/mtfan.h"
 #include "codec/paper/mtfan_distance_order.h"
-#include "codec/intra/triangle_fans.h"
 
 namespace htvm::internal {
 namespace {
@@ -61,7 +61,9 @@ Result<std::vector<Triangle>> decode_mtfan(std::span<const std::uint8_t> fans,
     RangeDecoder decoder(fans);
     const auto discovery = std::unique_ptr<DistanceOrders>(new DistanceOrders{
         positions, UnvisitedNear(positions, m, threads), RangeDecoder(distance_orders), {}, {}, 0, {}});
-    if (!decode_fans(decoder, triangle_count, *discovery, triangles))
+    bool decoded = false;
+    discovery->unvisited.search_beside([&] { decoded = decode_fans(decoder, triangle_count, *discovery, triangles); });
+    if (!decoded)
         return fail(ErrorKind::corrupt_stream,
                     "The M-TFAN connectivity names vertices that do not exist or ends early: the stream is damaged.");
     for (Triangle& triangle : triangles)

@@ -1,9 +1,6 @@
 #include "codec/paper/mtfan_distance_order.h"
 
 #include <algorithm>
-#include <exception>
-
-#include "core/thread.h"
 
 namespace htvm::internal {
 namespace {
@@ -75,23 +72,14 @@ UnvisitedNear::UnvisitedNear(std::span<const LatticePoint> positions, int m, Thr
       visited_(positions.size()),
       focus_(OpenEdges::none) {
     constexpr std::size_t worth_threads = 4096;
-    if (thread_count(threads) < 2 || positions.size() < worth_threads || m_ < first_look) return;
+    if (threads.count < 2 || positions.size() < worth_threads || m_ < first_look) return;
+    threads_ = threads;
     first_nearest_.resize(positions.size() * first_look);
-    try {
-        ahead_ = Thread([this] { search_ahead(); });
-    } catch (const std::exception&) {
-        // No thread to be had: the traversal searches for itself.
-    }
-}
-
-UnvisitedNear::~UnvisitedNear() {
-    stop_ = true;
-    if (ahead_.joinable()) ahead_.join();
 }
 
 void UnvisitedNear::search_ahead() {
     constexpr std::size_t block = 64;
-    for (std::size_t begin = 0; begin < positions_.size() && !stop_; begin += block) {
+    for (std::size_t begin = 0; begin < positions_.size() && !traversed_; begin += block) {
         const std::size_t end = std::min(begin + block, positions_.size());
         for (std::size_t v = begin; v < end; ++v)
             order_.find(static_cast<std::uint32_t>(v), std::span(first_nearest_).subspan(v * first_look, first_look));

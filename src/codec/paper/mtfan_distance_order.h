@@ -11,11 +11,11 @@
 #include <span>
 #include <vector>
 
+#include "codec/intra/triangle_fans.h"
 #include "codec/paper/mtfan.h"
 #include "codec/paper/nearest_order.h"
-#include "codec/intra/triangle_fans.h"
 #include "core/lattice.h"
-#include "core/thread.h"
+#include "core/parallel.h"
 
 namespace htvm::internal {
 
@@ -61,12 +61,29 @@ struct CandidateClasses {
 // The not yet visited vertices among the m nearest to a focus, nearest first.
 class UnvisitedNear {
 public:
-    // With more than one thread, another searches for the nearest ones of all vertices, ahead of the traversal, which
-    // searches itself where it is there first: both find the same.
     UnvisitedNear(std::span<const LatticePoint> positions, int m, Threads threads);
-    ~UnvisitedNear();
     UnvisitedNear(const UnvisitedNear&) = delete;
     UnvisitedNear& operator=(const UnvisitedNear&) = delete;
+
+    // Calls traverse(), which calls what is below. With more than one thread, another searches for the nearest ones of
+    // all vertices meanwhile, ahead of the traversal, which searches itself where it is there first: both find the
+    // same.
+    template <class Traversal>
+    void search_beside(const Traversal& traverse) {
+        struct Traversed {
+            std::atomic<bool>& flag;
+            ~Traversed() { flag = true; }
+        };
+        parallel_invoke(
+            threads_,
+            [&] {
+                const Traversed end{traversed_};
+                traverse();
+            },
+            [&] {
+                if (!first_nearest_.empty()) search_ahead();
+            });
+    }
 
     bool visited(std::uint32_t vertex) const { return visited_[vertex]; }
     void visit(std::uint32_t vertex) { visited_[vertex] = true; }
@@ -86,8 +103,8 @@ private:
     std::size_t m_;
     std::vector<std::uint32_t> first_nearest_;  // by vertex, first_look each, of the vertices below searched_
     std::atomic<std::size_t> searched_ = 0;
-    std::atomic<bool> stop_ = false;
-    Thread ahead_;
+    std::atomic<bool> traversed_ = false;
+    Threads threads_ = {};  // the caller's alone where the mesh is too small for another
     std::vector<bool> visited_;
     std::uint32_t focus_;  // whose nearest vertices `nearest_` holds
     std::size_t found_ = 0, looked_ = 0, count_ = 0;

@@ -1,8 +1,8 @@
 #include <memory>
 
+#include "codec/intra/triangle_fans.h"
 #include "codec/paper/mtfan.h"
 #include "codec/paper/mtfan_distance_order.h"
-#include "codec/intra/triangle_fans.h"
 
 namespace htvm::internal {
 namespace {
@@ -55,8 +55,10 @@ EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::
                                                            {},
                                                            {},
                                                            std::move(result.distance_order_counts)});
-    FanOrder fans =
-        encode_fans(coder, *models, static_cast<std::uint32_t>(decoded_positions.size()), triangles, *discovery);
+    FanOrder fans;
+    discovery->unvisited.search_beside([&] {
+        fans = encode_fans(coder, *models, static_cast<std::uint32_t>(decoded_positions.size()), triangles, *discovery);
+    });
     result.fans = encoder.finish();
     result.distance_orders = discovery->encoder.finish();
     result.distance_order_counts = std::move(discovery->counts);

@@ -64,7 +64,8 @@ std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
                                             std::span<const QuantisedTransform> transforms, Threads threads) {
     const auto rotation = rotation_matrices(transforms);
     std::vector<LatticePoint> out(reference.mesh.positions.size());
-    parallel_for(out.size(), threads, 16384, [&](std::size_t begin, std::size_t end) {
+    // Some 10 ns per vertex: a mesh of ordinary size is moved before another thread would be awake.
+    parallel_for(out.size(), threads, 1 << 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const LatticePoint v = reference.mesh.positions[k];
             const auto bone = reference.bone_of_vertex[k];

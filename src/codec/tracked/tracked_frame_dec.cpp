@@ -162,7 +162,7 @@ Result<void> decode_tracked_frame(const FramePayload& payload, const TrackedRefe
             displacement = decode_field(payload.of(Layer::geometry), reference.hierarchy, 1,
                                         before ? &before->displacement : nullptr);
             if (!displacement) return;
-            const auto moved = moved_by_nodes(reference, out.state.transforms, 1);
+            const auto moved = moved_by_nodes(reference, out.state.transforms, {});
             out.positions = displaced(moved, exact_normals(moved, mesh.triangles), displacement->values);
         });
     if (!colours) return tl::unexpected(colours.error());

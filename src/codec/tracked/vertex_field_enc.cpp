@@ -264,7 +264,7 @@ ComponentPlan plan_component(FieldWalk& walk, std::size_t c, const Means& means,
     return plan;
 }
 
-// Plans all components, the first two on this thread and the third, behind `beside`, on another.
+// Plans all components, the first two beside the third, which comes behind `beside`.
 std::vector<ComponentPlan> plan_field(FieldWalk& walk, std::span<const std::int32_t> values, bool turned, double lambda,
                                       Threads threads, const std::function<void()>& beside) {
     const std::size_t components = walk.components.size();
@@ -274,7 +274,7 @@ std::vector<ComponentPlan> plan_field(FieldWalk& walk, std::span<const std::int3
         plans[c] = plan_component(walk, c, means_of(walk.hierarchy, values, components, c, turned), lambda, progress[c],
                                   c > 0 ? &progress[c - 1] : nullptr);
     };
-    // The first of the two depends on nothing that the second does: it may as well run before it.
+    // The third waits for what the first two do, which begins before it on any number of threads.
     parallel_invoke(
         threads,
         [&] {
