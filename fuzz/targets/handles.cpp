@@ -2,8 +2,7 @@
 #include <numeric>
 
 #include "codec/reference/deformation_nodes.h"
-#include "codec/reference/handle_weights.h"
-#include "codec/reference/prediction.h"
+#include "codec/reference/skinning.h"
 #include "codec/tracked/tracked_frame.h"
 #include "small_mesh.h"
 
@@ -17,7 +16,7 @@ void check_weights(const HandleWeights& weights, std::size_t vertices, std::size
     require(weights.size() == vertices, "weights of every vertex");
     for (const auto& w : weights) {
         require(std::accumulate(w.weight.begin(), w.weight.end(), 0) == 1 << weight_bits, "weights sum to one");
-        for (std::size_t i = 0; i < handles_a_vertex; ++i)
+        for (std::size_t i = 0; i < handles_per_vertex; ++i)
             require(w.handle[i] < handles, "weights of handles that are there");
     }
 }

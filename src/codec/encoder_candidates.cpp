@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "codec/paper/animated_frame.h"
 #include "codec/intra/intra_frame.h"
-#include "codec/tracked/simplified_reference_enc.h"
+#include "codec/paper/animated_frame.h"
 #include "codec/stage_clock_enc.h"
+#include "codec/tracked/captured_surface_enc.h"
 
 namespace htvm::internal {
 namespace {
@@ -39,8 +39,8 @@ EnhancedFrameOptions enhanced_options(const State& state, const FrameSteps& step
     out.geometry.lambda = state.options.lambda * ratio * ratio;
     out.colour.lambda = state.options.lambda;
     out.geometry.threads = out.colour.threads = out.threads = state.threads;
-    out.reference_choice =
-        state.options.topology.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone : ReferenceChoice::any;
+    out.reference_choice = state.options.topology.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone
+                                                                                                : ReferenceChoice::any;
     out.merge_duplicates = state.options.topology.merge_duplicates;
     out.nearest_vertices = state.options.topology.nearest_vertices;
     return out;

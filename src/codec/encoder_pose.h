@@ -1,8 +1,8 @@
 // The pose of each frame as the codec needs it: on the lattice, complete, with an orientation for every bone.
 #pragma once
 
-#include "codec/reference/lattice_mesh.h"
 #include "codec/reference/transforms.h"
+#include "core/lattice.h"
 #include "htvm/mesh.hpp"
 #include "htvm/skeleton.hpp"
 

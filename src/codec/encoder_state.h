@@ -11,7 +11,7 @@
 #include "codec/encoder_pose.h"
 #include "codec/paper/enhanced_frame_enc.h"
 #include "codec/stream/sequence.h"
-#include "codec/tracked/tracked_fit_enc.h"
+#include "codec/tracked/captured_surface_enc.h"
 #include "codec/tracked/tracked_frame_enc.h"
 #include "core/thread.h"
 #include "htvm/encoder.hpp"

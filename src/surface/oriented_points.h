@@ -22,7 +22,7 @@ class OrientedPoints {
 public:
     static constexpr std::uint32_t no_point = std::numeric_limits<std::uint32_t>::max();
 
-    // Copies the points; normals: one a point, of unit length or zero (a zero normal matches any). cell: the side of
+    // Copies the points; normals: one per point, of unit length or zero (a zero normal matches any). cell: the side of
     // the grid's cells, > 0; searches are fast up to a few cells far. Points that are not finite are never found.
     OrientedPoints(std::span<const Point3f> points, std::span<const Point3f> normals, float cell);
     // The nearest point within reach whose normal agrees with the given one: their product is at least `agreement`.

@@ -22,7 +22,7 @@ namespace htvm::internal {
 struct SurfaceView {
     std::span<const Point3f> positions{};   // finite
     std::span<const Triangle> triangles{};  // every index < positions.size(); none: the vertices are the surface
-    std::span<const Colour> colours{};      // one a vertex, or none
+    std::span<const Colour> colours{};      // one per vertex, or none
 };
 
 struct SurfaceDistanceOptions {
@@ -65,8 +65,8 @@ struct RegionErrors {
 };
 
 // By region of the sampled mesh, e.g. by bone: from every n-th vertex of `from` to the surface of `to`, each vertex
-// counting for the region it is labelled with. Labels: one a vertex; those >= regions are left out. Infinite distances
-// where `to` is empty.
+// counting for the region it is labelled with. Labels: one per vertex; those >= regions are left out. Infinite
+// distances where `to` is empty.
 std::vector<RegionErrors> region_errors(const SurfaceView& from, std::span<const std::uint16_t> labels,
                                         std::size_t regions, const SurfaceView& to, const SurfaceSearch& search_to,
                                         const SurfaceDistanceOptions& options = {});

@@ -48,7 +48,7 @@ void expect_sound(const Strip& mesh, const DeformationNodes& nodes) {
     EXPECT_LE(count, most_deformation_nodes);
     for (const auto& weights : nodes.weights) {
         int sum = 0;
-        for (std::size_t k = 0; k < handles_a_vertex; ++k) {
+        for (std::size_t k = 0; k < handles_per_vertex; ++k) {
             sum += weights.weight[k];
             EXPECT_LT(weights.handle[k], count);
             if (weights.weight[k] == 0) {
@@ -66,7 +66,7 @@ void expect_sound(const Strip& mesh, const DeformationNodes& nodes) {
         const auto& w = nodes.weights[v];  // the nearest node weighs most, or as much as the first
         const auto k = static_cast<std::size_t>(std::find(w.handle.begin(), w.handle.end(), nodes.handle_of_vertex[v]) -
                                                 w.handle.begin());
-        ASSERT_LT(k, handles_a_vertex);
+        ASSERT_LT(k, handles_per_vertex);
         EXPECT_EQ(w.weight[k], w.weight[0]);
     }
     for (std::size_t n = 0; n < count; ++n) EXPECT_EQ(nodes.handle_of_vertex[nodes.vertex[n]], n);

@@ -1,5 +1,3 @@
-#include "codec/reference/handle_weights.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 #include <random>
 
 #include "codec/random_numbers.h"
+#include "codec/reference/skinning.h"
 
 namespace htvm::internal {
 namespace {
@@ -47,7 +46,7 @@ void expect_sound(const HandleWeights& weights, const Handles& own) {
         SCOPED_TRACE(v);
         ASSERT_EQ(std::accumulate(w.weight.begin(), w.weight.end(), 0), 4096);
         bool has_own = false;
-        for (std::size_t i = 0; i < handles_a_vertex; ++i) {
+        for (std::size_t i = 0; i < handles_per_vertex; ++i) {
             if (w.weight[i] == 0) {
                 ASSERT_EQ(w.handle[i], 0);
             }
@@ -64,7 +63,7 @@ void expect_sound(const HandleWeights& weights, const Handles& own) {
 }
 
 std::uint16_t weight_of(const VertexWeights& weights, std::uint16_t handle) {
-    for (std::size_t i = 0; i < handles_a_vertex; ++i)
+    for (std::size_t i = 0; i < handles_per_vertex; ++i)
         if (weights.weight[i] > 0 && weights.handle[i] == handle) return weights.weight[i];
     return 0;
 }

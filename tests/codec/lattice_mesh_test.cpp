@@ -1,10 +1,10 @@
-#include "codec/reference/lattice_mesh.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "core/lattice.h"
 
 namespace htvm::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "codec/reference/prediction.h"
+#include "codec/reference/skinning.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,6 @@
 #include <random>
 
 #include "codec/random_numbers.h"
-#include "codec/reference/handle_weights.h"
 
 namespace htvm::internal {
 namespace {

@@ -1,9 +1,9 @@
-#include "codec/reference/rigid_transform.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <random>
+
+#include "codec/reference/transforms.h"
 
 namespace htvm::internal {
 namespace {

@@ -6,9 +6,7 @@
 #include <map>
 #include <numeric>
 
-#include "codec/tracked/simplified_reference_enc.h"
-#include "codec/tracked/tracked_fit_enc.h"
-#include "codec/tracked/tracked_targets_enc.h"
+#include "codec/tracked/captured_surface_enc.h"
 #include "surface/nearest_points.h"
 
 namespace htvm::internal {

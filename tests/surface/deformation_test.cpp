@@ -1,5 +1,3 @@
-#include "surface/deformation.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -7,6 +5,8 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+
+#include "surface/tracked_registration.h"
 
 namespace htvm::internal {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "codec/reference/lattice_mesh.h"
+#include "core/lattice.h"
 
 namespace htvm::internal {
 

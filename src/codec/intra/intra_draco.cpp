@@ -10,9 +10,9 @@
 #include <new>
 #include <string>
 
-#include "codec/reference/lattice_mesh.h"
 #include "codec/stream/frame_payload.h"
 #include "core/bytes.h"
+#include "core/lattice.h"
 #include "htvm/intra_coder.hpp"
 
 namespace htvm {

@@ -2,8 +2,8 @@
 // predicted from its neighbours; or the whole mesh by another static coder.
 #pragma once
 
-#include "codec/reference/lattice_mesh.h"
 #include "codec/stream/frame_payload.h"
+#include "core/lattice.h"
 #include "htvm/intra_coder.hpp"
 
 namespace htvm::internal {

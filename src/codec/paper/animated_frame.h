@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "codec/reference/prediction.h"
+#include "codec/reference/skinning.h"
 #include "codec/stream/frame_payload.h"
 #include "core/thread.h"
 

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "codec/reference/lattice_mesh.h"
 #include "codec/reference/skinning.h"
+#include "core/lattice.h"
 #include "htvm/encoder.hpp"
 
 namespace htvm {

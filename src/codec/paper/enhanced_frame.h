@@ -6,7 +6,7 @@
 #include <span>
 
 #include "codec/paper/codebook.h"
-#include "codec/reference/prediction.h"
+#include "codec/reference/skinning.h"
 #include "codec/stream/frame_payload.h"
 #include "core/thread.h"
 

@@ -9,7 +9,7 @@
 #include "codec/paper/codebook.h"
 #include "codec/paper/motion_enc.h"
 #include "codec/paper/vector_quantiser_enc.h"
-#include "codec/reference/prediction.h"
+#include "codec/reference/skinning.h"
 #include "codec/stream/frame_payload.h"
 #include "core/thread.h"
 #include "htvm/encoder.hpp"

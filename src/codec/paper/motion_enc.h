@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "codec/reference/prediction.h"
+#include "codec/reference/skinning.h"
 #include "codec/reference/transforms.h"
 #include "core/thread.h"
 #include "htvm/encoder.hpp"
-#include "surface/registration.h"
+#include "surface/rigid_registration.h"
 
 namespace htvm::internal {
 

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "codec/reference/lattice_mesh.h"
+#include "core/lattice.h"
 #include "core/thread.h"
 
 namespace htvm::internal {

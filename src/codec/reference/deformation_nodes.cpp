@@ -218,7 +218,7 @@ struct NearNode {
     std::uint16_t node = 0;
     auto operator<=>(const NearNode&) const = default;
 };
-constexpr std::size_t near_nodes = handles_a_vertex + 1;
+constexpr std::size_t near_nodes = handles_per_vertex + 1;
 struct NearNodes {
     std::array<NearNode, near_nodes> near;
     std::uint8_t count = 0;
@@ -300,11 +300,11 @@ std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::
 
 // Sumner's weights, (1 - distance / distance of the next node)^2, made to sum to one: the rest goes to the nearest.
 VertexWeights weights_of(const NearNodes& list, Distance spacing) {
-    const std::size_t count = std::min<std::size_t>(list.count, handles_a_vertex);
+    const std::size_t count = std::min<std::size_t>(list.count, handles_per_vertex);
     const Distance last = list.near[count - 1].distance;
     const Distance zero = list.count == near_nodes ? std::max<Distance>(list.near[near_nodes - 1].distance, 1)
                                                    : std::max<Distance>(2 * spacing, last + spacing / 4 + 1);
-    std::array<std::uint64_t, handles_a_vertex> share{};
+    std::array<std::uint64_t, handles_per_vertex> share{};
     std::uint64_t sum = 0;
     for (std::size_t k = 0; k < count; ++k) {
         // Twelve bits before squaring: the sum fits easily.
@@ -312,7 +312,7 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
         share[k] = nearness * nearness;
         sum += share[k];
     }
-    std::array<std::pair<std::int32_t, std::uint16_t>, handles_a_vertex> entries{};  // weight below zero, node
+    std::array<std::pair<std::int32_t, std::uint16_t>, handles_per_vertex> entries{};  // weight below zero, node
     std::int32_t rest = 1 << weight_bits;
     for (std::size_t k = 1; k < count; ++k) {
         const auto weight = sum == 0 ? 0 : static_cast<std::int32_t>((share[k] << weight_bits) / sum);
@@ -322,7 +322,7 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
     entries[0] = {-rest, list.near[0].node};
     std::sort(entries.begin(), entries.end());
     VertexWeights out;
-    for (std::size_t k = 0; k < handles_a_vertex && entries[k].first < 0; ++k) {
+    for (std::size_t k = 0; k < handles_per_vertex && entries[k].first < 0; ++k) {
         out.handle[k] = entries[k].second;
         out.weight[k] = static_cast<std::uint16_t>(-entries[k].first);
     }

@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
-#include "core/handles.h"
 #include "core/lattice.h"
+#include "core/vertex_weights.h"
 #include "htvm/mesh.hpp"
 
 namespace htvm::internal {

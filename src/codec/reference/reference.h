@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "codec/reference/prediction.h"
+#include "codec/reference/skinning.h"
 #include "codec/reference/transforms.h"
 #include "codec/stream/sequence.h"
 #include "codec/tracked/tracked_frame.h"

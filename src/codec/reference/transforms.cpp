@@ -1,8 +1,99 @@
 #include "codec/reference/transforms.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "entropy/range_coder.h"
 
 namespace htvm::internal {
+
+RotationMatrix rotation_matrix(const QuantisedRotation& rotation) {
+    std::array<std::int64_t, 4> q{};
+    for (std::size_t i = 0, other = 0; i < 4; ++i)
+        q[i] = i == rotation.largest ? std::int64_t{1} << rotation_bits : rotation.others[other++];
+    const std::int64_t w = q[0], x = q[1], y = q[2], z = q[3];
+    const std::int64_t norm = w * w + x * x + y * y + z * z;
+    const std::array<std::int64_t, 9> scaled = {
+        w * w + x * x - y * y - z * z, 2 * (x * y - w * z),           2 * (x * z + w * y),
+        2 * (x * y + w * z),           w * w - x * x + y * y - z * z, 2 * (y * z - w * x),
+        2 * (x * z - w * y),           2 * (y * z + w * x),           w * w - x * x - y * y + z * z};
+    RotationMatrix matrix{};
+    for (std::size_t i = 0; i < 9; ++i) matrix[i] = divide_rounded(scaled[i] * (std::int64_t{1} << matrix_bits), norm);
+    return matrix;
+}
+
+LatticePoint rotate(const RotationMatrix& m, LatticePoint v) {
+    constexpr std::int64_t half = std::int64_t{1} << (matrix_bits - 1);
+    auto row = [&](std::size_t i) {
+        return static_cast<std::int32_t>((m[i] * v.x + m[i + 1] * v.y + m[i + 2] * v.z + half) >> matrix_bits);
+    };
+    return {row(0), row(3), row(6)};
+}
+
+QuantisedRotation quantise_rotation(const std::array<double, 4>& quaternion) {
+    QuantisedRotation out;
+    for (std::uint8_t i = 1; i < 4; ++i)
+        if (std::abs(quaternion[i]) > std::abs(quaternion[out.largest])) out.largest = i;
+    const double scale = static_cast<double>(1 << rotation_bits) / quaternion[out.largest];
+    for (std::size_t i = 0, other = 0; i < 4; ++i)
+        if (i != out.largest) out.others[other++] = static_cast<std::int16_t>(std::lround(quaternion[i] * scale));
+    return out;
+}
+
+namespace {
+
+// A sum of weighted vectors, in 2^-(matrix_bits + weight_bits) lattice units. The weights sum to 2^12, so that sums of
+// turned vectors stay below sqrt(3) * 2^25 * 2^36 and those of points that are moved below 2^63.
+using WeightedSum = std::array<std::int64_t, 3>;
+
+void add_turned(WeightedSum& sum, std::int64_t weight, const RotationMatrix& m, LatticePoint v) {
+    for (std::size_t i = 0; i < 3; ++i) sum[i] += weight * (m[3 * i] * v.x + m[3 * i + 1] * v.y + m[3 * i + 2] * v.z);
+}
+
+std::int64_t rounded(std::int64_t sum) {
+    constexpr int bits = matrix_bits + weight_bits;
+    return (sum + (std::int64_t{1} << (bits - 1))) >> bits;
+}
+
+}  // namespace
+
+std::vector<RotationMatrix> rotation_matrices(std::span<const QuantisedTransform> transforms) {
+    std::vector<RotationMatrix> out;
+    out.reserve(transforms.size());
+    for (const auto& t : transforms) out.push_back(rotation_matrix(t.rotation));
+    return out;
+}
+
+LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift) {
+    const LatticePoint turned = rotate(matrix, point - pivot);
+    return {within_lattice(std::int64_t{turned.x} + pivot.x + shift.x),
+            within_lattice(std::int64_t{turned.y} + pivot.y + shift.y),
+            within_lattice(std::int64_t{turned.z} + pivot.z + shift.z)};
+}
+
+LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, std::span<const RotationMatrix> rotation,
+                          std::span<const LatticePoint> pivots, std::span<const QuantisedTransform> transforms) {
+    WeightedSum sum{};
+    for (std::size_t i = 0; i < handles_per_vertex && weights.weight[i] > 0; ++i) {
+        const auto handle = weights.handle[i];
+        const LatticePoint pivot = pivots[handle], to = pivot + transforms[handle].shift;
+        add_turned(sum, weights.weight[i], rotation[handle], point - pivot);
+        const std::int64_t scale = std::int64_t{weights.weight[i]} << matrix_bits;
+        sum[0] += scale * to.x;
+        sum[1] += scale * to.y;
+        sum[2] += scale * to.z;
+    }
+    return {within_lattice(rounded(sum[0])), within_lattice(rounded(sum[1])), within_lattice(rounded(sum[2]))};
+}
+
+LatticePoint blended_turn(LatticePoint vector, const VertexWeights& weights, std::span<const RotationMatrix> rotation) {
+    WeightedSum sum{};
+    for (std::size_t i = 0; i < handles_per_vertex && weights.weight[i] > 0; ++i)
+        add_turned(sum, weights.weight[i], rotation[weights.handle[i]], vector);
+    return {static_cast<std::int32_t>(rounded(sum[0])), static_cast<std::int32_t>(rounded(sum[1])),
+            static_cast<std::int32_t>(rounded(sum[2]))};
+}
+
 namespace {
 
 // Written once for both directions (entropy/models.h): what is handed in is written, or becomes what is read.

@@ -25,7 +25,7 @@ namespace htvm::internal {
 inline constexpr std::uint32_t no_node = std::numeric_limits<std::uint32_t>::max();
 inline constexpr int slope_bits = 12;
 inline constexpr int share_bits = 30;
-inline constexpr std::size_t hierarchy_row_limit = 32;  // neighbours kept a node
+inline constexpr std::size_t hierarchy_row_limit = 32;  // neighbours kept per node
 inline constexpr int split_scale_bits = 14;
 
 // Nodes that join one or two nodes of the next finer level. Arrays by node, but for `neighbours` and `slopes`.

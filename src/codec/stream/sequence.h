@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "codec/reference/lattice_mesh.h"
+#include "core/lattice.h"
 #include "htvm/result.hpp"
 #include "htvm/skeleton.hpp"
 

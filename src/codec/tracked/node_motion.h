@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "codec/reference/rigid_transform.h"
+#include "codec/reference/transforms.h"
 #include "htvm/result.hpp"
 
 namespace htvm::internal {
@@ -29,13 +29,13 @@ struct EncodedNodeMotion {
     std::vector<QuantisedTransform> transforms;  // as the decoder has them
 };
 
-// wanted: one a node. parents: one a node, < its own number or no_parent. pivots: one a node. before: the frame
+// wanted: one per node. parents: one per node, < its own number or no_parent. pivots: one per node. before: the frame
 // before's, or empty.
 EncodedNodeMotion encode_node_motion(std::span<const QuantisedTransform> wanted, std::span<const std::uint32_t> parents,
                                      std::span<const LatticePoint> pivots, std::span<const QuantisedTransform> before,
                                      const NodeMotionOptions& options);
 
-// before: one a node; needed where the layer says so. corrupt_stream where the bytes end early or say what cannot be.
+// before: one per node; needed where the layer says so. corrupt_stream where the bytes end early or say what cannot be.
 Result<std::vector<QuantisedTransform>> decode_node_motion(std::span<const std::uint8_t> bytes,
                                                            std::span<const std::uint32_t> parents,
                                                            std::span<const LatticePoint> pivots,

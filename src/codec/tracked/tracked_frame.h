@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "codec/reference/deformation_nodes.h"
-#include "codec/reference/lattice_mesh.h"
 #include "codec/stream/frame_payload.h"
 #include "codec/tracked/node_motion.h"
 #include "codec/tracked/vertex_field.h"
@@ -38,7 +37,7 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 
 // What a frame leaves for the next.
 struct TrackedState {
-    std::vector<QuantisedTransform> transforms;  // one a node
+    std::vector<QuantisedTransform> transforms;  // one per node
     FieldHistory displacement, colour;
 };
 
@@ -56,7 +55,7 @@ Result<void> decode_tracked_frame(const FramePayload& payload, const TrackedRefe
                                   const TrackedState* before, Threads threads, DecodedTrackedFrame& out);
 
 // The pieces, which the encoder shares.
-// The reference moved by its nodes, one transform a node.
+// The reference moved by its nodes, one transform per node.
 std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
                                          std::span<const QuantisedTransform> transforms, Threads threads);
 
@@ -70,7 +69,7 @@ std::vector<ExactNormal> exact_normals(std::span<const LatticePoint> positions, 
 std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const ExactNormal> normals,
                                     std::span<const std::int32_t> displacement);
 
-// Each colour changed by its residual, three components a vertex, kept within 0..255.
+// Each colour changed by its residual, three components per vertex, kept within 0..255.
 std::vector<Colour> recoloured(std::span<const Colour> colours, std::span<const std::int32_t> residuals);
 
 // The normals that a displaced mesh shows, as the codec holds normals.

@@ -5,7 +5,7 @@
 
 #include "codec/paper/motion_enc.h"
 #include "codec/stage_clock_enc.h"
-#include "codec/tracked/tracked_targets_enc.h"
+#include "codec/tracked/captured_surface_enc.h"
 
 namespace htvm::internal {
 namespace {

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "codec/tracked/tracked_frame.h"
-#include "surface/deformation.h"
-#include "htvm/encoder.hpp"
 #include "core/thread.h"
+#include "htvm/encoder.hpp"
+#include "surface/tracked_registration.h"
 
 namespace htvm::internal {
 

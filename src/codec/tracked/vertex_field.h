@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "codec/reference/vertex_hierarchy.h"
-#include "htvm/result.hpp"
 #include "core/thread.h"
+#include "htvm/result.hpp"
 
 namespace htvm::internal {
 
@@ -49,7 +49,7 @@ struct FieldPlane {
 // What a frame leaves for the next on the same hierarchy; the same on both sides.
 struct FieldHistory {
     bool turned = false;
-    std::vector<FieldPlane> planes;  // one a component
+    std::vector<FieldPlane> planes;  // one per component
 };
 
 struct EncodedField {

@@ -1,8 +1,9 @@
+#include "codec/tracked/tracked_frame.h"
+
 #include <algorithm>
 #include <cmath>
 
-#include "codec/reference/blending.h"
-#include "codec/tracked/tracked_frame.h"
+#include "codec/reference/transforms.h"
 #include "core/parallel.h"
 
 namespace htvm::internal {

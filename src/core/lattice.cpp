@@ -1,10 +1,11 @@
-#include "codec/reference/lattice_mesh.h"
+#include "core/lattice.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 namespace htvm::internal {
+
 namespace {
 
 constexpr double normal_scale = 127.0;

@@ -1,4 +1,4 @@
-#include "surface/registration.h"
+#include "surface/rigid_registration.h"
 
 #include <Eigen/Dense>
 #include <algorithm>

@@ -10,16 +10,43 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
-#include "core/handles.h"
-#include "surface/deformation_system.h"
-#include "surface/registration.h"
-#include "surface/target_surface.h"
-#include "htvm/mesh.hpp"
 #include "core/thread.h"
+#include "core/vertex_weights.h"
+#include "htvm/mesh.hpp"
+#include "surface/rigid_registration.h"
+#include "surface/target_surface.h"
 
 namespace htvm::internal {
+
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+// Which pairs of handles have a block, row < column; block i stands for place[i].
+struct BlockPattern {
+    std::size_t handles = 0;
+    std::vector<std::pair<std::uint16_t, std::uint16_t>> place;  // ascending
+    std::vector<std::uint32_t> first;                            // of each row, handles + 1
+    // The block of a pair that is in the pattern, row < column.
+    std::uint32_t find(std::uint16_t row, std::uint16_t column) const;
+};
+// pairs in any order, either way round, repeated or not; equal ends are passed over.
+BlockPattern make_pattern(std::size_t handles, std::vector<std::pair<std::uint16_t, std::uint16_t>> pairs);
+
+// Symmetric: the blocks below the diagonal are the transposed ones above.
+struct BlockSystem {
+    std::vector<Matrix6> diagonal, above;  // one per handle; one per place
+    std::vector<Vector6> right;
+    explicit BlockSystem(const BlockPattern& pattern);
+    void clear();
+    BlockSystem& operator+=(const BlockSystem& other);
+};
+
+// Solves system * x = right by conjugate gradients, preconditioned by the diagonal blocks; stops after `iterations` or
+// when the residual has shrunk by `tolerance`. The system must be positive definite.
+std::vector<Vector6> solve(const BlockPattern& pattern, const BlockSystem& system, int iterations, double tolerance);
 
 // Two handles that pull on each other: their motions should agree at a point between them (for bones the joint), and
 // in how they turn.
@@ -46,14 +73,14 @@ struct DeformationOptions {
     double first_point_share = 0.5;   // weight of the distance to the point against that to its plane, likewise
     double last_point_share = 0.2;
     double agreement = 0.2;      // least product of the normals of a match
-    int solver_iterations = 40;  // of conjugate gradients, at most, a round
+    int solver_iterations = 40;  // of conjugate gradients, at most, per round
     Threads threads = {};
 };
 
 // How some vertices follow the handles, with the blocks of the linear system that each touches.
 struct SampleBlend {
-    std::array<std::uint16_t, handles_a_vertex> handle{};
-    std::array<float, handles_a_vertex> weight{};
+    std::array<std::uint16_t, handles_per_vertex> handle{};
+    std::array<float, handles_per_vertex> weight{};
     std::array<std::uint32_t, 6> block{};  // of the pairs 01 02 03 12 13 23
     std::uint8_t count = 0;
 };
@@ -64,13 +91,13 @@ SampleBlend blend_of(const VertexWeights& weights);
 // One level of handles over the samples.
 struct DeformationLevel {
     std::vector<std::uint32_t> samples;  // among the mesh's samples
-    std::vector<SampleBlend> blends;     // one a sample
+    std::vector<SampleBlend> blends;     // one per sample
     std::vector<std::uint32_t> centre;   // handles of the finer level that stand for these; of the finest: 0, 1, 2, ...
     std::vector<HandlePair> pairs;
     BlockPattern pattern;
 };
 
-// A reference mesh ready to be deformed; made once an I-frame.
+// A reference mesh ready to be deformed; made once per I-frame.
 struct DeformableMesh {
     std::vector<Point3f> positions;
     std::vector<Triangle> triangles;
@@ -83,13 +110,13 @@ struct DeformableMesh {
     std::vector<SampleBlend> groups;  // how each handle follows the coarse ones
 };
 
-// weights: one a vertex, of handles < handles.size(); pairs likewise. Without handles nothing ever moves.
+// weights: one per vertex, of handles < handles.size(); pairs likewise. Without handles nothing ever moves.
 DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<const Triangle> triangles,
                                HandleWeights weights, std::span<const Eigen::Vector3d> handles,
                                std::vector<HandlePair> pairs, const DeformationOptions& options);
 
-// The motions, one a handle, reference -> frame, that lay the reference on the target, from `start` (one a handle; or
-// empty: no motion). The same for any number of threads.
+// The motions, one per handle, reference -> frame, that lay the reference on the target, from `start` (one per handle;
+// or empty: no motion). The same for any number of threads.
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const TargetSurface& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options);
 

@@ -29,7 +29,7 @@ struct RegistrationOptions {
 };
 
 // Moves the reference points (in the tree, in their own space) onto the frame's points: from `start`, returns the
-// motion reference -> frame. normals: one a reference point, or empty. Steps to planes that lead far away from the
+// motion reference -> frame. normals: one per reference point, or empty. Steps to planes that lead far away from the
 // frame give back the start.
 RigidMotion register_points(const NearestPoints& reference, std::span<const Eigen::Vector3f> normals,
                             std::span<const Point3f> frame, const RigidMotion& start,

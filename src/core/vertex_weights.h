@@ -1,0 +1,25 @@
+// How much each handle moves a vertex. A handle is a rigid transform with a smooth region of influence: a bone, or a
+// node of a deformation graph. codec/reference/skinning.h derives the weights of bones, codec/reference/
+// deformation_nodes.h those of nodes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace htvm::internal {
+
+inline constexpr int weight_bits = 12;
+inline constexpr std::size_t handles_per_vertex = 4;
+
+// The handles that move one vertex, by descending weight, of equal ones the lower handle first. The weights sum to
+// 2^weight_bits; unused entries have weight 0 and handle 0.
+struct VertexWeights {
+    std::array<std::uint16_t, handles_per_vertex> handle{};
+    std::array<std::uint16_t, handles_per_vertex> weight{};
+    bool operator==(const VertexWeights&) const = default;
+};
+
+using HandleWeights = std::vector<VertexWeights>;  // one per vertex
+
+}  // namespace htvm::internal
