@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
 
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
@@ -104,7 +106,11 @@ TEST(ClosedLoop, EveryAwkwardSequence) {
 TEST(ClosedLoop, DracoIntraFrames) {
     auto options = key_every_third();
     options.intra_coder = draco_intra_coder();
-    expect_closed_loop(synthetic(true, 4), options);
+    const auto person = synthetic(true, 4);
+    const auto coded = encode(person, options);
+    EXPECT_TRUE(coded.errors.empty());
+    EXPECT_GT(coded.infos.at(0).bytes.external_intra, 0u);
+    expect_closed_loop(person, options);
     for (const auto& sequence : awkward_sequences()) expect_closed_loop(sequence, options);
 }
 
@@ -180,10 +186,13 @@ TEST(ClosedLoop, MotionBasedFramesByThreshold) {
 
 TEST(ClosedLoop, MotionBasedFramesWhoseAnimationIsChecked) {
     auto options = motion_based(200);
+    std::vector<std::size_t> bytes;
     for (const double error : {0.5, 2.0, 20.0}) {
         options.topology.animation_error = error;
+        bytes.push_back(encode(walking(4, 800), options).bytes.size());
         expect_closed_loop(walking(4, 800), options);
     }
+    EXPECT_GT(bytes.front(), bytes.back()) << "the more error is allowed, the more is animated";
 }
 
 TEST(ClosedLoop, MotionBasedFramesOfEveryAwkwardSequence) {
@@ -199,18 +208,22 @@ TEST(ClosedLoop, MotionBasedFramesOfEveryAwkwardSequence) {
 }
 
 TEST(ClosedLoop, EveryChoiceOfFrames) {
+    std::map<double, std::set<std::vector<std::uint8_t>>> streams;  // by still_below
     for (const auto choice : {FrameChoice::fixed, FrameChoice::motion, FrameChoice::rate_distortion})
         for (const double still_below : {0.0, 60.0}) {
             auto options = motion_based(still_below, 6);
             options.topology.frame_choice = choice;
             options.topology.predicted_below = 500;
             options.topology.intra_above = 2500;
-            options.topology.animation_error = 2;
+            options.topology.animation_error = 20;
+            streams[still_below].insert(encode(walking(7, 500), options).bytes);
             expect_closed_loop(walking(7, 500), options);
             // Slow, and half of the ways are other tests' already.
             if ((choice == FrameChoice::motion) != (still_below > 0) || choice == FrameChoice::fixed) continue;
             for (const auto& sequence : awkward_sequences()) expect_closed_loop(with_spokes(sequence), options);
         }
+    for (const auto& [still_below, different] : streams)
+        EXPECT_EQ(different.size(), 3u) << "each choice is another one, " << still_below;
 }
 
 std::vector<Triangle> by_source_vertex(const Mesh& decoded) {

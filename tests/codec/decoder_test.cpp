@@ -5,9 +5,9 @@
 
 #include <map>
 
-#include "codec/stream/frame_payload.h"
 #include "codec/hostile_bytes.h"
 #include "codec/moving_sequences.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/test_sequences.h"
 
 namespace htvm::internal {
@@ -179,13 +179,15 @@ TEST(Decoder, SaysWhatTheHeaderSays) {
 TEST(Decoder, LargerFramesThanAllowedAreRefused) {
     DecoderOptions options;
     options.max_vertices = 10;
-    for (const auto& error : decode_packets(nine_frames().packets, options).errors)
-        EXPECT_TRUE(error.kind == ErrorKind::limit) << error.message;
+    const auto of_vertices = decode_packets(nine_frames().packets, options);
     options.max_vertices = 1u << 20;
     options.max_triangles = 10;
-    const auto decoded = decode_packets(nine_frames().packets, options);
-    EXPECT_TRUE(decoded.frames.empty());
-    EXPECT_EQ(decoded.errors.size(), 9u);
+    const auto of_triangles = decode_packets(nine_frames().packets, options);
+    for (const auto& decoded : {of_vertices, of_triangles}) {
+        EXPECT_TRUE(decoded.frames.empty());
+        EXPECT_EQ(decoded.errors.size(), 9u);
+        for (const auto& error : decoded.errors) EXPECT_EQ(error.kind, ErrorKind::limit) << error.message;
+    }
 }
 
 TEST(Decoder, IntraFramesOfACoderThatIsNotThereAreUnsupported) {

@@ -80,8 +80,8 @@ Run coded_by(const TestSequence& sequence, EncoderOptions options) {
     return run;
 }
 
-EncoderOptions at_rate(double bits_per_second, double buffer_seconds = 0.5) {
-    EncoderOptions options = default_options(Profile::topology);
+EncoderOptions at_rate(double bits_per_second, double buffer_seconds = 0.5, Profile profile = Profile::topology) {
+    EncoderOptions options = default_options(profile);
     options.rate.bits_per_second = bits_per_second;
     options.rate.buffer_seconds = buffer_seconds;
     options.key_interval = 10;
@@ -198,15 +198,53 @@ TEST(EncoderRate, ASceneChangeInTheMiddleIsAbsorbed) {
 
 TEST(EncoderRate, AllChoicesOfFramesStayWithinTheBuffer) {
     const auto sequence = walking(20);
+    const auto fixed = coded_by(sequence, at_rate(300e3));
     for (const auto choice : {FrameChoice::motion, FrameChoice::rate_distortion}) {
         auto options = at_rate(300e3);
         options.topology.frame_choice = choice;
-        options.topology.predicted_below = 100;
+        options.topology.predicted_below = 500;
         options.topology.still_below = 60;
+        options.topology.animation_error = 0;
         const auto run = coded_by(sequence, options);
         EXPECT_LE(run.fullest, 1);
         EXPECT_TRUE(run.errors.empty());
+        EXPECT_NE(run.bits, fixed.bits) << "something was chosen";
     }
+}
+
+TEST(TrackedRate, StaysWithinFivePercentAndWithinTheBuffer) {
+    const auto sequence = walking(90);
+    for (const double rate : {150e3, 300e3}) {
+        SCOPED_TRACE(rate);
+        const auto options = at_rate(rate, 0.5, Profile::tracked);
+        const auto run = coded_by(sequence, options);
+        EXPECT_NEAR(off_target(run, options), 0, 0.05);
+        EXPECT_LE(run.fullest, 1);
+        EXPECT_TRUE(run.errors.empty());
+        EXPECT_GE(run.frames_of(FrameType::tracked), 75u);
+        EXPECT_EQ(run.frames_of(FrameType::predicted), 0u);
+    }
+}
+
+TEST(TrackedRate, TwoPassesAreNearerAndMoreEven) {
+    const auto sequence = walking(90);
+    auto options = at_rate(200e3, 0.5, Profile::tracked);
+    const auto first = coded_by(sequence, options);
+    options.rate.first_pass = first.costs;
+    const auto second = coded_by(sequence, options);
+    EXPECT_NEAR(off_target(second, options), 0, 0.02);
+    EXPECT_LE(second.fullest, 1);
+    EXPECT_LE(quality_spread(second, 0), quality_spread(first, 0));
+}
+
+TEST(TrackedRate, AFirstFrameThatNeverFitsSaysWhatWouldDo) {
+    const auto sequence = walking(1);
+    const auto run = coded_by(sequence, at_rate(1e3, 1, Profile::tracked));
+    ASSERT_EQ(run.errors.size(), 1u);
+    const auto seconds_at = run.errors[0].find("a buffer of at least ");
+    ASSERT_NE(seconds_at, std::string::npos) << run.errors[0];
+    const auto enough = at_rate(1e3, std::stod(run.errors[0].substr(seconds_at + 21)), Profile::tracked);
+    EXPECT_TRUE(coded_by(sequence, enough).errors.empty()) << run.errors[0];
 }
 
 double error_of(const Mesh& captured, const Mesh& shown) {
@@ -225,6 +263,43 @@ TEST(EncoderError, EveryFrameComesNearTheTarget) {
         ASSERT_EQ(run.shown.size(), sequence.frames.size());
         for (std::size_t f = 0; f < run.shown.size(); ++f)
             EXPECT_NEAR(error_of(sequence.frames[f].mesh, run.shown[f]) / target, 1, 0.06) << target << " mm, " << f;
+    }
+}
+
+// Large enough that the capture's own sampling, which T-frames do not follow, is finer than the errors asked for.
+TestSequence finely_sampled() {
+    TestSequence out{"finely sampled", synth_skeleton(), {}};
+    SynthOptions options;
+    options.vertices = 4000;
+    for (int t = 0; t < 6; ++t) {
+        auto frame = synth_frame(options, 40 + t);
+        out.frames.push_back({std::move(frame.mesh), std::move(frame.pose)});
+    }
+    return out;
+}
+
+TEST(TrackedError, EveryFrameComesNearTheTarget) {
+    const auto sequence = finely_sampled();
+    for (const double target : {1.5, 2.0}) {
+        EncoderOptions options;
+        options.rate.target_error = target;
+        options.key_interval = 4;
+        const auto run = coded_by(sequence, options);
+        ASSERT_EQ(run.shown.size(), sequence.frames.size());
+        EXPECT_EQ(run.frames_of(FrameType::tracked), 4u);
+        for (std::size_t f = 0; f < run.shown.size(); ++f)
+            EXPECT_NEAR(error_of(sequence.frames[f].mesh, run.shown[f]) / target, 1, 0.1) << target << " mm, " << f;
+    }
+}
+
+TEST(TrackedError, ATargetThatNoQualityIsBadEnoughForIsNotExceeded) {
+    const auto sequence = finely_sampled();
+    EncoderOptions options;
+    options.rate.target_error = 5;
+    const auto run = coded_by(sequence, options);
+    for (std::size_t f = 0; f < run.shown.size(); ++f) {
+        EXPECT_LT(error_of(sequence.frames[f].mesh, run.shown[f]), 5);
+        EXPECT_EQ(run.costs[f].quality, 0) << f;
     }
 }
 

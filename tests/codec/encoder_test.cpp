@@ -38,7 +38,8 @@ TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
         expect_refused(with([&](auto& o) { o.lambda = lambda; }), "lambda");
     for (const int interval : {0, -1})
         expect_refused(with([&](auto& o) { o.key_interval = interval; }), "key interval");
-    for (const int m : {0, -1, 65}) expect_refused(with([&](auto& o) { o.topology.nearest_vertices = m; }), "nearest vertices");
+    for (const int m : {0, -1, 65})
+        expect_refused(with([&](auto& o) { o.topology.nearest_vertices = m; }), "nearest vertices");
     for (const int bits : {-1, 17}) expect_refused(with([&](auto& o) { o.lattice_bits = bits; }), "lattice bits");
     expect_refused(with([](auto& o) { o.fps_numerator = 0; }), "frame rate");
     expect_refused(with([](auto& o) { o.fps_denominator = 0; }), "frame rate");
@@ -196,7 +197,7 @@ TEST(Encoder, AFirstFrameWithoutItsPoseIsRefusedAndTheNextBegins) {
 
 TEST(Encoder, AnIntraFrameComesEveryKeyIntervalOrWhenForced) {
     const auto sequence = synthetic(false, 7, 300);
-    auto options = EncoderOptions{};
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 4;
     auto encoder = Encoder::create(options);
     std::vector<bool> intra;
@@ -211,7 +212,7 @@ TEST(Encoder, AnIntraFrameComesEveryKeyIntervalOrWhenForced) {
 }
 
 TEST(Encoder, TheIndexSaysWhereTheIntraFramesAre) {
-    auto options = EncoderOptions{};
+    EncoderOptions options = default_options(Profile::topology);
     options.key_interval = 2;
     const auto coded = encode(synthetic(false, 5, 300), options);
     ASSERT_EQ(coded.packets.back().kind, PacketKind::index);
