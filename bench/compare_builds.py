@@ -125,7 +125,10 @@ def table(builds):
 
 
 def main():
-    parser = argparse.ArgumentParser(usage=__doc__, add_help=False)
+    if {"-h", "--help"} & set(sys.argv):
+        print(__doc__)
+        return
+    parser = argparse.ArgumentParser(usage=__doc__.split("usage: ")[1], add_help=False)
     parser.add_argument("builds", nargs="+")
     parser.add_argument("--data")
     parser.add_argument("--captures")
