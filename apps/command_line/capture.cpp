@@ -24,7 +24,7 @@ const char* unit_name(double millimetres) {
 void add_capture_options(CLI::App& command, CaptureOptions& options) {
     command
         .add_option("input", options.input,
-                    "The meshes, one file a frame (.ply, .obj, .drc): a folder, a pattern such as scan_%05d.ply, a\n"
+                    "The meshes, one file per frame (.ply, .obj, .drc): a folder, a pattern such as scan_%05d.ply, a\n"
                     "quoted glob such as 'scan_*.ply', one file, or - for PLY after PLY on standard input")
         ->required();
     command.add_option("-s,--skeleton", options.skeleton,

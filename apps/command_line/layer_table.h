@@ -31,7 +31,7 @@ void add(TotalsByType& totals, const FrameInfo& info);
 // Bits per captured vertex; 0 where there is no vertex.
 double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);
 
-// A table of bits per vertex by layer, one line a kind of frame and one for all.
+// A table of bits per vertex by layer, one line per kind of frame and one for all.
 std::string layer_table(const TotalsByType& totals);
 
 nlohmann::json layers_json(const LayerBytes& bytes);

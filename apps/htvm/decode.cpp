@@ -22,7 +22,6 @@
 #include "io/ply.h"
 #include "io/sequence.h"
 #include "stream_file.h"
-#include "stream_limits.h"
 
 namespace htvm::app {
 namespace {
@@ -319,7 +318,8 @@ void add_decode(CLI::App& app, Run& run) {
                      "or animate, the I-frame's mesh moved as the last known frame was, for up to 300 in a row")
         ->check(CLI::IsMember({"gap", "animate"}));
     command->add_option("--frames", options->frames, "Decode at most this many frames (default: all)");
-    command->add_option("--threads", options->threads, "Threads (default: one a core); the meshes do not depend on it");
+    command->add_option("--threads", options->threads,
+                        "Threads (default: one per core); the meshes do not depend on it");
     command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output");
     add_decoder_limits(*command, options->limits);
     command->footer(

@@ -5,13 +5,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "buffer_model.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "htvm/decoder.hpp"
+#include "rate_report.h"
 #include "stream_file.h"
-#include "stream_limits.h"
 
 namespace htvm::app {
 namespace {
@@ -163,7 +162,7 @@ void add_info(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("info", "Show what is in an .htvm stream: frames, sizes by layer, skeleton");
     command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
-    command->add_flag("--summary", options->summary, "The totals only, no line a frame");
+    command->add_flag("--summary", options->summary, "The totals only, no line per frame");
     command->add_flag("--json", options->json, "Everything as JSON");
     add_packet_limits(*command, options->limits);
     auto* bitrate =

@@ -5,7 +5,7 @@ int main(int argc, char** argv) {
     using namespace htvm::app;
     Program program;
     program.name = "htvm";
-    program.description = "htvm compresses human time-varying meshes: captured 3D people, one triangle mesh a frame.";
+    program.description = "htvm compresses human time-varying meshes: captured 3D people, one triangle mesh per frame.";
     program.commands = {add_synth, add_encode, add_decode, add_info, add_calibrate, add_compare};
     program.elsewhere = {{"rd", "htvm-lab rd"}, {"reproduce", "htvm-lab reproduce"}};
     return run_program(program, argc, argv);

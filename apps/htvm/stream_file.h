@@ -1,4 +1,5 @@
-// Streams as the commands read and write them: packets in a file, or on standard input and output.
+// Streams as the commands read and write them: packets in a file, or on standard input and output; and the options that
+// say what the commands accept of a stream.
 #pragma once
 
 #include <cstdint>
@@ -6,8 +7,13 @@
 #include <optional>
 #include <string>
 
+#include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace htvm::app {
 
@@ -39,5 +45,12 @@ private:
     bool standard_ = false;
     std::uint64_t bytes_ = 0;
 };
+
+// ---- What the commands accept of a stream ---------------------------------------------------------------------------
+
+// -M/--max-memory, --max-vertices, --max-triangles, --max-bones, --max-packet; into the options' limits.
+void add_decoder_limits(CLI::App& command, DecoderOptions& limits);
+// Where frames are not decoded: --max-bones and --max-packet alone.
+void add_packet_limits(CLI::App& command, DecoderOptions& limits);
 
 }  // namespace htvm::app

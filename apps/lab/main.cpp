@@ -8,8 +8,8 @@ int main(int argc, char** argv) {
     program.description =
         "htvm-lab measures coders of human time-varying meshes on a capture: ours, others', published ones.";
     program.footer =
-        "Begin with a capture: a folder of meshes, one a frame, or a synthetic one by 'htvm synth'.\n"
-        "  htvm-lab rd CAPTURE -o out/rd            rates and errors of coders at several qualities\n"
+        "Begin with a capture: a folder of meshes, one per frame, or a synthetic one by 'htvm synth'.\n"
+        "  htvm-lab rd CAPTURE -o out/rd              rates and errors of coders at several qualities\n"
         "  htvm-lab reproduce CAPTURE -o out/report   the published experiments, as one page to look at";
     program.commands = {add_rd, add_reproduce};
     for (const char* name : {"synth", "encode", "decode", "info", "calibrate", "compare"})

@@ -3,25 +3,22 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "charts.h"
+#include "coders.h"
 #include "command_line/capture.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/parallel.h"
 #include "io/sequence.h"
-#include "rd_cache.h"
-#include "rd_coders.h"
-#include "rd_peer.h"
-#include "rd_plot.h"
-#include "rd_report.h"
-#include "rd_source.h"
-#include "rd_sweep.h"
-#include "work_folder.h"
+#include "results.h"
+#include "sweep.h"
 
 namespace htvm::lab {
 
@@ -31,10 +28,13 @@ namespace {
 
 using std::filesystem::path;
 
+// What all coders' rates are compared with.
+constexpr std::array<const char*, 3> rate_references = {"draco10", "tfan", "tfan-mpeg"};
+
 struct Options {
     CaptureOptions capture;
     std::vector<double> qualities{20, 35, 50, 65, 80};
-    std::vector<std::string> coders{"htvm-t", "htvm-ep", "paper", "tfan", "draco10"};
+    std::vector<std::string> coders{"htvm-t", "htvm-ep", "paper", "tfan", "tfan-mpeg", "draco10"};
     std::vector<std::string> peers;
     std::vector<std::string> metrics{"m1", "m2"};
     std::uint64_t samples = 200000;
@@ -196,10 +196,11 @@ std::string capture_title(const Options& options, const RdPoint& point) {
 void print_tables(const Options& options, const std::string& title, const std::vector<RdPoint>& points) {
     fmt::print("{}\n\n{}", title, rate_table(points));
     if (const auto table = enhanced_frame_table(points); !table.empty()) fmt::print("\n{}", table);
-    for (const char* reference : {"draco10", "tfan"})
+    for (const char* reference : rate_references)
         if (const auto table = rate_difference_table(points, reference); !table.empty()) fmt::print("\n{}", table);
     std::string crossings;
-    for (const char* coder : {"paper", "htvm-ep"}) crossings += crossing_sentence(points, coder, "tfan");
+    for (const char* coder : {"paper", "htvm-ep"})
+        for (const char* peer : {"tfan", "tfan-mpeg"}) crossings += crossing_sentence(points, coder, peer);
     if (!crossings.empty()) fmt::print("\n{}", crossings);
     fmt::print(
         "\nbpvf and layers: bits per captured vertex, all frames, I-frames counted. one piece: what a coder does not\n"
@@ -211,14 +212,15 @@ void print_tables(const Options& options, const std::string& title, const std::v
 nlohmann::json as_json(const Options& options, const std::string& title, const std::vector<RdPoint>& points) {
     nlohmann::json list = nlohmann::json::array();
     for (const auto& point : points) list.push_back(to_json(point));
+    nlohmann::json differences;
+    for (const char* reference : rate_references) differences[reference] = rate_differences_json(points, reference);
     return {{"program", "htvm-lab " HTVM_VERSION},
             {"capture", title},
             {"input", options.capture.input},
             {"surface_samples", options.samples},
             {"coder_threads", options.coder_threads},
             {"points", std::move(list)},
-            {"rate_differences",
-             {{"draco10", rate_differences_json(points, "draco10")}, {"tfan", rate_differences_json(points, "tfan")}}}};
+            {"rate_differences", std::move(differences)}};
 }
 
 Result<void> write_outputs(const Options& options, const std::vector<RdPoint>& points) {
@@ -281,13 +283,14 @@ void add_sweep_options(CLI::App& command, Options& o) {
     command
         .add_option(
             "--coders", o.coders,
-            "Comma between (default htvm-t,htvm-ep,paper,tfan,draco10); none for peers alone:\n"
+            "Comma between (default htvm-t,htvm-ep,paper,tfan,tfan-mpeg,draco10); none for peers alone:\n"
             "  htvm-t   I- and T-frames, as htvm encode: a simplified mesh laid on each frame's surface\n"
             "  paper    I- and EP-frames as in the paper (reference vertices by bone)\n"
             "  htvm-ep  the same with reference vertices from the whole mesh, as htvm encode --profile topology\n"
             "  htvm-motion  htvm-ep by motion-based coding: what fits the capture is animated, not coded\n"
             "  htvm-rd  I-, EP- and P-frames chosen by measured bits and errors (slow)\n"
             "  tfan     our TFAN alone, every frame an I-frame\n"
+            "  tfan-mpeg  TFAN as published and in MPEG-4: no contexts, one parallelogram; every frame by itself\n"
             "  draco10, draco7  libdraco at compression level 10, 7, every frame by itself")
         ->delimiter(',')
         ->option_text("LIST");
@@ -300,7 +303,7 @@ void add_sweep_options(CLI::App& command, Options& o) {
         ->check(CLI::IsMember({"m1", "m2", "m3", "d1"}))
         ->option_text("LIST");
     command.add_option("--samples", o.samples,
-                       "For M2 in each direction (default 200000, within 1 % of METRO's 10 a triangle; 0: that)");
+                       "For M2 in each direction (default 200000, within 1 % of METRO's 10 per triangle; 0: that)");
     command.add_option("--measure-every", o.measure_every, "Measure errors on every so many-th frame (default 1)")
         ->check(CLI::Range(1, 1000000));
     command.add_option("--views", o.views, "For M3 (default 10)")->check(CLI::Range(1, 1000));
@@ -310,7 +313,7 @@ void add_sweep_options(CLI::App& command, Options& o) {
 }
 
 void add_running_options(CLI::App& command, Options& o) {
-    command.add_option("--threads", o.threads, "Coders at work at once (default: one a core)");
+    command.add_option("--threads", o.threads, "Coders at work at once (default: one per core)");
     command
         .add_option("--coder-threads", o.coder_threads,
                     "Threads of each of our coders (default 1: speeds are then processor time of one thread)")
@@ -337,7 +340,7 @@ void add_rd(CLI::App& app, app::Run& run) {
         "loss only: they are quantised to our colour step before. Normals and texture coordinates are left out.\n"
         "Results are kept in OUTPUT/results; they are made anew where the inputs, the options or the program changed.\n"
         "\n"
-        "A peer's COMMAND is run once a frame by the shell, with these replaced:\n"
+        "A peer's COMMAND is run once per frame by the shell, with these replaced:\n"
         "  {in}       binary PLY of the frame, mm          {out}      the file to write, whose size is the rate\n"
         "  {decoded}  PLY to write, decoded from {out}     {q}        quality, 0 to 100\n"
         "  {step} {colour_step}  our steps there, mm and levels       {bits}  position bits, as for Draco\n"

@@ -11,17 +11,13 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/parallel.h"
+#include "experiments.h"
+#include "figures.h"
+#include "findings.h"
+#include "galleries.h"
 #include "io/sequence.h"
-#include "rd_cache.h"
-#include "reproduce_figures.h"
-#include "reproduce_gallery.h"
-#include "reproduce_machine.h"
-#include "reproduce_motion.h"
-#include "reproduce_motion_gallery.h"
-#include "reproduce_page.h"
-#include "reproduce_summary.h"
-#include "reproduce_sweeps.h"
-#include "work_folder.h"
+#include "page.h"
+#include "sweep.h"
 
 namespace htvm::lab {
 
@@ -98,7 +94,7 @@ Result<std::vector<Pose>> tracked_poses(const SourceFrames& source) {
     return out;
 }
 
-// Poses for the noise to be added to, one a frame; none without a skeleton.
+// Poses for the noise to be added to, one per frame; none without a skeleton.
 Result<std::vector<Pose>> poses_for_noise(const Options& options, const SourceFrames& source) {
     const auto truth = true_skeleton_file(options);
     if (truth.empty()) return tracked_poses(source);
@@ -441,7 +437,7 @@ void add_reproduce(CLI::App& app, app::Run& run) {
     command->add_option("--azimuth", o.azimuth,
                         "Degrees about the vertical from which frames are drawn; 0 looks along -z (default: the\n"
                         "body's front, as far as that can be told)");
-    command->add_option("--threads", o.threads, "0: one a core")->check(CLI::Range(0, 1024));
+    command->add_option("--threads", o.threads, "0: one per core")->check(CLI::Range(0, 1024));
     command->add_option("--memory", o.memory_megabytes, "MB of frames to hold in memory (default 1024)")
         ->check(CLI::Range(1, 1 << 20));
     command->footer(

@@ -35,6 +35,7 @@ expect 2 "--output is required" "$lab" rd capture
 expect 2 "is not a number" "$lab" rd capture -o rd -q nan
 expect 1 "there is no coder 'none-such'; there are paper" "$lab" rd capture -o rd --coders none-such
 expect 1 "nowhere" "$lab" rd nowhere -o rd
+expect 0 "rate against tfan-mpeg" "$lab" rd capture -o peers -q 20,40 --coders tfan,tfan-mpeg
 expect 0 "bpvf" "$lab" rd capture -o rd -q 40 --coders tfan,draco10
 [ -s rd/rd.csv ] && [ -s rd/rd.json ] || { echo "FAILED: no rd.csv, or no rd.json"; failures=$((failures + 1)); }
 expect 0 "2 of 2 results are kept from earlier runs" "$lab" rd capture -o rd -q 40 --coders tfan,draco10

@@ -1,0 +1,91 @@
+// What the sweep found for one coder at one quality, and the measures that tables and curves show.
+#pragma once
+
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "command_line/layer_table.h"
+#include "htvm/frame.hpp"
+#include "metrics/bjontegaard.h"
+#include "metrics/compare.h"
+
+namespace htvm::lab {
+
+// A measure of the decoded sequence.
+struct Measure {
+    const char* key;    // in JSON, CSV and file names
+    const char* title;  // of a curve's axis
+    const char* brief;  // of a table's column
+    const char* unit;
+    const char* metric;  // of --metrics that it belongs to
+    bool is_error;       // smaller is better; else a PSNR
+    bool is_curve;       // drawn, and compared by rate differences
+    int digits;          // behind the point, in tables
+};
+std::span<const Measure> measures();
+
+struct RdFrame {
+    FrameType type = FrameType::intra;
+    std::uint32_t vertices = 0;  // of the captured mesh
+    LayerBytes bytes;
+    double encode_ms = 0;
+    std::optional<double> decode_ms;
+    std::optional<double> m1_mm, m2_mm;  // where the frame was measured
+};
+
+struct RdPoint {
+    std::string coder;
+    double quality = 0, geometry_step = 0, colour_step = 0;
+    std::string setting;  // the quality in the coder's own terms, where it has some
+    double fps = 30;
+    std::vector<RdFrame> frames;
+    std::map<std::string, double> values;  // by Measure::key; what was not measured is left out
+};
+
+// Over all frames, or those of one type.
+app::LayerTotals totals(const RdPoint& point);
+app::LayerTotals totals(const RdPoint& point, FrameType type);
+
+double bits_per_vertex(const RdPoint& point);  // bpvf: all bits over all captured vertices
+double megabits_per_second(const RdPoint& point);
+double encode_fps(const RdPoint& point);                 // frames a second
+std::optional<double> decode_fps(const RdPoint& point);  // nothing where decoding was not timed by itself
+
+// A coder's curve in a measure, the quality larger for better (errors by quality_of_error).
+std::vector<RatePoint> rate_curve(std::span<const RdPoint> points, const std::string& coder, const Measure& measure);
+
+// The measures of a summary that `options` asked for, into `values`; infinite ones are left out.
+void take_measures(const ComparisonSummary& summary, const CompareOptions& options,
+                   std::map<std::string, double>& values);
+
+nlohmann::json to_json(const RdPoint& point);
+// Nothing where the JSON is not what to_json wrote.
+std::optional<RdPoint> rd_point_from_json(const nlohmann::json& json);
+
+// ---- What the sweep says to people and programs: tables, and lines of CSV -------------------------------------------
+
+// Names of the coders in the order of their first points.
+std::vector<std::string> coders_of(std::span<const RdPoint> points);
+
+// One line per coder and quality: rates, bits per vertex by layer, measures, speeds.
+std::string rate_table(std::span<const RdPoint> points);
+
+// EP-frames alone, bits per vertex by layer; empty where there is none.
+std::string enhanced_frame_table(std::span<const RdPoint> points);
+
+// Bjontegaard rate differences of every coder against `reference`, in every measure that was taken; empty where the
+// reference was not measured.
+std::string rate_difference_table(std::span<const RdPoint> points, const std::string& reference);
+nlohmann::json rate_differences_json(std::span<const RdPoint> points, const std::string& reference);
+
+// Where the M1 curve of `first` crosses that of `second`, as a sentence; empty where one of them was not measured.
+std::string crossing_sentence(std::span<const RdPoint> points, const std::string& first, const std::string& second);
+
+// One line per coder and quality.
+std::string rd_csv(std::span<const RdPoint> points);
+
+}  // namespace htvm::lab

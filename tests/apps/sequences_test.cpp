@@ -1,0 +1,71 @@
+// Decoded frames are measured against their own originals, whatever frames are missing on either side.
+#include "sequences.h"
+
+#include <gtest/gtest.h>
+
+namespace htvm::app {
+namespace {
+
+using Numbers = std::vector<std::uint64_t>;
+using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
+
+Numbers numbers_of(const std::vector<std::filesystem::path>& names) { return numbers_in_names(names); }
+
+Pairs pairs_of(const Numbers& original, const Numbers& decoded) {
+    Pairs out;
+    for (const auto& pair : pair_by_number(original, decoded)) out.emplace_back(pair.original, pair.decoded);
+    return out;
+}
+
+TEST(FramePairs, TheNumberIsTheLastInTheName) {
+    EXPECT_EQ(numbers_of({"a/take2_frame_0007.ply", "a/take2_frame_0012.ply"}), (Numbers{7, 12}));
+    EXPECT_EQ(numbers_of({"00000.ply", "00003.ply"}), (Numbers{0, 3}));
+    EXPECT_EQ(numbers_of({"f9_low.obj", "f10_low.obj"}), (Numbers{9, 10}));
+}
+
+TEST(FramePairs, NamesThatDifferOtherwiseHaveNoNumbers) {
+    EXPECT_EQ(numbers_of({"first.ply", "second.ply"}), Numbers{});
+    EXPECT_EQ(numbers_of({"a1.ply", "b2.ply"}), Numbers{});
+    EXPECT_EQ(numbers_of({"1_low.ply", "2_high.ply"}), Numbers{});
+    EXPECT_EQ(numbers_of({"a1.ply", "a01.ply"}), Numbers{}) << "the same number twice";
+    EXPECT_EQ(numbers_of({"a99999999999999999999999.ply"}), Numbers{}) << "beyond 64 bits";
+    EXPECT_EQ(numbers_of({}), Numbers{});
+}
+
+TEST(FramePairs, AFrameThatIsMissingShiftsNoOther) {
+    EXPECT_EQ(pairs_of({0, 1, 2, 3, 4}, {0, 1, 3, 4}), (Pairs{{0, 0}, {1, 1}, {3, 2}, {4, 3}}));
+    EXPECT_EQ(pairs_of({0, 1, 3}, {0, 1, 2, 3}), (Pairs{{0, 0}, {1, 1}, {2, 3}}));
+}
+
+TEST(FramePairs, DecodedFramesMayCountThePlacesOfTheOriginals) {
+    EXPECT_EQ(pairs_of({1, 2, 3, 4}, {0, 1, 3}), (Pairs{{0, 0}, {1, 1}, {3, 2}}));
+    EXPECT_EQ(pairs_of({40, 41, 42, 43}, {1, 3}), (Pairs{{1, 0}, {3, 1}})) << "the first one is missing";
+    EXPECT_EQ(pairs_of({0, 2, 4}, {0, 1, 2}), (Pairs{{0, 0}, {1, 1}, {2, 2}})) << "the originals have gaps";
+}
+
+TEST(FramePairs, DecodedFramesMayCountFromAnythingElse) {
+    EXPECT_EQ(pairs_of({1, 2, 3, 4}, {100, 101, 103}), (Pairs{{0, 0}, {1, 1}, {3, 2}}));
+    EXPECT_EQ(pairs_of({7}, {3}), (Pairs{{0, 0}}));
+}
+
+TEST(FramePairs, NumbersAtTheEndOfTheirRangePairWithThemselves) {
+    constexpr std::uint64_t most = ~std::uint64_t{0};
+    EXPECT_EQ(pairs_of({0, most}, {0, most}), (Pairs{{0, 0}, {1, 1}}));
+    EXPECT_EQ(pairs_of({most - 1, most}, {0, 1, 2}), (Pairs{{0, 0}, {1, 1}}));
+}
+
+TEST(FramePairs, WithoutFramesThereAreNoPairs) {
+    EXPECT_EQ(pairs_of({}, {0, 1}), Pairs{});
+    EXPECT_EQ(pairs_of({0, 1}, {}), Pairs{});
+}
+
+TEST(FramePairs, FramesLeftOutAreNamed) {
+    const Numbers numbers = {10, 11, 12, 13, 14, 15};
+    EXPECT_EQ(frames_left_out(numbers, std::vector<std::size_t>{0, 1, 2, 3, 4, 5}), "");
+    EXPECT_EQ(frames_left_out(numbers, std::vector<std::size_t>{0, 2, 3, 4, 5}), "frame 11");
+    EXPECT_EQ(frames_left_out(numbers, std::vector<std::size_t>{1, 3}), "frames 10, 12, 14 to 15");
+    EXPECT_EQ(frames_left_out(numbers, {}), "frames 10 to 15");
+}
+
+}  // namespace
+}  // namespace htvm::app
