@@ -3,53 +3,29 @@
 #include <htvm/htvm.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
 
-/* Arrays that grow with the largest frame seen. */
-typedef struct {
-    float* positions;
-    uint32_t* triangles;
-    size_t position_capacity, triangle_capacity; /* numbers, not vertices or triangles */
-} frame_buffers;
-
-static int make_room(frame_buffers* buffers, const htvm_frame_info* info) {
-    const size_t positions = (size_t)info->vertices * 3, triangles = (size_t)info->triangles * 3;
-    if (positions > buffers->position_capacity) {
-        float* larger = realloc(buffers->positions, positions * sizeof *larger);
-        if (!larger) return 0;
-        buffers->positions = larger;
-        buffers->position_capacity = positions;
-    }
-    if (triangles > buffers->triangle_capacity) {
-        uint32_t* larger = realloc(buffers->triangles, triangles * sizeof *larger);
-        if (!larger) return 0;
-        buffers->triangles = larger;
-        buffers->triangle_capacity = triangles;
-    }
-    return 1;
-}
-
-static int write_obj(const char* prefix, const htvm_frame_info* info, const frame_buffers* buffers) {
+static int write_obj(const char* prefix, uint32_t number, const htvm_mesh_view* mesh) {
     char name[4096];
     FILE* file;
     uint32_t i;
-    if (snprintf(name, sizeof name, "%s%06" PRIu32 ".obj", prefix, info->frame) >= (int)sizeof name) return 0;
+    if (snprintf(name, sizeof name, "%s%06" PRIu32 ".obj", prefix, number) >= (int)sizeof name) return 0;
     file = fopen(name, "w");
     if (!file) return 0;
-    for (i = 0; i < info->vertices; ++i) {
-        const float* p = buffers->positions + 3 * (size_t)i;
+    for (i = 0; i < mesh->vertices; ++i) {
+        const float* p = mesh->positions + 3 * (size_t)i;
         fprintf(file, "v %.9g %.9g %.9g\n", (double)p[0], (double)p[1], (double)p[2]);
     }
-    for (i = 0; i < info->triangles; ++i) {
-        const uint32_t* t = buffers->triangles + 3 * (size_t)i;
+    for (i = 0; i < mesh->triangles; ++i) {
+        const uint32_t* t = mesh->indices + 3 * (size_t)i;
         fprintf(file, "f %" PRIu32 " %" PRIu32 " %" PRIu32 "\n", t[0] + 1, t[1] + 1, t[2] + 1);
     }
     return fclose(file) == 0;
 }
 
 /* Takes all frames that are whole so far. Gives the number of packets that could not be decoded. */
-static int receive_frames(htvm_decoder* decoder, frame_buffers* buffers, const char* prefix) {
+static int receive_frames(htvm_decoder* decoder, const char* prefix, uint32_t* topology) {
     htvm_frame_info info;
+    htvm_mesh_view mesh; /* the decoder's own arrays, until the next frame is received */
     htvm_status status;
     int errors = 0;
     while ((status = htvm_decoder_receive_frame(decoder, &info, sizeof info)) != HTVM_AGAIN) {
@@ -58,16 +34,13 @@ static int receive_frames(htvm_decoder* decoder, frame_buffers* buffers, const c
             ++errors;
             continue;
         }
-        if (!make_room(buffers, &info) ||
-            htvm_decoder_copy_positions(decoder, buffers->positions, buffers->position_capacity) != HTVM_OK ||
-            htvm_decoder_copy_triangles(decoder, buffers->triangles, buffers->triangle_capacity) != HTVM_OK) {
-            fprintf(stderr, "frame %" PRIu32 ": no memory for its mesh\n", info.frame);
-            ++errors;
-            continue;
-        }
-        printf("frame %" PRIu32 ": %s, %" PRIu32 " vertices, %" PRIu32 " triangles, %" PRIu64 " bytes\n", info.frame,
-               htvm_frame_kind_letter(info.type), info.vertices, info.triangles, info.bytes);
-        if (prefix && !write_obj(prefix, &info, buffers)) {
+        if (htvm_decoder_view(decoder, &mesh, sizeof mesh) != HTVM_OK) return errors + 1;
+        /* A player would send triangles and texture coordinates to the graphics card only where they are new. */
+        printf("frame %" PRIu32 ": %s, %" PRIu32 " vertices, %" PRIu32 " triangles%s, %" PRIu64 " bytes\n", info.frame,
+               htvm_frame_kind_letter(info.type), mesh.vertices, mesh.triangles,
+               mesh.topology == *topology ? " as before" : "", info.bytes);
+        *topology = mesh.topology;
+        if (prefix && !write_obj(prefix, info.frame, &mesh)) {
             fprintf(stderr, "frame %" PRIu32 " cannot be written\n", info.frame);
             ++errors;
         }
@@ -77,7 +50,7 @@ static int receive_frames(htvm_decoder* decoder, frame_buffers* buffers, const c
 
 int main(int argc, char** argv) {
     htvm_decoder* decoder = NULL;
-    frame_buffers buffers = {NULL, NULL, 0, 0};
+    uint32_t topology = 0;
     uint8_t piece[65536];
     uint64_t damaged = 0, pending = 0;
     size_t count;
@@ -91,13 +64,11 @@ int main(int argc, char** argv) {
     if (htvm_decoder_create(NULL, &decoder) != HTVM_OK) return 2;
     while ((count = fread(piece, 1, sizeof piece, file)) > 0) {
         if (htvm_decoder_send_bytes(decoder, piece, count) != HTVM_OK) ++errors;
-        errors += receive_frames(decoder, &buffers, argc == 3 ? argv[2] : NULL);
+        errors += receive_frames(decoder, argc == 3 ? argv[2] : NULL, &topology);
     }
     htvm_decoder_unused_bytes(decoder, &damaged, &pending);
     if (damaged + pending > 0) fprintf(stderr, "%" PRIu64 " bytes are damaged or cut short\n", damaged + pending);
     htvm_decoder_destroy(decoder);
-    free(buffers.positions);
-    free(buffers.triangles);
     fclose(file);
     return errors > 0 || damaged + pending > 0 ? 1 : 0;
 }

@@ -47,8 +47,10 @@ inline void require_sound(const Mesh& mesh, const DecoderOptions& limits) {
 
 inline void decode_all(const std::vector<Packet>& packets, const DecoderOptions& options) {
     Decoder decoder(options);
+    std::uint32_t topology = 0;
+    std::vector<Triangle> triangles;  // of the last frame
     for (const auto& packet : packets) {
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode(packet);
         if (!frame) {
             require(!frame.error().message.empty(), "an error says what is wrong");
             if (const auto stand_in = decoder.conceal(packet.frame, packet.timestamp_us)) {
@@ -59,9 +61,16 @@ inline void decode_all(const std::vector<Packet>& packets, const DecoderOptions&
         }
         require(frame->has_value() == frame_type(packet.kind).has_value(), "frames and nothing else give frames");
         if (!*frame) continue;
-        require_sound((*frame)->mesh, options);
+        const auto& mesh = (*frame)->mesh;
+        require_sound(copy_of(mesh), options);
+        require((*frame)->topology != 0, "a frame has a topology number");
+        require((*frame)->topology != topology ||
+                    std::equal(mesh.triangles.begin(), mesh.triangles.end(), triangles.begin(), triangles.end()),
+                "frames of one topology number have the same triangles");
+        topology = (*frame)->topology;
+        triangles.assign(mesh.triangles.begin(), mesh.triangles.end());
         const auto& skeleton = decoder.sequence()->skeleton;
-        require((*frame)->pose.joints.size() == skeleton.joint_names.size(), "one position a joint");
+        require((*frame)->pose->joints.size() == skeleton.joint_names.size(), "one position a joint");
         require(inspect(packet).has_value(), "a frame that was decoded can be inspected");
     }
 }

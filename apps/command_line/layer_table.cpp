@@ -6,22 +6,17 @@
 #include <array>
 #include <nlohmann/json.hpp>
 #include <utility>
+#include <vector>
 
 namespace htvm::app {
 namespace {
 
-using Column = std::pair<const char*, std::size_t LayerBytes::*>;
-constexpr std::array<Column, 11> columns = {{{"pose", &LayerBytes::pose},
-                                             {"transforms", &LayerBytes::transforms},
-                                             {"geometry", &LayerBytes::geometry},
-                                             {"colour", &LayerBytes::colour},
-                                             {"normals", &LayerBytes::normals},
-                                             {"texcoords", &LayerBytes::texcoords},
-                                             {"mapping", &LayerBytes::mapping},
-                                             {"fans", &LayerBytes::fans},
-                                             {"distance order", &LayerBytes::distance_orders},
-                                             {"external intra", &LayerBytes::external_intra},
-                                             {"overhead", &LayerBytes::overhead}}};
+// What a frame's bytes are told as: its layers, and the rest.
+template <class Visit>
+void for_each_part(const LayerBytes& bytes, const Visit& visit) {
+    for (const auto& [layer, name] : frame_layers) visit(name, bytes[layer]);
+    visit("overhead", bytes.overhead);
+}
 
 std::string key_of(std::string name) {
     std::replace(name.begin(), name.end(), ' ', '_');
@@ -33,7 +28,7 @@ std::string key_of(std::string name) {
 void add(LayerTotals& totals, const FrameInfo& info) {
     ++totals.frames;
     totals.source_vertices += info.source_vertices;
-    for (const auto& [name, member] : columns) totals.bytes.*member += info.bytes.*member;
+    totals.bytes += info.bytes;
 }
 
 void add(TotalsByType& totals, const FrameInfo& info) { add(totals.of(info.type), info); }
@@ -43,7 +38,7 @@ LayerTotals TotalsByType::all() const {
     for (const auto& sums : totals) {
         out.frames += sums.frames;
         out.source_vertices += sums.source_vertices;
-        for (const auto& [name, member] : columns) out.bytes.*member += sums.bytes.*member;
+        out.bytes += sums.bytes;
     }
     return out;
 }
@@ -54,39 +49,44 @@ double bits_per_vertex(std::size_t bytes, std::uint64_t vertices) {
 
 std::string layer_table(const TotalsByType& totals) {
     const LayerTotals all = totals.all();
+    std::vector<std::string> columns;  // of what any frame has
+    for_each_part(all.bytes, [&](const char* name, std::size_t bytes) {
+        if (bytes > 0) columns.emplace_back(name);
+    });
     std::string out = fmt::format("{:<10}{:>8}", "bits/vertex", "frames");
-    for (const auto& [name, member] : columns)
-        if (all.bytes.*member > 0) out += fmt::format("{:>16}", name);
+    for (const auto& name : columns) out += fmt::format("{:>16}", name);
     out += fmt::format("{:>10}\n", "total");
     const auto row = [&](const char* row_name, const LayerTotals& sums) {
         if (sums.frames == 0) return;
         out += fmt::format("{:<11}{:>7}", row_name, sums.frames);
-        for (const auto& [column, member] : columns)
-            if (all.bytes.*member > 0)
-                out += fmt::format("{:>16.3f}", bits_per_vertex(sums.bytes.*member, sums.source_vertices));
+        for_each_part(sums.bytes, [&](const char* name, std::size_t bytes) {
+            if (std::find(columns.begin(), columns.end(), name) != columns.end())
+                out += fmt::format("{:>16.3f}", bits_per_vertex(bytes, sums.source_vertices));
+        });
         out += fmt::format("{:>10.3f}\n", bits_per_vertex(sums.bytes.total(), sums.source_vertices));
     };
-    for (const auto type : all_frame_types) row(type_name(type), totals.of(type));
+    for (const auto& kind : frame_kinds) row(kind.letter, totals.of(kind.type));
     row("all", all);
     return out;
 }
 
 nlohmann::json layers_json(const LayerBytes& bytes) {
     nlohmann::json out;
-    for (const auto& [name, member] : columns) out[key_of(name)] = bytes.*member;
+    for_each_part(bytes, [&](const char* name, std::size_t part) { out[key_of(name)] = part; });
     out["total"] = bytes.total();
     return out;
 }
 
 LayerBytes layers_from_json(const nlohmann::json& json) {
     LayerBytes out;
-    for (const auto& [name, member] : columns) out.*member = json.at(key_of(name)).get<std::size_t>();
+    for (const auto& [layer, name] : frame_layers) out[layer] = json.at(key_of(name)).get<std::size_t>();
+    out.overhead = json.at("overhead").get<std::size_t>();
     return out;
 }
 
 nlohmann::json frame_json(const FrameInfo& info) {
     return {{"frame", info.frame},
-            {"type", type_name(info.type)},
+            {"type", kind_of(info.type).letter},
             {"reference", info.reference},
             {"timestamp_us", info.timestamp_us},
             {"source_vertices", info.source_vertices},
@@ -95,26 +95,6 @@ nlohmann::json frame_json(const FrameInfo& info) {
             {"triangles", info.triangles},
             {"bytes", layers_json(info.bytes)},
             {"bits_per_vertex", bits_per_vertex(info.bytes.total(), info.source_vertices)}};
-}
-
-const char* type_name(FrameType type) {
-    switch (type) {
-        case FrameType::intra:
-            return "I";
-        case FrameType::enhanced:
-            return "EP";
-        case FrameType::predicted:
-            return "P";
-        case FrameType::tracked:
-            return "T";
-    }
-    return "?";
-}
-
-std::optional<FrameType> type_named(const std::string& name) {
-    for (const auto type : all_frame_types)
-        if (name == type_name(type)) return type;
-    return std::nullopt;
 }
 
 }  // namespace htvm::app

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,7 +37,5 @@ nlohmann::json layers_json(const LayerBytes& bytes);
 // The reverse; throws as nlohmann-json does where a layer is missing or no number.
 LayerBytes layers_from_json(const nlohmann::json& json);
 nlohmann::json frame_json(const FrameInfo& info);
-const char* type_name(FrameType type);  // I, EP, P
-std::optional<FrameType> type_named(const std::string& name);
 
 }  // namespace htvm::app

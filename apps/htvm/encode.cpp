@@ -61,8 +61,8 @@ Result<void> drop(const Pass& pass, const Error& error) {
 }
 
 std::string progress_text(const Pass& pass, const FrameInfo& info) {
-    std::string text =
-        fmt::format("{} {:.2f} bpv", type_name(info.type), bits_per_vertex(info.bytes.total(), info.source_vertices));
+    std::string text = fmt::format("{} {:.2f} bpv", kind_of(info.type).letter,
+                                   bits_per_vertex(info.bytes.total(), info.source_vertices));
     if (pass.rate.controlled()) text += fmt::format(", quality {:.0f}", pass.encoder.last_cost().quality);
     return text;
 }

@@ -25,7 +25,8 @@ struct Options {
 // A frame's bytes, with those of the codebooks that came with it.
 void add_codebook(LayerBytes& bytes, const Packet& packet) {
     bytes.overhead += packet_overhead;
-    if (!packet.payload.empty()) (packet.payload[0] == 0 ? bytes.geometry : bytes.colour) += packet.payload.size();
+    if (!packet.payload.empty())
+        bytes[packet.payload[0] == 0 ? Layer::geometry : Layer::colour] += packet.payload.size();
 }
 
 void print_frame(const FrameInfo& f) {
@@ -34,9 +35,11 @@ void print_frame(const FrameInfo& f) {
     fmt::print(
         "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>9} {:>9} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} "
         "{:>8.3f}\n",
-        f.frame, type_name(f.type), f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices, f.triangles,
-        b.total(), bpv(b.pose + b.transforms), bpv(b.geometry + b.external_intra), bpv(b.colour),
-        bpv(b.normals + b.texcoords), bpv(b.mapping), bpv(b.fans), bpv(b.distance_orders), bpv(b.total()));
+        f.frame, kind_of(f.type).letter, f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices,
+        f.triangles, b.total(), bpv(b[Layer::pose] + b[Layer::transforms]),
+        bpv(b[Layer::geometry] + b[Layer::external_intra]), bpv(b[Layer::colour]),
+        bpv(b[Layer::normals] + b[Layer::texcoords]), bpv(b[Layer::mapping]), bpv(b[Layer::fans]),
+        bpv(b[Layer::distance_orders]), bpv(b.total()));
 }
 
 void print_sequence(const SequenceInfo& s, const std::string& input) {
@@ -113,9 +116,7 @@ Result<void> info(const Options& options) {
         if (!frame_type(packet->kind)) continue;
         auto frame = inspect(*packet);
         if (!frame) return tl::unexpected(frame.error());
-        frame->bytes.overhead += codebooks.overhead;
-        frame->bytes.geometry += codebooks.geometry;
-        frame->bytes.colour += codebooks.colour;
+        frame->bytes += codebooks;
         codebooks = {};
         if (count++ == 0) first_us = frame->timestamp_us;
         last_us = frame->timestamp_us;

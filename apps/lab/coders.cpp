@@ -262,14 +262,14 @@ Result<CodedFrame> code_by_draco(const SourceFrame& frame, const DracoSettings& 
     const bool colours = !frame.mesh.colours.empty();
     const auto bytes = encode(frame.mesh, settings, colours, out.encode_ms);
     if (!bytes) return tl::unexpected(bytes.error());
-    out.bytes.external_intra = bytes->size();
+    out.bytes[Layer::external_intra] = bytes->size();
     if (colours) {
         // Its colours' share: what the same frame takes less without them.
         double not_counted = 0;
         const auto geometry = encode(frame.mesh, settings, false, not_counted);
         if (!geometry) return tl::unexpected(geometry.error());
-        out.bytes.external_intra = std::min(geometry->size(), bytes->size());
-        out.bytes.colour = bytes->size() - out.bytes.external_intra;
+        out.bytes[Layer::external_intra] = std::min(geometry->size(), bytes->size());
+        out.bytes[Layer::colour] = bytes->size() - out.bytes[Layer::external_intra];
         out.bytes.overhead = 1;
     }
     out.decode_ms = 0;
@@ -342,7 +342,7 @@ Result<CodedFrame> code_by_command(const std::string& name, const std::string& c
     std::error_code missing;
     const auto bytes = std::filesystem::file_size(out, missing);
     if (missing) return fail(ErrorKind::bad_input, fmt::format("the command of {} wrote no {{out}}", name));
-    coded.bytes.external_intra = bytes;
+    coded.bytes[Layer::external_intra] = bytes;
     auto mesh = read_mesh(decoded);
     if (!mesh)
         return fail(ErrorKind::bad_input,

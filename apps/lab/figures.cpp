@@ -390,8 +390,9 @@ std::string crossing_reason(std::span<const RdPoint> points) {
             "expensive "
             "the static coder, the higher the rate where the curves cross.",
             found.crossings.empty() ? "Where the bits go" : "Why there", ours->geometry_step,
-            bpv(sums.bytes.geometry, sums), bpv(other.bytes.geometry, other), bpv(sums.bytes.mapping, sums),
-            bpv(sums.bytes.distance_orders, sums), bpv(sums.bytes.fans, sums), bpv(other.bytes.fans, other));
+            bpv(sums.bytes[Layer::geometry], sums), bpv(other.bytes[Layer::geometry], other),
+            bpv(sums.bytes[Layer::mapping], sums), bpv(sums.bytes[Layer::distance_orders], sums),
+            bpv(sums.bytes[Layer::fans], sums), bpv(other.bytes[Layer::fans], other));
     }
     return {};
 }
@@ -454,11 +455,11 @@ std::string at_rate(const InternalRun& run) {
         enhanced, run.quality, run.geometry_step, run.colour_step, run.bits_per_vertex);
 }
 
-std::size_t geometry_bytes(const LayerBytes& b) { return b.geometry; }
-std::size_t colour_bytes(const LayerBytes& b) { return b.colour; }
-std::size_t mapping_bytes(const LayerBytes& b) { return b.mapping; }
-std::size_t connectivity_bytes(const LayerBytes& b) { return b.fans + b.distance_orders; }
-std::size_t order_bytes(const LayerBytes& b) { return b.distance_orders; }
+std::size_t geometry_bytes(const LayerBytes& b) { return b[Layer::geometry]; }
+std::size_t colour_bytes(const LayerBytes& b) { return b[Layer::colour]; }
+std::size_t mapping_bytes(const LayerBytes& b) { return b[Layer::mapping]; }
+std::size_t connectivity_bytes(const LayerBytes& b) { return b[Layer::fans] + b[Layer::distance_orders]; }
+std::size_t order_bytes(const LayerBytes& b) { return b[Layer::distance_orders]; }
 std::size_t all_bytes(const LayerBytes& b) { return b.total(); }
 
 std::string beside(const char* what, double here, double paper) {

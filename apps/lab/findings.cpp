@@ -178,7 +178,7 @@ Table rate_table_of(const std::vector<RdPoint>& points, const std::string& title
     for (const auto& point : points) {
         const auto decoding = decode_fps(point);
         std::vector<std::string> row{look_of_coder(point.coder).name, fmt::format("{:.2f}", point.geometry_step),
-                                     totals(point).bytes.colour > 0 || point.values.contains("m1_colour")
+                                     totals(point).bytes[Layer::colour] > 0 || point.values.contains("m1_colour")
                                          ? fmt::format("{:g}", point.colour_step)
                                          : "",
                                      fmt::format("{:.2f}", bits_per_vertex(point)),
@@ -204,10 +204,11 @@ Table layer_table_of(const std::vector<RdPoint>& points) {
             return fmt::format("{:.2f}", app::bits_per_vertex(bytes, sums.source_vertices));
         };
         const auto& b = sums.bytes;
-        table.rows.push_back({look_of_coder(point.coder).name, fmt::format("{:.2f}", point.geometry_step),
-                              std::to_string(sums.frames), bpv(b.total()), bpv(b.geometry), bpv(b.mapping), bpv(b.fans),
-                              bpv(b.distance_orders),
-                              bpv(b.total() - b.geometry - b.mapping - b.fans - b.distance_orders)});
+        table.rows.push_back(
+            {look_of_coder(point.coder).name, fmt::format("{:.2f}", point.geometry_step), std::to_string(sums.frames),
+             bpv(b.total()), bpv(b[Layer::geometry]), bpv(b[Layer::mapping]), bpv(b[Layer::fans]),
+             bpv(b[Layer::distance_orders]),
+             bpv(b.total() - b[Layer::geometry] - b[Layer::mapping] - b[Layer::fans] - b[Layer::distance_orders])});
     }
     return table;
 }

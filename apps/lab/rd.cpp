@@ -190,7 +190,7 @@ std::string capture_title(const Options& options, const RdPoint& point) {
     const auto sums = totals(point);
     const double vertices = static_cast<double>(sums.source_vertices) / static_cast<double>(sums.frames);
     return fmt::format("{}: {} frames of {:.0f} vertices{}, {:g} frames/s", name, sums.frames, vertices,
-                       sums.bytes.colour == 0 ? " without colour" : "", point.fps);
+                       sums.bytes[Layer::colour] == 0 ? " without colour" : "", point.fps);
 }
 
 void print_tables(const Options& options, const std::string& title, const std::vector<RdPoint>& points) {

@@ -46,7 +46,7 @@ std::optional<double> optional_number(const nlohmann::json& json, const char* ke
 }
 
 nlohmann::json frame_to_json(const RdFrame& frame) {
-    return {{"type", type_name(frame.type)},
+    return {{"type", kind_of(frame.type).letter},
             {"vertices", frame.vertices},
             {"bytes", layers_json(frame.bytes)},
             {"encode_ms", frame.encode_ms},
@@ -57,7 +57,8 @@ nlohmann::json frame_to_json(const RdFrame& frame) {
 
 RdFrame frame_from_json(const nlohmann::json& json) {
     RdFrame frame;
-    frame.type = type_named(json.at("type").get<std::string>()).value_or(FrameType::intra);
+    const auto* kind = kind_of_letter(json.at("type").get<std::string>());
+    frame.type = kind ? kind->type : FrameType::intra;
     frame.vertices = json.at("vertices").get<std::uint32_t>();
     frame.bytes = layers_from_json(json.at("bytes"));
     frame.encode_ms = json.at("encode_ms").get<double>();
@@ -184,14 +185,17 @@ struct LayerColumn {
     std::size_t (*bytes)(const LayerBytes&);
 };
 constexpr std::array<LayerColumn, 7> layer_columns = {{
-    {"geometry", "geometry", [](const LayerBytes& b) { return b.geometry; }},
-    {"colour", "colour", [](const LayerBytes& b) { return b.colour; }},
-    {"mapping", "mapping", [](const LayerBytes& b) { return b.mapping; }},
-    {"fans", "fans", [](const LayerBytes& b) { return b.fans; }},
-    {"dist.ord.", "distance_order", [](const LayerBytes& b) { return b.distance_orders; }},
-    {"one piece", "one_piece", [](const LayerBytes& b) { return b.external_intra; }},
+    {"geometry", "geometry", [](const LayerBytes& b) { return b[Layer::geometry]; }},
+    {"colour", "colour", [](const LayerBytes& b) { return b[Layer::colour]; }},
+    {"mapping", "mapping", [](const LayerBytes& b) { return b[Layer::mapping]; }},
+    {"fans", "fans", [](const LayerBytes& b) { return b[Layer::fans]; }},
+    {"dist.ord.", "distance_order", [](const LayerBytes& b) { return b[Layer::distance_orders]; }},
+    {"one piece", "one_piece", [](const LayerBytes& b) { return b[Layer::external_intra]; }},
     {"other", "other",
-     [](const LayerBytes& b) { return b.overhead + b.pose + b.transforms + b.normals + b.texcoords; }},
+     [](const LayerBytes& b) {
+         return b.overhead + b[Layer::pose] + b[Layer::transforms] + b[Layer::normals] + b[Layer::texcoords] +
+                b[Layer::coded_bones];
+     }},
 }};
 
 bool measured(std::span<const RdPoint> points, const Measure& measure) {
@@ -282,7 +286,8 @@ std::string enhanced_frame_table(std::span<const RdPoint> points) {
         rows += fmt::format("{:<10}{:>5g}{:>9}{:>8.3f}", point.coder, point.quality, sums.frames,
                             app::bits_per_vertex(sums.bytes.total(), sums.source_vertices));
         rows += layer_cells(sums);
-        const auto connectivity = sums.bytes.fans + sums.bytes.distance_orders + sums.bytes.mapping;
+        const auto connectivity =
+            sums.bytes[Layer::fans] + sums.bytes[Layer::distance_orders] + sums.bytes[Layer::mapping];
         rows += fmt::format("{:>14.3f}\n", app::bits_per_vertex(connectivity, sums.source_vertices));
     }
     if (rows.empty()) return {};

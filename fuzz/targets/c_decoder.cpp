@@ -68,6 +68,28 @@ void copy_something(Caller& caller, std::uint8_t which, std::uint8_t room) {
     }
 }
 
+// What is lent can be read to its end.
+void view_everything(Caller& caller) {
+    htvm_mesh_view view{};
+    const auto status = expect(caller, htvm_decoder_view(caller.decoder, &view, sizeof view));
+    require(status == (caller.any_current ? HTVM_OK : HTVM_BAD_INPUT), "a current frame can be seen");
+    if (status != HTVM_OK) return;
+    require(view.vertices == caller.current.vertices && view.triangles == caller.current.triangles &&
+                view.topology == caller.current.topology,
+            "a view is of the current frame");
+    for (std::size_t i = 0; i < 3 * std::size_t{view.triangles}; ++i)
+        require(view.indices[i] < view.vertices, "triangles name vertices that are there");
+    std::size_t sum = 0;
+    const auto read = [&](const auto* numbers, std::size_t count) {
+        for (std::size_t i = 0; numbers && i < count; ++i) sum += numbers[i] != 0;
+    };
+    read(view.positions, 3 * std::size_t{view.vertices});
+    read(view.colours, 3 * std::size_t{view.vertices});
+    read(view.normals, 3 * std::size_t{view.vertices});
+    read(view.texcoords, 2 * std::size_t{view.vertices});
+    require(sum <= 11 * std::size_t{view.vertices}, "no more numbers than there are");
+}
+
 // A frame was made current, or none was.
 void made_current(Caller& caller, htvm_status status) {
     expect(caller, status);
@@ -120,6 +142,7 @@ void call(Caller& caller, std::uint8_t kind, std::uint8_t a, std::uint8_t b) {
             return made_current(caller, htvm_decoder_receive_frame(decoder, &info, sizeof info));
         case 3:
         case 4:
+            view_everything(caller);
             return copy_something(caller, a, b);
         case 5:
             return ask(caller, a, b);

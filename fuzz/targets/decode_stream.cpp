@@ -10,17 +10,18 @@ using namespace htvm::internal;
 
 // Damages one layer of a frame, or a number of its header, and leaves the rest as it is.
 void change_layer(Packet& packet, std::uint8_t choice, std::uint8_t where, std::uint8_t value) {
-    auto payload = read_frame_payload(packet.payload);
-    if (!payload) return;
-    auto& h = payload->header;
+    const auto read = read_frame_payload(packet.payload);
+    if (!read) return;
+    auto payload = copy_of(*read);
+    auto& h = payload.header;
     const std::array<std::uint32_t*, 8> numbers = {&h.source_vertices,   &h.source_triangles, &h.vertices,
                                                    &h.triangles,         &h.geometry_step,    &h.colour_step,
                                                    &h.geometry_codebook, &h.colour_codebook};
     if (choice % 32 < layer_count) {
         const std::size_t layer = choice % 32;
-        auto& bytes = payload->layers[layer];
+        auto& bytes = payload.layers[layer];
         if (value == 0) {
-            payload->present[layer] = !payload->present[layer];
+            payload.present[layer] = !payload.present[layer];
         } else if (!bytes.empty()) {
             auto& byte = bytes[where % bytes.size()];
             byte = static_cast<std::uint8_t>(byte ^ value);
@@ -30,7 +31,7 @@ void change_layer(Packet& packet, std::uint8_t choice, std::uint8_t where, std::
         auto& number = *numbers[choice % 32 - layer_count];
         number = value < 128 ? number + where - 128u : std::uint32_t{where} << (value % 23);
     }
-    packet.payload = write_frame_payload(*payload);
+    packet.payload = write_frame_payload(payload);
 }
 
 void change(std::vector<Packet>& packets, std::uint8_t kind, std::uint8_t a, std::uint8_t b, std::uint8_t c) {

@@ -1,8 +1,10 @@
-// The decoder: push packets, pull meshes. It depends on the standard library alone. Once made, it never throws.
+// The decoder: packets in, meshes out. It depends on the standard library alone. Once made, it never throws.
 //
 //   htvm::Decoder decoder;
-//   for each packet:  auto frame = decoder.push(packet);   // Result<std::optional<DecodedFrame>>
-//                     if (frame && *frame) show((*frame)->mesh);
+//   for each packet:  auto frame = decoder.decode(packet);   // Result<std::optional<FrameView>>
+//                     if (frame && *frame) draw((*frame)->mesh, (*frame)->topology);
+//
+// What decode() gives is lent: the arrays are the decoder's, used again for the next frame. push() gives a copy.
 //
 // EP- and P-frames refer to I-frames (and to codebook packets) alone: any of them may be left out, but a lost codebook
 // costs the frames that name it, until the next one. T-frames refer to the I-frame or, by default, to the T-frame
@@ -52,13 +54,28 @@ struct SequenceInfo {
     int nearest_vertices = 16;  // m of the distance order
 };
 
+// A frame that is lent: valid until the decoder is next told to do anything but tell, or is moved or destroyed.
+struct FrameView {
+    FrameInfo info;
+    // Frames of the same number have the same triangles and texture coordinates: whoever has sent those to a graphics
+    // card need not send them again. T- and P-frames have their I-frame's number, every other frame one of its own.
+    // Never 0; another decoder gives other numbers.
+    std::uint32_t topology = 0;
+    MeshView mesh;  // mm
+    // Never null. Of an I-frame, the skeleton as sent; of the others, the I-frame's moved by the transforms.
+    const Pose* pose = nullptr;
+    bool concealed = false;  // a stand-in
+};
+
+// The same, the caller's own.
 struct DecodedFrame {
     FrameInfo info;
-    Mesh mesh;  // mm
-    // Of an I-frame, the skeleton as sent; of the others, the I-frame's moved by the transforms.
+    std::uint32_t topology = 0;
+    Mesh mesh;
     Pose pose;
-    bool concealed = false;  // from conceal()
+    bool concealed = false;
 };
+DecodedFrame copy_of(const FrameView& frame);
 
 class Decoder {
 public:
@@ -68,15 +85,19 @@ public:
     Decoder& operator=(Decoder&&) noexcept;
     ~Decoder();
 
-    // Takes one packet; gives a frame where the packet is one. Errors cost that packet only: corrupt_stream where its
-    // bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported; limit where
-    // it is beyond the options, or memory ran out. What came before a packet that is refused stays in force.
-    Result<std::optional<DecodedFrame>> push(const Packet& packet);
+    // Takes one packet; lends the frame that it is, where it is one. Errors cost that packet only: corrupt_stream where
+    // its bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported; limit
+    // where it is beyond the options, or memory ran out. What came before a packet that is refused stays in force,
+    // but a frame that was lent is gone.
+    Result<std::optional<FrameView>> decode(const Packet& packet);
     // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh moved as the last frame
     // was, or, where that much of a frame could be read, as it is itself; after T-frames, the last of them again.
     // Nothing before an I-frame, or where memory ran out.
+    std::optional<FrameView> stand_in(std::uint32_t frame, std::int64_t timestamp_us);
+    // decode() and stand_in(), copied.
+    Result<std::optional<DecodedFrame>> push(const Packet& packet);
     std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us);
-    // Known once a sequence header was pushed.
+    // Known once a sequence header was decoded.
     const std::optional<SequenceInfo>& sequence() const;
 
 private:

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <string_view>
 
 namespace htvm {
@@ -29,8 +30,6 @@ inline constexpr std::array frame_kinds = {
     FrameKind{FrameType::tracked, "T", "tracked"},
 };
 inline constexpr std::size_t frame_type_count = frame_kinds.size();
-inline constexpr std::array all_frame_types = {FrameType::intra, FrameType::enhanced, FrameType::predicted,
-                                               FrameType::tracked};
 
 constexpr const FrameKind& kind_of(FrameType type) { return frame_kinds[static_cast<std::size_t>(type)]; }
 // The kind of this letter, or null.
@@ -40,24 +39,54 @@ constexpr const FrameKind* kind_of_letter(std::string_view letter) {
     return nullptr;
 }
 
-// Bytes of one frame by layer. The paper's layers: geometry, colour, mapping, and connectivity = fans +
-// distance_orders.
+// The parts of a frame's payload, each of which can be decoded by itself; the numbers are those of the stream
+// (docs/bitstream.md, section 4, which also says what is in them in which kind of frame).
+enum class Layer : std::uint8_t {
+    pose = 1,
+    transforms = 2,
+    geometry = 3,
+    colour = 4,
+    normals = 5,
+    texcoords = 6,
+    mapping = 7,
+    fans = 8,  // the paper's connectivity: fans and distance orders
+    distance_orders = 9,
+    external_intra = 10,  // all of a mesh that another coder packed
+    coded_bones = 11,
+};
+
+struct LayerName {
+    Layer layer;
+    const char* name;
+};
+inline constexpr std::array frame_layers = {
+    LayerName{Layer::pose, "pose"},
+    LayerName{Layer::transforms, "transforms"},
+    LayerName{Layer::geometry, "geometry"},
+    LayerName{Layer::colour, "colour"},
+    LayerName{Layer::normals, "normals"},
+    LayerName{Layer::texcoords, "texcoords"},
+    LayerName{Layer::mapping, "mapping"},
+    LayerName{Layer::fans, "fans"},
+    LayerName{Layer::distance_orders, "distance order"},
+    LayerName{Layer::external_intra, "external intra"},
+    LayerName{Layer::coded_bones, "coded bones"},
+};
+inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // one more than the largest number; 0 is none
+
+// Bytes of one frame by layer: bytes[Layer::geometry]. Geometry and colour have those of their codebook too, in the
+// frame that it came with.
 struct LayerBytes {
+    std::array<std::size_t, layer_count> of_layer{};
     std::size_t overhead = 0;  // packet headers, counts, checksums
-    std::size_t pose = 0;
-    std::size_t transforms = 0;
-    std::size_t geometry = 0;  // with its codebook, in the frame that brought it
-    std::size_t colour = 0;    // likewise
-    std::size_t normals = 0;
-    std::size_t texcoords = 0;
-    std::size_t mapping = 0;
-    std::size_t fans = 0;
-    std::size_t distance_orders = 0;
-    std::size_t external_intra = 0;  // all of a mesh that another coder packed
-    std::size_t total() const {
-        return overhead + pose + transforms + geometry + colour + normals + texcoords + mapping + fans +
-               distance_orders + external_intra;
+    std::size_t& operator[](Layer layer) { return of_layer[static_cast<std::size_t>(layer)]; }
+    std::size_t operator[](Layer layer) const { return of_layer[static_cast<std::size_t>(layer)]; }
+    LayerBytes& operator+=(const LayerBytes& other) {
+        for (std::size_t i = 0; i < layer_count; ++i) of_layer[i] += other.of_layer[i];
+        overhead += other.overhead;
+        return *this;
     }
+    std::size_t total() const { return std::accumulate(of_layer.begin(), of_layer.end(), overhead); }
 };
 
 struct FrameInfo {

@@ -11,7 +11,7 @@
  *       while ((status = htvm_decoder_receive_frame(decoder, &info, sizeof info)) != HTVM_AGAIN) {
  *           if (status == HTVM_BAD_INPUT) return 1;               the call is wrong, and would be wrong again
  *           if (status != HTVM_OK) { puts(htvm_decoder_last_error(decoder)); continue; }     a packet is lost
- *           htvm_decoder_copy_positions(decoder, positions, capacity);
+ *           htvm_decoder_view(decoder, &view, sizeof view);      or htvm_decoder_copy_positions(...) and its like
  *       }
  *   }
  *   htvm_decoder_destroy(decoder);
@@ -123,6 +123,9 @@ typedef struct htvm_frame_info {
     uint32_t joints, bones;                     /* of its pose */
     uint32_t concealed;                         /* 1: from htvm_decoder_conceal() */
     uint64_t bytes;                             /* of its packet */
+    uint32_t topology; /* frames of a decoder with the same number have the same triangles and texture coordinates; 0
+                          from an encoder */
+    uint32_t reserved; /* 0 */
 } htvm_frame_info;
 
 /* ---- decoder -------------------------------------------------------------------------------------------------- */
@@ -189,6 +192,22 @@ htvm_status htvm_decoder_discard(htvm_decoder* decoder);
 /* Bytes that were passed over as damage so far, and bytes that are not part of a whole packet yet: at the end of a
  * stream, a packet cut short. Either may be NULL. Both 0 with htvm_decoder_send_packet(). */
 htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* damaged, uint64_t* pending);
+
+/* The current frame's arrays, lent: none is copied, and they are valid until the next call to receive or conceal on the
+ * decoder, or its end. */
+typedef struct htvm_mesh_view {
+    uint32_t struct_size; /* bytes of this struct that were filled */
+    uint32_t vertices, triangles;
+    uint32_t topology; /* as in htvm_frame_info: where it is the last frame's, indices and texcoords are too */
+    const float* positions;  /* mm, 3 a vertex */
+    const uint32_t* indices; /* 3 a triangle, counter-clockwise seen from outside */
+    const uint8_t* colours;  /* red, green, blue a vertex; NULL: the frame has none */
+    const float* normals;    /* 3 a vertex, unit length; or NULL */
+    const float* texcoords;  /* 2 a vertex, or NULL */
+} htvm_mesh_view;
+
+/* HTVM_BAD_INPUT: there is no current frame, or view_size is not sizeof(htvm_mesh_view). */
+htvm_status htvm_decoder_view(htvm_decoder* decoder, htvm_mesh_view* view, size_t view_size);
 
 /* The current frame's arrays, copied into the caller's. HTVM_BAD_INPUT: there is no current frame, or it has no such
  * attribute. HTVM_BUFFER_TOO_SMALL: capacity is below what is said behind. A NULL array with nothing to copy is fine.

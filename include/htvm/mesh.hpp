@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace htvm {
@@ -22,5 +23,26 @@ struct Mesh {
     std::vector<Vector3f> normals;    // unit length
     std::vector<Vector2f> texcoords;  // usually 0..1, any finite value is legal
 };
+
+// A mesh that is lent: its arrays are another's, and valid as long as that one says.
+struct MeshView {
+    std::span<const Vector3f> positions;
+    std::span<const Triangle> triangles;
+    std::span<const Colour> colours;
+    std::span<const Vector3f> normals;
+    std::span<const Vector2f> texcoords;
+};
+
+inline MeshView view_of(const Mesh& mesh) {
+    return {mesh.positions, mesh.triangles, mesh.colours, mesh.normals, mesh.texcoords};
+}
+
+inline Mesh copy_of(const MeshView& mesh) {
+    return {{mesh.positions.begin(), mesh.positions.end()},
+            {mesh.triangles.begin(), mesh.triangles.end()},
+            {mesh.colours.begin(), mesh.colours.end()},
+            {mesh.normals.begin(), mesh.normals.end()},
+            {mesh.texcoords.begin(), mesh.texcoords.end()}};
+}
 
 }  // namespace htvm

@@ -18,9 +18,9 @@ struct htvm_decoder {
     htvm_allocator allocator;
     std::size_t max_packet_bytes;
     htvm::Decoder decoder;
-    htvm::PacketReader reader;           // of what is sent as bytes
-    std::optional<htvm::Packet> packet;  // sent as such, not yet received
-    std::optional<htvm::DecodedFrame> current;
+    htvm::PacketReader reader;               // of what is sent as bytes
+    std::optional<htvm::Packet> packet;      // sent as such, not yet received
+    std::optional<htvm::FrameView> current;  // lent by the decoder
     LastError error;
     std::uint64_t damaged_before = 0;  // bytes, by readers that were discarded
     Sent sent = Sent::nothing;
@@ -69,8 +69,9 @@ htvm_status no_frame(LastError& error) {
 htvm_status describe_current(htvm_decoder& decoder, htvm_frame_info* info, std::size_t info_size) {
     const auto& frame = *decoder.current;
     auto out = htvm::c_api::describe(frame.info, htvm::c_api::attributes_of(frame.mesh));
-    out.joints = static_cast<std::uint32_t>(frame.pose.joints.size());
-    out.bones = static_cast<std::uint32_t>(frame.pose.orientations.size());
+    out.joints = static_cast<std::uint32_t>(frame.pose->joints.size());
+    out.bones = static_cast<std::uint32_t>(frame.pose->orientations.size());
+    out.topology = frame.topology;
     out.concealed = frame.concealed;
     if (!info) return HTVM_OK;
     const auto written = htvm::c_api::write_struct(out, info, info_size);
@@ -89,9 +90,15 @@ std::optional<htvm::Packet> next_packet(htvm_decoder& decoder) {
     return std::exchange(decoder.packet, std::nullopt);
 }
 
+// The numbers of an array of points or the like, which lie side by side; null where there is none.
+template <class Element>
+const typename Element::value_type* numbers(std::span<const Element> elements) {
+    return elements.empty() ? nullptr : elements.front().data();
+}
+
 // Copies elements, each N numbers, to the caller's array.
 template <class Element>
-htvm_status copy(LastError& error, const std::vector<Element>& elements, const std::string& name,
+htvm_status copy(LastError& error, std::span<const Element> elements, const std::string& name,
                  typename Element::value_type* out, std::size_t capacity) {
     const std::size_t count = elements.size() * std::tuple_size_v<Element>;
     if (capacity < count)
@@ -106,7 +113,7 @@ htvm_status copy(LastError& error, const std::vector<Element>& elements, const s
 
 // The same for an attribute of the current frame's vertices, which it may not have.
 template <class Element>
-htvm_status copy_attribute(htvm_decoder* decoder, std::vector<Element> htvm::Mesh::*attribute, const char* name,
+htvm_status copy_attribute(htvm_decoder* decoder, std::span<const Element> htvm::MeshView::*attribute, const char* name,
                            typename Element::value_type* out, std::size_t capacity) {
     if (!decoder) return HTVM_BAD_INPUT;
     return guarded(decoder->error, [&] {
@@ -125,7 +132,7 @@ htvm_status copy_pose(htvm_decoder* decoder, std::vector<Element> htvm::Pose::*p
     if (!decoder) return HTVM_BAD_INPUT;
     return guarded(decoder->error, [&] {
         if (!decoder->current) return no_frame(decoder->error);
-        return copy(decoder->error, decoder->current->pose.*part, name, out, capacity);
+        return copy(decoder->error, std::span<const Element>(decoder->current->pose->*part), name, out, capacity);
     });
 }
 
@@ -198,10 +205,10 @@ htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* i
     const auto status = guarded(decoder->error, [&] {
         decoder->current.reset();
         while (const auto packet = next_packet(*decoder)) {
-            auto frame = decoder->decoder.push(*packet);
+            auto frame = decoder->decoder.decode(*packet);
             if (!frame) return decoder->error.set(frame.error());
             if (!*frame) continue;
-            decoder->current = std::move(*frame);
+            decoder->current = *frame;
             return describe_current(*decoder, info, info_size);
         }
         return htvm_status{HTVM_AGAIN};
@@ -215,7 +222,7 @@ htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t 
                                  size_t info_size) {
     if (!decoder) return HTVM_BAD_INPUT;
     return guarded(decoder->error, [&] {
-        decoder->current = decoder->decoder.conceal(frame, timestamp_us);
+        decoder->current = decoder->decoder.stand_in(frame, timestamp_us);
         return decoder->current ? describe_current(*decoder, info, info_size) : htvm_status{HTVM_AGAIN};
     });
 }
@@ -235,20 +242,37 @@ htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* dam
     return HTVM_OK;
 }
 
+htvm_status htvm_decoder_view(htvm_decoder* decoder, htvm_mesh_view* view, size_t view_size) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    if (!decoder->current) return no_frame(decoder->error);
+    const auto& mesh = decoder->current->mesh;
+    htvm_mesh_view out{};
+    out.vertices = static_cast<std::uint32_t>(mesh.positions.size());
+    out.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
+    out.topology = decoder->current->topology;
+    out.positions = numbers(mesh.positions);
+    out.indices = numbers(mesh.triangles);
+    out.colours = numbers(mesh.colours);
+    out.normals = numbers(mesh.normals);
+    out.texcoords = numbers(mesh.texcoords);
+    const auto written = htvm::c_api::write_struct(out, view, view_size);
+    return written == HTVM_OK ? HTVM_OK : decoder->error.set(written, "view is NULL or view_size not its sizeof");
+}
+
 htvm_status htvm_decoder_copy_positions(htvm_decoder* decoder, float* positions, size_t capacity) {
-    return copy_attribute(decoder, &htvm::Mesh::positions, "positions", positions, capacity);
+    return copy_attribute(decoder, &htvm::MeshView::positions, "positions", positions, capacity);
 }
 
 htvm_status htvm_decoder_copy_colours(htvm_decoder* decoder, uint8_t* rgb, size_t capacity) {
-    return copy_attribute(decoder, &htvm::Mesh::colours, "colours", rgb, capacity);
+    return copy_attribute(decoder, &htvm::MeshView::colours, "colours", rgb, capacity);
 }
 
 htvm_status htvm_decoder_copy_normals(htvm_decoder* decoder, float* normals, size_t capacity) {
-    return copy_attribute(decoder, &htvm::Mesh::normals, "normals", normals, capacity);
+    return copy_attribute(decoder, &htvm::MeshView::normals, "normals", normals, capacity);
 }
 
 htvm_status htvm_decoder_copy_texcoords(htvm_decoder* decoder, float* texcoords, size_t capacity) {
-    return copy_attribute(decoder, &htvm::Mesh::texcoords, "texcoords", texcoords, capacity);
+    return copy_attribute(decoder, &htvm::MeshView::texcoords, "texcoords", texcoords, capacity);
 }
 
 htvm_status htvm_decoder_copy_triangles(htvm_decoder* decoder, uint32_t* indices, size_t capacity) {

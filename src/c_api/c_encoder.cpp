@@ -234,7 +234,7 @@ htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh,
             encoder->encoder.push(cpp_mesh, with_pose ? &cpp_pose : nullptr, timestamp_us, force_intra != 0);
         if (!pushed) return error.set(pushed.error());
         encoder->any_frame = true;
-        encoder->attributes = htvm::c_api::attributes_of(cpp_mesh);
+        encoder->attributes = htvm::c_api::attributes_of(htvm::view_of(cpp_mesh));
         return htvm_status{HTVM_OK};
     });
 }

@@ -70,7 +70,7 @@ htvm_status check_struct(LastError& error, StructSize size, const char* name) {
     return HTVM_INTERNAL;
 }
 
-std::uint32_t attributes_of(const Mesh& mesh) {
+std::uint32_t attributes_of(const MeshView& mesh) {
     std::uint32_t out = 0;
     if (!mesh.colours.empty()) out |= HTVM_COLOURS;
     if (!mesh.normals.empty()) out |= HTVM_NORMALS;

@@ -116,6 +116,6 @@ htvm_status init_struct(Struct value, void* out, std::size_t size) {
 htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes);
 
 // Those that the mesh has: HTVM_COLOURS | ...
-std::uint32_t attributes_of(const Mesh& mesh);
+std::uint32_t attributes_of(const MeshView& mesh);
 
 }  // namespace htvm::c_api

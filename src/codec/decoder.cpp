@@ -112,7 +112,7 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
 }
 
 // The payload of a frame that this decoder may decode, as far as its header tells.
-Result<FramePayload> read_frame(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
+Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
     if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
     auto payload = read_frame_payload(packet.payload);
     if (!payload) return payload;
@@ -132,7 +132,7 @@ Result<FramePayload> read_frame(const DecoderState& state, const Packet& packet,
     return payload;
 }
 
-FrameInfo describe(const Packet& packet, FrameType type, const FramePayload& payload) {
+FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload) {
     FrameInfo out;
     out.type = type;
     out.frame = packet.frame;
@@ -142,42 +142,39 @@ FrameInfo describe(const Packet& packet, FrameType type, const FramePayload& pay
     out.source_triangles = payload.header.source_triangles;
     out.vertices = payload.header.vertices;
     out.triangles = payload.header.triangles;
-    auto size = [&](Layer layer) { return payload.of(layer).size(); };
-    auto& b = out.bytes;
-    b.pose = size(Layer::pose);
-    b.transforms = size(Layer::transforms);
-    b.geometry = size(Layer::geometry);
-    b.colour = size(Layer::colour);
-    b.normals = size(Layer::normals);
-    b.texcoords = size(Layer::texcoords);
-    b.mapping = size(Layer::mapping);
-    b.fans = size(Layer::fans);
-    b.distance_orders = size(Layer::distance_orders);
-    b.external_intra = size(Layer::external_intra);
-    b.overhead = packet.payload.size() + packet_overhead - b.total();
+    for (const auto& [layer, name] : frame_layers) out.bytes[layer] = payload.of(layer).size();
+    out.bytes.overhead = packet.payload.size() + packet_overhead - out.bytes.total();
     return out;
 }
 
-// Motion-based coding counts only what is coded in its header.
-void count_shown(const ShownFrame& shown, FrameInfo& info) {
-    info.vertices = static_cast<std::uint32_t>(shown.positions.size());
-    info.triangles = static_cast<std::uint32_t>(shown.triangles.size());
+// Lends what is shown. Motion-based coding counts only what it codes in its header.
+FrameView lend(const ShownFrame& shown, const FrameInfo& info) {
+    FrameView out;
+    out.info = info;
+    out.info.vertices = static_cast<std::uint32_t>(shown.positions.size());
+    out.info.triangles = static_cast<std::uint32_t>(shown.triangles.size());
+    out.topology = shown.topology;
+    out.mesh = {shown.positions, shown.triangles, shown.colours, shown.normals, shown.texcoords};
+    out.pose = &shown.pose;
+    return out;
 }
 
-// A packet that is a frame is shown.
-Result<std::optional<FrameInfo>> take(DecoderState& state, const Packet& packet) {
-    using Taken = std::optional<FrameInfo>;
-    state.shown.topology = 0;
-    state.shown.own = {};
+// Frees what only the frame that is lent needs, before there are two.
+void take_back(ShownFrame& shown) {
+    shown.topology = 0;
+    shown.own = {};
+}
+
+Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet) {
+    using Taken = std::optional<FrameView>;
+    take_back(state.shown);
     if (auto ok = check_limits(packet, state.options); !ok) return tl::unexpected(ok.error());
     if (const auto type = frame_type(packet.kind)) {
         const auto& rules = rules_of(*type);
         const auto payload = read_frame(state, packet, rules);
         if (!payload) return tl::unexpected(payload.error());
         if (auto ok = rules.decode(state, packet, *payload); !ok) return tl::unexpected(ok.error());
-        auto info = describe(packet, *type, *payload);
-        count_shown(state.shown, info);
-        return Taken{info};
+        return Taken{lend(state.shown, describe(packet, *type, *payload))};
     }
     Result<void> taken;
     if (packet.kind == PacketKind::sequence) taken = take_header(state, packet);
@@ -186,20 +183,7 @@ Result<std::optional<FrameInfo>> take(DecoderState& state, const Packet& packet)
     return Taken{};  // what this version does not know is skipped
 }
 
-// What is shown, as the caller's own.
-DecodedFrame copy_of(const ShownFrame& shown, const FrameInfo& info) {
-    DecodedFrame out;
-    out.info = info;
-    out.mesh.positions = shown.positions;
-    out.mesh.triangles.assign(shown.triangles.begin(), shown.triangles.end());
-    out.mesh.colours.assign(shown.colours.begin(), shown.colours.end());
-    out.mesh.normals = shown.normals;
-    out.mesh.texcoords = shown.texcoords;
-    out.pose = shown.pose;
-    return out;
-}
-
-Result<std::optional<DecodedFrame>> out_of_memory(const Packet& packet) {
+tl::unexpected<Error> out_of_memory(const Packet& packet) {
     try {
         return fail(ErrorKind::limit, "out of memory at frame " + std::to_string(packet.frame));
     } catch (const std::bad_alloc&) {
@@ -208,6 +192,10 @@ Result<std::optional<DecodedFrame>> out_of_memory(const Packet& packet) {
 }
 
 }  // namespace
+
+DecodedFrame copy_of(const FrameView& frame) {
+    return {frame.info, frame.topology, copy_of(frame.mesh), *frame.pose, frame.concealed};
+}
 
 Decoder::Decoder(const DecoderOptions& options) : state_(std::make_unique<State>()) {
     state_->options = options;
@@ -218,12 +206,9 @@ Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 Decoder::~Decoder() = default;
 
-Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
+Result<std::optional<FrameView>> Decoder::decode(const Packet& packet) {
     try {
-        const auto info = take(*state_, packet);
-        if (!info) return tl::unexpected(info.error());
-        if (!*info) return std::optional<DecodedFrame>{};
-        return std::optional<DecodedFrame>{copy_of(state_->shown, **info)};
+        return take(*state_, packet);
     } catch (const std::bad_alloc&) {
         return out_of_memory(packet);
     } catch (const std::length_error&) {
@@ -231,22 +216,40 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
     }
 }
 
-std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) try {
+Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
+    try {
+        const auto frame = take(*state_, packet);
+        if (!frame) return tl::unexpected(frame.error());
+        return *frame ? std::optional(copy_of(**frame)) : std::nullopt;
+    } catch (const std::bad_alloc&) {
+        return out_of_memory(packet);
+    } catch (const std::length_error&) {
+        return out_of_memory(packet);
+    }
+}
+
+std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) try {
     auto& state = *state_;
-    state.shown.own = {};
+    take_back(state.shown);
     if (!show_last_tracked(state) && !show_moved_by_bones(state)) return std::nullopt;
     FrameInfo info;
     info.type = FrameType::predicted;
     info.frame = frame;
     info.reference = state.reference->number;
     info.timestamp_us = timestamp_us;
-    count_shown(state.shown, info);
-    auto out = copy_of(state.shown, info);
+    auto out = lend(state.shown, info);
     out.concealed = true;
     return out;
 } catch (const std::bad_alloc&) {
     return std::nullopt;
 } catch (const std::length_error&) {
+    return std::nullopt;
+}
+
+std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) try {
+    const auto lent = stand_in(frame, timestamp_us);
+    return lent ? std::optional(copy_of(*lent)) : std::nullopt;
+} catch (const std::bad_alloc&) {
     return std::nullopt;
 }
 

@@ -47,7 +47,7 @@ const Codebook* named(const std::optional<NumberedCodebook>& codebook, std::uint
 
 }  // namespace
 
-Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const FramePayload& payload) {
+Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const FramePayloadView& payload) {
     const auto& reference = skinned(state);
     auto& history = state.bones;
     const EnhancedFrameContext context{reference, named(history.geometry_codebook, payload.header.geometry_codebook),
@@ -72,7 +72,7 @@ Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const Fr
     return {};
 }
 
-Result<void> decode_predicted(DecoderState& state, const Packet&, const FramePayload& payload) {
+Result<void> decode_predicted(DecoderState& state, const Packet&, const FramePayloadView& payload) {
     auto decoded = decode_predicted_frame(payload, skinned(state), state.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     show_animated(state, *decoded);

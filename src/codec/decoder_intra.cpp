@@ -5,7 +5,7 @@
 
 namespace htvm::internal {
 
-Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayload& payload) {
+Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayloadView& payload) {
     const auto& header = *state.header;
     auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
     if (!pose) return tl::unexpected(pose.error());

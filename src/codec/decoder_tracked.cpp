@@ -39,7 +39,7 @@ void show_tracked(DecoderState& state, const DecodedTrackedFrame& frame, Pose po
 
 }  // namespace
 
-Result<void> decode_tracked(DecoderState& state, const Packet& packet, const FramePayload& payload) {
+Result<void> decode_tracked(DecoderState& state, const Packet& packet, const FramePayloadView& payload) {
     if (state.header->node_spacing == 0)
         return fail(ErrorKind::corrupt_stream, "a tracked frame in a stream whose header says that it has none");
     auto& history = state.tracked;

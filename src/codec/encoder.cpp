@@ -82,16 +82,14 @@ void send_frame(State& state, std::vector<Packet> packets, std::uint32_t referen
         packet.timestamp_us = timestamp_us;
         if (packet.kind == PacketKind::codebook) {
             codebooks.overhead += packet_overhead;
-            (packet.payload[0] == codebook_for_geometry ? codebooks.geometry : codebooks.colour) +=
+            codebooks[packet.payload[0] == codebook_for_geometry ? Layer::geometry : Layer::colour] +=
                 packet.payload.size();
             continue;
         }
         state.info = *inspect(packet);
         state.info.vertices = static_cast<std::uint32_t>(state.decoded.positions.size());
         state.info.triangles = static_cast<std::uint32_t>(state.decoded.triangles.size());
-        state.info.bytes.overhead += codebooks.overhead;
-        state.info.bytes.geometry += codebooks.geometry;
-        state.info.bytes.colour += codebooks.colour;
+        state.info.bytes += codebooks;
         if (packet.kind == PacketKind::intra)
             state.index.push_back({packet.frame, packet.timestamp_us, state.stream_bytes});
     }

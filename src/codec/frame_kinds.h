@@ -51,7 +51,7 @@ struct FrameRules {
     RateClass rate;
     // Decodes and shows it, once its header was found within all limits and what it refers to, where that is the
     // I-frame alone, is there. After an error the state is as before, but for what conceals.
-    Result<void> (*decode)(DecoderState&, const Packet&, const FramePayload&);
+    Result<void> (*decode)(DecoderState&, const Packet&, const FramePayloadView&);
 };
 
 extern const std::array<FrameRules, frame_type_count> frame_rules;
@@ -59,9 +59,9 @@ extern const std::array<FrameRules, frame_type_count> frame_rules;
 inline const FrameRules& rules_of(FrameType type) { return frame_rules[static_cast<std::size_t>(type)]; }
 
 // The decoders of the rows, each in decoder_NAME.cpp.
-Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayload& payload);
-Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const FramePayload& payload);
-Result<void> decode_predicted(DecoderState& state, const Packet& packet, const FramePayload& payload);
-Result<void> decode_tracked(DecoderState& state, const Packet& packet, const FramePayload& payload);
+Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
+Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
+Result<void> decode_predicted(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
+Result<void> decode_tracked(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
 
 }  // namespace htvm::internal

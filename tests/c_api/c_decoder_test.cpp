@@ -36,7 +36,9 @@ void expect_same_frame(htvm_decoder* decoder, const htvm_frame_info& info, const
     EXPECT_EQ(info.source_triangles, expected.info.source_triangles);
     EXPECT_EQ(info.bytes, expected.info.bytes.total());
     EXPECT_EQ(info.concealed, expected.concealed ? 1u : 0u);
+    EXPECT_EQ(info.topology, expected.topology);
     expect_same_mesh(copied_mesh(decoder, info), expected.mesh);
+    expect_same_mesh(lent_mesh(decoder, info), expected.mesh);
     const auto pose = copied_pose(decoder, info);
     EXPECT_EQ(pose.joints, expected.pose.joints);
     EXPECT_EQ(pose.orientations, expected.pose.orientations);
@@ -243,6 +245,16 @@ TEST(CDecoder, SaysWhichAttributesAFrameHas) {
     EXPECT_STREQ(htvm_decoder_last_error(decoder.get()), "the frame has no colours");
 }
 
+TEST(CDecoder, KindsOfFramesHaveNames) {
+    for (const auto& kind : frame_kinds) {
+        EXPECT_STREQ(htvm_frame_kind_name(static_cast<std::uint32_t>(kind.type)), kind.name);
+        EXPECT_STREQ(htvm_frame_kind_letter(static_cast<std::uint32_t>(kind.type)), kind.letter);
+    }
+    EXPECT_STREQ(htvm_frame_kind_letter(HTVM_FRAME_ENHANCED), "EP");
+    EXPECT_STREQ(htvm_frame_kind_name(HTVM_FRAME_KINDS), "unknown");
+    EXPECT_STREQ(htvm_frame_kind_letter(0xFFFFFFFF), "?");
+}
+
 TEST(CDecoder, DiscardForgetsWhatWasSent) {
     const auto decoder = make_decoder();
     const auto& bytes = coded_grid().bytes;
@@ -277,6 +289,9 @@ TEST(CDecoder, SurvivesMisuse) {
     EXPECT_STREQ(htvm_decoder_last_error(decoder.get()), "");
     EXPECT_EQ(htvm_decoder_copy_positions(decoder.get(), nullptr, 0), HTVM_BAD_INPUT) << "nothing was received yet";
     EXPECT_EQ(htvm_decoder_copy_triangles(decoder.get(), nullptr, 0), HTVM_BAD_INPUT);
+    htvm_mesh_view view;
+    EXPECT_EQ(htvm_decoder_view(decoder.get(), &view, sizeof view), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_decoder_view(nullptr, &view, sizeof view), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_decoder_copy_orientations(decoder.get(), nullptr, 0), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_decoder_send_packet(decoder.get(), nullptr, 5), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_decoder_send_bytes(decoder.get(), nullptr, 5), HTVM_BAD_INPUT);

@@ -52,6 +52,31 @@ inline Mesh copied_mesh(htvm_decoder* decoder, const htvm_frame_info& info) {
     return out;
 }
 
+// The same as it is lent.
+inline Mesh lent_mesh(htvm_decoder* decoder, const htvm_frame_info& info) {
+    htvm_mesh_view view;
+    EXPECT_EQ(htvm_decoder_view(decoder, &view, sizeof view), HTVM_OK);
+    EXPECT_EQ(view.struct_size, sizeof view);
+    EXPECT_EQ(view.vertices, info.vertices);
+    EXPECT_EQ(view.triangles, info.triangles);
+    EXPECT_EQ(view.topology, info.topology);
+    EXPECT_EQ(view.colours != nullptr, (info.attributes & HTVM_COLOURS) != 0);
+    EXPECT_EQ(view.normals != nullptr, (info.attributes & HTVM_NORMALS) != 0);
+    EXPECT_EQ(view.texcoords != nullptr, (info.attributes & HTVM_TEXCOORDS) != 0);
+    Mesh out;
+    const auto take = [](auto& array, const auto* numbers, std::size_t count) {
+        if (!numbers || count == 0) return;
+        array.resize(count);
+        std::copy_n(numbers, count * array[0].size(), array[0].data());
+    };
+    take(out.positions, view.positions, view.vertices);
+    take(out.triangles, view.indices, view.triangles);
+    take(out.colours, view.colours, view.vertices);
+    take(out.normals, view.normals, view.vertices);
+    take(out.texcoords, view.texcoords, view.vertices);
+    return out;
+}
+
 inline Pose copied_pose(htvm_decoder* decoder, const htvm_frame_info& info) {
     Pose out;
     out.joints.resize(info.joints);

@@ -109,7 +109,7 @@ TEST(ClosedLoop, DracoIntraFrames) {
     const auto person = synthetic(true, 4);
     const auto coded = encode(person, options);
     EXPECT_TRUE(coded.errors.empty());
-    EXPECT_GT(coded.infos.at(0).bytes.external_intra, 0u);
+    EXPECT_GT(coded.infos.at(0).bytes[Layer::external_intra], 0u);
     expect_closed_loop(person, options);
     for (const auto& sequence : awkward_sequences()) expect_closed_loop(sequence, options);
 }

@@ -116,7 +116,7 @@ void write_moving() {
     ASSERT_NE(model, coded.packets.rend());
     const Packet last = *model;
     const auto add = [&](const std::optional<std::vector<std::uint8_t>>& bones) {
-        auto payload = *read_frame_payload(last.payload);
+        auto payload = copy_of(*read_frame_payload(last.payload));
         payload.header.triangles = 0;
         for (const auto layer : {Layer::fans, Layer::distance_orders}) payload.set(layer, {});
         if (bones) {

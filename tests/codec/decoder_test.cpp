@@ -295,7 +295,7 @@ void expect_noise_is_harmless(const CodedSequence& coded) {
         if (!is_frame(original)) continue;
         std::mt19937 random(1);
         for (int i = 0; i < 300; ++i) {
-            auto payload = *read_frame_payload(original.payload);
+            auto payload = copy_of(*read_frame_payload(original.payload));
             const auto layer = static_cast<Layer>(1 + below(random, layer_count - 1));
             std::vector<std::uint8_t> noise(below(random, 200));
             for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());

@@ -68,7 +68,7 @@ TEST(ChoiceByMotion, CodesAfterAllWhatDoesNotFitTheCapture) {
 TEST(PredictedFrames, TakeTransformsAndNothingElse) {
     const auto coded = encode(carried({0, 5}), by_motion());
     const auto& bytes = coded.infos[1].bytes;
-    EXPECT_EQ(bytes.total(), bytes.transforms + bytes.overhead);
+    EXPECT_EQ(bytes.total(), bytes[Layer::transforms] + bytes.overhead);
     EXPECT_LT(bytes.total(), 250u);
     EXPECT_EQ(coded.infos[1].vertices, coded.infos[0].vertices);
     EXPECT_EQ(coded.infos[1].source_vertices, coded.infos[0].source_vertices);

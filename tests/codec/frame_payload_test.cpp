@@ -20,9 +20,10 @@ FramePayload full_payload() {
 
 TEST(FramePayload, ComesBackLayerByLayer) {
     for (const auto& payload : {FramePayload{}, full_payload()}) {
-        const auto read = read_frame_payload(write_frame_payload(payload));
+        const auto bytes = write_frame_payload(payload);
+        const auto read = read_frame_payload(bytes);
         ASSERT_TRUE(read.has_value()) << read.error().message;
-        EXPECT_EQ(read->layers, payload.layers);
+        EXPECT_EQ(copy_of(*read).layers, payload.layers);
         EXPECT_EQ(read->present, payload.present);
         const auto &a = read->header, &b = payload.header;
         EXPECT_EQ(a.source_vertices, b.source_vertices);
@@ -38,7 +39,8 @@ TEST(FramePayload, ComesBackLayerByLayer) {
 }
 
 TEST(FramePayload, AnEmptyLayerIsPresent) {
-    const auto read = read_frame_payload(write_frame_payload(full_payload()));
+    const auto bytes = write_frame_payload(full_payload());
+    const auto read = read_frame_payload(bytes);
     EXPECT_TRUE(read->has(Layer::mapping));
     EXPECT_FALSE(read->has(Layer::colour));
 }
@@ -58,10 +60,19 @@ std::vector<std::uint8_t> with_layers(const std::vector<std::uint8_t>& numbers) 
 }
 
 TEST(FramePayload, LayersOfUnknownNumbersAreSkipped) {
-    const auto read = read_frame_payload(with_layers({200, 3, 99, 4}));
+    const auto bytes = with_layers({200, 3, 99, 4});
+    const auto read = read_frame_payload(bytes);
     ASSERT_TRUE(read.has_value()) << read.error().message;
-    EXPECT_EQ(read->of(Layer::geometry), (std::vector<std::uint8_t>{3, 3, 3}));
-    EXPECT_EQ(read->of(Layer::colour), (std::vector<std::uint8_t>{4, 4, 4}));
+    EXPECT_EQ(copy_of(*read).of(Layer::geometry), (std::vector<std::uint8_t>{3, 3, 3}));
+    EXPECT_EQ(copy_of(*read).of(Layer::colour), (std::vector<std::uint8_t>{4, 4, 4}));
+}
+
+TEST(FramePayload, LayersThatAreReadLieInTheBytes) {
+    const auto bytes = with_layers({3, 4});
+    const auto read = read_frame_payload(bytes);
+    ASSERT_TRUE(read.has_value()) << read.error().message;
+    EXPECT_EQ(read->of(Layer::geometry).data(), bytes.data() + bytes.size() - 6);
+    EXPECT_EQ(read->of(Layer::colour).data(), bytes.data() + bytes.size() - 3);
 }
 
 TEST(FramePayload, ALayerThatComesTwiceIsAnError) {

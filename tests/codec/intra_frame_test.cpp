@@ -38,7 +38,7 @@ TEST(IntraFrame, DecodesToWhatTheEncoderSays) {
                 const auto promised =
                     encode_intra_frame(mesh, {.geometry_step = step, .merge_duplicates = merge}, payload);
                 ASSERT_TRUE(promised.has_value());
-                const auto decoded = decode_intra_frame(payload, nullptr);
+                const auto decoded = decode_intra_frame(view_of(payload), nullptr);
                 ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
                 expect_same(*decoded, *promised);
                 EXPECT_EQ(payload.header.source_vertices, mesh.positions.size());
@@ -54,7 +54,7 @@ TEST(IntraFrame, PositionsOffTheLatticeAreRefused) {
     FramePayload payload;
     ASSERT_TRUE(encode_intra_frame(lattice_mesh_of(tfan_test::grid(3, 3)), {.geometry_step = 1}, payload).has_value());
     payload.header.geometry_step = 1 << 24;
-    const auto decoded = decode_intra_frame(payload, nullptr);
+    const auto decoded = decode_intra_frame(view_of(payload), nullptr);
     ASSERT_FALSE(decoded.has_value());
     EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
 }
@@ -70,10 +70,10 @@ TEST(IntraFrame, WhatAnExternalCoderGivesIsNotTrusted) {
     const auto good = coder_of(mesh);
     FramePayload payload;
     ASSERT_TRUE(encode_intra_frame(mesh, {.geometry_step = 1, .external = &good}, payload).has_value());
-    ASSERT_TRUE(decode_intra_frame(payload, &good).has_value());
+    ASSERT_TRUE(decode_intra_frame(view_of(payload), &good).has_value());
     const auto refused = [&](const LatticeMesh& given, const char* why) {
         const auto coder = coder_of(given);
-        const auto decoded = decode_intra_frame(payload, &coder);
+        const auto decoded = decode_intra_frame(view_of(payload), &coder);
         ASSERT_FALSE(decoded.has_value()) << why;
         EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream) << why;
     };
@@ -99,8 +99,8 @@ TEST(IntraFrame, WhatAnExternalCoderGivesIsNotTrusted) {
     refused(bad, "a texture coordinate out of range");
     auto other = good;
     other.number = 8;
-    EXPECT_EQ(decode_intra_frame(payload, &other).error().kind, ErrorKind::unsupported);
-    EXPECT_EQ(decode_intra_frame(payload, nullptr).error().kind, ErrorKind::unsupported);
+    EXPECT_EQ(decode_intra_frame(view_of(payload), &other).error().kind, ErrorKind::unsupported);
+    EXPECT_EQ(decode_intra_frame(view_of(payload), nullptr).error().kind, ErrorKind::unsupported);
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "codec/stream/frame_payload.h"
 #include "codec/moving_sequences.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 
@@ -98,7 +98,7 @@ TEST(Limits, DracoIsNotAskedForMoreThanTheFramesHeaderSays) {
         Decoder decoder(decoding);
         ASSERT_TRUE(decoder.push(coded.packets[0]).has_value());
         ASSERT_TRUE(decoder.push(coded.packets[1]).has_value());
-        auto payload = *read_frame_payload(coded.packets[1].payload);
+        auto payload = copy_of(*read_frame_payload(coded.packets[1].payload));
         auto bytes = payload.of(Layer::external_intra);
         for (std::size_t i = 0; i < 3; ++i) bytes[(triangles ? 12 : 11) + i] = 0xFF;  // the count of vertices
         payload.set(Layer::external_intra, bytes);
@@ -148,7 +148,7 @@ TEST(LeastPayload, AFrameInLessIsCorrupt) {
         for (const auto& packet : stream().packets) {
             if (packet.kind == kind && !found) {
                 found = true;
-                auto payload = *read_frame_payload(packet.payload);
+                auto payload = copy_of(*read_frame_payload(packet.payload));
                 payload.header.vertices = 4000000;
                 payload.header.triangles = 8000000;
                 auto claims = packet;

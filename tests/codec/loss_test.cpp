@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <map>
 
-#include "codec/stream/frame_payload.h"
 #include "codec/moving_sequences.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
 
@@ -59,7 +59,7 @@ Mesh moved_by(const std::vector<Packet>& packets, std::size_t place) {
     FramePayload payload;
     payload.header.vertices = vertices;
     payload.header.triangles = triangles;
-    payload.set(Layer::transforms, read_frame_payload(packets[place].payload)->of(Layer::transforms));
+    payload.set(Layer::transforms, copy_of(*read_frame_payload(packets[place].payload)).of(Layer::transforms));
     Packet packet = packets[place];
     packet.kind = PacketKind::predicted;
     packet.payload = write_frame_payload(payload);
@@ -184,7 +184,7 @@ Result<std::optional<DecodedFrame>> changed_frame_in_part(const Change& change) 
     const auto& packets = ten_frames().packets;
     const auto at =
         static_cast<std::size_t>(std::find_if(packets.begin(), packets.end(), is_in_part) - packets.begin());
-    auto payload = *read_frame_payload(packets[at].payload);
+    auto payload = copy_of(*read_frame_payload(packets[at].payload));
     change(payload);
     Packet packet = packets[at];
     packet.payload = write_frame_payload(payload);
@@ -240,7 +240,7 @@ TEST(Predicted, OtherCountsThanTheReferenceMeshsAreRefused) {
         std::find_if(packets.begin(), packets.end(),
                      [](const Packet& packet) { return packet.kind == PacketKind::predicted; }) -
         packets.begin());
-    const auto original = *read_frame_payload(packets[at].payload);
+    const auto original = copy_of(*read_frame_payload(packets[at].payload));
     for (const int which : {0, 1, 2}) {
         auto payload = original;
         if (which == 0) ++payload.header.vertices;

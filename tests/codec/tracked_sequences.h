@@ -93,7 +93,8 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
         for (const bool refers_to_last : {false, true, true, false}) {
             const auto tracked = tracked_by_chance(reference, refers_to_last ? &state : nullptr, motion, random);
             DecodedTrackedFrame decoded;
-            if (!decode_tracked_frame(tracked, reference, refers_to_last ? &state : nullptr, {}, decoded)) break;
+            if (!decode_tracked_frame(view_of(tracked), reference, refers_to_last ? &state : nullptr, {}, decoded))
+                break;
             state = std::move(decoded.state);
             Packet next = packet;
             next.kind = PacketKind::tracked;

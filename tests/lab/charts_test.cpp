@@ -59,7 +59,7 @@ RdPoint point_of(const std::string& coder, double m1) {
     point.coder = coder;
     RdFrame frame;
     frame.vertices = 100;
-    frame.bytes.geometry = 100;
+    frame.bytes[Layer::geometry] = 100;
     point.frames = {frame};
     point.values["m1_mm"] = m1;
     return point;

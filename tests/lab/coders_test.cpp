@@ -70,7 +70,7 @@ TEST(BuiltInCoders, decode_every_frame_within_their_steps) {
             EXPECT_LT(m1_geometry(error), quality.geometry_step) << coder.name;
             EXPECT_LT(m1_colour(error), 3 * quality.colour_step) << coder.name;
             EXPECT_GT(coded->bytes.total(), 100u) << coder.name;
-            EXPECT_GT(coded->bytes.colour, 0u) << coder.name;
+            EXPECT_GT(coded->bytes[Layer::colour], 0u) << coder.name;
             EXPECT_LT(coded->bytes.total(), 15 * frame.mesh.positions.size()) << coder.name;
         }
     }
@@ -117,7 +117,7 @@ TEST(CodecUnderTest, tells_p_frames) {
     const auto moved = (*start)(synthetic_frame(1));
     ASSERT_TRUE(moved);
     EXPECT_EQ(FrameType::predicted, moved->type);
-    EXPECT_EQ(0u, moved->bytes.geometry);
+    EXPECT_EQ(0u, moved->bytes[Layer::geometry]);
 }
 
 TEST(BuiltInCoders, meshes_without_colour_triangles_or_vertices_go_through) {

@@ -18,7 +18,7 @@ RdPoint point_of(const std::string& coder, double rate, double m1, double step) 
     point.geometry_step = step;
     RdFrame frame;
     frame.vertices = 8000;
-    frame.bytes.geometry = static_cast<std::size_t>(std::lround(1000 * rate));
+    frame.bytes[Layer::geometry] = static_cast<std::size_t>(std::lround(1000 * rate));
     point.frames = {frame};
     point.values["m1_mm"] = m1;
     return point;

@@ -17,7 +17,7 @@ RdFrame frame_of(FrameType type, std::uint32_t vertices, std::size_t geometry) {
     RdFrame frame;
     frame.type = type;
     frame.vertices = vertices;
-    frame.bytes.geometry = geometry;
+    frame.bytes[Layer::geometry] = geometry;
     frame.encode_ms = 20;
     frame.decode_ms = 10;
     return frame;
@@ -66,14 +66,14 @@ TEST(RdPoint, comes_back_from_json_as_it_was) {
     point.colour_step = 10;
     point.setting = "9 bits";
     point.fps = 25;
-    point.frames[0].bytes.distance_orders = 3;
+    point.frames[0].bytes[Layer::distance_orders] = 3;
     point.frames[0].m1_mm = 1.5;
     point.frames[1].decode_ms.reset();
     const auto json = to_json(point);
     const auto back = rd_point_from_json(nlohmann::json::parse(json.dump()));
     ASSERT_TRUE(back);
     EXPECT_EQ(json, to_json(*back));
-    EXPECT_EQ(3u, back->frames[0].bytes.distance_orders);
+    EXPECT_EQ(3u, back->frames[0].bytes[Layer::distance_orders]);
     EXPECT_EQ(1.5, back->frames[0].m1_mm);
     EXPECT_FALSE(back->frames[1].decode_ms);
 }

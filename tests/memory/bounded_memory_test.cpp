@@ -100,7 +100,7 @@ TEST(DecoderMemory, IsNotTakenForWhatAHeaderClaims) {
             if (before.frame == packet.frame && before.kind == packet.kind) break;
             ASSERT_TRUE(decoder.push(before).has_value());
         }
-        auto payload = *read_frame_payload(packet.payload);
+        auto payload = copy_of(*read_frame_payload(packet.payload));
         payload.header.vertices = 1u << 22;
         payload.header.triangles = 1u << 23;
         auto claims = packet;
@@ -111,6 +111,48 @@ TEST(DecoderMemory, IsNotTakenForWhatAHeaderClaims) {
         EXPECT_FALSE(decoder.push(claims).has_value());
         EXPECT_LT(allocations().most_live - live, 100000) << "kind " << static_cast<int>(packet.kind);
     }
+}
+
+// What bones and mapping take is not there until a frame asks for it.
+TEST(DecoderMemory, SkinningIsNotMadeForTrackedFrames) {
+    const auto packets = tracked_stream(2000);
+    const auto held = [&](bool skinned) {
+        DecoderOptions options;
+        options.threads = 1;
+        const auto live = allocations().live;
+        Decoder decoder(options);
+        for (const auto& packet : packets) {
+            EXPECT_TRUE(decoder.decode(packet).has_value());
+            // Moves the I-frame's mesh by its bones.
+            if (skinned && packet.kind == PacketKind::intra) EXPECT_TRUE(decoder.stand_in(0, 0).has_value());
+        }
+        return allocations().live - live;
+    };
+    // At least the bone of each vertex and the vertices of each bone.
+    EXPECT_GE(held(true), held(false) + 6 * 2000);
+}
+
+TEST(DecoderMemory, TrackedFramesThatAreLentCopyNoTriangles) {
+    const auto packets = tracked_stream(2000);
+    const auto taken = [&](bool lent) {
+        DecoderOptions options;
+        options.threads = 1;
+        Decoder decoder(options);
+        std::int64_t bytes = 0;
+        for (const auto& packet : packets) {
+            reset_allocations();
+            if (lent)
+                EXPECT_TRUE(decoder.decode(packet).has_value());
+            else
+                EXPECT_TRUE(decoder.push(packet).has_value());
+            if (packet.kind == PacketKind::tracked) bytes = allocations().bytes;
+        }
+        return bytes;
+    };
+    const auto mesh = inspect(*std::find_if(packets.begin(), packets.end(), is_frame));
+    ASSERT_TRUE(mesh.has_value());
+    // A copy has positions, colours, normals, texture coordinates and triangles.
+    EXPECT_GE(taken(false), taken(true) + 12 * (std::int64_t{mesh->vertices} + mesh->triangles));
 }
 
 TEST(DecoderMemory, IsRefusedBeforeItIsTaken) {

@@ -14,7 +14,7 @@ constexpr std::size_t head = alignof(std::max_align_t);
 static_assert(head >= sizeof(std::size_t));
 
 std::atomic<std::uint64_t> made = 0, fail_from = never, fail_to = never;
-std::atomic<std::int64_t> live = 0, most_live = 0;
+std::atomic<std::int64_t> bytes = 0, live = 0, most_live = 0;
 
 void* allocate(std::size_t size) {
     const std::uint64_t number = made++;
@@ -22,6 +22,7 @@ void* allocate(std::size_t size) {
     auto* block = static_cast<std::byte*>(std::malloc(head + size));
     if (!block) return nullptr;
     ::new (block) std::size_t(size);
+    bytes += static_cast<std::int64_t>(size);
     const std::int64_t now = live += static_cast<std::int64_t>(size);
     std::int64_t most = most_live;
     while (now > most && !most_live.compare_exchange_weak(most, now)) {
@@ -54,10 +55,11 @@ void operator delete[](void* pointer, const std::nothrow_t&) noexcept { release(
 
 namespace htvm::test {
 
-Allocations allocations() { return {made, live, most_live}; }
+Allocations allocations() { return {made, bytes, live, most_live}; }
 
 void reset_allocations() {
     made = 0;
+    bytes = 0;
     most_live = live.load();
 }
 

@@ -7,11 +7,12 @@ namespace htvm::test {
 
 struct Allocations {
     std::uint64_t made = 0;      // calls that succeeded or failed since the last reset()
+    std::int64_t bytes = 0;      // asked for since the last reset()
     std::int64_t live = 0;       // bytes asked for and not given back
     std::int64_t most_live = 0;  // since the last reset()
 };
 Allocations allocations();
-// Counts from here: made = 0, most_live = live.
+// Counts from here: made = bytes = 0, most_live = live.
 void reset_allocations();
 
 // Calls work() while allocation number `first` from now on (0 is the next) throws std::bad_alloc, and where `all`,

@@ -7,7 +7,8 @@ import { crc32 } from './crc32.mjs';
 
 const OK = 0, AGAIN = 1, BAD_INPUT = -1, CORRUPT_STREAM = -2;
 const COLOURS = 1, NORMALS = 2, TEXCOORDS = 4;
-const infoSize = 64;      // sizeof(htvm_frame_info)
+const infoSize = 72;      // sizeof(htvm_frame_info)
+const viewSize = 36;      // sizeof(htvm_mesh_view)
 const optionsSize = 56;   // sizeof(htvm_decoder_options)
 const maxMemoryAt = 32;   // offsetof(htvm_decoder_options, max_memory); 64-bit numbers are BigInts
 const maxMemory = 256n << 20n;
@@ -35,12 +36,14 @@ class Decoder {
         library.free(options);
         if (status !== OK) throw new Error(`htvm_decoder_create: ${status}`);
         this.info = library.malloc(infoSize);
+        this.lent = library.malloc(viewSize);
     }
 
     view() { return new DataView(this.library.memory.buffer); }
 
     destroy() {
         this.library.free(this.info);
+        this.library.free(this.lent);
         this.library.htvm_decoder_destroy(this.handle);
     }
 
@@ -64,7 +67,20 @@ class Decoder {
         if (status !== OK) throw Object.assign(new Error(this.lastError()), { status });
         const view = this.view();
         const u32 = (offset) => view.getUint32(this.info + offset, true);
-        return { type: u32(4), frame: u32(8), vertices: u32(32), triangles: u32(36), attributes: u32(40) };
+        return { type: u32(4), frame: u32(8), vertices: u32(32), triangles: u32(36), attributes: u32(40), topology: u32(64) };
+    }
+
+    // The arrays of the current frame where they lie, in bytes: valid until the next call that may allocate.
+    mesh() {
+        const status = this.library.htvm_decoder_view(this.handle, this.lent, viewSize);
+        if (status !== OK) throw new Error(`view: ${this.lastError()}`);
+        const view = this.view();
+        const u32 = (offset) => view.getUint32(this.lent + offset, true);
+        const vertices = u32(4), triangles = u32(8);
+        const array = (offset, bytes) =>
+            new Uint8Array(this.library.memory.buffer, u32(offset), u32(offset) === 0 ? 0 : bytes);
+        return { topology: u32(12), positions: array(16, 12 * vertices), indices: array(20, 12 * triangles),
+                 colours: array(24, 3 * vertices), normals: array(28, 12 * vertices), texcoords: array(32, 8 * vertices) };
     }
 
     // `count` numbers of `bytes` bytes each, as the copy function `name` gives them.
@@ -78,21 +94,42 @@ class Decoder {
     }
 }
 
-function digestLine(decoder, info) {
-    const arrays = [decoder.copy('positions', 3 * info.vertices, 4), decoder.copy('triangles', 3 * info.triangles, 4)];
-    if (info.attributes & COLOURS) arrays.push(decoder.copy('colours', 3 * info.vertices, 1));
-    if (info.attributes & NORMALS) arrays.push(decoder.copy('normals', 3 * info.vertices, 4));
-    if (info.attributes & TEXCOORDS) arrays.push(decoder.copy('texcoords', 2 * info.vertices, 4));
+function kindLetter(library, type) {
+    const bytes = new Uint8Array(library.memory.buffer, library.htvm_frame_kind_letter(type));
+    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+}
+
+// As a player would: triangles and texture coordinates are taken only where the topology number is a new one.
+function digestLine(decoder, info, kept) {
+    const lent = decoder.mesh();
+    if (lent.topology !== kept.topology) {
+        kept.topology = lent.topology;
+        kept.triangles = lent.indices.slice();
+        kept.texcoords = lent.texcoords.slice();
+    }
+    const arrays = [lent.positions, kept.triangles, lent.colours, lent.normals, kept.texcoords];
     const digest = crc32(Buffer.concat(arrays)).toString(16).padStart(8, '0');
-    return `${info.frame} ${'IEPT'[info.type]} ${info.vertices} ${info.triangles} ${digest}\n`;
+    return `${info.frame} ${kindLetter(decoder.library, info.type)[0]} ${info.vertices} ${info.triangles} ${digest}\n`;
+}
+
+function copiesAreTheSame(decoder, info) {
+    const copies = [['positions', 3 * info.vertices, 4, 'positions'], ['triangles', 3 * info.triangles, 4, 'indices']];
+    if (info.attributes & COLOURS) copies.push(['colours', 3 * info.vertices, 1, 'colours']);
+    if (info.attributes & NORMALS) copies.push(['normals', 3 * info.vertices, 4, 'normals']);
+    if (info.attributes & TEXCOORDS) copies.push(['texcoords', 2 * info.vertices, 4, 'texcoords']);
+    return copies.every(([name, count, bytes, lent]) =>
+        Buffer.compare(decoder.copy(name, count, bytes), decoder.mesh()[lent]) === 0);
 }
 
 function digests(library, stream) {
-    const decoder = new Decoder(library);
+    const decoder = new Decoder(library), kept = {};
     let lines = '';
     for (let at = 0; at < stream.length; at += 1000) {
         decoder.send(stream.subarray(at, at + 1000));
-        for (let info; (info = decoder.receive()); ) lines += digestLine(decoder, info);
+        for (let info; (info = decoder.receive()); ) {
+            if (!copiesAreTheSame(decoder, info)) return 'the copies are not what is lent';
+            lines += digestLine(decoder, info, kept);
+        }
     }
     decoder.destroy();
     return lines;

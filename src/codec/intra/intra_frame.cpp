@@ -74,7 +74,7 @@ Result<LatticeMesh> encode_by(const ExternalIntraCoder& coder, LatticeMesh grid,
     return mesh;
 }
 
-Result<LatticeMesh> decode_by_tfan(const FramePayload& payload) {
+Result<LatticeMesh> decode_by_tfan(const FramePayloadView& payload) {
     const auto& h = payload.header;
     LatticeMesh mesh;
     auto triangles = decode_tfan(payload.of(Layer::fans), h.vertices, h.triangles);
@@ -112,7 +112,7 @@ bool within_attribute_limit(const auto& values) {
 }
 
 // What another coder gives back is not trusted: sizes as announced, indices and attributes in range.
-Result<LatticeMesh> decode_by(const ExternalIntraCoder& coder, const FramePayload& payload) {
+Result<LatticeMesh> decode_by(const ExternalIntraCoder& coder, const FramePayloadView& payload) {
     if (coder.claims) {
         const auto claimed = coder.claims(payload.of(Layer::external_intra));
         if (!claimed) return tl::unexpected(claimed.error());
@@ -156,7 +156,7 @@ Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrame
     return decoded;
 }
 
-Result<LatticeMesh> decode_intra_frame(const FramePayload& payload, const ExternalIntraCoder* external) {
+Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external) {
     const auto number = payload.header.intra_coder;
     if (number != intra_coder_tfan && (!external || external->number != number))
         return fail(ErrorKind::unsupported, "the I-frame was coded by " +

@@ -20,6 +20,6 @@ Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrame
                                        FramePayload& payload);
 
 // external: of the number that the payload names, or null: unsupported then.
-Result<LatticeMesh> decode_intra_frame(const FramePayload& payload, const ExternalIntraCoder* external);
+Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external);
 
 }  // namespace htvm::internal

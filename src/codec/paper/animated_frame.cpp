@@ -35,7 +35,7 @@ AnimatedFrame animated_frame(const ReferenceMesh& reference, std::vector<Quantis
     return out;
 }
 
-Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
+Result<AnimatedFrame> decode_predicted_frame(const FramePayloadView& payload, const ReferenceMesh& reference,
                                              Threads threads) {
     const auto& mesh = reference.mesh;
     if (payload.header.vertices != mesh.positions.size() || payload.header.triangles != mesh.triangles.size())

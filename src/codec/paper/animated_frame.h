@@ -26,7 +26,7 @@ AnimatedFrame animated_frame(const ReferenceMesh& reference, std::vector<Quantis
                              Threads threads);
 
 // A P-frame. corrupt_stream where its counts are not the reference's or its transforms are damaged.
-Result<AnimatedFrame> decode_predicted_frame(const FramePayload& payload, const ReferenceMesh& reference,
+Result<AnimatedFrame> decode_predicted_frame(const FramePayloadView& payload, const ReferenceMesh& reference,
                                              Threads threads);
 
 // A P-frame's payload. source: the captured mesh's counts.

@@ -13,7 +13,7 @@
 namespace htvm::internal {
 namespace {
 
-Result<std::vector<LatticePoint>> decode_positions(const FramePayload& payload, const EnhancedFrameContext& context,
+Result<std::vector<LatticePoint>> decode_positions(const FramePayloadView& payload, const EnhancedFrameContext& context,
                                                    std::span<const LatticePoint> predicted,
                                                    std::span<const std::uint32_t> reference_of) {
     const auto residuals =
@@ -26,7 +26,7 @@ Result<std::vector<LatticePoint>> decode_positions(const FramePayload& payload, 
     return out;
 }
 
-Result<std::vector<Colour>> decode_colours(const FramePayload& payload, const EnhancedFrameContext& context,
+Result<std::vector<Colour>> decode_colours(const FramePayloadView& payload, const EnhancedFrameContext& context,
                                            std::span<const std::uint32_t> reference_of) {
     const auto residuals = decode_residuals(payload.of(Layer::colour), reference_of.size(), *context.colour_codebook);
     if (!residuals) return tl::unexpected(residuals.error());
@@ -45,7 +45,7 @@ std::vector<Value> of_references(const std::vector<Value>& values, std::span<con
 }
 
 // Colours, normals and texture coordinates, where the reference has them.
-Result<void> decode_attributes(const FramePayload& payload, const EnhancedFrameContext& context,
+Result<void> decode_attributes(const FramePayloadView& payload, const EnhancedFrameContext& context,
                                std::span<const QuantisedTransform> transforms,
                                std::span<const std::uint32_t> reference_of, LatticeMesh& mesh) {
     const auto& reference = context.reference;
@@ -128,7 +128,7 @@ Colour add_colour(Colour reference, const std::array<std::int32_t, 3>& residual)
     return out;
 }
 
-Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayload& payload, const EnhancedFrameContext& context) {
+Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayloadView& payload, const EnhancedFrameContext& context) {
     if (auto ok = check(context); !ok) return tl::unexpected(ok.error());
     const auto& reference = context.reference;
     DecodedEnhancedFrame out;

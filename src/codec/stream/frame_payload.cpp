@@ -27,13 +27,26 @@ std::vector<std::uint8_t> write_frame_payload(const FramePayload& payload) {
     return bytes;
 }
 
-Result<FramePayload> read_frame_payload(std::span<const std::uint8_t> bytes) {
+FramePayloadView view_of(const FramePayload& payload) {
+    FramePayloadView out{payload.header, {}, payload.present};
+    for (std::size_t i = 0; i < layer_count; ++i) out.layers[i] = payload.layers[i];
+    return out;
+}
+
+FramePayload copy_of(const FramePayloadView& payload) {
+    FramePayload out{payload.header, {}, payload.present};
+    for (std::size_t i = 0; i < layer_count; ++i)
+        out.layers[i].assign(payload.layers[i].begin(), payload.layers[i].end());
+    return out;
+}
+
+Result<FramePayloadView> read_frame_payload(std::span<const std::uint8_t> bytes) {
     ByteReader in(bytes);
     std::array<std::uint64_t, 9> v{};
     for (auto& value : v) value = in.varint();
     for (const auto value : v)
         if (value > 0x7FFFFFFF) return fail(ErrorKind::corrupt_stream, "frame: a number of its header is out of range");
-    FramePayload out;
+    FramePayloadView out;
     auto& h = out.header;
     h.source_vertices = static_cast<std::uint32_t>(v[0]);
     h.source_triangles = static_cast<std::uint32_t>(v[1]);
@@ -50,7 +63,8 @@ Result<FramePayload> read_frame_payload(std::span<const std::uint8_t> bytes) {
         std::size_t layer;
         std::uint64_t size;
     };
-    std::vector<Entry> entries(in.u8());
+    std::array<Entry, 255> table;
+    const auto entries = std::span(table).first(in.u8());
     for (auto& entry : entries) {
         entry.layer = in.u8();
         entry.size = in.varint();
@@ -61,7 +75,8 @@ Result<FramePayload> read_frame_payload(std::span<const std::uint8_t> bytes) {
         const auto layer = in.bytes(entry.size);
         if (entry.layer >= layer_count) continue;
         if (out.present[entry.layer]) return fail(ErrorKind::corrupt_stream, "frame: a layer comes twice");
-        out.set(static_cast<Layer>(entry.layer), {layer.begin(), layer.end()});
+        out.layers[entry.layer] = layer;
+        out.present[entry.layer] = true;
     }
     if (!in.ok()) return fail(ErrorKind::corrupt_stream, "frame: its header or layers end too early");
     return out;

@@ -7,24 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "htvm/frame.hpp"
 #include "htvm/result.hpp"
 
 namespace htvm::internal {
-
-enum class Layer : std::uint8_t {
-    pose = 1,             // I: joints and orientations of the skeleton
-    transforms = 2,       // P, EP: one rigid transform a bone
-    geometry = 3,         // I: positions in the order of TFAN; EP: quantised residuals
-    colour = 4,           // likewise
-    normals = 5,          // likewise, without a codebook
-    texcoords = 6,        // likewise
-    mapping = 7,          // EP: the graph of Fig. 4
-    fans = 8,             // I: TFAN; EP: the part of M-TFAN that TFAN has too
-    distance_orders = 9,  // EP: the generalised distance orders of M-TFAN
-    external_intra = 10,  // I: a mesh as another coder packed it
-    coded_bones = 11,     // EP with motion-based coding: the bones whose sub-meshes are coded
-};
-inline constexpr std::size_t layer_count = 12;  // one more than the largest number
 
 inline constexpr std::uint8_t intra_coder_tfan = 0;
 inline constexpr std::uint8_t intra_coder_draco = 1;
@@ -38,6 +24,7 @@ struct FrameHeader {
     std::uint32_t geometry_codebook = 0, colour_codebook = 0;  // EP: numbers of the codebooks used
 };
 
+// A payload to be written.
 struct FramePayload {
     FrameHeader header;
     std::array<std::vector<std::uint8_t>, layer_count> layers;
@@ -50,6 +37,17 @@ struct FramePayload {
     const std::vector<std::uint8_t>& of(Layer layer) const { return layers[static_cast<std::size_t>(layer)]; }
 };
 
+// A payload that was read: its layers lie in the packet's bytes, and are valid as long as these.
+struct FramePayloadView {
+    FrameHeader header;
+    std::array<std::span<const std::uint8_t>, layer_count> layers;
+    std::array<bool, layer_count> present{};
+    bool has(Layer layer) const { return present[static_cast<std::size_t>(layer)]; }
+    std::span<const std::uint8_t> of(Layer layer) const { return layers[static_cast<std::size_t>(layer)]; }
+};
+FramePayloadView view_of(const FramePayload& payload);
+FramePayload copy_of(const FramePayloadView& payload);
+
 // The fewest bytes that the payload of an I- or EP-frame of so many vertices and triangles may have: it bounds what a
 // few bytes can make a decoder do.
 inline std::uint64_t least_payload(std::uint64_t vertices, std::uint64_t triangles) {
@@ -59,6 +57,6 @@ inline std::uint64_t least_payload(std::uint64_t vertices, std::uint64_t triangl
 // An I- or EP-frame (known by its pose or mapping) that came out shorter than it may be gets zeros behind its layers.
 std::vector<std::uint8_t> write_frame_payload(const FramePayload& payload);
 // Layers of a number that is not known are skipped.
-Result<FramePayload> read_frame_payload(std::span<const std::uint8_t> bytes);
+Result<FramePayloadView> read_frame_payload(std::span<const std::uint8_t> bytes);
 
 }  // namespace htvm::internal

@@ -133,7 +133,7 @@ std::vector<QuantisedNormal> quantised_normals(std::span<const ExactNormal> norm
     return out;
 }
 
-Result<void> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
+Result<void> decode_tracked_frame(const FramePayloadView& payload, const TrackedReference& reference,
                                   const TrackedState* before, Threads threads, DecodedTrackedFrame& out) {
     const auto& mesh = reference.mesh;
     if (payload.header.vertices != mesh.positions.size() || payload.header.triangles != mesh.triangles.size())

@@ -51,7 +51,7 @@ struct DecodedTrackedFrame {
 
 // before: of the frame that the payload refers to; null where that is the I-frame. out: an earlier frame's, whose
 // arrays serve again, but not that of `before`; of no use after an error.
-Result<void> decode_tracked_frame(const FramePayload& payload, const TrackedReference& reference,
+Result<void> decode_tracked_frame(const FramePayloadView& payload, const TrackedReference& reference,
                                   const TrackedState* before, Threads threads, DecodedTrackedFrame& out);
 
 // The pieces, which the encoder shares.
