@@ -46,7 +46,7 @@ Result<void> decode_tracked(DecoderState& state, const Packet& packet, const Fra
     const bool of_frame_before = history.frame && *history.frame == packet.reference;
     if (!of_frame_before)
         if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
-    if (auto ok = derive_nodes(*state.reference, *state.header); !ok) return tl::unexpected(ok.error());
+    if (auto ok = derive_nodes(*state.reference, *state.header, state.threads); !ok) return tl::unexpected(ok.error());
     if (auto ok = decode_tracked_frame(payload, *state.reference->tracked,
                                        of_frame_before ? &history.last.state : nullptr, state.threads, history.next);
         !ok)

@@ -10,9 +10,9 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
     reference.has_bones = true;
 }
 
-Result<void> derive_nodes(Reference& reference, const SequenceHeader& header) {
+Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
-    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step);
+    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads);
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     return {};
@@ -28,7 +28,7 @@ Result<Reference> make_reference(const SequenceHeader& header, std::uint32_t num
     out.skinned.orientations = std::move(pose.orientations);
     out.skinned.frame = number;
     if (derived.nodes && header.node_spacing > 0)
-        if (auto ok = derive_nodes(out, header); !ok) return tl::unexpected(ok.error());
+        if (auto ok = derive_nodes(out, header, threads); !ok) return tl::unexpected(ok.error());
     if (derived.bones) derive_bones(out, header, threads);
     return out;
 }

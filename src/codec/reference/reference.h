@@ -35,6 +35,6 @@ Result<Reference> make_reference(const SequenceHeader& header, std::uint32_t num
 // What was not derived at once, for whoever finds out later that it is needed. Nothing where it is there already.
 void derive_bones(Reference& reference, const SequenceHeader& header, Threads threads);
 // Needs a header with a node spacing.
-Result<void> derive_nodes(Reference& reference, const SequenceHeader& header);
+Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads);
 
 }  // namespace htvm::internal

@@ -49,17 +49,19 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 }
 
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                std::int32_t quantiser_step) {
+                                                std::int32_t quantiser_step, Threads threads) {
     TrackedReference out;
     out.mesh = mesh;
     out.mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, quantiser_step);
     DeformationNodeOptions options;
     options.spacing = node_spacing;
     options.link_reach = std::max(node_spacing / 10, 1);
-    out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options);
+    Result<VertexHierarchy> hierarchy;
+    parallel_invoke(
+        threads, [&] { hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles); },
+        [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options); });
     for (const auto v : out.nodes.vertex) out.pivots.push_back(out.mesh.positions[v]);
     out.parents = parents_of(out.nodes);
-    auto hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles);
     if (!hierarchy) return tl::unexpected(hierarchy.error());
     out.hierarchy = std::move(*hierarchy);
     return out;

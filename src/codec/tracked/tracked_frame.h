@@ -27,8 +27,9 @@ struct TrackedReference {
     VertexHierarchy hierarchy;
 };
 // node_spacing: lattice units, > 0. quantiser_step: of the I-frame's positions, lattice units.
+// threads: two at most serve.
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                std::int32_t quantiser_step);
+                                                std::int32_t quantiser_step, Threads threads = {});
 
 // Vertices halfway to the mean of their neighbours, but no farther than half a quantiser step from where they were in
 // each coordinate: takes the steps out of a coarsely quantised surface without sending anything.
