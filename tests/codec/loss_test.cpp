@@ -116,7 +116,7 @@ TEST(Loss, WithoutAnIntraFrameNothingStandsIn) {
 }
 
 TEST(Loss, BehindAnIntraFrameItsOwnMeshStandsIn) {
-    const auto decoder = decoder_before(ten_frames().packets, 2);
+    auto decoder = decoder_before(ten_frames().packets, 2);
     const auto frame = decoder.conceal(1, 4711);
     ASSERT_TRUE(frame.has_value());
     EXPECT_TRUE(frame->concealed);
