@@ -37,7 +37,6 @@ htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
     options.threads = threads;
     options.skeleton = htvm::synth_skeleton();
     options.key_interval = 1000;
-    options.topology.scene_changes = false;
     return options;
 }
 
@@ -47,12 +46,13 @@ enum class Kind { intra, enhanced, motion, predicted, tracked };
 // Motion-based coding leaves some bones of frames so near to the I-frame out; P-frames are animated whatever the
 // motion.
 void choose(htvm::EncoderOptions& options, Kind kind) {
-    if (kind == Kind::enhanced || kind == Kind::intra) return;
     if (kind == Kind::tracked) {
         options.profile = htvm::Profile::tracked;
         options.least_key_interval = options.key_interval;
         return;
     }
+    options.topology.scene_changes = false;
+    if (kind == Kind::enhanced || kind == Kind::intra) return;
     options.topology.animation_error = 0;
     if (kind == Kind::motion) {
         options.topology.still_below = 60;

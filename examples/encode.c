@@ -48,8 +48,9 @@ int main(int argc, char** argv) {
     static float positions[3 * vertices];
     static uint8_t colours[3 * vertices];
     static uint32_t indices[3 * triangles];
-    htvm_encoder_options options;
+    htvm_encoder_options* options = NULL;
     htvm_encoder* encoder = NULL;
+    double geometry_step, colour_step;
     htvm_mesh mesh;
     char problem[256];
     int frame, fine = 1;
@@ -58,12 +59,19 @@ int main(int argc, char** argv) {
         fprintf(stderr, "usage: encode FILE.htvm (a file that can be written)\n");
         return 2;
     }
-    htvm_encoder_options_init(&options, sizeof options);
-    htvm_quality_steps(60, &options.geometry_step, &options.colour_step);
-    if (htvm_encoder_create(&options, &encoder, problem, sizeof problem) != HTVM_OK) {
+    htvm_quality_steps(60, &geometry_step, &colour_step);
+    if (htvm_encoder_options_create(HTVM_PROFILE_TRACKED, NULL, &options) != HTVM_OK) return 2;
+    if (htvm_encoder_options_set_number(options, "geometry_step", geometry_step) != HTVM_OK ||
+        htvm_encoder_options_set_number(options, "colour_step", colour_step) != HTVM_OK ||
+        htvm_encoder_options_set(options, "key_interval", "60") != HTVM_OK) {
+        fprintf(stderr, "%s\n", htvm_encoder_options_last_error(options));
+        return 2;
+    }
+    if (htvm_encoder_create(options, &encoder, problem, sizeof problem) != HTVM_OK) {
         fprintf(stderr, "%s\n", problem);
         return 2;
     }
+    htvm_encoder_options_destroy(options);
     htvm_mesh_init(&mesh, sizeof mesh);
     mesh.vertices = vertices;
     mesh.triangles = triangles;

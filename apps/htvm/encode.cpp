@@ -169,6 +169,13 @@ void add_encode(CLI::App& app, Run& run) {
     command->add_option("-o,--output", options->output, "The stream: a file, or - for standard output")->required();
     add_encoding_options(*command, options->encoding);
     command->add_flag("--json", options->json, "Print sizes by frame and layer as JSON on standard output");
+    command->add_flag_callback(
+        "--help-options",
+        [] {
+            fmt::print("{}", options_in_markdown());
+            throw CLI::Success();
+        },
+        "Print all options of the library with their ranges, as docs/options.md has them, and exit");
     command->footer(
         "Examples:\n"
         "  htvm encode capture/ --skeleton capture/skeleton.json -o person.htvm\n"
@@ -176,8 +183,8 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --profile topology -s capture/skeleton.json -o exact.htvm\n"
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 --passes 2 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
-    command->callback([command, options, &run] {
-        check_profile(*command, options->encoding);
+    command->callback([options, &run] {
+        check_together(options->encoding);
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
         if (options->encoding.passes == 2 && options->capture.input == "-")

@@ -5,13 +5,16 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <string_view>
 
 #include "htvm/decoder.hpp"
+#include "htvm/option_list.hpp"
 #include "io/mesh_file.h"
 #include "tfan_mpeg.h"
 
@@ -71,16 +74,16 @@ Result<FrameCoder> start_codec(EncoderOptions options, const SequenceFacts& fact
     });
 }
 
-const char* choice_name(FrameChoice choice) {
-    switch (choice) {
-        case FrameChoice::fixed:
-            return "fixed";
-        case FrameChoice::motion:
-            return "motion";
-        case FrameChoice::rate_distortion:
-            return "rd";
-    }
-    return "?";
+// Every option that the profile heeds, but for what the sweep sets.
+std::string settings_of(const EncoderOptions& options) {
+    constexpr std::array<std::string_view, 6> by_the_sweep = {"geometry_step", "colour_step",     "threads",
+                                                              "fps_numerator", "fps_denominator", "unit_micrometres"};
+    std::string out = profile_name(options.profile);
+    for (const auto& option : option_list())
+        if (serves(option.group, options.profile) &&
+            std::find(by_the_sweep.begin(), by_the_sweep.end(), option.name) == by_the_sweep.end())
+            out += fmt::format(", {} {}", option.name, value_text(option, option.get(options)));
+    return out;
 }
 
 }  // namespace
@@ -99,20 +102,7 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
     CoderUnderTest out;
     out.name = name;
     out.description = description;
-    out.settings =
-        fmt::format("keyint {}, reference {}, registration {}, weights {}, lambda {}, nearest {}", options.key_interval,
-                    options.topology.reference_vertices == ReferenceVertices::bone ? "bone" : "any",
-                    options.topology.point_to_plane ? "plane" : "point", options.topology.weight_width, options.lambda,
-                    options.topology.nearest_vertices);
-    if (options.profile == Profile::tracked)
-        out.settings += fmt::format(", tracked from {}, nodes {}, simplify {}",
-                                    options.tracked.references == TrackedReferences::intra ? "I" : "the frame before",
-                                    options.tracked.node_spacing, options.tracked.simplify);
-    out.settings +=
-        fmt::format(", {}, P below {}, I above {}, still below {}, animation error {}{}",
-                    choice_name(options.topology.frame_choice), options.topology.predicted_below,
-                    options.topology.intra_above, options.topology.still_below, options.topology.animation_error,
-                    options.topology.scene_changes ? "" : ", no scene changes");
+    out.settings = settings_of(options);
     out.start = [options](const SequenceFacts& facts, const QualityPoint& quality) {
         return start_codec(options, facts, quality);
     };

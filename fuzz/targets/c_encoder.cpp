@@ -1,7 +1,9 @@
-// The encoder's C interface on any meshes, poses and options, structs of earlier versions among them: a status and a
-// sentence, or packets that the C decoder takes, frame by frame.
+// The encoder's C interface on any meshes, poses and options, by any names, structs of earlier versions among them: a
+// status and a sentence, or packets that the C decoder takes, frame by frame.
 #include <array>
 #include <cstring>
+#include <limits>
+#include <string>
 
 #include "any_capture.h"
 #include "htvm/htvm.h"
@@ -25,33 +27,32 @@ constexpr std::array numbers = {0.0,
                                 std::numeric_limits<double>::infinity(),
                                 std::numeric_limits<double>::quiet_NaN()};
 
-// A few fields changed, each to a value that may be far out of its range.
-htvm_encoder_options any_options(fuzz::FuzzInput& input) {
-    htvm_encoder_options out;
-    require(htvm_encoder_options_init(&out, sizeof out) == HTVM_OK, "options are given their defaults");
-    out.geometry_step = 8;
-    const std::array<double*, 13> doubles = {
-        &out.geometry_step,   &out.colour_step,  &out.lambda,      &out.simplify,        &out.node_spacing,
-        &out.predicted_below, &out.intra_above,  &out.still_below, &out.animation_error, &out.bits_per_second,
-        &out.buffer_seconds,  &out.target_error, &out.weight_width};
-    const std::array<std::int32_t*, 4> integers = {&out.key_interval, &out.least_key_interval, &out.nearest_vertices,
-                                                   &out.lattice_bits};
-    const std::array<std::uint32_t*, 10> words = {
-        &out.scene_changes, &out.frame_choice,   &out.tracked,          &out.tracked_from_intra, &out.merge_duplicates,
-        &out.reference_any, &out.point_to_plane, &out.unit_micrometres, &out.fps_numerator,      &out.fps_denominator};
+// A few options changed, each to a value that may be far out of its range, by a name that may be wrong.
+void set_any_options(fuzz::FuzzInput& input, htvm_encoder_options* options, std::uint32_t profile) {
+    require(htvm_encoder_options_set_number(options, "geometry_step", 8) == HTVM_OK, "8 mm is a step");
     for (std::uint32_t n = input.below(6); n > 0; --n) {
-        const std::uint8_t which = input.u8();
-        if (which < 100)
-            *doubles[which % doubles.size()] = numbers[input.below(numbers.size())];
-        else if (which < 140)
-            *integers[which % integers.size()] = input.number(1 << 30);
-        else if (which < 250)
-            *words[which % words.size()] = input.below(4);
-        else
-            out.struct_size = input.below(sizeof out + 1);
+        htvm_option_info info;
+        require(htvm_encoder_option(input.below(htvm_encoder_option_count()), profile, &info, sizeof info) == HTVM_OK,
+                "every option of the list can be asked for");
+        std::string name = info.name;
+        const std::uint8_t how = input.u8();
+        if (how > 250) name[input.below(static_cast<std::uint32_t>(name.size()))] = static_cast<char>(input.u8());
+        const double value = how % 3 == 0 ? numbers[input.below(numbers.size())] : input.below(4) + how % 2 * 0.5;
+        const auto status = how % 8 == 0
+                                ? htvm_encoder_options_set(options, name.c_str(), std::to_string(value).c_str())
+                                : htvm_encoder_options_set_number(options, name.c_str(), value);
+        require(status == HTVM_OK || status == HTVM_BAD_INPUT, "a status that the header names");
+        if (status < 0) require(std::strlen(htvm_encoder_options_last_error(options)) > 0, "a failure says why");
+        double now = 0;
+        if (status == HTVM_OK && how % 8 != 0)
+            require(htvm_encoder_options_get_number(options, name.c_str(), &now) == HTVM_OK && now == value,
+                    "what was set is read");
+        std::array<char, 32> text{};
+        if (status == HTVM_OK)
+            require(htvm_encoder_options_get(options, name.c_str(), text.data(), text.size()) == HTVM_OK,
+                    "32 characters are enough");
     }
-    out.threads = 1;
-    return out;
+    require(htvm_encoder_options_set_number(options, "threads", 1) == HTVM_OK, "one thread");
 }
 
 // The mesh's arrays as C has them. Attributes that do not fit its vertices are left out: C cannot say such a thing.
@@ -121,7 +122,10 @@ void send(htvm_encoder* encoder, htvm_decoder* decoder, const fuzz::AnyCapture& 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     fuzz::FuzzInput input(data, size);
     const std::uint8_t age = input.u8();
-    auto options = any_options(input);
+    const std::uint32_t profile = age % 3;
+    htvm_encoder_options* options = nullptr;
+    require(htvm_encoder_options_create(profile, nullptr, &options) == HTVM_OK, "options can be made");
+    set_any_options(input, options, profile);
     const auto capture = fuzz::any_capture(input);
     std::vector<std::uint16_t> bone_joints;
     for (const auto& bone : capture.skeleton.bones) bone_joints.insert(bone_joints.end(), {bone.first, bone.second});
@@ -130,14 +134,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     skeleton.joints = static_cast<std::uint32_t>(capture.skeleton.joint_names.size());
     skeleton.bones = static_cast<std::uint32_t>(capture.skeleton.bones.size());
     skeleton.bone_joints = bone_joints.data();
-    options.skeleton = &skeleton;
+    if (age == 250) skeleton.struct_size = input.below(sizeof skeleton + 1);
+    const auto taken = htvm_encoder_options_set_skeleton(options, &skeleton);
+    require(taken == HTVM_OK || taken == HTVM_BAD_INPUT, "a skeleton is taken or refused");
     htvm_encoder* encoder = nullptr;
     std::array<char, 40> words{};
-    const auto status = htvm_encoder_create(&options, &encoder, words.data(), words.size());
+    const auto status = htvm_encoder_create(options, &encoder, words.data(), words.size());
+    htvm_encoder_options_destroy(options);
     require((status == HTVM_OK) == (encoder != nullptr), "a handle where there is success");
     require(words.back() == 0, "the sentence is cut where the array ends");
     if (status != HTVM_OK) {
-        require(status == HTVM_BAD_INPUT || status == HTVM_UNSUPPORTED, "a status that the header names");
+        require(status == HTVM_BAD_INPUT, "a status that the header names");
         require(words[0] != 0, "a failure says what was wrong");
         return 0;
     }

@@ -15,9 +15,10 @@ using namespace htvm;
 using fuzz::require;
 
 EncoderOptions any_options(fuzz::FuzzInput& input) {
-    EncoderOptions out = default_options(Profile::topology);
-    out.threads = 1;
     const std::uint8_t what = input.u8();
+    const bool tracked = (what & 8) != 0;
+    EncoderOptions out = default_options(tracked ? Profile::tracked : Profile::topology);
+    out.threads = 1;
     constexpr std::array steps = {2.0, 0.05, 0.5, 8.0, 30.0, 1000.0, 1.0 / 65536, -1.0};
     constexpr std::array colour_steps = {6.0, 1.0, 20.0, 255.0};
     constexpr std::array lambdas = {0.12, 0.0, 2.0, 1000.0};
@@ -26,20 +27,25 @@ EncoderOptions any_options(fuzz::FuzzInput& input) {
     out.lambda = lambdas[input.below(4)];
     out.key_interval = static_cast<int>(input.below(6));
     out.least_key_interval = 1 + (what & 1);
-    out.topology.scene_changes = (what & 2) != 0;
-    out.topology.merge_duplicates = (what & 4) != 0;
-    out.profile = (what & 8) != 0 ? Profile::tracked : Profile::topology;
-    out.topology.point_to_plane = (what & 16) != 0;
-    if (what & 32) out.tracked.references = TrackedReferences::intra;
-    if (what & 64) out.topology.reference_vertices = ReferenceVertices::bone;
-    out.topology.frame_choice = static_cast<FrameChoice>(input.below(3));
-    out.tracked.node_spacing = 1 + 20 * input.u8();
-    out.topology.still_below = input.below(3) * 100;
-    out.topology.animation_error = input.below(3) * 5;
-    out.topology.predicted_below = input.below(4) * 400;
-    out.topology.intra_above = input.below(3) * 800;
-    out.topology.nearest_vertices = static_cast<int>(input.below(66));
-    out.topology.weight_width = input.below(4) * 25;
+    if (tracked) {
+        if (what & 32) out.tracked.references = TrackedReferences::intra;
+        out.tracked.node_spacing = 1 + 20 * input.u8();
+        out.tracked.simplify = input.below(4) * 0.4;
+    } else {
+        out.topology.scene_changes = (what & 2) != 0;
+        out.topology.merge_duplicates = (what & 4) != 0;
+        if (what & 16) out.topology.registration = BoneRegistration::point;
+        if (what & 64) out.topology.reference_vertices = ReferenceVertices::bone;
+        out.topology.frame_choice = static_cast<FrameChoice>(input.below(3));
+        out.topology.still_below = input.below(3) * 100;
+        out.topology.animation_error = input.below(3) * 5;
+        if (out.topology.frame_choice == FrameChoice::motion) {
+            out.topology.predicted_below = input.below(4) * 400;
+            out.topology.intra_above = input.below(3) * 800;
+        }
+        out.topology.nearest_vertices = static_cast<int>(input.below(66));
+        out.topology.weight_width = input.below(4) * 25;
+    }
     out.lattice_bits = static_cast<int>(input.below(18));
     const std::uint8_t control = input.u8();
     if (control > 220) out.rate.bits_per_second = 1000.0 * control * input.u8();

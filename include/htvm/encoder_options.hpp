@@ -1,6 +1,5 @@
-// What an encoder can be told. Every option is listed once, here with its default and meaning, and in
-// src/codec/encoder_options.cpp with its range; the checks, the C interface, the command line and docs/options.md
-// follow from that list.
+// What an encoder can be told: every option with its default and meaning. Their ranges, and what they are called
+// elsewhere, are in one list (option_list.hpp, docs/options.md).
 #pragma once
 
 #include <cstdint>
@@ -26,6 +25,11 @@ enum class ReferenceVertices : std::uint8_t {
     any,   // the nearest vertex of the whole predicted mesh
 };
 
+enum class BoneRegistration : std::uint8_t {
+    point,  // the paper's: by distances from point to point
+    plane,  // from point to plane
+};
+
 enum class FrameChoice : std::uint8_t {
     fixed,            // an I-frame every key_interval frames, EP-frames between
     motion,           // the paper's (section III-B): by skeletal motion since the last I-frame
@@ -37,7 +41,7 @@ enum class TrackedReferences : std::uint8_t {
     previous,  // to the frame before: fewer bits; a lost one costs those up to the next I-frame
 };
 
-// Profile::tracked alone.
+// Profile::tracked alone: with others, anything but the defaults is refused.
 struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
     double simplify = 0.4;  // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
@@ -45,11 +49,11 @@ struct TrackedOptions {
     double node_spacing = 80;  // mm, between the nodes of the deformation graph
 };
 
-// Profile::topology and Profile::paper alone.
+// Profile::topology and Profile::paper alone, likewise.
 struct TopologyOptions {
     FrameChoice frame_choice = FrameChoice::fixed;
-    double predicted_below = 400;  // mm, choice by motion: with less skeletal motion since the I-frame, a P-frame
-    double intra_above = 0;        // mm, choice by motion: with more, an I-frame; 0: never
+    double predicted_below = 400;  // mm, FrameChoice::motion: with less skeletal motion since the I-frame, a P-frame
+    double intra_above = 0;        // mm, FrameChoice::motion: with more, an I-frame; 0: never
     double still_below = 0;        // mm, motion-based coding (section V): bones that moved less since the I-frame are
                                    // animated, not coded; 0: all are coded
     double animation_error = 2;  // mm: what is animated is coded after all where it is farther (root mean square, bone
@@ -58,17 +62,18 @@ struct TopologyOptions {
     bool merge_duplicates = true;  // merge vertices that decode to the same, drop triangles that collapse
     int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
     ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured better than the paper's, see docs
-    double weight_width = 30;    // mm, 0..1000: borders between bones blend over it; 0: rigid, as in the paper
-    bool point_to_plane = true;  // register bones by distances to planes; false: to points, as in the paper
+    double weight_width = 30;  // mm, 0..1000: borders between bones blend over it; 0: rigid, as in the paper
+    BoneRegistration registration = BoneRegistration::plane;
 };
 
 // Quality that follows from a rate or an error, instead of from the steps.
 struct RateOptions {
-    double bits_per_second = 0;         // > 0: the rate to keep to
-    double buffer_seconds = 1;          // of the receiver: what a frame may come late against a constant rate
+    double bits_per_second = 0;  // > 0: the rate to keep to
+    double buffer_seconds = 1;   // of the receiver, with bits_per_second: what a frame may come late against a constant
+                                 // rate
     std::vector<FrameCost> first_pass;  // with bits_per_second: last_cost() of every frame of a first run over the same
                                         // capture; the quality then stays as even as the buffer allows
-    double target_error = 0;            // mm (M2), > 0: the error that every frame comes near to
+    double target_error = 0;  // mm (M2), > 0: the error that every frame comes near to; not with bits_per_second
 };
 
 struct EncoderOptions {

@@ -18,6 +18,9 @@
  *
  * Encoding (examples/encode.c):
  *
+ *   htvm_encoder_options_create(HTVM_PROFILE_TRACKED, NULL, &options);
+ *   htvm_encoder_options_set(options, "key_interval", "60");
+ *   if (htvm_encoder_create(options, &encoder, problem, sizeof problem) != HTVM_OK) return 1;
  *   htvm_encoder_send_mesh(encoder, &mesh, &pose, timestamp_us, 0);
  *   while (htvm_encoder_receive_packet(encoder, buffer, sizeof buffer, &size) == HTVM_OK) store(buffer, size);
  *   htvm_encoder_finish(encoder);                                   then receive the rest, up to HTVM_END
@@ -243,14 +246,14 @@ htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* fi
 
 typedef struct htvm_encoder htvm_encoder;
 
-/* frame_choice */
+/* What the stream is for: which frames lie between the I-frames. */
 enum {
-    HTVM_CHOICE_FIXED = 0,          /* an I-frame every key_interval frames, EP-frames between */
-    HTVM_CHOICE_MOTION = 1,         /* by skeletal motion since the last I-frame */
-    HTVM_CHOICE_RATE_DISTORTION = 2 /* by measured bits and errors */
+    HTVM_PROFILE_TRACKED = 0,  /* the fewest bits: T-frames, the I-frame's mesh laid on each frame's surface */
+    HTVM_PROFILE_TOPOLOGY = 1, /* every frame's own connectivity: EP-frames, or I-frames where those cost less */
+    HTVM_PROFILE_PAPER = 2     /* the same by the published method's own choices */
 };
 
-/* The skeleton of the sequence: constant over it. All arrays are copied by htvm_encoder_create(). */
+/* The skeleton of the sequence: constant over it. All arrays are copied by htvm_encoder_options_set_skeleton(). */
 typedef struct htvm_skeleton {
     uint32_t struct_size;           /* set by htvm_skeleton_init() */
     uint32_t joints, bones;         /* 0, 0: the capture has no skeleton */
@@ -259,41 +262,68 @@ typedef struct htvm_skeleton {
     const double* radii;            /* mm, one a bone, or NULL: calibrated on the first frame */
 } htvm_skeleton;
 
-/* What each option means in full, with measurements: include/htvm/encoder.hpp, docs/algorithm.md. */
-typedef struct htvm_encoder_options {
-    uint32_t struct_size;        /* set by htvm_encoder_options_init() */
-    uint32_t threads;            /* at work at once; 0: one per core; the bytes are the same for any number. 0 */
-    double geometry_step;        /* mm, > 0: cell of the position quantiser; errors are about half of it. 2 */
-    double colour_step;          /* levels of 255, >= 1. 6 */
-    double lambda;               /* squared error worth one bit, in units of step^2. 0.12 */
-    int32_t key_interval;        /* most frames from one I-frame to the next; 1: I-frames only. 30 */
-    int32_t least_key_interval;  /* fewest. 1 */
-    uint32_t scene_changes;      /* 1: an I-frame where the mesh is nowhere near the reference's. 1 */
-    uint32_t frame_choice;       /* HTVM_CHOICE_... HTVM_CHOICE_FIXED */
-    uint32_t tracked;            /* 1: T-frames between I-frames, where they fit the capture. 0 */
-    uint32_t tracked_from_intra; /* 1: T-frames refer to I-frames alone, any may be lost; 0: to the frame before. 0 */
-    double simplify;             /* geometry steps, T-frames: error of the I-frames' simplified meshes; 0: whole. 0.4 */
-    double node_spacing;         /* mm, T-frames. 80 */
-    double predicted_below;      /* mm, choice by motion. 400 */
-    double intra_above;          /* mm, choice by motion; 0: never. 0 */
-    double still_below;          /* mm, motion-based coding; 0: all bones are coded. 0 */
-    double animation_error;      /* mm; 0: unchecked. 2 */
-    double bits_per_second;      /* > 0: quality follows from it, instead of from the steps. 0 */
-    double buffer_seconds;       /* of the receiver. 1 */
-    double target_error;         /* mm (M2), > 0: quality follows from it, instead of from the steps. 0 */
-    uint32_t merge_duplicates;   /* 1: merge vertices that decode to the same. 1 */
-    int32_t nearest_vertices;    /* m of the distance order, 1..64. 16 */
-    uint32_t reference_any;      /* 1: nearest reference vertex of all, 0: of the same bone, as in the paper. 1 */
-    uint32_t point_to_plane;     /* 1: register bones by distances to planes, 0: to points, as in the paper. 1 */
-    double weight_width;         /* mm, 0..1000: borders between bones blend over it; 0: rigid. 30 */
-    int32_t lattice_bits;        /* positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is. 0 */
-    uint32_t unit_micrometres;   /* the capture's own unit, for the decoder. 1000 */
-    uint32_t fps_numerator, fps_denominator; /* 30, 1 */
-    const htvm_skeleton* skeleton;           /* NULL: the capture has none */
-    htvm_allocator allocator;                /* malloc and free */
-    htvm_run_tasks run_tasks;                /* gives the threads. NULL: a pool of the encoder's own */
-    void* run_tasks_user;                    /* for run_tasks */
-} htvm_encoder_options;
+/* The options of an encoder. Those that are numbers, words or switches are set by name; docs/options.md lists them, and
+ * so does htvm_encoder_option(). */
+typedef struct htvm_encoder_options htvm_encoder_options;
+
+/* The options of a profile at their defaults. allocator: NULL for malloc and free; copied, and used for the encoders
+ * made of these options too. *options is set to NULL unless the status is HTVM_OK: HTVM_BAD_INPUT (no such profile, one
+ * allocator function without the other), HTVM_OUT_OF_MEMORY. */
+htvm_status htvm_encoder_options_create(uint32_t profile, const htvm_allocator* allocator,
+                                        htvm_encoder_options** options);
+void htvm_encoder_options_destroy(htvm_encoder_options* options);
+
+/* As htvm_decoder_last_error(). */
+const char* htvm_encoder_options_last_error(const htvm_encoder_options* options);
+
+/* Sets an option, such as "key_interval" to "60" or 60, "topology.frame_choice" to "motion" or its place in the list of
+ * words, "topology.scene_changes" to "off" or 0. Numbers in text have a point, whatever the locale. HTVM_BAD_INPUT, and
+ * nothing is changed: there is no such option (the last error names the nearest), or the value is out of its range.
+ * Whether options go together is checked by htvm_encoder_create(). */
+htvm_status htvm_encoder_options_set(htvm_encoder_options* options, const char* name, const char* value);
+htvm_status htvm_encoder_options_set_number(htvm_encoder_options* options, const char* name, double value);
+
+/* The option's value, as text ended by a 0 (HTVM_BUFFER_TOO_SMALL below its length + 1; 32 are always enough) or as a
+ * number. */
+htvm_status htvm_encoder_options_get(htvm_encoder_options* options, const char* name, char* value, size_t capacity);
+htvm_status htvm_encoder_options_get_number(htvm_encoder_options* options, const char* name, double* value);
+
+/* Copies the skeleton; NULL, and none to begin with: the capture has none. */
+htvm_status htvm_encoder_options_set_skeleton(htvm_encoder_options* options, const htvm_skeleton* skeleton);
+
+/* Gives the encoder its threads, up to the option "threads" at once. NULL, and none to begin with: a pool of the
+ * encoder's own. user is handed to run_tasks as it is. */
+htvm_status htvm_encoder_options_set_run_tasks(htvm_encoder_options* options, htvm_run_tasks run_tasks, void* user);
+
+/* kind of an option's value */
+enum {
+    HTVM_OPTION_NUMBER = 0,
+    HTVM_OPTION_WHOLE_NUMBER = 1,
+    HTVM_OPTION_SWITCH = 2, /* "on" or "off", 1 or 0 */
+    HTVM_OPTION_WORD = 3    /* one of htvm_encoder_option_word() */
+};
+
+/* What there is to know of an option. The texts are the library's own and never NULL. */
+typedef struct htvm_option_info {
+    uint32_t struct_size; /* bytes of this struct that were filled */
+    uint32_t kind;        /* HTVM_OPTION_... */
+    const char* name;     /* "tracked.node_spacing" */
+    const char* group;    /* "common", "rate"; "tracked", "topology": of these profiles alone (paper: topology) */
+    const char* unit;     /* "mm", "frames"; "": none */
+    const char* meaning;  /* in a line */
+    const char* zero;     /* what 0 stands for, where it stands for something: it is then allowed beside the range */
+    double least, most;   /* range, both ends allowed */
+    double default_value; /* in the profile asked for */
+    uint32_t words;       /* how many it may be; 0 for other kinds */
+    uint32_t serves;      /* 1: it means something to the profile; 0: it must stay at its default */
+} htvm_option_info;
+
+/* Options have the numbers 0 to htvm_encoder_option_count() - 1, which may be others in another version.
+ * HTVM_BAD_INPUT: no such option or profile, or info is NULL. */
+uint32_t htvm_encoder_option_count(void);
+htvm_status htvm_encoder_option(uint32_t option, uint32_t profile, htvm_option_info* info, size_t info_size);
+/* NULL where there is no such word. */
+const char* htvm_encoder_option_word(uint32_t option, uint32_t word);
 
 /* A frame to code. Attributes are NULL where the mesh has none. Nothing is assumed of the triangles but that their
  * indices are below `vertices`. */
@@ -317,8 +347,7 @@ typedef struct htvm_pose {
     const uint8_t* tracked;     /* one a joint, 0: the position is a guess; NULL: all tracked */
 } htvm_pose;
 
-/* Set the first struct_size bytes to the defaults: of options, those above; of the others, all 0. */
-htvm_status htvm_encoder_options_init(htvm_encoder_options* options, size_t struct_size);
+/* Set the first struct_size bytes to 0, but for struct_size itself. */
 htvm_status htvm_skeleton_init(htvm_skeleton* skeleton, size_t struct_size);
 htvm_status htvm_mesh_init(htvm_mesh* mesh, size_t struct_size);
 htvm_status htvm_pose_init(htvm_pose* pose, size_t struct_size);
@@ -327,9 +356,9 @@ htvm_status htvm_pose_init(htvm_pose* pose, size_t struct_size);
  * outside of 0..100 counts as the nearer end. Either pointer may be NULL. */
 void htvm_quality_steps(double quality, double* geometry_step, double* colour_step);
 
-/* Makes an encoder. options: NULL for the defaults. *encoder is set to NULL unless the status is HTVM_OK:
- * HTVM_BAD_INPUT (an option out of its range or at odds with another; text, where not NULL, is set to a
- * sentence about it of up to text_capacity characters, the closing 0 included), HTVM_UNSUPPORTED, HTVM_OUT_OF_MEMORY.
+/* Makes an encoder. options: NULL for the defaults of the tracked profile; they are copied. *encoder is set to NULL
+ * unless the status is HTVM_OK: HTVM_BAD_INPUT (options at odds with each other or with the skeleton; text, where not
+ * NULL, is set to a sentence about it of up to text_capacity characters, the closing 0 included), HTVM_OUT_OF_MEMORY.
  */
 htvm_status htvm_encoder_create(const htvm_encoder_options* options, htvm_encoder** encoder, char* text,
                                 size_t text_capacity);

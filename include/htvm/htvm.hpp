@@ -8,6 +8,7 @@
 #include "htvm/intra_coder.hpp"      // IWYU pragma: export
 #include "htvm/lattice_mesh.hpp"     // IWYU pragma: export
 #include "htvm/mesh.hpp"             // IWYU pragma: export
+#include "htvm/option_list.hpp"      // IWYU pragma: export
 #include "htvm/packet.hpp"           // IWYU pragma: export
 #include "htvm/result.hpp"           // IWYU pragma: export
 #include "htvm/skeleton.hpp"         // IWYU pragma: export

@@ -1,11 +1,13 @@
 // The encoder's part of the C interface, over htvm::Encoder.
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "c_api/c_status.h"
 #include "htvm/encoder.hpp"
+#include "htvm/option_list.hpp"
 
 using htvm::c_api::check_struct;
 using htvm::c_api::guarded;
@@ -28,78 +30,47 @@ struct htvm_encoder {
           encoder(std::move(made)) {}
 };
 
+struct htvm_encoder_options {
+    htvm_allocator allocator;
+    htvm::EncoderOptions options;
+    LastError error;
+
+    htvm_encoder_options(const htvm_allocator& memory, htvm::Profile profile)
+        : allocator(memory), options(htvm::default_options(profile)) {}
+};
+
 namespace {
 
-htvm_encoder_options default_options() {
-    const auto cpp = htvm::default_options(htvm::Profile::topology);
-    htvm_encoder_options out{};
-    out.struct_size = sizeof out;
-    out.threads = cpp.threads;
-    out.geometry_step = cpp.geometry_step;
-    out.colour_step = cpp.colour_step;
-    out.lambda = cpp.lambda;
-    out.key_interval = cpp.key_interval;
-    out.least_key_interval = cpp.least_key_interval;
-    out.scene_changes = cpp.topology.scene_changes;
-    out.frame_choice = static_cast<std::uint32_t>(cpp.topology.frame_choice);
-    out.tracked = cpp.profile == htvm::Profile::tracked;
-    out.tracked_from_intra = cpp.tracked.references == htvm::TrackedReferences::intra;
-    out.simplify = cpp.tracked.simplify;
-    out.node_spacing = cpp.tracked.node_spacing;
-    out.predicted_below = cpp.topology.predicted_below;
-    out.intra_above = cpp.topology.intra_above;
-    out.still_below = cpp.topology.still_below;
-    out.animation_error = cpp.topology.animation_error;
-    out.bits_per_second = cpp.rate.bits_per_second;
-    out.buffer_seconds = cpp.rate.buffer_seconds;
-    out.target_error = cpp.rate.target_error;
-    out.merge_duplicates = cpp.topology.merge_duplicates;
-    out.nearest_vertices = cpp.topology.nearest_vertices;
-    out.reference_any = cpp.topology.reference_vertices == htvm::ReferenceVertices::any;
-    out.point_to_plane = cpp.topology.point_to_plane;
-    out.weight_width = cpp.topology.weight_width;
-    out.lattice_bits = cpp.lattice_bits;
-    out.unit_micrometres = cpp.unit_micrometres;
-    out.fps_numerator = cpp.fps_numerator;
-    out.fps_denominator = cpp.fps_denominator;
-    return out;
+constexpr auto number_of_profiles = std::uint32_t{HTVM_PROFILE_PAPER} + 1;
+static_assert(HTVM_PROFILE_TRACKED == static_cast<int>(htvm::Profile::tracked) &&
+              HTVM_PROFILE_TOPOLOGY == static_cast<int>(htvm::Profile::topology) &&
+              HTVM_PROFILE_PAPER == static_cast<int>(htvm::Profile::paper));
+static_assert(HTVM_OPTION_NUMBER == static_cast<int>(htvm::OptionKind::number) &&
+              HTVM_OPTION_WHOLE_NUMBER == static_cast<int>(htvm::OptionKind::whole_number) &&
+              HTVM_OPTION_SWITCH == static_cast<int>(htvm::OptionKind::on_or_off) &&
+              HTVM_OPTION_WORD == static_cast<int>(htvm::OptionKind::word));
+
+// The value is text or a number.
+template <class Value>
+htvm_status set_option(htvm_encoder_options* options, const char* name, Value value) {
+    if (!options) return HTVM_BAD_INPUT;
+    return guarded(options->error, [&] {
+        if (!name) return options->error.set(HTVM_BAD_INPUT, "the option's name is NULL");
+        const auto set = htvm::set_option(options->options, name, value);
+        return set ? htvm_status{HTVM_OK} : options->error.set(set.error());
+    });
 }
 
-// All but the skeleton. frame_choice is within its range.
-htvm::EncoderOptions cpp_options(const htvm_encoder_options& options) {
-    htvm::EncoderOptions out;
-    out.threads = options.threads;
-    out.runner = htvm::c_api::task_runner(options.run_tasks, options.run_tasks_user);
-    out.geometry_step = options.geometry_step;
-    out.colour_step = options.colour_step;
-    out.lambda = options.lambda;
-    out.key_interval = options.key_interval;
-    out.least_key_interval = options.least_key_interval;
-    out.topology.scene_changes = options.scene_changes != 0;
-    out.topology.frame_choice = static_cast<htvm::FrameChoice>(options.frame_choice);
-    out.profile = options.tracked != 0 ? htvm::Profile::tracked : htvm::Profile::topology;
-    out.tracked.references =
-        options.tracked_from_intra != 0 ? htvm::TrackedReferences::intra : htvm::TrackedReferences::previous;
-    out.tracked.simplify = options.simplify;
-    out.tracked.node_spacing = options.node_spacing;
-    out.topology.predicted_below = options.predicted_below;
-    out.topology.intra_above = options.intra_above;
-    out.topology.still_below = options.still_below;
-    out.topology.animation_error = options.animation_error;
-    out.rate.bits_per_second = options.bits_per_second;
-    out.rate.buffer_seconds = options.buffer_seconds;
-    out.rate.target_error = options.target_error;
-    out.topology.merge_duplicates = options.merge_duplicates != 0;
-    out.topology.nearest_vertices = options.nearest_vertices;
-    out.topology.reference_vertices =
-        options.reference_any != 0 ? htvm::ReferenceVertices::any : htvm::ReferenceVertices::bone;
-    out.topology.point_to_plane = options.point_to_plane != 0;
-    out.topology.weight_width = options.weight_width;
-    out.lattice_bits = options.lattice_bits;
-    out.unit_micrometres = options.unit_micrometres;
-    out.fps_numerator = options.fps_numerator;
-    out.fps_denominator = options.fps_denominator;
-    return out;
+// Calls take(), which gives a status, with the option and its value.
+template <class Take>
+htvm_status get_option(htvm_encoder_options* options, const char* name, const Take& take) {
+    if (!options) return HTVM_BAD_INPUT;
+    return guarded(options->error, [&] {
+        if (!name) return options->error.set(HTVM_BAD_INPUT, "the option's name is NULL");
+        const auto* option = htvm::find_option(name);
+        if (!option) return options->error.set(htvm::no_such_option(name));
+        return take(*option, option->get(options->options));
+    });
 }
 
 htvm_status read_skeleton(LastError& error, const htvm_skeleton& given, htvm::EncoderOptions& options) {
@@ -158,30 +129,121 @@ htvm_status read_pose(htvm_encoder& encoder, const htvm_pose& given, htvm::Pose&
     return HTVM_OK;
 }
 
-htvm_status create(LastError& error, const htvm_encoder_options* options, htvm_encoder** encoder) {
-    auto all = default_options();
-    if (options) {
-        const auto read = check_struct(error, read_struct(options, all), "htvm_encoder_options");
-        if (read != HTVM_OK) return read;
-    }
-    if (!htvm::c_api::complete(all.allocator))
-        return error.set(HTVM_BAD_INPUT, "htvm_allocator has one of its functions and not the other");
-    if (all.frame_choice > HTVM_CHOICE_RATE_DISTORTION)
-        return error.set(HTVM_BAD_INPUT, "htvm_encoder_options.frame_choice is none of HTVM_CHOICE_...");
-    auto cpp = cpp_options(all);
-    if (all.skeleton)
-        if (const auto read = read_skeleton(error, *all.skeleton, cpp); read != HTVM_OK) return read;
-    auto made = htvm::Encoder::create(cpp);
+htvm_status create(LastError& error, const htvm_encoder_options& options, htvm_encoder** encoder) {
+    auto made = htvm::Encoder::create(options.options);
     if (!made) return error.set(made.error());
-    *encoder = htvm::c_api::make_handle<htvm_encoder>(all.allocator, all.allocator, cpp.skeleton, std::move(*made));
+    *encoder = htvm::c_api::make_handle<htvm_encoder>(options.allocator, options.allocator, options.options.skeleton,
+                                                      std::move(*made));
     return *encoder ? htvm_status{HTVM_OK} : error.set(HTVM_OUT_OF_MEMORY, "there is no memory for an encoder");
+}
+
+htvm_status create_with_defaults(LastError& error, htvm_encoder** encoder) {
+    htvm_allocator memory{};
+    htvm::c_api::complete(memory);
+    return create(error, htvm_encoder_options(memory, htvm::Profile::tracked), encoder);
 }
 
 }  // namespace
 
-htvm_status htvm_encoder_options_init(htvm_encoder_options* options, size_t struct_size) {
-    return htvm::c_api::init_struct(default_options(), options, struct_size);
+htvm_status htvm_encoder_options_create(uint32_t profile, const htvm_allocator* allocator,
+                                        htvm_encoder_options** options) {
+    if (!options) return HTVM_BAD_INPUT;
+    *options = nullptr;
+    htvm_allocator memory = allocator ? *allocator : htvm_allocator{};
+    if (profile >= number_of_profiles || !htvm::c_api::complete(memory)) return HTVM_BAD_INPUT;
+    LastError unused;  // there is no handle yet to keep it in
+    return guarded(unused, [&] {
+        *options = htvm::c_api::make_handle<htvm_encoder_options>(memory, memory, static_cast<htvm::Profile>(profile));
+        return htvm_status{*options ? HTVM_OK : HTVM_OUT_OF_MEMORY};
+    });
 }
+
+void htvm_encoder_options_destroy(htvm_encoder_options* options) {
+    if (options) htvm::c_api::destroy_handle(options, options->allocator);
+}
+
+const char* htvm_encoder_options_last_error(const htvm_encoder_options* options) {
+    return options ? options->error.text.data() : "";
+}
+
+htvm_status htvm_encoder_options_set(htvm_encoder_options* options, const char* name, const char* value) {
+    if (options && !value) return options->error.set(HTVM_BAD_INPUT, "the option's value is NULL");
+    return set_option(options, name, std::string_view(value ? value : ""));
+}
+
+htvm_status htvm_encoder_options_set_number(htvm_encoder_options* options, const char* name, double value) {
+    return set_option(options, name, value);
+}
+
+htvm_status htvm_encoder_options_get(htvm_encoder_options* options, const char* name, char* value, size_t capacity) {
+    return get_option(options, name, [&](const htvm::Option& option, double number) {
+        const auto text = htvm::value_text(option, number);
+        if (capacity <= text.size()) return options->error.set(HTVM_BUFFER_TOO_SMALL, "the value is longer");
+        if (!value) return options->error.set(HTVM_BAD_INPUT, "the array for the value is NULL");
+        std::memcpy(value, text.c_str(), text.size() + 1);
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_encoder_options_get_number(htvm_encoder_options* options, const char* name, double* value) {
+    return get_option(options, name, [&](const htvm::Option&, double number) {
+        if (!value) return options->error.set(HTVM_BAD_INPUT, "the place for the value is NULL");
+        *value = number;
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_encoder_options_set_skeleton(htvm_encoder_options* options, const htvm_skeleton* skeleton) {
+    if (!options) return HTVM_BAD_INPUT;
+    return guarded(options->error, [&] {
+        htvm::EncoderOptions read;
+        if (skeleton)
+            if (const auto status = read_skeleton(options->error, *skeleton, read); status != HTVM_OK) return status;
+        options->options.skeleton = std::move(read.skeleton);
+        options->options.radii = std::move(read.radii);
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_encoder_options_set_run_tasks(htvm_encoder_options* options, htvm_run_tasks run_tasks, void* user) {
+    if (!options) return HTVM_BAD_INPUT;
+    return guarded(options->error, [&] {
+        options->options.runner = htvm::c_api::task_runner(run_tasks, user);
+        return htvm_status{HTVM_OK};
+    });
+}
+
+uint32_t htvm_encoder_option_count() { return static_cast<std::uint32_t>(htvm::option_list().size()); }
+
+htvm_status htvm_encoder_option(uint32_t option, uint32_t profile, htvm_option_info* info, size_t info_size) {
+    const auto list = htvm::option_list();
+    if (option >= list.size() || profile >= number_of_profiles) return HTVM_BAD_INPUT;
+    const auto& row = list[option];
+    LastError unused;
+    return guarded(unused, [&] {
+        const auto asked = static_cast<htvm::Profile>(profile);
+        const bool number = row.kind == htvm::OptionKind::number || row.kind == htvm::OptionKind::whole_number;
+        htvm_option_info out{};
+        out.kind = static_cast<std::uint32_t>(row.kind);
+        out.name = row.name;
+        out.group = htvm::group_name(row.group);
+        out.unit = row.unit;
+        out.meaning = row.meaning;
+        out.zero = row.zero;
+        out.words = static_cast<std::uint32_t>(row.words.size());
+        out.least = number ? row.least : 0;
+        out.most = number ? row.most : row.words.empty() ? 1 : out.words - 1;
+        out.default_value = row.get(htvm::default_options(asked));
+        out.serves = htvm::serves(row.group, asked);
+        return htvm::c_api::write_struct(out, info, info_size);
+    });
+}
+
+const char* htvm_encoder_option_word(uint32_t option, uint32_t word) {
+    const auto list = htvm::option_list();
+    return option < list.size() && word < list[option].words.size() ? list[option].words[word] : nullptr;
+}
+
 htvm_status htvm_skeleton_init(htvm_skeleton* skeleton, size_t struct_size) {
     return htvm::c_api::init_struct(htvm_skeleton{}, skeleton, struct_size);
 }
@@ -203,7 +265,8 @@ htvm_status htvm_encoder_create(const htvm_encoder_options* options, htvm_encode
     if (!encoder) return HTVM_BAD_INPUT;
     *encoder = nullptr;
     LastError error;  // there is no handle yet to keep it in
-    const auto status = guarded(error, [&] { return create(error, options, encoder); });
+    const auto status = guarded(
+        error, [&] { return options ? create(error, *options, encoder) : create_with_defaults(error, encoder); });
     if (text && text_capacity > 0) {
         const std::size_t length = std::min(std::strlen(error.text.data()), text_capacity - 1);
         std::memcpy(text, error.text.data(), length);

@@ -23,7 +23,7 @@ std::int32_t step_for_reference(double edge, std::int32_t step) {
 
 RegistrationOptions registration_options(const State& state) {
     RegistrationOptions out;
-    out.point_to_plane = state.options.topology.point_to_plane;
+    out.point_to_plane = state.options.topology.registration == BoneRegistration::plane;
     if (!out.point_to_plane) {  // slower to settle
         out.iterations = 16;
         out.samples = 500;

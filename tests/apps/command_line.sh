@@ -2,6 +2,7 @@
 # The command line from end to end on a small synthetic capture: what it writes, what it says, how it exits.
 set -u
 htvm=$1
+project=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -29,7 +30,11 @@ expect 2 "add --profile topology" "$htvm" encode capture --keep-duplicates -o b.
 expect 2 "add --profile tracked" "$htvm" encode capture --profile paper --simplify 0 -o b.htvm
 expect 2 "choose one" "$htvm" encode capture --json -o -
 expect 2 "choose one" "$htvm" decode a.htvm --json -o -
-expect 2 "is not a number" "$htvm" encode capture --geometry-step nan -o b.htvm
+expect 2 "--geometry-step must be 2^-16 to 1000 mm, not 'nan'" "$htvm" encode capture --geometry-step nan -o b.htvm
+expect 2 "--bitrate must be 0, or 0.001 to 1000000 Mbit/s, not 0.0001" "$htvm" encode capture --bitrate 0.0001 -o b.htvm
+expect 2 "--reference must be bone or any, not 'every'" "$htvm" encode capture --profile paper --reference every -o b.htvm
+expect 2 "--predicted-below does nothing unless --decide is motion" "$htvm" encode capture --profile paper --predicted-below 5 -o b.htvm
+expect 2 "--min-keyint, 5 frames, is above --keyint, 4" "$htvm" encode capture --keyint 4 --min-keyint 5 -o b.htvm
 expect 2 "is less than 0" "$htvm" encode capture --frames -1 -o b.htvm
 expect 2 "--max-memory" "$htvm" decode a.htvm -M -1 -o unlimited
 expect 5 "raise --max-packet" "$htvm" decode a.htvm --max-packet 10 -o nothing
@@ -66,6 +71,21 @@ expect 2 "excludes" "$htvm" encode capture --bitrate 2 -q 50 -o rate.htvm
 expect 2 "excludes" "$htvm" encode capture --bitrate 2 --target-error 1 -o rate.htvm
 expect 2 "--bitrate" "$htvm" encode capture --passes 2 -o rate.htvm
 expect 0 "target error 1 mm" "$htvm" encode capture --target-error 1 -o error.htvm
+
+# Every option of the list that has a flag is in the help, and does what its name in the library says.
+for flag in $("$htvm" encode --help-options | grep -oE '^\| `[a-z_.]+` \| `--[a-z-]+' | grep -oE -- '--[a-z-]+'); do
+    expect 0 "$flag" "$htvm" encode --help
+done
+"$htvm" encode --help-options | cmp - "$project/docs/options.md" ||
+    { echo "FAILED: docs/options.md is not what 'htvm encode --help-options' prints"; failures=$((failures + 1)); }
+"$htvm" encode capture --profile paper -s capture/skeleton.json -o paper.htvm 2>/dev/null
+"$htvm" encode capture --profile topology --reference bone --registration point --weights 0 -s capture/skeleton.json -o alike.htvm 2>/dev/null
+cmp -s paper.htvm alike.htvm || { echo "FAILED: the paper's profile is not topology with its three choices"; failures=$((failures + 1)); }
+"$htvm" encode capture -o usual.htvm 2>/dev/null
+"$htvm" encode capture --simplify 0.4 --node-spacing 80 --tracked-from previous --keyint 30 --lambda 0.12 -o said.htvm 2>/dev/null
+cmp -s usual.htvm said.htvm || { echo "FAILED: options at their defaults change the bytes"; failures=$((failures + 1)); }
+"$htvm" encode capture --tracked-from intra -o intra.htvm 2>/dev/null
+cmp -s usual.htvm intra.htvm && { echo "FAILED: --tracked-from changes nothing"; failures=$((failures + 1)); }
 
 # Limits: what is beyond them is refused, with the option's name.
 expect 5 "max_memory" "$htvm" decode a.htvm -o limited -M 1M

@@ -3,12 +3,13 @@
 
 #include <cstddef>
 #include <cstring>
-#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "c_api/c_test_streams.h"
+#include "htvm/option_list.hpp"
 
 namespace htvm {
 namespace {
@@ -16,18 +17,19 @@ namespace {
 using namespace test;
 
 using Handle = std::unique_ptr<htvm_encoder, decltype(&htvm_encoder_destroy)>;
+using Options = std::unique_ptr<htvm_encoder_options, decltype(&htvm_encoder_options_destroy)>;
+
+Options make_options(std::uint32_t profile = HTVM_PROFILE_TRACKED, const htvm_allocator* allocator = nullptr) {
+    htvm_encoder_options* options = nullptr;
+    EXPECT_EQ(htvm_encoder_options_create(profile, allocator, &options), HTVM_OK);
+    return {options, htvm_encoder_options_destroy};
+}
 
 Handle make_encoder(const htvm_encoder_options* options = nullptr) {
     htvm_encoder* encoder = nullptr;
     char text[200] = "";
     EXPECT_EQ(htvm_encoder_create(options, &encoder, text, sizeof text), HTVM_OK) << text;
     return {encoder, htvm_encoder_destroy};
-}
-
-htvm_encoder_options default_options() {
-    htvm_encoder_options options;
-    EXPECT_EQ(htvm_encoder_options_init(&options, sizeof options), HTVM_OK);
-    return options;
 }
 
 // The mesh as the C interface takes it; it refers to the mesh's arrays.
@@ -86,10 +88,12 @@ htvm_status receive_all(htvm_encoder* encoder, std::vector<std::uint8_t>& out) {
     }
 }
 
-std::vector<std::uint8_t> bytes_of(const TestSequence& sequence, htvm_encoder_options options) {
+std::vector<std::uint8_t> bytes_of(const TestSequence& sequence, const Options& options) {
     const CSkeleton skeleton(sequence.skeleton);
-    if (!sequence.skeleton.bones.empty()) options.skeleton = &skeleton.skeleton;
-    const auto encoder = make_encoder(&options);
+    if (!sequence.skeleton.bones.empty()) {
+        EXPECT_EQ(htvm_encoder_options_set_skeleton(options.get(), &skeleton.skeleton), HTVM_OK);
+    }
+    const auto encoder = make_encoder(options.get());
     std::vector<std::uint8_t> out;
     std::int64_t time = -40000;
     for (const auto& frame : sequence.frames) {
@@ -106,74 +110,111 @@ std::vector<std::uint8_t> bytes_of(const TestSequence& sequence, htvm_encoder_op
 
 TEST(CEncoder, GivesTheBytesOfTheCppEncoder) {
     for (const auto& sequence : {synthetic(true, 4, 300), sequence_of(tfan_test::grid(6, 6), 4, all)})
-        EXPECT_EQ(bytes_of(sequence, default_options()), encode(sequence, {}).bytes) << sequence.name;
+        EXPECT_EQ(bytes_of(sequence, make_options()), encode(sequence, {}).bytes) << sequence.name;
 }
 
-TEST(CEncoder, EveryOptionReachesTheCppEncoder) {
-    EncoderOptions cpp = default_options(Profile::topology);
-    auto options = default_options();
-    cpp.geometry_step = options.geometry_step = 5;
-    cpp.colour_step = options.colour_step = 9;
-    cpp.lambda = options.lambda = 0.3;
-    cpp.key_interval = options.key_interval = 3;
-    cpp.least_key_interval = options.least_key_interval = 2;
-    cpp.topology.scene_changes = false;
-    options.scene_changes = 0;
-    cpp.topology.frame_choice = FrameChoice::motion;
-    options.frame_choice = HTVM_CHOICE_MOTION;
-    cpp.topology.predicted_below = options.predicted_below = 30;
-    cpp.topology.intra_above = options.intra_above = 3000;
-    cpp.topology.still_below = options.still_below = 20;
-    cpp.topology.animation_error = options.animation_error = 6;
-    cpp.topology.merge_duplicates = false;
-    options.merge_duplicates = 0;
-    cpp.topology.nearest_vertices = options.nearest_vertices = 5;
-    cpp.topology.reference_vertices = ReferenceVertices::bone;
-    options.reference_any = 0;
-    cpp.topology.point_to_plane = false;
-    options.point_to_plane = 0;
-    cpp.topology.weight_width = options.weight_width = 10;
-    cpp.lattice_bits = options.lattice_bits = 6;
-    cpp.unit_micrometres = options.unit_micrometres = 10000;
-    cpp.fps_numerator = options.fps_numerator = 25;
-    cpp.fps_denominator = options.fps_denominator = 2;
-    cpp.threads = options.threads = 2;
-    const auto person = synthetic(true, 6, 300);
-    EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
+TEST(CEncoder, OptionsGiveTheBytesOfTheCppEncoder) {
+    struct Case {
+        Profile profile;
+        std::vector<std::pair<const char*, const char*>> changed;
+    };
+    const auto person = synthetic(true, 5, 300);
+    for (const auto& [profile, changed] :
+         std::vector<Case>{{Profile::paper, {}},
+                           {Profile::topology,
+                            {{"key_interval", "3"},
+                             {"topology.frame_choice", "motion"},
+                             {"topology.predicted_below", "30"},
+                             {"topology.merge_duplicates", "off"}}},
+                           {Profile::tracked, {{"tracked.references", "intra"}, {"tracked.simplify", "0.2"}}},
+                           {Profile::tracked, {{"rate.bits_per_second", "4e6"}, {"rate.buffer_seconds", "0.5"}}}}) {
+        const auto options = make_options(static_cast<std::uint32_t>(profile));
+        auto cpp = default_options(profile);
+        for (const auto& [name, value] : changed) {
+            EXPECT_EQ(htvm_encoder_options_set(options.get(), name, value), HTVM_OK)
+                << htvm_encoder_options_last_error(options.get());
+            ASSERT_TRUE(set_option(cpp, name, value));
+        }
+        EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes) << profile_name(profile);
+    }
+}
 
-    cpp = default_options(Profile::topology);
-    options = default_options();
-    cpp.profile = Profile::tracked;
-    options.tracked = 1;
-    cpp.tracked.references = TrackedReferences::intra;
-    options.tracked_from_intra = 1;
-    cpp.tracked.simplify = options.simplify = 0.2;
-    cpp.tracked.node_spacing = options.node_spacing = 120;
-    EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
+// The list of options as C has it is the C++ one, and each can be set and read by text and by number.
+TEST(CEncoder, EveryOptionOfTheListCanBeAskedForSetAndRead) {
+    ASSERT_EQ(htvm_encoder_option_count(), option_list().size());
+    for (const auto profile : {Profile::tracked, Profile::topology, Profile::paper}) {
+        const auto number = static_cast<std::uint32_t>(profile);
+        const auto options = make_options(number);
+        for (std::uint32_t i = 0; i < htvm_encoder_option_count(); ++i) {
+            const auto& row = option_list()[i];
+            htvm_option_info info;
+            ASSERT_EQ(htvm_encoder_option(i, number, &info, sizeof info), HTVM_OK);
+            EXPECT_EQ(info.struct_size, sizeof info);
+            EXPECT_STREQ(info.name, row.name);
+            EXPECT_STREQ(info.group, group_name(row.group));
+            EXPECT_STREQ(info.unit, row.unit);
+            EXPECT_STREQ(info.meaning, row.meaning);
+            EXPECT_STREQ(info.zero, row.zero);
+            EXPECT_EQ(info.serves != 0, serves(row.group, profile));
+            EXPECT_EQ(info.default_value, row.get(default_options(profile))) << row.name;
+            for (std::uint32_t w = 0; w < info.words; ++w)
+                EXPECT_STREQ(htvm_encoder_option_word(i, w), row.words[w]) << row.name;
+            EXPECT_EQ(htvm_encoder_option_word(i, info.words), nullptr);
+            double value = -1;
+            EXPECT_EQ(htvm_encoder_options_get_number(options.get(), row.name, &value), HTVM_OK);
+            EXPECT_EQ(value, info.default_value) << row.name;
+            for (const double end : {info.most, info.least}) {
+                EXPECT_EQ(htvm_encoder_options_set_number(options.get(), row.name, end), HTVM_OK) << row.name;
+                char text[32] = "";
+                EXPECT_EQ(htvm_encoder_options_get(options.get(), row.name, text, sizeof text), HTVM_OK);
+                EXPECT_EQ(text, value_text(row, end));
+                EXPECT_EQ(htvm_encoder_options_get_number(options.get(), row.name, &value), HTVM_OK);
+                EXPECT_EQ(value, end) << row.name;
+                EXPECT_EQ(htvm_encoder_options_set_number(options.get(), row.name, info.most + 1), HTVM_BAD_INPUT);
+            }
+        }
+    }
+}
 
-    cpp = default_options(Profile::topology);
-    options = default_options();
-    cpp.rate.bits_per_second = options.bits_per_second = 4e6;
-    cpp.rate.buffer_seconds = options.buffer_seconds = 0.5;
-    EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
-
-    cpp = default_options(Profile::topology);
-    options = default_options();
-    cpp.rate.target_error = options.target_error = 1.5;
-    EXPECT_EQ(bytes_of(person, options), encode(person, cpp).bytes);
+TEST(CEncoder, SaysWhatIsWrongWithAnOption) {
+    const auto options = make_options();
+    const auto said = [&](const char* name, const char* value) {
+        EXPECT_EQ(htvm_encoder_options_set(options.get(), name, value), HTVM_BAD_INPUT);
+        return std::string(htvm_encoder_options_last_error(options.get()));
+    };
+    EXPECT_EQ(said("keyinterval", "4"), "there is no option 'keyinterval'; the nearest is 'key_interval'");
+    EXPECT_EQ(said("key_interval", "often"), "key_interval must be 1 to 1000000 frames, not 'often'");
+    EXPECT_NE(said(nullptr, "4"), "");
+    EXPECT_NE(said("key_interval", nullptr), "");
+    char text[4] = "abc";
+    EXPECT_EQ(htvm_encoder_options_get(options.get(), "tracked.references", text, sizeof text), HTVM_BUFFER_TOO_SMALL);
+    EXPECT_STREQ(text, "abc");
+    EXPECT_EQ(htvm_encoder_options_get(options.get(), "tracked.references", nullptr, 100), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_get(options.get(), "nothing", text, sizeof text), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_get_number(options.get(), "lambda", nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_get_number(options.get(), nullptr, nullptr), HTVM_BAD_INPUT);
+    htvm_encoder_options* none = nullptr;
+    EXPECT_EQ(htvm_encoder_options_create(3, nullptr, &none), HTVM_BAD_INPUT);
+    EXPECT_EQ(none, nullptr);
+    EXPECT_EQ(htvm_encoder_options_create(0, nullptr, nullptr), HTVM_BAD_INPUT);
+    htvm_option_info info;
+    EXPECT_EQ(htvm_encoder_option(htvm_encoder_option_count(), 0, &info, sizeof info), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_option(0, 3, &info, sizeof info), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_option(0, 0, nullptr, sizeof info), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_option_word(0, 0), nullptr) << "a number has no words";
 }
 
 TEST(CEncoder, RunsItsTasksOnTheCallersThreads) {
     const auto person = synthetic(true, 3, 300);
-    auto options = default_options();
-    options.threads = 3;
+    const auto options = make_options();
+    EXPECT_EQ(htvm_encoder_options_set(options.get(), "threads", "3"), HTVM_OK);
     const auto expected = bytes_of(person, options);
     std::size_t calls = 0;
-    options.run_tasks_user = &calls;
-    options.run_tasks = [](void* user, size_t tasks, void (*task)(void*, size_t), void* context) {
+    const auto run_tasks = [](void* user, size_t tasks, void (*task)(void*, size_t), void* context) {
         ++*static_cast<std::size_t*>(user);
         for (std::size_t t = tasks; t-- > 0;) task(context, t);
     };
+    EXPECT_EQ(htvm_encoder_options_set_run_tasks(options.get(), run_tasks, &calls), HTVM_OK);
     EXPECT_EQ(bytes_of(person, options), expected);
     EXPECT_GT(calls, 0u);
 }
@@ -215,55 +256,54 @@ TEST(CEncoder, APacketStaysUntilItsBufferIsLargeEnough) {
     EXPECT_TRUE(reader.pull().has_value());
 }
 
-TEST(CEncoder, WrongOptionsAreToldInASentence) {
+TEST(CEncoder, OptionsThatDoNotGoTogetherAreToldInASentence) {
     htvm_encoder* encoder = nullptr;
+    const auto options = make_options();
+    ASSERT_EQ(htvm_encoder_options_set(options.get(), "topology.frame_choice", "rd"), HTVM_OK);
     char text[300] = "";
-    const auto told = [&](const htvm_encoder_options& options) {
-        text[0] = '\0';
-        EXPECT_EQ(htvm_encoder_create(&options, &encoder, text, sizeof text), HTVM_BAD_INPUT);
-        EXPECT_EQ(encoder, nullptr);
-        return std::strlen(text) > 10;
-    };
-    auto options = default_options();
-    options.geometry_step = std::numeric_limits<double>::quiet_NaN();
-    EXPECT_TRUE(told(options));
-    options = default_options();
-    options.nearest_vertices = 65;
-    EXPECT_TRUE(told(options));
-    options = default_options();
-    options.frame_choice = 3;
-    EXPECT_TRUE(told(options));
-    options = default_options();
-    options.allocator.allocate = CountingMemory::allocate;
-    EXPECT_TRUE(told(options));
-    options = default_options();
+    EXPECT_EQ(htvm_encoder_create(options.get(), &encoder, text, sizeof text), HTVM_BAD_INPUT);
+    EXPECT_EQ(encoder, nullptr);
+    EXPECT_STREQ(text, "topology.frame_choice does nothing with the tracked profile; choose the topology profile");
+    EXPECT_EQ(htvm_encoder_create(options.get(), &encoder, text, 4), HTVM_BAD_INPUT);
+    EXPECT_STREQ(text, "top") << "cut to the caller's array";
+    EXPECT_EQ(htvm_encoder_create(options.get(), &encoder, nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_create(nullptr, nullptr, nullptr, 0), HTVM_BAD_INPUT);
+}
+
+TEST(CEncoder, WrongSkeletonsAreToldInASentence) {
+    const auto options = make_options();
     htvm_skeleton skeleton{};
-    options.skeleton = &skeleton;
-    EXPECT_TRUE(told(options)) << "no htvm_skeleton_init()";
+    const auto refused = [&] {
+        EXPECT_EQ(htvm_encoder_options_set_skeleton(options.get(), &skeleton), HTVM_BAD_INPUT);
+        return std::strlen(htvm_encoder_options_last_error(options.get())) > 10;
+    };
+    EXPECT_TRUE(refused()) << "no htvm_skeleton_init()";
     htvm_skeleton_init(&skeleton, sizeof skeleton);
     skeleton.bones = 1;
-    EXPECT_TRUE(told(options)) << "no joints of the bones";
+    EXPECT_TRUE(refused()) << "no joints of the bones";
+    skeleton.struct_size = offsetof(htvm_skeleton, bone_joints) + sizeof(void*) / 2;
+    EXPECT_TRUE(refused()) << "a size that cuts the pointer in half";
+    skeleton.struct_size = sizeof skeleton;
+    skeleton.joints = 0xFFFFFFFF;
+    EXPECT_TRUE(refused());
+    skeleton.joints = 0;
     const std::uint16_t joints[] = {0, 5};
     skeleton.bone_joints = joints;
-    EXPECT_TRUE(told(options)) << "joints that are not there";
-    skeleton.joints = 0xFFFFFFFF;
-    EXPECT_TRUE(told(options));
-    options.struct_size = offsetof(htvm_encoder_options, skeleton) + sizeof(void*) / 2;
-    EXPECT_TRUE(told(options)) << "a size that cuts the pointer in half";
-    options.struct_size = 0;
-    EXPECT_TRUE(told(options));
-    EXPECT_EQ(htvm_encoder_create(&options, &encoder, text, 4), HTVM_BAD_INPUT);
-    EXPECT_EQ(std::strlen(text), 3u) << "cut to the caller's array";
-    EXPECT_EQ(htvm_encoder_create(&options, &encoder, nullptr, 0), HTVM_BAD_INPUT);
-    EXPECT_EQ(htvm_encoder_create(nullptr, nullptr, nullptr, 0), HTVM_BAD_INPUT);
+    ASSERT_EQ(htvm_encoder_options_set_skeleton(options.get(), &skeleton), HTVM_OK);
+    htvm_encoder* encoder = nullptr;
+    char text[300] = "";
+    EXPECT_EQ(htvm_encoder_create(options.get(), &encoder, text, sizeof text), HTVM_BAD_INPUT);
+    EXPECT_NE(std::string(text).find("joint"), std::string::npos) << "joints that are not there";
+    ASSERT_EQ(htvm_encoder_options_set_skeleton(options.get(), nullptr), HTVM_OK);
+    make_encoder(options.get());
 }
 
 TEST(CEncoder, WrongMeshesAndPosesAreErrorsAndTheNextFrameIsFine) {
     const auto person = synthetic(true, 1, 300).frames[0];
     const CSkeleton skeleton(synth_skeleton());
-    auto options = default_options();
-    options.skeleton = &skeleton.skeleton;
-    const auto encoder = make_encoder(&options);
+    const auto options = make_options();
+    ASSERT_EQ(htvm_encoder_options_set_skeleton(options.get(), &skeleton.skeleton), HTVM_OK);
+    const auto encoder = make_encoder(options.get());
     const auto good = c_mesh(person.mesh);
     const auto pose = c_pose(*person.pose);
     EXPECT_EQ(htvm_encoder_send_mesh(encoder.get(), nullptr, &pose, 0, 0), HTVM_BAD_INPUT);
@@ -305,6 +345,14 @@ TEST(CEncoder, SurvivesNullHandles) {
     EXPECT_EQ(htvm_encoder_last_frame(nullptr, nullptr, 0), HTVM_BAD_INPUT);
     EXPECT_STREQ(htvm_encoder_last_error(nullptr), "");
     htvm_encoder_destroy(nullptr);
+    EXPECT_EQ(htvm_encoder_options_set(nullptr, "lambda", "1"), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_set_number(nullptr, "lambda", 1), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_get(nullptr, "lambda", nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_get_number(nullptr, "lambda", nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_set_skeleton(nullptr, nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_options_set_run_tasks(nullptr, nullptr, nullptr), HTVM_BAD_INPUT);
+    EXPECT_STREQ(htvm_encoder_options_last_error(nullptr), "");
+    htvm_encoder_options_destroy(nullptr);
     htvm_quality_steps(50, nullptr, nullptr);
     double geometry = 0, colour = 0;
     htvm_quality_steps(50, &geometry, &colour);
@@ -314,15 +362,23 @@ TEST(CEncoder, SurvivesNullHandles) {
 
 TEST(CEncoder, LivesInTheCallersMemory) {
     CountingMemory memory;
-    auto options = default_options();
-    options.allocator = memory.allocator();
-    make_encoder(&options);
-    EXPECT_GE(memory.made, 1);
-    EXPECT_EQ(memory.released, memory.made);
+    auto allocator = memory.allocator();
+    auto options = make_options(HTVM_PROFILE_TOPOLOGY, &allocator);
+    EXPECT_EQ(memory.made, 1);
+    make_encoder(options.get());
+    EXPECT_EQ(memory.made, 2);
+    EXPECT_EQ(memory.released, 1);
     memory.fails_from = 0;
     htvm_encoder* encoder = nullptr;
-    EXPECT_EQ(htvm_encoder_create(&options, &encoder, nullptr, 0), HTVM_OUT_OF_MEMORY);
+    EXPECT_EQ(htvm_encoder_create(options.get(), &encoder, nullptr, 0), HTVM_OUT_OF_MEMORY);
     EXPECT_EQ(encoder, nullptr);
+    options.reset();
+    EXPECT_EQ(memory.released, memory.made);
+    htvm_encoder_options* none = nullptr;
+    EXPECT_EQ(htvm_encoder_options_create(0, &allocator, &none), HTVM_OUT_OF_MEMORY);
+    EXPECT_EQ(none, nullptr);
+    allocator.release = nullptr;
+    EXPECT_EQ(htvm_encoder_options_create(0, &allocator, &none), HTVM_BAD_INPUT);
 }
 
 }  // namespace

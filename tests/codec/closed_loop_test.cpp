@@ -82,7 +82,7 @@ TEST(ClosedLoop, ASyntheticCaptureWithoutSkeleton) { expect_closed_loop(syntheti
 TEST(ClosedLoop, OtherOptions) {
     auto options = key_every_third();
     options.topology.reference_vertices = ReferenceVertices::bone;
-    options.topology.point_to_plane = !options.topology.point_to_plane;
+    options.topology.registration = BoneRegistration::point;
     options.topology.nearest_vertices = 1;
     options.lambda = 1000;
     expect_closed_loop(synthetic(true, 4), options);
@@ -213,8 +213,10 @@ TEST(ClosedLoop, EveryChoiceOfFrames) {
         for (const double still_below : {0.0, 60.0}) {
             auto options = motion_based(still_below, 6);
             options.topology.frame_choice = choice;
-            options.topology.predicted_below = 500;
-            options.topology.intra_above = 2500;
+            if (choice == FrameChoice::motion) {
+                options.topology.predicted_below = 500;
+                options.topology.intra_above = 2500;
+            }
             options.topology.animation_error = 20;
             streams[still_below].insert(encode(walking(7, 500), options).bytes);
             expect_closed_loop(walking(7, 500), options);

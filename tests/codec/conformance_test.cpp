@@ -200,11 +200,8 @@ void write_corner_cases() {
 void write_choices() {
     auto person = synthetic(true, 4, 500);
     for (auto& frame : person.frames) frame.mesh.normals.clear();
-    EncoderOptions paper = default_options(Profile::topology);
+    EncoderOptions paper = default_options(Profile::paper);
     paper.key_interval = 4;
-    paper.topology.weight_width = 0;
-    paper.topology.reference_vertices = ReferenceVertices::bone;
-    paper.topology.point_to_plane = false;
     paper.topology.nearest_vertices = 8;
     write_stream("paper", person, paper);
 

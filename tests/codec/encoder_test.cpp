@@ -23,6 +23,7 @@ void expect_refused(const EncoderOptions& options, const char* what) {
 
 TEST(EncoderOptions, DefaultsAreLegal) { EXPECT_TRUE(Encoder::create({}).has_value()); }
 
+// Numbers of the list: OptionList.RangesEndWhereTheySay.
 TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
     const auto with = [](const std::function<void(EncoderOptions&)>& change) {
         EncoderOptions options = default_options(Profile::topology);
@@ -30,20 +31,14 @@ TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
         return options;
     };
     const double not_a_number = std::nan("");
-    for (const double step : {0.0, -1.0, 1001.0, not_a_number, 1e-9})
-        expect_refused(with([&](auto& o) { o.geometry_step = step; }), "geometry step");
-    for (const double step : {0.0, 0.9, 256.0, not_a_number})
-        expect_refused(with([&](auto& o) { o.colour_step = step; }), "colour step");
-    for (const double lambda : {-0.1, 1001.0, not_a_number})
-        expect_refused(with([&](auto& o) { o.lambda = lambda; }), "lambda");
     for (const int interval : {0, -1})
-        expect_refused(with([&](auto& o) { o.key_interval = interval; }), "key interval");
+        expect_refused(with([&](auto& o) { o.key_interval = interval; }), "key_interval");
     for (const int m : {0, -1, 65})
-        expect_refused(with([&](auto& o) { o.topology.nearest_vertices = m; }), "nearest vertices");
-    for (const int bits : {-1, 17}) expect_refused(with([&](auto& o) { o.lattice_bits = bits; }), "lattice bits");
-    expect_refused(with([](auto& o) { o.fps_numerator = 0; }), "frame rate");
-    expect_refused(with([](auto& o) { o.fps_denominator = 0; }), "frame rate");
-    expect_refused(with([](auto& o) { o.unit_micrometres = 0; }), "unit");
+        expect_refused(with([&](auto& o) { o.topology.nearest_vertices = m; }), "nearest_vertices");
+    for (const int bits : {-1, 17}) expect_refused(with([&](auto& o) { o.lattice_bits = bits; }), "lattice_bits");
+    expect_refused(with([](auto& o) { o.fps_numerator = 0; }), "fps_numerator");
+    expect_refused(with([](auto& o) { o.fps_denominator = 0; }), "fps_denominator");
+    expect_refused(with([](auto& o) { o.unit_micrometres = 0; }), "unit_micrometres");
     expect_refused(with([](auto& o) { o.skeleton.joint_names.resize(1025); }), "1024");
     expect_refused(with([](auto& o) { o.skeleton.bones.resize(1025); }), "1024");
     expect_refused(with([](auto& o) { o.skeleton.bones = {{0, 0}}; }), "joint");

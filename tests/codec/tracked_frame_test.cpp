@@ -57,7 +57,6 @@ TEST(TrackedFrames, HaveASimplifiedIntraFrameUnlessToldNotTo) {
     auto options = tracked();
     const auto simplified = encode(sequence, options);
     options.tracked.simplify = 0;
-    options.topology.merge_duplicates = false;
     const auto whole = encode(sequence, options);
     const auto captured = sequence.frames[0].mesh.positions.size();
     EXPECT_EQ(whole.infos[0].vertices, captured);

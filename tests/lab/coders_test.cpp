@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <set>
+#include <string>
 
 #include "metrics/point_error.h"
 #include "synth/synth.h"
@@ -88,22 +89,26 @@ TEST(BuiltInCoders, only_the_coders_with_references_code_enhanced_frames) {
     }
 }
 
+// The key of kept results: only what the sweep sets for each run itself is not part of it.
 TEST(CodecUnderTest, settings_differ_where_options_do) {
-    std::set<std::string> settings;
-    auto add = [&](auto&& change) {
-        EncoderOptions options = default_options(Profile::topology);
-        change(options);
-        EXPECT_TRUE(settings.insert(codec_under_test("name", {}, options).settings).second);
-    };
-    add([](EncoderOptions&) {});
-    add([](EncoderOptions& o) { o.topology.still_below = 5; });
-    add([](EncoderOptions& o) { o.topology.animation_error = 0; });
-    add([](EncoderOptions& o) { o.topology.weight_width = 0; });
-    add([](EncoderOptions& o) { o.topology.frame_choice = FrameChoice::motion; });
-    add([](EncoderOptions& o) { o.topology.frame_choice = FrameChoice::rate_distortion; });
-    add([](EncoderOptions& o) { o.topology.predicted_below = 5; });
-    add([](EncoderOptions& o) { o.topology.intra_above = 5; });
-    add([](EncoderOptions& o) { o.topology.scene_changes = false; });
+    for (const auto profile : {Profile::tracked, Profile::topology, Profile::paper}) {
+        std::set<std::string> settings = {codec_under_test("name", {}, default_options(profile)).settings};
+        std::size_t different = 1;
+        for (const auto& option : option_list()) {
+            auto options = default_options(profile);
+            const double usual = option.get(options);
+            option.set(options, usual == option.least ? usual + 1 : option.least);
+            ASSERT_NE(usual, option.get(options)) << option.name;
+            const std::string name = option.name;
+            const bool by_the_sweep = name == "geometry_step" || name == "colour_step" || name == "threads" ||
+                                      name.starts_with("fps_") || name == "unit_micrometres";
+            different += serves(option.group, profile) && !by_the_sweep;
+            settings.insert(codec_under_test("name", {}, options).settings);
+        }
+        EXPECT_EQ(different, settings.size()) << profile_name(profile);
+    }
+    const auto of = [](Profile profile) { return codec_under_test("name", {}, default_options(profile)).settings; };
+    EXPECT_NE(of(Profile::topology), of(Profile::paper));
 }
 
 TEST(CodecUnderTest, tells_p_frames) {

@@ -79,10 +79,13 @@ TEST(CInterfaceOutOfMemory, TheEncoderSaysSo) {
     int failures = 0;
     const auto run = [&] {
         htvm_encoder* encoder = nullptr;
-        htvm_encoder_options options;
-        htvm_encoder_options_init(&options, sizeof options);
-        options.threads = 1;
-        failures += htvm_encoder_create(&options, &encoder, nullptr, 0) != HTVM_OK;
+        htvm_encoder_options* options = nullptr;
+        failures += htvm_encoder_options_create(HTVM_PROFILE_TOPOLOGY, nullptr, &options) != HTVM_OK;
+        failures += htvm_encoder_options_set(options, "threads", "1") != HTVM_OK;
+        failures += htvm_encoder_options_set_skeleton(options, nullptr) != HTVM_OK;
+        failures += htvm_encoder_options_set(options, "an option that there is none of", "1") != HTVM_BAD_INPUT;
+        failures += htvm_encoder_create(options, &encoder, nullptr, 0) != HTVM_OK;
+        htvm_encoder_options_destroy(options);
         for (int t = 0; encoder && t < 3; ++t) {
             failures += htvm_encoder_send_mesh(encoder, &mesh, nullptr, t, 0) != HTVM_OK;
             std::uint8_t packet[4096];

@@ -1,0 +1,81 @@
+// The encoder's options as a list: what the check, the C interface, the command line, its help and docs/options.md
+// are made from, and what a dialogue or a binding to another language can be made from. An option is one field in
+// encoder_options.hpp and one row in src/codec/encoder_options.cpp.
+//
+//   for (const htvm::Option& option : htvm::option_list())
+//       if (htvm::serves(option.group, options.profile)) show(option.name, htvm::value_text(option,
+//       option.get(options)));
+//   if (auto set = htvm::set_option(options, "tracked.node_spacing", "60"); !set) show(set.error().message);
+//
+// Not in the list, as they are no numbers, words or switches: the profile, runner, skeleton, radii, intra_coder,
+// first_pass.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "htvm/encoder_options.hpp"
+#include "htvm/result.hpp"
+
+namespace htvm {
+
+enum class OptionGroup : std::uint8_t { common, rate, tracked, topology };
+
+enum class OptionKind : std::uint8_t {
+    number,
+    whole_number,
+    on_or_off,  // 1 or 0
+    word,       // one of Option::words: its place among them
+};
+
+struct Option {
+    const char* name;  // the field's path in EncoderOptions: "key_interval", "tracked.node_spacing"
+    OptionGroup group;
+    OptionKind kind;
+    const char* unit = "";       // "mm", "frames"; "": none
+    double least = 0, most = 1;  // of numbers; both are allowed
+    const char* zero = "";       // what 0 stands for where that is not what a small number would; it is then allowed
+    const char* meaning;         // in a line
+    std::span<const char* const> words = {};
+    double (*get)(const EncoderOptions&);
+    void (*set)(EncoderOptions&, double);  // the value must be in range and, but for numbers, whole: see set_option()
+
+    const char* flag = "";       // of the command line; "": it has none
+    const char* flag_unit = "";  // "": as above
+    double flag_factor = 1;      // from the command line's unit to ours
+    bool flag_off = false;       // of a switch: the flag turns it off
+};
+
+std::span<const Option> option_list();
+
+// nullptr where no option has that name.
+const Option* find_option(std::string_view name);
+// The one whose name, last part of the name or flag is most like it.
+const Option& nearest_option(std::string_view name);
+// bad_input that says so and names the nearest.
+Error no_such_option(std::string_view name);
+
+// bad_input where there is no such option, where the text is no value of it, or where
+// the value is out of its range. Whether options go together is checked by Encoder::create().
+Result<void> set_option(EncoderOptions& options, std::string_view name, double value);
+// The text is a number with a point, "on" or "off", or one of the words.
+Result<void> set_option(EncoderOptions& options, std::string_view name, std::string_view text);
+Result<double> parse_value(const Option& option, std::string_view text);
+// bad_input where the value is out of range or, but for numbers, not whole.
+Result<void> check_value(const Option& option, double value);
+
+// As set_option() reads it: "0.12", "off", "motion".
+std::string value_text(const Option& option, double value);
+// "0.01 to 3600 s", "0, or 1 to 1024", "on or off", "bone or any".
+std::string range_text(const Option& option);
+// What it means, with what 0 stands for.
+std::string meaning_text(const Option& option);
+
+// Whether options of the group mean anything to the profile. Those of other groups must stay at their defaults.
+bool serves(OptionGroup group, Profile profile);
+const char* group_name(OptionGroup group);  // "common", "rate", "tracked", "topology"
+const char* profile_name(Profile profile);  // "tracked", "topology", "paper"
+
+}  // namespace htvm

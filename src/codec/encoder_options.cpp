@@ -1,0 +1,464 @@
+// The one list of the encoder's options, and what follows from it for all who set them: ranges, texts, names.
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "htvm/option_list.hpp"
+
+namespace htvm {
+namespace {
+
+constexpr std::array<const char*, 2> tracked_references = {"intra", "previous"};
+constexpr std::array<const char*, 3> frame_choices = {"fixed", "motion", "rd"};
+constexpr std::array<const char*, 2> reference_vertices = {"bone", "any"};
+constexpr std::array<const char*, 2> bone_registrations = {"point", "plane"};
+
+// Each group in the order in which people will want its options.
+constexpr Option list[] = {
+    {.name = "geometry_step",
+     .group = OptionGroup::common,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 1.0 / 65536,
+     .most = 1000,
+     .meaning = "step of the positions; errors are about half of it",
+     .get = [](const EncoderOptions& o) -> double { return o.geometry_step; },
+     .set = [](EncoderOptions& o, double value) { o.geometry_step = value; },
+     .flag = "--geometry-step"},
+    {.name = "colour_step",
+     .group = OptionGroup::common,
+     .kind = OptionKind::number,
+     .unit = "levels of 255",
+     .least = 1,
+     .most = 255,
+     .meaning = "step of the colours",
+     .get = [](const EncoderOptions& o) -> double { return o.colour_step; },
+     .set = [](EncoderOptions& o, double value) { o.colour_step = value; },
+     .flag = "--colour-step"},
+    {.name = "lambda",
+     .group = OptionGroup::common,
+     .kind = OptionKind::number,
+     .unit = "steps squared",
+     .least = 0,
+     .most = 1000,
+     .zero = "the nearest codeword is taken",
+     .meaning = "squared error that is worth one bit; more saves bits",
+     .get = [](const EncoderOptions& o) -> double { return o.lambda; },
+     .set = [](EncoderOptions& o, double value) { o.lambda = value; },
+     .flag = "--lambda"},
+    {.name = "key_interval",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .unit = "frames",
+     .least = 1,
+     .most = 1000000,
+     .meaning = "most frames from one I-frame to the next; 1: I-frames only",
+     .get = [](const EncoderOptions& o) -> double { return o.key_interval; },
+     .set = [](EncoderOptions& o, double value) { o.key_interval = static_cast<int>(value); },
+     .flag = "--keyint"},
+    {.name = "least_key_interval",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .unit = "frames",
+     .least = 1,
+     .most = 1000000,
+     .meaning = "fewest frames from one I-frame to the next, unless the frame cannot refer to the I-frame or the scene "
+                "changes",
+     .get = [](const EncoderOptions& o) -> double { return o.least_key_interval; },
+     .set = [](EncoderOptions& o, double value) { o.least_key_interval = static_cast<int>(value); },
+     .flag = "--min-keyint"},
+    {.name = "threads",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .least = 1,
+     .most = 1024,
+     .zero = "one per core",
+     .meaning = "threads at work at once; the bytes do not depend on it",
+     .get = [](const EncoderOptions& o) -> double { return o.threads; },
+     .set = [](EncoderOptions& o, double value) { o.threads = static_cast<unsigned>(value); },
+     .flag = "--threads"},
+    {.name = "lattice_bits",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .unit = "bits",
+     .least = 1,
+     .most = 16,
+     .zero = "4, or finer if the step is",
+     .meaning = "decoded positions are multiples of 2^-bits mm",
+     .get = [](const EncoderOptions& o) -> double { return o.lattice_bits; },
+     .set = [](EncoderOptions& o, double value) { o.lattice_bits = static_cast<int>(value); }},
+    {.name = "fps_numerator",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .least = 1,
+     .most = 4294967295,
+     .meaning = "frames a second, for players and rate control, times fps_denominator",
+     .get = [](const EncoderOptions& o) -> double { return o.fps_numerator; },
+     .set = [](EncoderOptions& o, double value) { o.fps_numerator = static_cast<std::uint32_t>(value); }},
+    {.name = "fps_denominator",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .least = 1,
+     .most = 4294967295,
+     .meaning = "what fps_numerator is divided by",
+     .get = [](const EncoderOptions& o) -> double { return o.fps_denominator; },
+     .set = [](EncoderOptions& o, double value) { o.fps_denominator = static_cast<std::uint32_t>(value); }},
+    {.name = "unit_micrometres",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .unit = "micrometres",
+     .least = 1,
+     .most = 4294967295,
+     .meaning = "the capture's own unit, kept so that a decoder can give it back; meshes are given in mm all the same",
+     .get = [](const EncoderOptions& o) -> double { return o.unit_micrometres; },
+     .set = [](EncoderOptions& o, double value) { o.unit_micrometres = static_cast<std::uint32_t>(value); }},
+
+    {.name = "rate.bits_per_second",
+     .group = OptionGroup::rate,
+     .kind = OptionKind::number,
+     .unit = "bit/s",
+     .least = 1000,
+     .most = 1e12,
+     .zero = "none",
+     .meaning = "rate that the stream keeps to; the quality follows, and frames that do not fit into the buffer even "
+                "at the lowest become P-frames or are dropped",
+     .get = [](const EncoderOptions& o) -> double { return o.rate.bits_per_second; },
+     .set = [](EncoderOptions& o, double value) { o.rate.bits_per_second = value; },
+     .flag = "--bitrate",
+     .flag_unit = "Mbit/s",
+     .flag_factor = 1e6},
+    {.name = "rate.buffer_seconds",
+     .group = OptionGroup::rate,
+     .kind = OptionKind::number,
+     .unit = "s",
+     .least = 0.01,
+     .most = 3600,
+     .meaning = "what the receiver's buffer holds of a stream with a bitrate, which is the delay that a live receiver "
+                "needs; a short capture may exceed the bitrate by it",
+     .get = [](const EncoderOptions& o) -> double { return o.rate.buffer_seconds; },
+     .set = [](EncoderOptions& o, double value) { o.rate.buffer_seconds = value; },
+     .flag = "--buffer"},
+    {.name = "rate.target_error",
+     .group = OptionGroup::rate,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 0.001,
+     .most = 1000,
+     .zero = "none",
+     .meaning = "error that every frame comes near to, root mean square between the surfaces (M2); where no quality "
+                "reaches it, the nearest serves, and T-frames may stay well above it",
+     .get = [](const EncoderOptions& o) -> double { return o.rate.target_error; },
+     .set = [](EncoderOptions& o, double value) { o.rate.target_error = value; },
+     .flag = "--target-error"},
+
+    {.name = "tracked.references",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::word,
+     .meaning = "what T-frames refer to: the frame before, or the I-frame alone, so that any of them may be lost, for "
+                "a few more bits",
+     .words = tracked_references,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.references); },
+     .set = [](EncoderOptions& o, double value) { o.tracked.references = static_cast<TrackedReferences>(value); },
+     .flag = "--tracked-from"},
+    {.name = "tracked.simplify",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::number,
+     .unit = "geometry steps",
+     .least = 0,
+     .most = 10,
+     .zero = "they keep every vertex and their connectivity",
+     .meaning = "how far the I-frames' meshes, which the T-frames take over, may be simplified: error of their surface",
+     .get = [](const EncoderOptions& o) -> double { return o.tracked.simplify; },
+     .set = [](EncoderOptions& o, double value) { o.tracked.simplify = value; },
+     .flag = "--simplify"},
+    {.name = "tracked.node_spacing",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 1,
+     .most = 10000,
+     .meaning = "distance between the nodes that move the mesh",
+     .get = [](const EncoderOptions& o) -> double { return o.tracked.node_spacing; },
+     .set = [](EncoderOptions& o, double value) { o.tracked.node_spacing = value; },
+     .flag = "--node-spacing"},
+
+    {.name = "topology.frame_choice",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::word,
+     .meaning = "choice of frames: fixed, an I-frame every key interval and EP-frames between; motion, by how far the "
+                "skeleton's bones are from the last I-frame; rd, by measured bits and errors (slow)",
+     .words = frame_choices,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.topology.frame_choice); },
+     .set = [](EncoderOptions& o, double value) { o.topology.frame_choice = static_cast<FrameChoice>(value); },
+     .flag = "--decide"},
+    {.name = "topology.predicted_below",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 0,
+     .most = 1e6,
+     .meaning = "choice by motion: frames whose bones moved less than this in all are P-frames, the I-frame's mesh "
+                "moved, where that fits the capture",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.predicted_below; },
+     .set = [](EncoderOptions& o, double value) { o.topology.predicted_below = value; },
+     .flag = "--predicted-below"},
+    {.name = "topology.intra_above",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 0,
+     .most = 1e6,
+     .zero = "never",
+     .meaning = "choice by motion: frames whose bones moved more than this in all are I-frames",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.intra_above; },
+     .set = [](EncoderOptions& o, double value) { o.topology.intra_above = value; },
+     .flag = "--intra-above"},
+    {.name = "topology.still_below",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 0,
+     .most = 1e6,
+     .zero = "all are coded",
+     .meaning = "motion-based coding: the sub-meshes of bones that moved less than this since the I-frame are "
+                "animated, the others coded, and both zippered",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.still_below; },
+     .set = [](EncoderOptions& o, double value) { o.topology.still_below = value; },
+     .flag = "--still-below"},
+    {.name = "topology.animation_error",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 0,
+     .most = 1e6,
+     .zero = "unchecked, as the paper has it",
+     .meaning = "what would be animated is coded after all where it is farther than this from the capture's surface "
+                "(root mean square, bone by bone)",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.animation_error; },
+     .set = [](EncoderOptions& o, double value) { o.topology.animation_error = value; },
+     .flag = "--animation-error"},
+    {.name = "topology.scene_changes",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::on_or_off,
+     .meaning = "an I-frame where much of the mesh is nowhere near the reference's",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.scene_changes; },
+     .set = [](EncoderOptions& o, double value) { o.topology.scene_changes = value != 0; },
+     .flag = "--no-scene-changes",
+     .flag_off = true},
+    {.name = "topology.merge_duplicates",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::on_or_off,
+     .meaning = "merging vertices that decode to the same point and attributes, and dropping triangles that collapse; "
+                "without it the decoded triangle set is exactly the input's",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.merge_duplicates; },
+     .set = [](EncoderOptions& o, double value) { o.topology.merge_duplicates = value != 0; },
+     .flag = "--keep-duplicates",
+     .flag_off = true},
+    {.name = "topology.nearest_vertices",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::whole_number,
+     .least = 1,
+     .most = 64,
+     .meaning = "nearest vertices that the distance order counts",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.nearest_vertices; },
+     .set = [](EncoderOptions& o, double value) { o.topology.nearest_vertices = static_cast<int>(value); },
+     .flag = "--nearest"},
+    {.name = "topology.reference_vertices",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::word,
+     .meaning = "reference vertex of a residual: any, the nearest of the predicted mesh, or bone, the nearest of the "
+                "same bone",
+     .words = reference_vertices,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.topology.reference_vertices); },
+     .set = [](EncoderOptions& o,
+               double value) { o.topology.reference_vertices = static_cast<ReferenceVertices>(value); },
+     .flag = "--reference"},
+    {.name = "topology.registration",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::word,
+     .meaning = "registration of the bones, by distances from point to plane, or from point to point",
+     .words = bone_registrations,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.topology.registration); },
+     .set = [](EncoderOptions& o, double value) { o.topology.registration = static_cast<BoneRegistration>(value); },
+     .flag = "--registration"},
+    {.name = "topology.weight_width",
+     .group = OptionGroup::topology,
+     .kind = OptionKind::number,
+     .unit = "mm",
+     .least = 0,
+     .most = 1000,
+     .zero = "none, each vertex moves with one bone",
+     .meaning = "width of the borders between bones, over which their motions blend",
+     .get = [](const EncoderOptions& o) -> double { return o.topology.weight_width; },
+     .set = [](EncoderOptions& o, double value) { o.topology.weight_width = value; },
+     .flag = "--weights"},
+};
+
+// Whole numbers in full, small powers of two as such, others as short as they can be.
+std::string number_text(double value) {
+    int exponent = 0;
+    if (value > 0 && value < 1e-3 && std::frexp(value, &exponent) == 0.5) return "2^" + std::to_string(exponent - 1);
+    std::array<char, 32> text{};
+    const bool whole = value == std::trunc(value) && std::abs(value) < 1e15;
+    const auto end = whole ? std::to_chars(text.data(), text.data() + text.size(), static_cast<std::int64_t>(value))
+                           : std::to_chars(text.data(), text.data() + text.size(), value);
+    return {text.data(), end.ptr};
+}
+
+// "bone or any", "fixed, motion or rd".
+std::string words_text(const Option& option) {
+    std::string out;
+    for (std::size_t w = 0; w < option.words.size(); ++w) {
+        if (w > 0) out += w + 1 == option.words.size() ? " or " : ", ";
+        out += option.words[w];
+    }
+    return out;
+}
+
+std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+
+// How many characters must be put in, taken out or changed to make one text of the other.
+std::size_t edits(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), std::size_t{0});
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        std::size_t diagonal = row[0];
+        row[0] = i + 1;
+        for (std::size_t j = 0; j < b.size(); ++j) {
+            const std::size_t changed = diagonal + (a[i] != b[j]);
+            diagonal = row[j + 1];
+            row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
+        }
+    }
+    return row.back();
+}
+
+}  // namespace
+
+EncoderOptions default_options(Profile profile) {
+    EncoderOptions out;
+    out.profile = profile;
+    if (profile != Profile::paper) return out;
+    out.topology.reference_vertices = ReferenceVertices::bone;
+    out.topology.registration = BoneRegistration::point;
+    out.topology.weight_width = 0;
+    return out;
+}
+
+std::span<const Option> option_list() { return list; }
+
+const Option* find_option(std::string_view name) {
+    const auto found = std::find_if(std::begin(list), std::end(list), [&](const Option& o) { return o.name == name; });
+    return found == std::end(list) ? nullptr : &*found;
+}
+
+const Option& nearest_option(std::string_view name) {
+    const auto shown = name.substr(0, 100);
+    const auto distance = [&](const Option& option) {
+        const std::string_view whole = option.name, flag = option.flag;
+        const auto last = whole.substr(whole.find('.') + 1);
+        auto out = std::min(edits(shown, whole), edits(shown, last));
+        if (!flag.empty()) out = std::min({out, edits(shown, flag), edits(shown, flag.substr(2))});
+        return out;
+    };
+    return *std::min_element(std::begin(list), std::end(list),
+                             [&](const Option& a, const Option& b) { return distance(a) < distance(b); });
+}
+
+Error no_such_option(std::string_view name) {
+    return {ErrorKind::bad_input, "there is no option " + quoted(name.substr(0, 60)) + "; the nearest is " +
+                                      quoted(nearest_option(name).name)};
+}
+
+Result<void> check_value(const Option& option, double value) {
+    const bool number = option.kind == OptionKind::number;
+    const double least = number || option.kind == OptionKind::whole_number ? option.least : 0;
+    const double most = option.kind == OptionKind::word        ? static_cast<double>(option.words.size()) - 1
+                        : option.kind == OptionKind::on_or_off ? 1
+                                                               : option.most;
+    const bool within = (value >= least && value <= most) || (value == 0 && *option.zero != '\0');
+    if (within && (number || value == std::trunc(value))) return {};
+    return fail(ErrorKind::bad_input,
+                std::string(option.name) + " must be " + range_text(option) + ", not " + number_text(value));
+}
+
+Result<double> parse_value(const Option& option, std::string_view text) {
+    const auto refused = [&] {
+        return fail(ErrorKind::bad_input, std::string(option.name) + " must be " + range_text(option) + ", not " +
+                                              quoted(text.substr(0, 60)));
+    };
+    if (option.kind == OptionKind::on_or_off) {
+        if (text == "on") return 1.0;
+        if (text == "off") return 0.0;
+        return refused();
+    }
+    if (option.kind == OptionKind::word) {
+        const auto word = std::find(option.words.begin(), option.words.end(), text);
+        if (word == option.words.end()) return refused();
+        return static_cast<double>(word - option.words.begin());
+    }
+    double value = 0;
+    const auto end = text.data() + text.size();
+    const auto read = std::from_chars(text.data(), end, value);
+    if (read.ec != std::errc{} || read.ptr != end || std::isnan(value)) return refused();
+    if (auto fine = check_value(option, value); !fine) return tl::unexpected(fine.error());
+    return value;
+}
+
+Result<void> set_option(EncoderOptions& options, std::string_view name, double value) {
+    const auto* option = find_option(name);
+    if (!option) return tl::unexpected(no_such_option(name));
+    if (auto fine = check_value(*option, value); !fine) return fine;
+    option->set(options, value);
+    return {};
+}
+
+Result<void> set_option(EncoderOptions& options, std::string_view name, std::string_view text) {
+    const auto* option = find_option(name);
+    if (!option) return tl::unexpected(no_such_option(name));
+    const auto value = parse_value(*option, text);
+    if (!value) return tl::unexpected(value.error());
+    option->set(options, *value);
+    return {};
+}
+
+std::string value_text(const Option& option, double value) {
+    if (option.kind == OptionKind::on_or_off) return value != 0 ? "on" : "off";
+    if (option.kind != OptionKind::word) return number_text(value);
+    const bool known = value >= 0 && value < static_cast<double>(option.words.size());
+    return known ? option.words[static_cast<std::size_t>(value)] : number_text(value);
+}
+
+std::string range_text(const Option& option) {
+    if (option.kind == OptionKind::on_or_off) return "on or off";
+    if (option.kind == OptionKind::word) return words_text(option);
+    std::string out = *option.zero && option.least > 0 ? "0, or " : "";
+    out += number_text(option.least) + " to " + number_text(option.most);
+    if (*option.unit) out += std::string(" ") + option.unit;
+    return out;
+}
+
+std::string meaning_text(const Option& option) {
+    return *option.zero ? std::string(option.meaning) + "; 0: " + option.zero : option.meaning;
+}
+
+bool serves(OptionGroup group, Profile profile) {
+    if (group == OptionGroup::tracked) return profile == Profile::tracked;
+    if (group == OptionGroup::topology) return profile != Profile::tracked;
+    return true;
+}
+
+const char* group_name(OptionGroup group) {
+    constexpr std::array<const char*, 4> names = {"common", "rate", "tracked", "topology"};
+    return names[static_cast<std::size_t>(group)];
+}
+
+const char* profile_name(Profile profile) {
+    constexpr std::array<const char*, 3> names = {"tracked", "topology", "paper"};
+    return names[static_cast<std::size_t>(profile)];
+}
+
+}  // namespace htvm
