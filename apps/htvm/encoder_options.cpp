@@ -262,6 +262,7 @@ std::string options_in_markdown() {
         "| `profile` | `--profile` | tracked (default), topology or paper: `default_options(profile)`, and "
         "`htvm_encoder_options_create` in C, give its defaults |\n"
         "| `geometry_step`, `colour_step` | `--quality` | both steps at once: `quality_steps(quality)` |\n"
+        "| `runner` | | threads of the caller's own (`htvm_encoder_options_set_run_tasks` in C) |\n"
         "| `skeleton` | `--skeleton` | the capture's joints and bones; none: one bone that spans the mesh |\n"
         "| `radii` | `--radii` | of the bones, from `calibrate()` or `htvm calibrate` |\n"
         "| `intra_coder` | `--intra` | another coder of I-frames than TFAN |\n"
