@@ -304,7 +304,7 @@ std::string number_text(double value) {
     std::array<char, 32> text{};
     const bool whole = value == std::trunc(value) && std::abs(value) < 1e15;
     const auto end = whole ? std::to_chars(text.data(), text.data() + text.size(), static_cast<std::int64_t>(value))
-                           : std::to_chars(text.data(), text.data() + text.size(), value);
+                           : std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general);
     return {text.data(), end.ptr};
 }
 
