@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 
+#include "htvm/option_list.hpp"
 #include "metrics/point_error.h"
 #include "synth/synth.h"
 
