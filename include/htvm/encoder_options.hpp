@@ -34,6 +34,7 @@ enum class FrameChoice : std::uint8_t {
     fixed,            // an I-frame every key_interval frames, EP-frames between
     motion,           // the paper's (section III-B): by skeletal motion since the last I-frame
     rate_distortion,  // by measured bits and errors: the fewest bits among those no worse than an I-frame
+    cheaper,          // as fixed, but an I-frame wherever an EP-frame takes more bits, or there is no skeleton
 };
 
 enum class TrackedReferences : std::uint8_t {
@@ -44,14 +45,15 @@ enum class TrackedReferences : std::uint8_t {
 // Profile::tracked alone: with others, anything but the defaults is refused.
 struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
-    double simplify = 0.4;  // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
-                            // their surface, in geometry steps; 0: they keep every vertex and their connectivity
-    double node_spacing = 80;  // mm, between the nodes of the deformation graph
+    double simplify = 0.4;     // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
+                               // their surface, in geometry steps; 0: they keep every vertex and their connectivity
+    double node_spacing = 0;   // mm, between the nodes of the deformation graph; 0: 80 on an adult, in proportion on
+                               // larger and smaller subjects
 };
 
 // Profile::topology and Profile::paper alone, likewise.
 struct TopologyOptions {
-    FrameChoice frame_choice = FrameChoice::fixed;
+    FrameChoice frame_choice = FrameChoice::cheaper;  // Profile::paper: fixed
     double predicted_below = 400;  // mm, FrameChoice::motion: with less skeletal motion since the I-frame, a P-frame
     double intra_above = 0;        // mm, FrameChoice::motion: with more, an I-frame; 0: never
     double still_below = 0;        // mm, motion-based coding (section V): bones that moved less since the I-frame are
@@ -84,6 +86,8 @@ struct EncoderOptions {
     int key_interval = 30;       // most frames from one I-frame to the next; 1: I-frames only
     int least_key_interval = 1;  // fewest, unless the frame cannot refer to the I-frame or the scene changes
     int lattice_bits = 0;        // decoded positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is
+    double subject_size = 0;     // mm: the longest side of the subject, which reaches and thresholds are in proportion
+                                 // to (all are known from adults, 1100 to 2500 mm); 0: told from the first mesh
     unsigned threads = 0;        // at work at once; 0: one per core; the bytes are the same for any number
     TaskRunner runner;           // gives the threads; none: a pool of the encoder's own
     std::uint32_t fps_numerator = 30, fps_denominator = 1;  // frames a second, for players

@@ -1,16 +1,19 @@
-// The encoder, top to bottom: a frame's mesh goes onto the lattice, becomes an I- or an EP-frame, and leaves as
-// packets.
+// The encoder, as a block diagram: a captured mesh and its pose go onto the lattice; the frame's work is found from
+// them, the configuration and the sequence so far; the choice codes it in one way or several and gives the candidate to
+// send; the sequence advances by it, and its packets are numbered and queued.
 #include "htvm/encoder.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <new>
 #include <stdexcept>
 
-#include "codec/choice/encoder_choice.h"
+#include "codec/choice/frame_choice.h"
 #include "codec/encoder_check.h"
-#include "codec/encoder_state.h"
-#include "codec/stage_clock_enc.h"
+#include "codec/encoder_pose.h"
+#include "codec/frame_work_enc.h"
+#include "codec/stream/sequence.h"
 #include "core/parallel.h"
 #include "htvm/decoder.hpp"
 
@@ -20,7 +23,36 @@ using namespace internal;
 
 namespace {
 
-using State = EncoderState;
+// What was given out, and waits to be.
+struct Output {
+    std::deque<Packet> packets;
+    std::uint64_t stream_bytes = 0;
+    std::vector<IndexEntry> index;
+    std::uint32_t header_sent = 0;  // number of the frame that the sequence header came with last
+};
+
+}  // namespace
+
+struct Encoder::State {
+    ThreadPool pool;
+    Configuration configuration;
+    bool begun = false, finished = false;
+    PoseTracker poses;
+    Sequence sequence;
+    QualityControl control;
+    Output output;
+    std::optional<std::int64_t> last_timestamp;
+    // Of the last frame.
+    FrameCost cost;
+    FrameInfo info;
+    LatticeMesh decoded;
+    std::vector<StageTime> stages;
+    std::vector<std::uint32_t> distance_order_counts;
+};
+
+namespace {
+
+using State = Encoder::State;
 
 // 1/16 mm, or as fine as makes the step eight units.
 int lattice_bits(const EncoderOptions& options) {
@@ -31,54 +63,105 @@ int lattice_bits(const EncoderOptions& options) {
     return std::clamp(needed, 4, 16);
 }
 
+// What a millimetre on an adult is on this subject, millimetres. Reaches, spacings and thresholds are known from
+// adults; a doll's or a giant's follow from its size. Adults differ by pose, and half an arm's length changes nothing.
+double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
+    constexpr double adult = 1750, shortest = 1100, longest = 2500;
+    double size = options.subject_size;
+    if (!(size > 0)) {
+        for (std::size_t axis = 0; axis < 3 && !mesh.positions.empty(); ++axis) {
+            const auto [low, high] =
+                std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
+                                    [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+            size = std::max(size, static_cast<double>((*high)[axis]) - (*low)[axis]);
+        }
+    }
+    return size <= 0 || (size >= shortest && size <= longest) ? 1 : size / adult;
+}
+
 // Short enough to need no memory itself.
 tl::unexpected<Error> out_of_memory() { return fail(ErrorKind::limit, "out of memory"); }
 
-void send(State& state, Packet packet) {
-    state.stream_bytes += packet.payload.size() + packet_overhead;
-    state.packets.push_back(std::move(packet));
-}
-
-// The sequence header goes out with the first frame: its origin and, where none were given, the radii come from there.
+// The configuration settles with the first frame: the lattice's origin, the subject's size and, where none were given,
+// the skeleton and the radii come from there.
 Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
+    auto& configuration = state.configuration;
+    const auto& options = configuration.options;
+    auto& header = configuration.header;
     const auto origin = lattice_origin(mesh);
     if (!origin) return tl::unexpected(origin.error());
-    auto& header = state.header;
     header.lattice.origin = *origin;
-    header.lattice.bits = lattice_bits(state.options);
-    auto tracker = make_pose_tracker(state.options.skeleton, mesh, pose);
+    header.lattice.bits = lattice_bits(options);
+    auto tracker = make_pose_tracker(options.skeleton, mesh, pose);
     if (!tracker) return tl::unexpected(tracker.error());
     state.poses = std::move(*tracker);
     header.skeleton = state.poses.skeleton;
     header.skeleton_tracked = state.poses.tracked;
-    auto radii = state.options.radii;
+    auto radii = options.radii;
     if (radii.empty()) {
         auto calibrated = calibrate(mesh, header.skeleton, state.poses.last);
         if (!calibrated) return tl::unexpected(calibrated.error());
         radii = std::move(*calibrated);
     }
-    const double units = 1.0 / header.lattice.step();
+    const double units = configuration.units = 1.0 / header.lattice.step();
+    const double adult = adult_millimetre(options, mesh);
+    configuration.adult_millimetre = adult * units;
+    const auto on_lattice = [](double length) {
+        return static_cast<std::int32_t>(std::lround(std::min(length, 1.0 * lattice_limit)));
+    };
     header.radii.clear();
-    for (const auto r : radii)
-        header.radii.push_back(static_cast<std::int32_t>(std::lround(std::min(r * units, 1.0 * lattice_limit))));
-    header.fps_numerator = state.options.fps_numerator;
-    header.fps_denominator = state.options.fps_denominator;
-    header.unit_micrometres = state.options.unit_micrometres;
-    header.nearest_vertices = static_cast<std::uint8_t>(state.options.topology.nearest_vertices);
-    header.weight_width = static_cast<std::int32_t>(
-        std::lround(std::min(state.options.topology.weight_width * units, 1.0 * lattice_limit)));
-    if (state.options.profile == Profile::tracked)
-        header.node_spacing = static_cast<std::int32_t>(
-            std::clamp(std::lround(state.options.tracked.node_spacing * units), 1L, static_cast<long>(lattice_limit)));
+    for (const auto r : radii) header.radii.push_back(on_lattice(r * units));
+    header.fps_numerator = options.fps_numerator;
+    header.fps_denominator = options.fps_denominator;
+    header.unit_micrometres = options.unit_micrometres;
+    header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
+    header.weight_width = on_lattice(options.topology.weight_width * units);
+    if (configuration.tracked()) {
+        constexpr double spacing_on_adults = 80;  // mm
+        const double spacing =
+            options.tracked.node_spacing > 0 ? options.tracked.node_spacing : spacing_on_adults * adult;
+        header.node_spacing = std::max(on_lattice(spacing * units), 1);
+    }
+    configuration.intra_alone = options.key_interval == 1 ||
+                                (options.profile != Profile::tracked &&
+                                 options.topology.frame_choice == FrameChoice::cheaper && !header.skeleton_tracked);
     return {};
 }
 
+// The sequence header goes before the first frame, and before I-frames now and then, so that who joins later, or lost
+// it, can begin there.
+bool brings_header(const State& state, const Candidate& candidate) {
+    constexpr std::uint32_t repeated_after = 10;  // frames
+    return !state.begun || (candidate.type == FrameType::intra &&
+                            state.sequence.next_frame - state.output.header_sent >= repeated_after);
+}
+
+double bits_of(const State& state, const Candidate& candidate) {
+    const std::size_t header = brings_header(state, candidate)
+                                   ? write_sequence_header(state.configuration.header).size() + packet_overhead
+                                   : 0;
+    return 8.0 * static_cast<double>(candidate.bytes() + header);
+}
+
+void send(Output& output, Packet packet) {
+    output.stream_bytes += packet.payload.size() + packet_overhead;
+    output.packets.push_back(std::move(packet));
+}
+
+void send_header(State& state, std::int64_t timestamp_us) {
+    Packet header;
+    header.payload = write_sequence_header(state.configuration.header);
+    header.frame = state.output.header_sent = state.sequence.next_frame;
+    header.timestamp_us = timestamp_us;
+    send(state.output, std::move(header));
+}
+
 // Numbers and queues a frame's packets, and adds up where their bytes went.
-void send_frame(State& state, std::vector<Packet> packets, std::uint32_t reference, std::int64_t timestamp_us) {
+void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us) {
     LayerBytes codebooks;
-    for (auto& packet : packets) {
-        packet.frame = state.next_frame;
-        packet.reference = packet.kind == PacketKind::tracked ? reference : state.group->reference.frame;
+    for (auto& packet : candidate.packets) {
+        packet.frame = state.sequence.next_frame;
+        packet.reference = candidate.reference;
         packet.timestamp_us = timestamp_us;
         if (packet.kind == PacketKind::codebook) {
             codebooks.overhead += packet_overhead;
@@ -87,63 +170,61 @@ void send_frame(State& state, std::vector<Packet> packets, std::uint32_t referen
             continue;
         }
         state.info = *inspect(packet);
-        state.info.vertices = static_cast<std::uint32_t>(state.decoded.positions.size());
-        state.info.triangles = static_cast<std::uint32_t>(state.decoded.triangles.size());
+        state.info.vertices = static_cast<std::uint32_t>(candidate.decoded.positions.size());
+        state.info.triangles = static_cast<std::uint32_t>(candidate.decoded.triangles.size());
         state.info.bytes += codebooks;
         if (packet.kind == PacketKind::intra)
-            state.index.push_back({packet.frame, packet.timestamp_us, state.stream_bytes});
+            state.output.index.push_back({packet.frame, packet.timestamp_us, state.output.stream_bytes});
     }
-    for (auto& packet : packets) send(state, std::move(packet));
+    for (auto& packet : candidate.packets) send(state.output, std::move(packet));
 }
 
 Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
     StageClock clock(state.stages);
-    const auto on_lattice = to_lattice(mesh, state.header.lattice);
+    auto on_lattice = to_lattice(mesh, state.configuration.header.lattice);
     if (!on_lattice) return tl::unexpected(on_lattice.error());
-    const auto coded_pose = state.poses.next(mesh, pose, state.header.lattice);
+    auto coded_pose = state.poses.next(mesh, pose, state.configuration.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");
-    FrameUnderWay frame{*on_lattice, *coded_pose, {}, {}, {}, {}};
-    auto coded = code_frame(state, frame, force_intra);
-    if (!coded) return tl::unexpected(coded.error());
-    adopt(state, *coded);
-    state.cost = {coded->type, coded->quality, bits_of(state, *coded)};
-    if (state.rate) state.rate->coded(state.cost.type, state.cost.quality, state.cost.bits);
-    if (brings_header(state, *coded)) {
-        Packet header;
-        header.payload = write_sequence_header(state.header);
-        header.frame = state.header_sent = state.next_frame;
-        header.timestamp_us = timestamp_us;
-        send(state, std::move(header));
-        state.begun = true;
-    }
-    send_frame(state, std::move(coded->packets), coded->reference, timestamp_us);
-    ++state.next_frame;
+    FrameWork work(state.configuration, state.sequence, std::move(*on_lattice), std::move(*coded_pose), state.stages);
+    auto chosen = choose_frame(
+        work, state.control, [&](const Candidate& candidate) { return bits_of(state, candidate); }, force_intra);
+    if (!chosen) return tl::unexpected(chosen.error());
+    const FrameCost cost{rate_type(*chosen), chosen->quality, bits_of(state, *chosen)};
+    StageClock derivation(state.stages);
+    auto sequence = advance(state.configuration, state.sequence, *chosen);
+    if (!sequence) return tl::unexpected(sequence.error());
+    derivation.done("reference");
+    if (brings_header(state, *chosen)) send_header(state, timestamp_us);
+    send_frame(state, *chosen, timestamp_us);
+    // From here on nothing can fail.
+    state.sequence = std::move(*sequence);
+    state.begun = true;
     state.last_timestamp = timestamp_us;
+    state.cost = cost;
+    if (state.control.rate) state.control.rate->coded(cost.type, cost.quality, cost.bits);
+    state.decoded = std::move(chosen->decoded);
+    state.distance_order_counts = std::move(chosen->distance_order_counts);
     return {};
 }
 
-// Where a frame's packets begin: what is queued from there on can be taken back.
+// Where a frame's packets begin: where it fails, what is queued from there on is taken back, and the sequence stays as
+// it was.
 struct Queued {
     std::size_t packets, index;
     std::uint64_t stream_bytes;
     std::uint32_t header_sent;
-    bool begun;
 };
 
-Queued queued(const State& state) {
-    return {state.packets.size(), state.index.size(), state.stream_bytes, state.header_sent, state.begun};
+Queued queued(const Output& output) {
+    return {output.packets.size(), output.index.size(), output.stream_bytes, output.header_sent};
 }
 
-// Memory ran out within a frame: it is not part of the stream, and nothing may refer to it, so the next is an I-frame.
-tl::unexpected<Error> take_back(State& state, const Queued& before) {
-    state.packets.resize(before.packets);
-    state.index.resize(before.index);
-    state.stream_bytes = before.stream_bytes;
-    state.header_sent = before.header_sent;
-    state.begun = before.begun;
-    state.group.reset();
-    return out_of_memory();
+void take_back(Output& output, const Queued& before) {
+    output.packets.resize(before.packets);
+    output.index.resize(before.index);
+    output.stream_bytes = before.stream_bytes;
+    output.header_sent = before.header_sent;
 }
 
 RateControlOptions rate_options(const EncoderOptions& options) {
@@ -158,8 +239,6 @@ RateControlOptions rate_options(const EncoderOptions& options) {
 
 }  // namespace
 
-struct Encoder::State : EncoderState {};
-
 QualitySteps quality_steps(double quality) {
     const double q = std::clamp(quality, 0.0, 100.0) / 100;
     return {16 * std::exp2(-6 * q), 32 * std::exp2(-5 * q)};
@@ -167,12 +246,12 @@ QualitySteps quality_steps(double quality) {
 
 Result<Encoder> Encoder::create(const EncoderOptions& options) try {
     if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
-    auto state = std::make_unique<Encoder::State>();
-    state->options = options;
+    auto state = std::make_unique<State>();
+    state->configuration.options = options;
     state->pool = ThreadPool(options.threads, options.runner);
-    state->threads = state->pool.threads();
-    if (options.rate.bits_per_second > 0) state->rate.emplace(rate_options(options), options.rate.first_pass);
-    if (options.rate.target_error > 0) state->error.emplace(options.rate.target_error);
+    state->configuration.threads = state->pool.threads();
+    if (options.rate.bits_per_second > 0) state->control.rate.emplace(rate_options(options), options.rate.first_pass);
+    if (options.rate.target_error > 0) state->control.error.emplace(options.rate.target_error);
     return Encoder(std::move(state));
 } catch (const std::bad_alloc&) {
     return out_of_memory();
@@ -188,19 +267,25 @@ Encoder::~Encoder() = default;
 Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
     auto& state = *state_;
     state.stages.clear();
-    const auto before = queued(state);
-    try {
+    const auto before = queued(state.output);
+    const auto code = [&]() -> Result<void> {
         if (state.finished) return fail(ErrorKind::bad_input, "the sequence was finished; start a new encoder");
         if (state.last_timestamp && timestamp_us <= *state.last_timestamp)
             return fail(ErrorKind::bad_input, "timestamps must ascend");
         if (!state.begun)
             if (auto ok = begin(state, mesh, pose); !ok) return ok;
         return push_frame(state, mesh, pose, timestamp_us, force_intra);
+    };
+    try {
+        auto done = code();
+        if (!done) take_back(state.output, before);
+        return done;
     } catch (const std::bad_alloc&) {
-        return take_back(state, before);
+        take_back(state.output, before);
     } catch (const std::length_error&) {
-        return take_back(state, before);
+        take_back(state.output, before);
     }
+    return out_of_memory();
 }
 
 void Encoder::finish() try {
@@ -209,24 +294,25 @@ void Encoder::finish() try {
     state.finished = true;
     Packet packet;
     packet.kind = PacketKind::index;
-    packet.frame = state.next_frame;
+    packet.frame = state.sequence.next_frame;
     packet.timestamp_us = *state.last_timestamp;
-    packet.payload = write_sequence_index(state.index);
-    send(state, std::move(packet));
+    packet.payload = write_sequence_index(state.output.index);
+    send(state.output, std::move(packet));
 } catch (const std::bad_alloc&) {
     // A stream may end without an index.
 }
 
 std::optional<Packet> Encoder::pull() {
-    if (state_->packets.empty()) return std::nullopt;
-    Packet packet = std::move(state_->packets.front());
-    state_->packets.pop_front();
+    auto& packets = state_->output.packets;
+    if (packets.empty()) return std::nullopt;
+    Packet packet = std::move(packets.front());
+    packets.pop_front();
     return packet;
 }
 
 const FrameInfo& Encoder::last_frame() const { return state_->info; }
 FrameCost Encoder::last_cost() const { return state_->cost; }
-Mesh Encoder::reconstruction() const { return to_mesh(state_->decoded, state_->header.lattice); }
+Mesh Encoder::reconstruction() const { return to_mesh(state_->decoded, state_->configuration.header.lattice); }
 const std::vector<StageTime>& Encoder::stage_times() const { return state_->stages; }
 const std::vector<std::uint32_t>& Encoder::distance_order_counts() const { return state_->distance_order_counts; }
 

@@ -23,27 +23,7 @@ std::vector<HandlePair> pairs_of(const TrackedReference& reference) {
     return out;
 }
 
-// The start whose surface lies nearest: where the last frame was, one step on, or where the skeleton says.
-std::vector<RigidMotion> best_start(const TrackedGroup& group, const TargetSurface& target,
-                                    std::span<const RigidMotion> skeletal, const DeformationOptions& options) {
-    std::vector<std::vector<RigidMotion>> starts;
-    starts.push_back(group.last.empty() ? std::vector<RigidMotion>(group.reference.pivots.size()) : group.last);
-    if (!group.before_last.empty()) starts.push_back(moved_on(group.deformable, group.before_last, group.last));
-    if (!skeletal.empty()) starts.emplace_back(skeletal.begin(), skeletal.end());
-    if (starts.size() == 1) return std::move(starts[0]);
-    std::size_t best = 0;
-    double least = 0;
-    for (std::size_t i = 0; i < starts.size(); ++i) {
-        const double error = deformation_error(group.deformable, target, starts[i], options);
-        if (i > 0 && error >= least) continue;
-        best = i;
-        least = error;
-    }
-    return std::move(starts[best]);
-}
-
-std::vector<QuantisedTransform> quantised(const std::vector<RigidMotion>& motion,
-                                          std::span<const LatticePoint> pivots) {
+std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, std::span<const LatticePoint> pivots) {
     std::vector<QuantisedTransform> out;
     for (std::size_t i = 0; i < motion.size(); ++i) out.push_back(quantise_motion(motion[i], pivots[i]));
     return out;
@@ -60,15 +40,11 @@ NodeMotionOptions motion_options(double geometry_step) {
 
 }  // namespace
 
-TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOptions& options) {
-    TrackedGroup out;
-    const auto points = points_of(reference.mesh.positions);
+DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options) {
     std::vector<Eigen::Vector3d> handles;
     for (const auto pivot : reference.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
-    out.deformable = make_deformable(points, reference.mesh.triangles, reference.nodes.weights, handles,
-                                     pairs_of(reference), options);
-    out.reference = std::move(reference);
-    return out;
+    return make_deformable(points_of(reference.mesh.positions), reference.mesh.triangles, reference.nodes.weights,
+                           handles, pairs_of(reference), options);
 }
 
 TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
@@ -78,47 +54,70 @@ TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions
                                options.back_samples, options.threads);
 }
 
+std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const TargetSurface& surface,
+                                        const NodeStarts& starts, const DeformationOptions& options) {
+    std::vector<std::vector<RigidMotion>> from;
+    if (starts.last.empty())
+        from.emplace_back(deformable.handles.size());
+    else
+        from.emplace_back(starts.last.begin(), starts.last.end());
+    if (!starts.before_last.empty()) from.push_back(moved_on(deformable, starts.before_last, starts.last));
+    if (!starts.skeletal.empty()) from.emplace_back(starts.skeletal.begin(), starts.skeletal.end());
+    std::size_t best = 0;
+    double least = 0;
+    for (std::size_t i = 0; from.size() > 1 && i < from.size(); ++i) {
+        const double error = deformation_error(deformable, surface, from[i], options);
+        if (i > 0 && error >= least) continue;
+        best = i;
+        least = error;
+    }
+    return register_deformation(deformable, surface, from[best], options);
+}
+
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TargetSurface& surface,
-                                                 const TrackedGroup& group, bool refer_to_last,
-                                                 std::span<const RigidMotion> skeletal,
-                                                 const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
+                                                 const TrackedReference& reference, std::span<const RigidMotion> motion,
+                                                 const TrackedState* before, const TrackedFrameOptions& options,
+                                                 std::vector<StageTime>& stages) {
     StageClock clock(stages);
-    const auto& reference = group.reference;
     const auto& triangles = reference.mesh.triangles;
     EncodedTrackedFrame out;
-    out.motion = register_deformation(group.deformable, surface,
-                                      best_start(group, surface, skeletal, options.deformation), options.deformation);
-    clock.done("registration");
-
-    const std::span<const QuantisedTransform> before = refer_to_last
-                                                           ? std::span<const QuantisedTransform>(group.state.transforms)
-                                                           : std::span<const QuantisedTransform>{};
-    auto motion = encode_node_motion(quantised(out.motion, reference.pivots), reference.parents, reference.pivots,
-                                     before, motion_options(options.geometry_step));
-    const auto moved = moved_by_nodes(reference, motion.transforms, options.threads);
+    auto coded_motion = encode_node_motion(
+        quantised(motion, reference.pivots), reference.parents, reference.pivots,
+        before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
+        motion_options(options.geometry_step));
+    const auto moved = moved_by_nodes(reference, coded_motion.transforms, options.threads);
     const auto normals = exact_normals(moved, triangles);
-    const auto targets = find_tracked_targets({moved, normals, triangles, reference.mesh.colours}, mesh, surface,
-                                              30 * options.deformation.millimetre, options.threads);
+    TrackedTargets targets;
+    if (options.motion_alone) {
+        targets.displacement.resize(moved.size());
+        if (!reference.mesh.colours.empty()) targets.colours.resize(3 * moved.size());
+    } else {
+        targets = find_tracked_targets({moved, normals, triangles, reference.mesh.colours}, mesh, surface,
+                                       options.reach, options.threads);
+    }
     clock.done("targets");
 
+    // A step so large that whatever differs from the prediction counts as nothing.
+    const double displacement_step = options.motion_alone ? field_limit : options.geometry_step;
+    const double colour_step = options.motion_alone ? field_limit : options.colour_step;
     FieldOptions geometry;
-    geometry.step = {options.geometry_step, options.geometry_step, options.geometry_step};
+    geometry.step = {displacement_step, displacement_step, displacement_step};
     geometry.lambda = options.lambda;
     FieldOptions colour;
-    colour.step = {options.colour_step, options.colour_step, options.colour_step};
+    colour.step = {colour_step, colour_step, colour_step};
     colour.lambda = options.lambda;
     colour.turned = true;
     Result<EncodedField> displacement, colours;
     const auto code_displacement = [&] {
         displacement = encode_field(reference.hierarchy, targets.displacement, 1, geometry,
-                                    refer_to_last ? &group.state.displacement : nullptr);
+                                    before ? &before->displacement : nullptr);
         if (displacement) out.mesh.positions = displaced(moved, normals, displacement->values);
     };
     if (reference.mesh.colours.empty())
         code_displacement();
     else
-        colours = encode_field(reference.hierarchy, targets.colours, 3, colour,
-                               refer_to_last ? &group.state.colour : nullptr, options.threads, code_displacement);
+        colours = encode_field(reference.hierarchy, targets.colours, 3, colour, before ? &before->colour : nullptr,
+                               options.threads, code_displacement);
     if (!reference.mesh.colours.empty() && !colours) return tl::unexpected(colours.error());
     if (!displacement) return tl::unexpected(displacement.error());
     clock.done("fields");
@@ -127,14 +126,14 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     out.mesh.texcoords = reference.mesh.texcoords;
     if (!reference.mesh.normals.empty())
         out.mesh.normals = quantised_normals(exact_normals(out.mesh.positions, triangles));
-    out.state.transforms = std::move(motion.transforms);
+    out.state.transforms = std::move(coded_motion.transforms);
     out.state.displacement = std::move(displacement->history);
     auto& header = out.payload.header;
     header.source_vertices = static_cast<std::uint32_t>(mesh.positions.size());
     header.source_triangles = static_cast<std::uint32_t>(mesh.triangles.size());
     header.vertices = static_cast<std::uint32_t>(reference.mesh.positions.size());
     header.triangles = static_cast<std::uint32_t>(triangles.size());
-    out.payload.set(Layer::transforms, std::move(motion.bytes));
+    out.payload.set(Layer::transforms, std::move(coded_motion.bytes));
     out.payload.set(Layer::geometry, std::move(displacement->bytes));
     if (!reference.mesh.colours.empty()) {
         out.mesh.colours = recoloured(reference.mesh.colours, colours->values);

@@ -1,5 +1,6 @@
-// Tracked frames, encoding side: the group's reference is registered to the captured surface, its nodes' motion
-// quantised, and what remains along the normals and in the colours coded as fields.
+// Tracked frames, encoding side: the reference is registered to the captured surface, which depends on no quantiser
+// step and is done once for a frame; then its nodes' motion is quantised, and what remains along the normals and in the
+// colours coded as fields.
 #pragma once
 
 #include <span>
@@ -16,36 +17,37 @@ struct TrackedFrameOptions {
     double geometry_step = 32;  // lattice units: of the displacement along the normal
     double colour_step = 11;    // levels
     double lambda = 0.12;       // squared steps that a bit is worth
-    DeformationOptions deformation;
+    double reach = 480;         // lattice units: how far from the moved reference the captured surface is looked for
+    bool motion_alone = false;  // displacement and colours stay as predicted: the fewest bits that a frame can take
     Threads threads = {};
 };
 
-// What the encoder needs of a group besides what the decoder has.
-struct TrackedGroup {
-    TrackedReference reference;
-    DeformableMesh deformable;
-    // Of each node, in the last frame and the one before that, as registered; empty where there is none.
-    std::vector<RigidMotion> last, before_last;
-    TrackedState state;  // of the last frame, empty behind the I-frame
-};
-TrackedGroup make_tracked_group(TrackedReference reference, const DeformationOptions& options);
+// The reference, ready to be registered; made once for an I-frame.
+DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options);
 
 // The captured mesh, ready to be registered to.
 TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions& options);
+
+// Where a registration may start: each one motion per node, or empty. last, before_last: of the two frames before.
+// skeletal: where the skeleton moves each node.
+struct NodeStarts {
+    std::span<const RigidMotion> last, before_last, skeletal;
+};
+// The motion of each node, reference -> frame, from the start whose surface lies nearest.
+std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const TargetSurface& surface,
+                                        const NodeStarts& starts, const DeformationOptions& options);
 
 struct EncodedTrackedFrame {
     FramePayload payload;  // header and layers
     LatticeMesh mesh;      // what the decoder will have
     TrackedState state;
-    std::vector<RigidMotion> motion;  // of each node, as registered
 };
 
-// refer_to_last: predict from the frame before (group.state must be of it), else from the I-frame alone.
-// skeletal: where the skeleton moves each node, or empty: one of the starts that the registration chooses from.
-// surface: of `mesh`, see captured_surface().
+// mesh: as captured; surface: of it, see captured_surface(). motion: of each node, as registered. before: of the frame
+// that this one refers to; null where that is the I-frame.
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TargetSurface& surface,
-                                                 const TrackedGroup& group, bool refer_to_last,
-                                                 std::span<const RigidMotion> skeletal,
-                                                 const TrackedFrameOptions& options, std::vector<StageTime>& stages);
+                                                 const TrackedReference& reference, std::span<const RigidMotion> motion,
+                                                 const TrackedState* before, const TrackedFrameOptions& options,
+                                                 std::vector<StageTime>& stages);
 
 }  // namespace htvm::internal

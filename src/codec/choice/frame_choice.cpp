@@ -1,0 +1,393 @@
+#include "codec/choice/frame_choice.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+#include <string>
+
+#include "codec/choice/scene_change_enc.h"
+#include "codec/frame_coders_enc.h"
+#include "codec/intra/intra_frame.h"
+
+namespace htvm::internal {
+namespace {
+
+FrameSteps steps_of(const Configuration& configuration, const QualitySteps& steps) {
+    return {static_cast<std::int32_t>(std::clamp(std::lround(steps.geometry_step * configuration.units), 1L,
+                                                 static_cast<long>(lattice_limit))),
+            static_cast<std::int32_t>(std::lround(steps.colour_step))};
+}
+
+bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
+    return a.colours.empty() == b.colours.empty() && a.normals.empty() == b.normals.empty() &&
+           a.texcoords.empty() == b.texcoords.empty();
+}
+
+// Whether the reference's bones or nodes can move it to this frame.
+bool can_be_moved(const FrameWork& work) {
+    if (!work.sequence.reference) return false;
+    const auto& reference = work.reference().decoded;
+    const bool derived =
+        work.configuration.tracked() ? reference.tracked.has_value() : !reference.skinned.bone_of_vertex.empty();
+    return derived && !reference.mesh().positions.empty() && !work.mesh.positions.empty() &&
+           same_attributes(work.mesh, reference.mesh());
+}
+
+bool can_refer(const FrameWork& work) { return !work.configuration.intra_alone && can_be_moved(work); }
+
+bool is_due(const FrameWork& work) {
+    return !can_refer(work) || work.frames_since_intra() >= work.configuration.options.key_interval;
+}
+
+// The least key interval has passed: an I-frame may come for the sake of bits.
+bool may_be_intra(const FrameWork& work) {
+    return work.frames_since_intra() >= work.configuration.options.least_key_interval;
+}
+
+bool is_scene_change(FrameWork& work) {
+    const auto& configuration = work.configuration;
+    if (!configuration.options.topology.scene_changes || configuration.tracked()) return false;
+    constexpr double far = 150;  // of an adult's millimetres
+    return scene_changed(work.mesh.positions, work.bone_motion().predicted, far * configuration.adult_millimetre);
+}
+
+// ---- what may be animated -------------------------------------------------------------------------------------------
+
+// What may be animated is at most this far off, lattice units; 0: unchecked.
+double largest_animation_error(const Configuration& configuration) {
+    const auto& options = configuration.options;
+    double largest = options.topology.animation_error;
+    if (options.rate.target_error > 0) largest = std::min(largest > 0 ? largest : 1e6, options.rate.target_error);
+    return largest * configuration.units;
+}
+
+bool animation_fits(FrameWork& work) {
+    const double largest = largest_animation_error(work.configuration);
+    if (!(largest > 0)) return true;
+    const auto& fit = work.animation_fit();
+    return std::all_of(fit.rms.begin(), fit.rms.end(), [&](double rms) { return rms <= largest; });
+}
+
+std::vector<double> shifts_of_bones(const FrameWork& work) {
+    return bone_shifts(work.reference().decoded.skinned, work.configuration.header.skeleton.bones, work.pose);
+}
+
+// Motion-based coding where it is asked for and leaves something out; else all of the frame.
+Result<Candidate> code_what_moves(FrameWork& work, const FrameSteps& steps) {
+    const double still_below = work.configuration.options.topology.still_below * work.configuration.units;
+    if (!(still_below > 0)) return code_enhanced(work, steps);
+    const auto shifts = shifts_of_bones(work);
+    if (std::all_of(shifts.begin(), shifts.end(), [&](double shift) { return shift >= still_below; }))
+        return code_enhanced(work, steps);
+    return code_coded_bones(
+        work, steps,
+        choose_coded_bones(shifts, work.animation_fit(), still_below, largest_animation_error(work.configuration)));
+}
+
+// ---- FrameChoice::motion --------------------------------------------------------------------------------------------
+
+Result<Candidate> choose_by_motion(FrameWork& work, const FrameSteps& steps) {
+    const auto shifts = shifts_of_bones(work);
+    const double motion = work.configuration.to_millimetres(std::accumulate(shifts.begin(), shifts.end(), 0.0));
+    const auto& options = work.configuration.options.topology;
+    if (options.intra_above > 0 && motion > options.intra_above && may_be_intra(work))
+        return code_intra(work, steps, IntraUse::reference);
+    if (motion < options.predicted_below && animation_fits(work)) return code_predicted(work);
+    return code_what_moves(work, steps);
+}
+
+// ---- FrameChoice::cheaper -------------------------------------------------------------------------------------------
+
+// Bytes of an I-frame that nothing refers to, by vertex: found once for a reference, since that hardly changes.
+Result<double> plain_intra_bytes(FrameWork& work, const FrameSteps& steps) {
+    const auto& known = work.sequence.bones.plain_intra_bytes;
+    const auto& reference = work.reference();
+    if (known > 0 && reference.intra.steps.geometry == steps.geometry && reference.intra.steps.colour == steps.colour)
+        return known;
+    const auto plain = code_intra(work, steps, IntraUse::alone);
+    if (!plain) return tl::unexpected(plain.error());
+    return static_cast<double>(plain->bytes()) / static_cast<double>(work.mesh.positions.size());
+}
+
+// A codebook serves some ten frames: a tenth of it counts.
+double bytes_in_the_long_run(const Candidate& candidate) {
+    const auto frame = static_cast<double>(candidate.packets.back().payload.size() + packet_overhead);
+    return frame + (static_cast<double>(candidate.bytes()) - frame) / 10;
+}
+
+// An EP-frame where it takes fewer bits than an I-frame at the same steps, at which both err alike. Where it does not,
+// as at high quality or where the bones do not say how the surface moves, EP-frames are tried again only after a
+// while, so that a capture that they do not suit costs hardly more time than I-frames.
+Result<Candidate> choose_the_cheaper(FrameWork& work, const FrameSteps& steps) {
+    if (work.configuration.options.topology.still_below > 0) return code_what_moves(work, steps);
+    const bool suspended = work.sequence.next_frame < work.sequence.trial.next && may_be_intra(work);
+    if (!suspended) {
+        auto enhanced = code_enhanced(work, steps);
+        if (!enhanced || !may_be_intra(work)) return enhanced;
+        const auto plain = plain_intra_bytes(work, steps);
+        if (!plain) return tl::unexpected(plain.error());
+        enhanced->bones->plain_intra_bytes = *plain;
+        const double intra = *plain * static_cast<double>(work.mesh.positions.size());
+        if (bytes_in_the_long_run(*enhanced) < intra) {
+            enhanced->trial = EnhancedTrial{};
+            return enhanced;
+        }
+    }
+    // The I-frame before the next trial serves as its reference.
+    EnhancedTrial trial = work.sequence.trial;
+    if (!suspended) {
+        trial.losses = std::min(trial.losses + 1, 6);
+        trial.next = work.sequence.next_frame + (2u << trial.losses);
+    }
+    const bool referred_to = work.sequence.next_frame + 1 >= trial.next;
+    auto intra = code_intra(work, steps, referred_to ? IntraUse::reference : IntraUse::alone);
+    if (intra) intra->trial = trial;
+    return intra;
+}
+
+// ---- FrameChoice::rate_distortion -----------------------------------------------------------------------------------
+
+// What a frame's errors may be: the I-frame's at the same quality, and a little for the estimate.
+SurfaceErrors allowed_errors(const ReferenceInUse& reference, const FrameSteps& steps) {
+    constexpr double tolerance = 1.05;
+    const double geometry = static_cast<double>(steps.geometry) / reference.intra.steps.geometry;
+    const double colour = static_cast<double>(steps.colour) / reference.intra.steps.colour;
+    return {tolerance * geometry * reference.intra.plain.geometry_rms,
+            tolerance * colour * reference.intra.plain.colour_rms};
+}
+
+bool within(const SurfaceErrors& errors, const SurfaceErrors& allowed) {
+    return errors.geometry_rms <= allowed.geometry_rms && errors.colour_rms <= allowed.colour_rms;
+}
+
+// An I-frame, and what one that nothing refers to would err.
+Result<Candidate> code_measured_intra(FrameWork& work, const FrameSteps& steps) {
+    auto out = code_intra(work, steps, IntraUse::reference);
+    if (!out) return out;
+    const auto plain = code_intra(work, steps, IntraUse::alone);
+    if (!plain) return plain;
+    StageClock clock(work.stages);
+    out->intra->plain = work.errors_of(plain->decoded);
+    clock.done("errors");
+    return out;
+}
+
+// An I-frame would hardly cost more.
+bool is_expensive(const FrameWork& work, const Candidate& enhanced) {
+    const auto& reference = work.reference();
+    const auto vertices = static_cast<double>(work.mesh.positions.size());
+    const auto of_reference = static_cast<double>(std::max<std::size_t>(reference.decoded.mesh().positions.size(), 1));
+    return static_cast<double>(enhanced.bytes()) >= 0.95 * reference.bytes * vertices / of_reference;
+}
+
+// The frames without residuals, or with some, where they are good enough; none where no bone fits.
+Result<std::optional<Candidate>> choose_animation(FrameWork& work, const FrameSteps& steps,
+                                                  const SurfaceErrors& allowed) {
+    using Choice = std::optional<Candidate>;
+    std::vector<bool> coded;
+    std::size_t animated = 0;
+    for (const double rms : work.animation_fit().rms) {
+        coded.push_back(rms > allowed.geometry_rms);
+        animated += coded.back() ? 0 : 1;
+    }
+    if (animated == 0) return Choice();
+    auto moved = code_predicted(work);
+    if (!moved) return tl::unexpected(moved.error());
+    if (within(work.errors_of(moved->decoded), allowed)) return Choice(std::move(*moved));
+    if (animated == coded.size()) return Choice();
+    auto candidate = code_coded_bones(work, steps, coded);
+    if (!candidate) return tl::unexpected(candidate.error());
+    if (!within(work.errors_of(candidate->decoded), allowed)) return Choice();
+    return Choice(std::move(*candidate));
+}
+
+// True where what the frames since the I-frame have cost above the cheapest of them, this one too, would have paid for
+// a new one.
+bool intra_is_paid_for(const FrameWork& work, const Candidate& enhanced) {
+    const auto& history = work.sequence.bones;
+    const auto bytes = static_cast<double>(enhanced.bytes());
+    const double least = history.least_bytes > 0 ? std::min(history.least_bytes, bytes) : bytes;
+    return may_be_intra(work) && history.excess_bytes + bytes - least > work.reference().bytes - least;
+}
+
+Result<Candidate> choose_by_cost(FrameWork& work, const FrameSteps& steps) {
+    const auto allowed = allowed_errors(work.reference(), steps);
+    auto animated = choose_animation(work, steps, allowed);
+    if (!animated) return tl::unexpected(animated.error());
+    if (*animated) return std::move(**animated);
+    auto enhanced = code_enhanced(work, steps);
+    if (!enhanced) return enhanced;
+    const bool good = within(work.errors_of(enhanced->decoded), allowed);
+    const bool due = intra_is_paid_for(work, *enhanced);
+    if (good && !due && !is_expensive(work, *enhanced)) return enhanced;
+    auto intra = code_measured_intra(work, steps);
+    if (!intra) return intra;
+    if (good && !due && enhanced->bytes() <= intra->bytes()) return enhanced;
+    return intra;
+}
+
+// ---- Profile::tracked -----------------------------------------------------------------------------------------------
+
+// Whether a T-frame does worse than those behind its I-frame can: over all, or in one region, such as a hand, as far as
+// that shows.
+bool lost_track(const FrameWork& work, const TrackedFit& fit) {
+    constexpr double more_strays = 0.004, worst_to_best = 2.2, region_to_best = 7, region_to_intra = 1.5;
+    constexpr double visible = 6, visible_in_edges = 0.5;  // of an adult's millimetres; of the capture's edges
+    const auto& reference = work.reference();
+    const double best_fit = work.sequence.nodes.best_fit;
+    const double best = best_fit > 0 ? best_fit : fit.rms;
+    return fit.stray_share > reference.intra.fit.stray_share + more_strays || fit.rms > worst_to_best * best ||
+           fit.worst_region >
+               std::max({region_to_best * best, region_to_intra * reference.intra.fit.worst_region,
+                         visible * work.configuration.adult_millimetre, visible_in_edges * reference.intra.edge});
+}
+
+// A T-frame where it fits the capture: where a hand has left a pocket, or an arm was lost, the I-frame's mesh no longer
+// serves, and an I-frame is due; so it is, at the earliest the least key interval behind the last, where the T-frame
+// takes more bits than the I-frame did.
+Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps) {
+    auto tracked = code_tracked(work, steps, TrackedParts::all);
+    if (!tracked) return tracked;
+    const auto& reference = work.reference();
+    const auto fit = work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
+    const bool expensive = may_be_intra(work) && static_cast<double>(tracked->bytes()) > reference.bytes;
+    if (expensive || lost_track(work, fit)) return code_intra(work, steps, IntraUse::reference);
+    auto& best = tracked->nodes->best_fit;
+    if (best == 0 || fit.rms < best) best = fit.rms;
+    return tracked;
+}
+
+// ---- one attempt at given steps -------------------------------------------------------------------------------------
+
+Result<Candidate> choose(FrameWork& work, const FrameSteps& steps, bool force_intra) {
+    const auto& options = work.configuration.options;
+    const auto choice = options.topology.frame_choice;
+    if (force_intra || is_due(work) || is_scene_change(work)) {
+        if (options.profile != Profile::tracked && choice == FrameChoice::rate_distortion)
+            return code_measured_intra(work, steps);
+        return code_intra(work, steps, work.configuration.intra_alone ? IntraUse::alone : IntraUse::reference);
+    }
+    if (options.profile == Profile::tracked) return choose_tracked(work, steps);
+    switch (choice) {
+        case FrameChoice::motion:
+            return choose_by_motion(work, steps);
+        case FrameChoice::rate_distortion:
+            return choose_by_cost(work, steps);
+        case FrameChoice::cheaper:
+            return choose_the_cheaper(work, steps);
+        case FrameChoice::fixed:
+            break;
+    }
+    return code_what_moves(work, steps);
+}
+
+FrameType expected_type(const FrameWork& work, bool force_intra) {
+    if (force_intra || is_due(work)) return FrameType::intra;
+    return work.configuration.tracked() ? FrameType::tracked : FrameType::enhanced;
+}
+
+// ---- quality by rate ------------------------------------------------------------------------------------------------
+
+// Of a frame that takes so many bits even at the lowest quality.
+tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, double bits) {
+    const double capacity = options.bits_per_second * options.buffer_seconds;
+    const auto number = [](double x) {
+        std::array<char, 32> text{};
+        std::snprintf(text.data(), text.size(), "%.3g", x);
+        return std::string(text.data());
+    };
+    std::string message = "the frame takes " + number(bits / 8000) +
+                          " kB even at the lowest quality, and the buffer has room for " + number(room / 8000) +
+                          " kB of its " + number(capacity / 8000) + " kB; give ";
+    // Rounded up, as what is asked for must do.
+    const auto enough = [&](double x) { return number(1.01 * x); };
+    if (bits > capacity)
+        message += "a bitrate of at least " + enough(bits / options.buffer_seconds / 1e6) +
+                   " Mbit/s or a buffer of at least " + enough(bits / options.bits_per_second) + " s";
+    else
+        message += "a higher bitrate or a larger buffer";
+    return fail(ErrorKind::limit, message);
+}
+
+// What takes the fewest bits: the motion alone, of the nodes or of the bones.
+Result<Candidate> code_stand_in(FrameWork& work, double quality) {
+    auto out = work.configuration.tracked() ? code_tracked(work, steps_of(work.configuration, quality_steps(quality)),
+                                                           TrackedParts::motion_alone)
+                                            : code_predicted(work);
+    if (out) out->stands_in = true;
+    return out;
+}
+
+// Coarser until the frame fits into the buffer; its motion alone at the last. The first frames of a kind are coded up
+// to four times, until their quality is what the rate allows.
+Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, const BitsOf& bits_of, bool force_intra) {
+    const auto fits = [&](const Candidate& candidate) { return bits_of(candidate) <= rate.room(); };
+    double quality = rate.quality(expected_type(work, force_intra)), bits = 0;
+    constexpr double far_off = 3;
+    for (int trials = 3;;) {
+        auto candidate = choose(work, steps_of(work.configuration, quality_steps(quality)), force_intra);
+        if (!candidate) return candidate;
+        candidate->quality = quality;
+        bits = bits_of(*candidate);
+        if (trials-- > 0 && rate.is_guess(candidate->type)) {
+            // The codebooks that come with the first frame are not in every one.
+            const auto own = static_cast<double>(candidate->packets.back().payload.size() + packet_overhead);
+            rate.tried(candidate->type, quality, 8 * own);
+            const double better = rate.quality(candidate->type);
+            if (std::abs(better - quality) > far_off) {
+                quality = better;
+                continue;
+            }
+        }
+        if (fits(*candidate)) return candidate;
+        const double lower = rate.lower_quality(candidate->type, quality, bits);
+        if (lower >= quality) break;
+        quality = lower;
+    }
+    if (can_be_moved(work)) {
+        auto stand_in = code_stand_in(work, quality);
+        if (!stand_in) return stand_in;
+        stand_in->quality = quality;
+        if (fits(*stand_in)) return stand_in;
+    }
+    auto error = does_not_fit(work.configuration.options.rate, rate.room(), bits);
+    rate.coded(FrameType::predicted, quality, 0);
+    return error;
+}
+
+// ---- quality by error -----------------------------------------------------------------------------------------------
+
+// Again with what was learnt where the error is off; of several attempts, the nearest.
+Result<Candidate> code_to_error(FrameWork& work, ErrorController& control, bool force_intra) {
+    constexpr int attempts = 4;
+    FrameType type = expected_type(work, force_intra);
+    std::optional<Candidate> nearest;
+    double nearest_off = 0;
+    for (int attempt = 0; attempt < attempts; ++attempt) {
+        const double quality = control.quality(type);
+        auto candidate = choose(work, steps_of(work.configuration, quality_steps(quality)), force_intra);
+        if (!candidate) return candidate;
+        candidate->quality = quality;
+        type = candidate->type;
+        const double error = work.configuration.to_millimetres(work.errors_of(candidate->decoded).geometry_rms);
+        if (control.accept(type, quality, error) || type == FrameType::predicted) return candidate;
+        const double off = std::abs(std::log2(error / work.configuration.options.rate.target_error));
+        if (!nearest || off < nearest_off) nearest_off = off, nearest = std::move(*candidate);
+    }
+    return std::move(*nearest);
+}
+
+}  // namespace
+
+FrameType rate_type(const Candidate& candidate) { return candidate.stands_in ? FrameType::predicted : candidate.type; }
+
+Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra) {
+    if (control.rate) return code_within_buffer(work, *control.rate, bits_of, force_intra);
+    if (control.error) return code_to_error(work, *control.error, force_intra);
+    const auto& options = work.configuration.options;
+    return choose(work, steps_of(work.configuration, {options.geometry_step, options.colour_step}), force_intra);
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,244 @@
+#include "codec/frame_coders_enc.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/intra/intra_frame.h"
+#include "codec/paper/animated_frame.h"
+#include "codec/stream/sequence.h"
+#include "codec/tracked/captured_surface_enc.h"
+
+namespace htvm::internal {
+namespace {
+
+Packet frame_packet(PacketKind kind, const FramePayload& payload) {
+    Packet packet;
+    packet.kind = kind;
+    packet.payload = write_frame_payload(payload);
+    return packet;
+}
+
+std::uint32_t count(std::size_t n) { return static_cast<std::uint32_t>(n); }
+
+// Where EP-frames refer to an I-frame, its step is no wider than half an edge: they then save more than it costs. Their
+// quantiser starts from the same cells; the price of a bit stays that of the step asked for, so that it is the entropy
+// constraint that makes it coarse. At 8 mm and 35,000 vertices: a fifth fewer bits at the same error.
+std::int32_t step_for_reference(double edge, std::int32_t step) {
+    const double half_edge = edge / 2;
+    return half_edge >= 1 && half_edge < step ? static_cast<std::int32_t>(half_edge) : step;
+}
+
+// Steps at which the simplified I-frame and the T-frames behind it err about as much as other frames do at the steps
+// asked for: see docs/algorithm.md for the measurement.
+FrameSteps tracked_steps(const FrameSteps& steps) {
+    constexpr double finer = 0.55, coarser_colours = 1.3;
+    const auto scaled = [](double factor, std::int32_t step) {
+        return std::max(1, static_cast<std::int32_t>(std::lround(factor * step)));
+    };
+    constexpr std::int32_t coarsest_colours = 255;  // that a frame's header can say
+    return {scaled(finer, steps.geometry), std::min(scaled(coarser_colours, steps.colour), coarsest_colours)};
+}
+
+LatticeMesh simplified(FrameWork& work, const FrameSteps& steps) {
+    constexpr double longest_edge = 40, reach = 30;  // of an adult's millimetres
+    constexpr double colour_steps = 2.5;
+    const auto& surface = work.target();
+    StageClock clock(work.stages);
+    const auto& configuration = work.configuration;
+    SimplifiedReferenceOptions options;
+    options.surface_error = configuration.options.tracked.simplify * steps.geometry;
+    options.colour_error = colour_steps * steps.colour;
+    options.longest_edge = longest_edge * configuration.adult_millimetre;
+    options.reach = reach * configuration.adult_millimetre;
+    options.threads = configuration.threads;
+    auto out = simplified_reference(work.mesh, surface, options);
+    clock.done("simplification");
+    return out;
+}
+
+EnhancedFrameOptions enhanced_options(const FrameWork& work, const FrameSteps& steps) {
+    const auto& options = work.configuration.options;
+    EnhancedFrameOptions out;
+    out.geometry.step = step_for_reference(work.reference().intra.edge, steps.geometry);
+    out.colour.step = steps.colour;
+    const double ratio = static_cast<double>(steps.geometry) / out.geometry.step;
+    out.geometry.lambda = options.lambda * ratio * ratio;
+    out.colour.lambda = options.lambda;
+    out.geometry.threads = out.colour.threads = out.threads = work.configuration.threads;
+    out.reference_choice =
+        options.topology.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone : ReferenceChoice::any;
+    out.merge_duplicates = options.topology.merge_duplicates;
+    out.nearest_vertices = options.topology.nearest_vertices;
+    return out;
+}
+
+// New codebooks, and now and then the one in force: a lost packet costs the frames that name it, but not for long.
+// Every tenth frame it takes 0.2 to 0.4 % of the bits.
+void send_codebook(std::uint32_t frame, std::uint8_t purpose, CodebookInUse& use, std::vector<Packet>& packets) {
+    constexpr std::uint32_t repeated_after = 10;  // frames
+    if (!use.codebook || (!use.is_new && frame - use.sent < repeated_after)) return;
+    use.sent = frame;
+    Packet packet;
+    packet.kind = PacketKind::codebook;
+    packet.payload = write_codebook_payload(purpose, use.number, *use.codebook);
+    packets.push_back(std::move(packet));
+}
+
+EnhancedFrameSource source_of(FrameWork& work) {
+    const auto& motion = work.bone_motion();
+    EnhancedFrameSource out;
+    out.mesh = &work.mesh;
+    out.bone_of_vertex = motion.bone_of_vertex;
+    out.motion = &motion;
+    out.reference = &work.reference().decoded.skinned;
+    out.search = &work.reference().search;
+    out.source_vertices = count(work.mesh.positions.size());
+    out.source_triangles = count(work.mesh.triangles.size());
+    return out;
+}
+
+// Whole EP-frames are compared with the cheapest since the I-frame: see intra_is_paid_for() in choice/frame_choice.cpp.
+void count_bytes(BoneHistory& history, double bytes) {
+    if (history.least_bytes == 0 || bytes < history.least_bytes) history.least_bytes = bytes;
+    history.excess_bytes += bytes - history.least_bytes;
+}
+
+Candidate code_residuals(FrameWork& work, const EnhancedFrameSource& source, const FrameSteps& steps) {
+    Candidate out;
+    out.type = FrameType::enhanced;
+    out.reference = work.reference().decoded.number;
+    auto& history = out.bones.emplace(work.sequence.bones);
+    auto encoded = encode_enhanced_frame(source, history.codebooks, enhanced_options(work, steps), work.stages);
+    history.motion = work.bone_motion().motion;
+    send_codebook(work.sequence.next_frame, codebook_for_geometry, history.codebooks.geometry, out.packets);
+    send_codebook(work.sequence.next_frame, codebook_for_colour, history.codebooks.colour, out.packets);
+    out.packets.push_back(frame_packet(PacketKind::enhanced, encoded.payload));
+    out.decoded = std::move(encoded.mesh);
+    out.distance_order_counts = std::move(encoded.distance_order_counts);
+    return out;
+}
+
+Candidate code_moving_part(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded_bones) {
+    const auto& fit = work.animation_fit();
+    StageClock clock(work.stages);
+    constexpr double stray_in_edges = 4;
+    const auto part = cut_moving_part(work.mesh, work.bone_motion().bone_of_vertex, work.reference().decoded.skinned,
+                                      fit, coded_bones, stray_in_edges * work.reference().intra.edge);
+    clock.done("cutting");
+    auto source = source_of(work);
+    source.mesh = &part.mesh;
+    source.bone_of_vertex = part.bone_of_vertex;
+    source.nearest = part.nearest;
+    source.coded_bones = coded_bones;
+    return code_residuals(work, source, steps);
+}
+
+}  // namespace
+
+Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse use) {
+    const auto& configuration = work.configuration;
+    const bool tracked = configuration.tracked(), referred_to = use == IntraUse::reference;
+    const auto asked = tracked ? tracked_steps(steps) : steps;
+    const bool simplify = tracked && configuration.options.tracked.simplify > 0;
+    const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
+    const auto& mesh = simplify ? simple : work.mesh;
+    StageClock clock(work.stages);
+    IntraFrameOptions options;
+    options.geometry_step = referred_to ? step_for_reference(mean_edge(mesh), asked.geometry) : asked.geometry;
+    options.colour_step = asked.colour;
+    options.merge_duplicates = configuration.options.topology.merge_duplicates;
+    options.external = configuration.options.intra_coder ? &*configuration.options.intra_coder : nullptr;
+    FramePayload payload;
+    auto decoded = encode_intra_frame(mesh, options, payload);
+    if (!decoded) return tl::unexpected(decoded.error());
+    payload.header.source_vertices = count(work.mesh.positions.size());
+    payload.header.source_triangles = count(work.mesh.triangles.size());
+    payload.set(Layer::pose, encode_pose(work.pose));
+    Candidate out;
+    out.type = FrameType::intra;
+    out.reference = work.sequence.next_frame;
+    out.decoded = std::move(*decoded);
+    out.pose = work.pose;
+    out.packets.push_back(frame_packet(PacketKind::intra, payload));
+    auto& facts = out.intra.emplace();
+    facts.step = options.geometry_step;
+    facts.edge = work.edge();
+    facts.steps = steps;
+    clock.done("intra coding");
+    if (tracked && referred_to) facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
+    return out;
+}
+
+Result<Candidate> code_predicted(FrameWork& work) {
+    const auto& motion = work.bone_motion();
+    const auto& reference = work.reference().decoded;
+    Candidate out;
+    out.type = FrameType::predicted;
+    out.reference = reference.number;
+    out.packets.push_back(
+        frame_packet(PacketKind::predicted,
+                     predicted_frame_payload(reference.skinned, motion.transforms, count(work.mesh.positions.size()),
+                                             count(work.mesh.triangles.size()))));
+    out.decoded = animate(reference.skinned, motion.transforms, motion.predicted);
+    out.bones.emplace(work.sequence.bones).motion = motion.motion;
+    return out;
+}
+
+Result<Candidate> code_enhanced(FrameWork& work, const FrameSteps& steps) {
+    auto out = code_residuals(work, source_of(work), steps);
+    count_bytes(*out.bones, static_cast<double>(out.bytes()));
+    return out;
+}
+
+Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded) {
+    if (std::find(coded.begin(), coded.end(), true) == coded.end()) return code_predicted(work);
+    const auto& sub_meshes = work.reference().decoded.skinned.sub_meshes;
+    bool something = false, everything = true;
+    for (std::size_t bone = 0; bone < coded.size(); ++bone) {
+        const bool bare = sub_meshes.of(bone).empty();
+        something = something || (coded[bone] && !bare);
+        everything = everything && (coded[bone] || bare);
+    }
+    if (everything || !something) return code_enhanced(work, steps);
+    return code_moving_part(work, steps, coded);
+}
+
+Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts) {
+    // Re-meshing alone makes colours at the same place differ from frame to frame: finer steps would code that noise.
+    constexpr double coarser_colours = 6, reach = 30;  // the reach of an adult's millimetres
+    const auto& configuration = work.configuration;
+    const auto& reference = work.reference().decoded;
+    const auto& nodes = work.sequence.nodes;
+    TrackedFrameOptions options;
+    options.geometry_step = tracked_steps(steps).geometry;
+    options.colour_step = coarser_colours * steps.colour;
+    options.lambda = configuration.options.lambda;
+    options.reach = reach * configuration.adult_millimetre;
+    options.motion_alone = parts == TrackedParts::motion_alone;
+    options.threads = configuration.threads;
+    const bool from_last = nodes.frame && configuration.options.tracked.references == TrackedReferences::previous;
+    auto encoded = encode_tracked_frame(work.mesh, work.target(), *reference.tracked, work.node_motion(),
+                                        from_last ? &nodes.state : nullptr, options, work.stages);
+    if (!encoded) return tl::unexpected(encoded.error());
+    Candidate out;
+    out.type = FrameType::tracked;
+    out.reference = from_last ? *nodes.frame : reference.number;
+    out.packets.push_back(frame_packet(PacketKind::tracked, encoded->payload));
+    out.decoded = std::move(encoded->mesh);
+    auto& history = out.nodes.emplace();
+    history.frame = work.sequence.next_frame;
+    history.before_last = nodes.last;
+    history.last = work.node_motion();
+    history.state = std::move(encoded->state);
+    history.best_fit = nodes.best_fit;
+    return out;
+}
+
+const std::array<FrameCoder, frame_type_count> frame_coders = {
+    [](FrameWork& work, const FrameSteps& steps) { return code_intra(work, steps, IntraUse::reference); },
+    code_enhanced,
+    [](FrameWork& work, const FrameSteps&) { return code_predicted(work); },
+    [](FrameWork& work, const FrameSteps& steps) { return code_tracked(work, steps, TrackedParts::all); },
+};
+
+}  // namespace htvm::internal

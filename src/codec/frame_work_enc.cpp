@@ -1,0 +1,159 @@
+#include "codec/frame_work_enc.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace htvm::internal {
+namespace {
+
+RegistrationOptions registration_options(const EncoderOptions& options) {
+    RegistrationOptions out;
+    out.point_to_plane = options.topology.registration == BoneRegistration::plane;
+    if (!out.point_to_plane) {  // slower to settle
+        out.iterations = 16;
+        out.samples = 500;
+    }
+    return out;
+}
+
+// What frames behind an I-frame may refer to. Where the skeleton was tracked, the bones also tell the nodes' motion a
+// start.
+Derived derived_of(const Configuration& configuration) {
+    // Under rate control also what stands in for a frame that does not fit.
+    const bool referred_to = !configuration.intra_alone || configuration.options.rate.bits_per_second > 0;
+    return {.bones = referred_to && (configuration.header.skeleton_tracked || !configuration.tracked()),
+            .nodes = referred_to && configuration.tracked()};
+}
+
+// Where the skeleton moves each node: with the bone of the vertex that it sits on.
+std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration, const Reference& reference,
+                                              const CodedPose& pose) {
+    if (!configuration.header.skeleton_tracked) return {};
+    const auto bones = skeletal_motion(reference.skinned, configuration.header.skeleton.bones, pose);
+    std::vector<RigidMotion> out;
+    for (const auto v : reference.tracked->nodes.vertex) out.push_back(bones[reference.skinned.bone_of_vertex[v]]);
+    return out;
+}
+
+}  // namespace
+
+std::size_t Candidate::bytes() const {
+    std::size_t sum = 0;
+    for (const auto& packet : packets) sum += packet.payload.size() + packet_overhead;
+    return sum;
+}
+
+DeformationOptions deformation_options(const Configuration& configuration) {
+    DeformationOptions out;
+    out.millimetre = configuration.adult_millimetre;
+    out.threads = configuration.threads;
+    return out;
+}
+
+Result<Sequence> advance(const Configuration& configuration, const Sequence& before, Candidate& sent) {
+    Sequence out;
+    out.next_frame = before.next_frame + 1;
+    out.trial = sent.trial ? *sent.trial : before.trial;
+    if (!sent.intra) {
+        out.reference = before.reference;
+        out.bones = sent.bones ? std::move(*sent.bones) : before.bones;
+        out.nodes = sent.nodes ? std::move(*sent.nodes) : before.nodes;
+        return out;
+    }
+    auto decoded = make_reference(configuration.header, before.next_frame, sent.decoded, std::move(sent.pose),
+                                  sent.intra->step, derived_of(configuration), configuration.threads);
+    if (!decoded) return tl::unexpected(decoded.error());
+    auto in_use = std::make_shared<ReferenceInUse>();
+    in_use->decoded = std::move(*decoded);
+    in_use->intra = std::move(*sent.intra);
+    in_use->bytes = static_cast<double>(sent.bytes());
+    if (in_use->decoded.tracked)
+        in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
+    else if (!in_use->decoded.skinned.bone_of_vertex.empty())
+        in_use->search = make_reference_search(in_use->decoded.skinned);
+    out.reference = std::move(in_use);
+    return out;
+}
+
+double FrameWork::edge() {
+    if (!edge_) edge_ = mean_edge(mesh);
+    return *edge_;
+}
+
+const TargetSurface& FrameWork::target() {
+    if (!target_) {
+        StageClock clock(stages);
+        target_ = captured_surface(mesh, deformation_options(configuration));
+        clock.done("search structures");
+    }
+    return *target_;
+}
+
+const FrameMotion& FrameWork::bone_motion() {
+    if (!bone_motion_) {
+        const auto& in_use = reference();
+        const MotionReference against{&in_use.decoded.skinned, &in_use.search, &configuration.header.skeleton.bones,
+                                      configuration.header.radii, sequence.bones.motion};
+        bone_motion_ = find_frame_motion(mesh.positions, pose, against, registration_options(configuration.options),
+                                         configuration.threads, stages);
+    }
+    return *bone_motion_;
+}
+
+const std::vector<RigidMotion>& FrameWork::node_motion() {
+    if (!node_motion_) {
+        const auto& surface = target();
+        StageClock clock(stages);
+        const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
+        node_motion_ =
+            register_nodes(reference().deformable, surface, {sequence.nodes.last, sequence.nodes.before_last, skeletal},
+                           deformation_options(configuration));
+        clock.done("registration");
+    }
+    return *node_motion_;
+}
+
+const AnimationFit& FrameWork::animation_fit() {
+    if (!animation_fit_) {
+        const auto& predicted = bone_motion().predicted;
+        StageClock clock(stages);
+        const auto& options = configuration.options;
+        const bool checked = options.topology.animation_error > 0 || options.rate.target_error > 0 ||
+                             options.topology.frame_choice == FrameChoice::rate_distortion;
+        animation_fit_ =
+            measure_animation(mesh, reference().decoded.skinned, predicted, checked, configuration.threads);
+        clock.done("fit of the animation");
+    }
+    return *animation_fit_;
+}
+
+SurfaceErrors FrameWork::errors_of(const LatticeMesh& decoded) {
+    SurfaceDistanceOptions options;
+    options.threads = configuration.threads;
+    options.every = 4;
+    if (!captured_) {
+        auto points = points_of(mesh.positions);
+        SurfaceSearch search(points, mesh.triangles);
+        captured_ = CapturedSurface{std::move(points), std::move(search)};
+    }
+    const auto shown = points_of(decoded.positions);
+    return surface_errors({captured_->points, mesh.triangles, mesh.colours}, captured_->search,
+                          {shown, decoded.triangles, decoded.colours}, options);
+}
+
+TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_edge,
+                                  std::span<const double> intra_squared) {
+    constexpr double stray_in_edges = 2, reach = 25, region = 100;  // of an adult's millimetres
+    const auto& surface = target();
+    StageClock clock(stages);
+    TrackedFitOptions options;
+    options.stray = std::max(stray_in_edges * reference_edge, 1.0);
+    options.reach = std::max(reach * configuration.adult_millimetre, options.stray);
+    options.region = region * configuration.adult_millimetre;
+    options.threads = configuration.threads;
+    auto out = measure_tracked_fit(surface, decoded, intra_squared, options);
+    clock.done("fit of the tracking");
+    return out;
+}
+
+}  // namespace htvm::internal
