@@ -51,6 +51,7 @@ void choose(htvm::EncoderOptions& options, Kind kind) {
         options.least_key_interval = options.key_interval;
         return;
     }
+    options.topology.frame_choice = htvm::FrameChoice::fixed;
     options.topology.scene_changes = false;
     if (kind == Kind::enhanced || kind == Kind::intra) return;
     options.topology.animation_error = 0;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "c_api/c_test_streams.h"
+#include "codec/enhanced_options.h"
 
 namespace htvm {
 namespace {
@@ -233,7 +234,7 @@ TEST(CDecoder, WritesToArraysThatAreLargeEnoughOnly) {
 }
 
 TEST(CDecoder, SaysWhichAttributesAFrameHas) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     const auto coded = encode(sequence_of(tfan_test::grid(4, 4), 1, none), options);
     const auto decoder = make_decoder();
     ASSERT_EQ(htvm_decoder_send_bytes(decoder.get(), coded.bytes.data(), coded.bytes.size()), HTVM_OK);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "codec/enhanced_options.h"
 #include "codec/test_sequences.h"
 #include "htvm/htvm.h"
 
@@ -16,7 +17,7 @@ using namespace internal;
 // A person of some 300 vertices with skeleton, colours and normals; an I-frame, EP-frames, P-frames, T-frames.
 inline const CodedSequence& coded_person() {
     static const auto coded = [] {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = enhanced_options();
         options.key_interval = 3;
         options.topology.frame_choice = FrameChoice::motion;
         options.topology.predicted_below = 60;
@@ -28,7 +29,7 @@ inline const CodedSequence& coded_person() {
 // Without skeleton, with every attribute.
 inline const CodedSequence& coded_grid() {
     static const auto coded = [] {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = enhanced_options();
         options.key_interval = 2;
         return encode(sequence_of(tfan_test::grid(6, 6), 4, all), options);
     }();

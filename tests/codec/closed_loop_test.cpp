@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 #include "codec/tfan_test_meshes.h"
@@ -53,7 +54,7 @@ void expect_closed_loop(const TestSequence& sequence, EncoderOptions options) {
 }
 
 EncoderOptions key_every_third() {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 3;
     return options;
 }
@@ -131,7 +132,7 @@ TEST(ClosedLoop, VerticesAndPoseAtOppositeEndsOfTheLattice) {
     }
     for (const double lambda : {0.0, 0.12, 1000.0})
         for (const double step : {0.1, 2.0, 1000.0}) {
-            EncoderOptions options = default_options(Profile::topology);
+            EncoderOptions options = test::enhanced_options();
             options.lattice_bits = 4;
             options.lambda = lambda;
             options.geometry_step = step;
@@ -151,7 +152,7 @@ TEST(ClosedLoop, NoChoiceOfCodewordLeavesTheLattice) {
     mesh.positions.assign(9, {-end, end - 0.1f, 0});
     mesh.positions.push_back({end, end, 0});
     sequence.frames.push_back({mesh, {}});
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.lattice_bits = 16;
     options.lambda = 1000;
     options.geometry_step = 100;

@@ -11,6 +11,7 @@
 #include <iterator>
 #include <optional>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 #include "codec/tracked_sequences.h"
@@ -138,7 +139,7 @@ void write_moving() {
 
 // T-frames as the encoder writes them.
 void write_tracked() {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = default_options(Profile::tracked);
     options.profile = Profile::tracked;
     options.key_interval = 4;
     write_stream("tracked", walking(6, 300, 20), options);
@@ -152,7 +153,7 @@ void write_tracked_by_chance() {
     for (const auto& shape : tfan_test::special_meshes())
         if (shape.vertex_count <= 80) awkward.frames.push_back(sequence_of(shape, 1, attributes++ % 8).frames[0]);
     awkward.frames.push_back(synthetic(false, 1, 150).frames[0]);
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 1;
     options.topology.merge_duplicates = false;
     options.geometry_step = 6;
@@ -185,7 +186,7 @@ void write_corner_cases() {
                                    "another number of vertices in every frame", "isolated vertices"})
             if (sequence.name == wanted)
                 corners.frames.insert(corners.frames.end(), sequence.frames.begin(), sequence.frames.end());
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 2;
     options.geometry_step = 8;
     options.colour_step = 40;
@@ -205,7 +206,7 @@ void write_choices() {
     paper.topology.nearest_vertices = 8;
     write_stream("paper", person, paper);
 
-    EncoderOptions fine = default_options(Profile::topology);
+    EncoderOptions fine = test::enhanced_options();
     fine.key_interval = 2;
     fine.geometry_step = 0.1;
     fine.colour_step = 1;
@@ -218,7 +219,7 @@ void write_choices() {
     // EP-frames, whole and in part, whose steps change: the skeleton walks, and jumps.
     auto all = walking(6, 300, 20);
     for (const int later : {60, 61, 200}) all.frames.push_back(walking(1, 300, later).frames[0]);
-    EncoderOptions rate = default_options(Profile::topology);
+    EncoderOptions rate = test::enhanced_options();
     rate.topology.frame_choice = FrameChoice::motion;
     rate.topology.predicted_below = 50;
     rate.topology.still_below = 40;
@@ -244,7 +245,7 @@ void write_all() {
     moving.topology.nearest_vertices = 5;
     write_stream("awkward_moving", spokes, moving);
 
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 3;
     auto person = synthetic(true, 5, 800);
     for (auto& frame : person.frames) frame.mesh.normals.clear();

@@ -5,8 +5,9 @@
 #include <cmath>
 #include <map>
 
-#include "codec/stream/frame_payload.h"
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
+#include "codec/stream/frame_payload.h"
 #include "codec/tracked_sequences.h"
 #include "htvm/decoder.hpp"
 
@@ -37,7 +38,7 @@ const std::vector<Packet>& animated() {
 // Header, I-frame and four T-frames, twice.
 const std::vector<Packet>& tracked() {
     static const std::vector<Packet> packets = [] {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = test::enhanced_options();
         options.key_interval = 1;
         return with_tracked_frames(encode(synthetic(true, 2, 100), options).packets, 1500, {}, 0, 1);
     }();

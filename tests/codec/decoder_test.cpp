@@ -5,6 +5,7 @@
 
 #include <map>
 
+#include "codec/enhanced_options.h"
 #include "codec/hostile_bytes.h"
 #include "codec/moving_sequences.h"
 #include "codec/stream/frame_payload.h"
@@ -24,7 +25,7 @@ const CodedSequence& nine_frames() {
             give_attributes(frame.mesh, all, 1);
             frame.mesh.colours = original;
         }
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = test::enhanced_options();
         options.key_interval = 3;
         return encode(sequence, options);
     }();
@@ -191,7 +192,7 @@ TEST(Decoder, LargerFramesThanAllowedAreRefused) {
 }
 
 TEST(Decoder, IntraFramesOfACoderThatIsNotThereAreUnsupported) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.intra_coder = draco_intra_coder();
     const auto decoded = decode_packets(encode(synthetic(false, 2, 200), options).packets);
     ASSERT_EQ(decoded.errors.size(), 2u);
@@ -202,7 +203,7 @@ TEST(Decoder, IntraFramesOfACoderThatIsNotThereAreUnsupported) {
 
 TEST(Decoder, ThePoseComesBack) {
     const auto sequence = synthetic(true, 3, 400);
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     const auto decoded = decode_packets(encode(sequence, options).packets);
     ASSERT_EQ(decoded.frames.size(), 3u);
     const auto& pose = decoded.frames[0].pose;
@@ -247,7 +248,7 @@ DecoderOptions small_limits() {
 
 CodedSequence small_stream(bool draco) {
     auto sequence = sequence_of(tfan_test::grid(7, 6), 2, all);
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     if (draco) options.intra_coder = draco_intra_coder();
     return encode(sequence, options);
 }

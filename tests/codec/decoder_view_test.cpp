@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "codec/tracked_sequences.h"
 #include "htvm/decoder.hpp"
@@ -100,7 +101,7 @@ TEST(TopologyNumber, ChangesAtFramesThatCodeAMeshAlone) {
 }
 
 std::vector<Packet> tracked_packets() {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 1;
     return with_tracked_frames(encode(synthetic(true, 2, 300), options).packets, 1500, {}, 0, 1);
 }

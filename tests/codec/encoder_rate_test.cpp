@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "surface/surface_distance.h"
 
@@ -81,7 +82,7 @@ Run coded_by(const TestSequence& sequence, EncoderOptions options) {
 }
 
 EncoderOptions at_rate(double bits_per_second, double buffer_seconds = 0.5, Profile profile = Profile::topology) {
-    EncoderOptions options = default_options(profile);
+    EncoderOptions options = profile == Profile::topology ? test::enhanced_options() : default_options(profile);
     options.rate.bits_per_second = bits_per_second;
     options.rate.buffer_seconds = buffer_seconds;
     options.key_interval = 10;
@@ -256,7 +257,7 @@ double error_of(const Mesh& captured, const Mesh& shown) {
 TEST(EncoderError, EveryFrameComesNearTheTarget) {
     const auto sequence = walking(8);
     for (const double target : {0.4, 1.0}) {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = test::enhanced_options();
         options.rate.target_error = target;
         options.key_interval = 4;
         const auto run = coded_by(sequence, options);

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 
+#include "codec/enhanced_options.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 
@@ -26,7 +27,7 @@ TEST(EncoderOptions, DefaultsAreLegal) { EXPECT_TRUE(Encoder::create({}).has_val
 // Numbers of the list: OptionList.RangesEndWhereTheySay.
 TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
     const auto with = [](const std::function<void(EncoderOptions&)>& change) {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = test::enhanced_options();
         change(options);
         return options;
     };
@@ -105,7 +106,7 @@ std::vector<Fault> faults() {
 }
 
 EncoderOptions with_synthetic_skeleton() {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.skeleton = synth_skeleton();
     options.key_interval = 3;
     options.threads = 1;
@@ -192,7 +193,7 @@ TEST(Encoder, AFirstFrameWithoutItsPoseIsRefusedAndTheNextBegins) {
 
 TEST(Encoder, AnIntraFrameComesEveryKeyIntervalOrWhenForced) {
     const auto sequence = synthetic(false, 7, 300);
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 4;
     auto encoder = Encoder::create(options);
     std::vector<bool> intra;
@@ -207,7 +208,7 @@ TEST(Encoder, AnIntraFrameComesEveryKeyIntervalOrWhenForced) {
 }
 
 TEST(Encoder, TheIndexSaysWhereTheIntraFramesAre) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 2;
     const auto coded = encode(synthetic(false, 5, 300), options);
     ASSERT_EQ(coded.packets.back().kind, PacketKind::index);
@@ -248,7 +249,7 @@ TEST(Encoder, AnEmptySequenceHasNoPackets) {
 }
 
 TEST(Encoder, AnIntraCoderThatFailsCostsItsFrameAlone) {
-    auto options = EncoderOptions{};
+    auto options = test::enhanced_options();
     options.key_interval = 1;
     int calls = 0;
     auto coder = draco_intra_coder();

@@ -6,6 +6,7 @@
 #include <thread>
 #include <vector>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 
@@ -37,7 +38,7 @@ CodedSequence expect_same_bytes(const TestSequence& sequence, EncoderOptions opt
 }
 
 TEST(EncoderThreads, IntraAndEnhancedFrames) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 3;
     expect_same_bytes(person(), options);
     expect_same_bytes(without_skeleton(), options);
@@ -70,7 +71,7 @@ TEST(EncoderThreads, TrackedFrames) {
 
 TEST(EncoderThreads, FramesChosenByRateAndDistortion) {
     const auto sequence = walking(4, 6000, 20);
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     const auto unchosen = encode(sequence, options);
     options.topology.frame_choice = FrameChoice::rate_distortion;
     options.topology.still_below = 40;
@@ -114,7 +115,7 @@ TEST(EncoderThreads, EncodersThatShareAPoolMayRunAtOnce) {
 }
 
 TEST(EncoderThreads, RateControlInOnePassAndTwo) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 4;
     options.rate.bits_per_second = 8e6;
     const auto in_one_pass = expect_same_bytes(person(), options);
@@ -132,7 +133,7 @@ TEST(EncoderThreads, RateControlInOnePassAndTwo) {
 }
 
 TEST(EncoderThreads, AGivenError) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.rate.target_error = 1.5;
     expect_same_bytes(person(), options);
 }

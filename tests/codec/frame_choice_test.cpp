@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "codec/choice/scene_change_enc.h"
+#include "codec/enhanced_options.h"
 #include "codec/test_sequences.h"
 #include "surface/surface_distance.h"
 
@@ -33,7 +34,7 @@ std::vector<FrameType> types_of(const CodedSequence& coded) {
 }
 
 EncoderOptions by_motion() {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.topology.frame_choice = FrameChoice::motion;
     options.topology.predicted_below = 14 * 10;  // 14 bones that each moved 10 mm
     options.topology.intra_above = 14 * 40;
@@ -83,7 +84,7 @@ TEST(SceneChanges, ForceAnIntraFrameUnlessSwitchedOff) {
     for (const auto& p : one.positions) mesh.positions.push_back({p[0], p[1], p[2] + 1200});
     for (const auto& t : one.triangles) mesh.triangles.push_back({t[0] + n, t[1] + n, t[2] + n});
     mesh.colours.insert(mesh.colours.end(), one.colours.begin(), one.colours.end());
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     EXPECT_EQ(types_of(encode(sequence, options)), (std::vector{intra, enhanced, intra}));
     options.topology.scene_changes = false;
     EXPECT_EQ(types_of(encode(sequence, options)), (std::vector{intra, enhanced, enhanced}));
@@ -102,7 +103,7 @@ TEST(SceneChanges, AreMoreThanATenthOfEitherSurfaceFarFromTheOther) {
 }
 
 TEST(ChoiceByCost, TakesAPredictedFrameWhereNothingButThePlaceChanged) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.topology.frame_choice = FrameChoice::rate_distortion;
     options.geometry_step = 8;  // beside which the registration's own error is small
     auto sequence = carried({0, 30, 60});
@@ -117,7 +118,7 @@ TEST(ChoiceByCost, IsNeverWorseThanIntraFramesAtTheSameQuality) {
         return surface_errors({a.positions, a.triangles, a.colours}, {b.positions, b.triangles, b.colours});
     };
     for (const double quality : {25.0, 50.0}) {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = test::enhanced_options();
         options.geometry_step = quality_steps(quality).geometry_step;
         options.colour_step = quality_steps(quality).colour_step;
         options.topology.frame_choice = FrameChoice::rate_distortion;

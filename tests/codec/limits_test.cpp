@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "codec/stream/frame_payload.h"
 #include "codec/stream/sequence.h"
@@ -87,7 +88,7 @@ TEST(Limits, WhatWasRefusedChangesNothing) {
 }
 
 TEST(Limits, DracoIsNotAskedForMoreThanTheFramesHeaderSays) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.intra_coder = draco_intra_coder();
     DecoderOptions decoding;
     decoding.intra_coder = draco_intra_coder();
@@ -127,7 +128,7 @@ TestSequence flat_sheet(std::uint32_t side, int frames) {
 }
 
 TEST(LeastPayload, NoMeshIsCodedInLess) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.geometry_step = 50;
     const auto coded = encode(flat_sheet(200, 2), options);
     for (const auto& packet : coded.packets) {

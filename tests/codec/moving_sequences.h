@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "codec/enhanced_options.h"
 #include "codec/stream/frame_payload.h"
 #include "codec/test_sequences.h"
 
@@ -69,7 +70,7 @@ inline std::size_t frames_of(const CodedSequence& coded, FrameType type) {
 
 // Whatever moved less than this is animated, however badly it fits.
 inline EncoderOptions motion_based(double still_below, int key_interval = 4) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = key_interval;
     options.topology.still_below = still_below;
     options.topology.animation_error = 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "codec/enhanced_options.h"
 #include "codec/test_sequences.h"
 #include "surface/surface_distance.h"
 
@@ -94,7 +95,7 @@ double root_mean_square(const std::vector<double>& values) {
 TEST(SkeletonFaults, LeaveTheErrorsOfFullyCodedFramesAsTheyAre) {
     const auto sequence = walking(6);
     for (const auto reference : {ReferenceVertices::any, ReferenceVertices::bone}) {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = test::enhanced_options();
         options.topology.reference_vertices = reference;
         const auto clean = encode(sequence, options);
         const double error = root_mean_square(surface_errors_of(sequence, clean));
@@ -110,12 +111,12 @@ TEST(SkeletonFaults, LeaveTheErrorsOfFullyCodedFramesAsTheyAre) {
 
 TEST(SkeletonFaults, NeverLetAnAnimatedFrameOrPartOfOneBeFartherOffThanAllowed) {
     const auto sequence = walking(16);
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.topology.frame_choice = FrameChoice::motion;
     options.topology.predicted_below = 600;
     options.topology.still_below = 100;
     options.topology.animation_error = 4;
-    const auto fully_coded = encode(sequence, default_options(Profile::topology)).bytes.size();
+    const auto fully_coded = encode(sequence, test::enhanced_options()).bytes.size();
     std::vector<Fault> all = faults(sequence.skeleton);
     all.insert(all.begin(), {"none", [](Pose&, std::size_t, const Pose&) {}});
     for (const auto& fault : all) {
@@ -136,7 +137,7 @@ TEST(SkeletonFaults, NeverLetAnAnimatedFrameOrPartOfOneBeFartherOffThanAllowed) 
 TEST(SkeletonFaults, CostNoMoreThanAFewBits) {
     const auto sequence = walking(6);
     const auto bytes_of = [](const TestSequence& capture) {
-        return encode(capture, default_options(Profile::topology)).bytes.size();
+        return encode(capture, test::enhanced_options()).bytes.size();
     };
     const auto clean = bytes_of(sequence);
     for (const auto& fault : faults(sequence.skeleton)) {

@@ -1,6 +1,7 @@
 // T-frames at the decoder: what they may refer to, and meshes that are hard on the nodes.
 #include <gtest/gtest.h>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "codec/tracked_sequences.h"
 
@@ -10,7 +11,7 @@ namespace {
 using namespace test;
 
 std::vector<Packet> tracked_person() {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 1;
     const auto intra = encode(synthetic(false, 1, 150), options).packets;
     return with_tracked_frames(intra, 1500, {}, 0, 1);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "codec/enhanced_options.h"
 #include "codec/hostile_bytes.h"
 #include "codec/test_sequences.h"
 #include "surface/surface_distance.h"
@@ -15,7 +16,7 @@ namespace {
 using namespace test;
 
 EncoderOptions tracked(TrackedReferences references = TrackedReferences::previous) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = default_options(Profile::tracked);
     options.profile = Profile::tracked;
     options.tracked.references = references;
     options.key_interval = 6;
@@ -69,7 +70,7 @@ TEST(TrackedFrames, TakeAFractionOfTheBitsForTheSameSurface) {
     for (const bool skeleton : {false, true}) {
         const auto sequence = walking(5, skeleton);
         const auto coded = encode(sequence, tracked());
-        const auto enhanced = encode(sequence, default_options(Profile::topology));
+        const auto enhanced = encode(sequence, test::enhanced_options());
         for (std::size_t t = 1; t < 5; ++t) {
             EXPECT_EQ(coded.infos[t].type, FrameType::tracked);
             EXPECT_LT(coded.infos[t].bytes.total() * 2, enhanced.infos[t].bytes.total());

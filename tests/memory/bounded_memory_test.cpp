@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "codec/enhanced_options.h"
 #include "codec/frame_kinds.h"
 #include "core/crc32.h"
 #include "memory/counted_allocations.h"
@@ -33,7 +34,7 @@ TestSequence soup(std::uint32_t vertices, std::uint32_t triangles, bool apart, i
 }
 
 EncoderOptions nothing_merged() {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.topology.merge_duplicates = false;
     options.topology.nearest_vertices = 64;
     options.topology.weight_width = 1000;
@@ -221,7 +222,7 @@ TEST(DecoderMemory, DoesNotGrowWithTheStream) {
 TEST(EncoderMemory, GrowsWithTheIndexAlone) {
     const auto sequence = walking(6, 300);
     const auto most = [&](int times) {
-        EncoderOptions options = default_options(Profile::topology);
+        EncoderOptions options = test::enhanced_options();
         options.skeleton = sequence.skeleton;
         options.key_interval = 3;
         options.threads = 1;

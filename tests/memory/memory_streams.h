@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
 #include "codec/tracked_sequences.h"
 
@@ -20,7 +21,7 @@ inline std::vector<Packet> animated_stream(int vertices) {
 
 // Header, I and four T-frames, from the I-frame and from the frame before.
 inline std::vector<Packet> tracked_stream(int vertices) {
-    EncoderOptions options = default_options(Profile::topology);
+    EncoderOptions options = test::enhanced_options();
     options.key_interval = 1;
     ChanceMotion motion;
     motion.fields.turned = true;
