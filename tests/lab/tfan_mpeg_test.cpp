@@ -128,8 +128,8 @@ TEST(TfanMpeg, gives_back_fans_of_more_than_256_vertices) {
 TEST(TfanMpeg, codes_a_regular_grid_in_a_bit_or_two_a_vertex) {
     const auto frame = encode_mpeg_tfan(with_vertices(101 * 101, grid(100)), {});
     ASSERT_TRUE(frame);
-    EXPECT_LT(8.0 * static_cast<double>(frame->layers.fans) / (101 * 101), 2.0);
-    EXPECT_GT(frame->layers.fans, 100u);
+    EXPECT_LT(8.0 * static_cast<double>(frame->layers[Layer::fans]) / (101 * 101), 2.0);
+    EXPECT_GT(frame->layers[Layer::fans], 100u);
 }
 
 TEST(TfanMpeg, quantises_positions_to_cells_of_the_longest_side) {
