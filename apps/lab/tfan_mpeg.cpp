@@ -483,7 +483,7 @@ Result<MpegTfanFrame> encode_mpeg_tfan(const Mesh& mesh, const MpegTfanSettings&
     write_numbers(traversed.symbols.configurations, configuration_symbols, out);
     write_numbers(traversed.symbols.operations, operation_symbols, out);
     write_numbers(traversed.symbols.indices, index_symbols, out);
-    frame.layers.fans = bytes_since();
+    frame.layers[Layer::fans] = bytes_since();
 
     const Predictor predictor(vertex_count, traversed.triangles);
     std::vector<Values> values(vertex_count);
@@ -494,7 +494,7 @@ Result<MpegTfanFrame> encode_mpeg_tfan(const Mesh& mesh, const MpegTfanSettings&
                 std::lround((double{mesh.positions[traversed.order[v]][i]} - grid.low[i]) * scale));
     write_numbers(residuals_of(values, [&](std::uint32_t v) { return predictor.parallelogram(v); }), residual_symbols,
                   out);
-    frame.layers.geometry = bytes_since();
+    frame.layers[Layer::geometry] = bytes_since();
 
     if (!mesh.colours.empty()) {
         for (std::uint32_t v = 0; v < vertex_count; ++v)
@@ -503,7 +503,7 @@ Result<MpegTfanFrame> encode_mpeg_tfan(const Mesh& mesh, const MpegTfanSettings&
                     std::lround(static_cast<double>(mesh.colours[traversed.order[v]][i]) / settings.colour_step));
         write_numbers(residuals_of(values, [&](std::uint32_t v) { return predictor.neighbour(v); }), residual_symbols,
                       out);
-        frame.layers.colour = bytes_since();
+        frame.layers[Layer::colour] = bytes_since();
     }
     frame.order = std::move(traversed.order);
     frame.bytes = out.take();
