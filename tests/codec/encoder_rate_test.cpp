@@ -254,6 +254,31 @@ double error_of(const Mesh& captured, const Mesh& shown) {
         .geometry_rms;
 }
 
+TEST(TrackedRate, AFrameThatFitsNoBufferIsTheMotionAlone) {
+    auto sequence = walking(15);
+    sequence.skeleton = {};  // without which a P-frame would be one rigid body
+    for (auto& frame : sequence.frames) frame.pose.reset();
+    const auto run = coded_by(sequence, at_rate(60e3, 0.5, Profile::tracked));
+    EXPECT_TRUE(run.errors.empty());
+    EXPECT_LE(run.fullest, 1);
+    ASSERT_EQ(run.shown.size(), sequence.frames.size());
+    std::size_t alone = 0, intra = 0;
+    for (const auto& packet : run.packets) {
+        EXPECT_NE(packet.kind, PacketKind::predicted);
+        if (packet.kind == PacketKind::intra) intra = packet.frame;
+        if (packet.kind != PacketKind::tracked) continue;
+        const auto payload = read_frame_payload(packet.payload);
+        ASSERT_TRUE(payload.has_value());
+        if (payload->of(Layer::geometry).size() + payload->of(Layer::colour).size() > 32) continue;
+        ++alone;
+        EXPECT_GT(payload->of(Layer::transforms).size(), 100u);
+        const auto& captured = sequence.frames[packet.frame].mesh;
+        EXPECT_LT(error_of(captured, run.shown[packet.frame]), 0.5 * error_of(captured, run.shown[intra]))
+            << "frame " << packet.frame << " against the I-frame held still";
+    }
+    EXPECT_GE(alone, 3u);
+}
+
 TEST(EncoderError, EveryFrameComesNearTheTarget) {
     const auto sequence = walking(8);
     for (const double target : {0.4, 1.0}) {
