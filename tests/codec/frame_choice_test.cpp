@@ -1,6 +1,8 @@
 // Which kind of frame a frame becomes (paper, section III-B, and past it).
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "codec/choice/scene_change_enc.h"
 #include "codec/enhanced_options.h"
 #include "codec/test_sequences.h"
@@ -64,6 +66,66 @@ TEST(ChoiceByMotion, CodesAfterAllWhatDoesNotFitTheCapture) {
     auto unchecked = by_motion();
     unchecked.topology.animation_error = 0;
     EXPECT_EQ(types_of(encode(sequence, unchecked)), (std::vector{intra, predicted, predicted}));
+}
+
+// A person who walks, as the synthetic capture has it.
+TestSequence on_foot(int frames, double size = 1) {
+    SynthOptions options;
+    options.vertices = 1500;
+    TestSequence out{"on foot", synth_skeleton(), {}};
+    for (int f = 0; f < frames; ++f) {
+        const auto captured = synth_frame(options, 40 + f);
+        SequenceFrame frame{captured.mesh, captured.pose};
+        for (auto& p : frame.mesh.positions)
+            for (auto& c : p) c *= static_cast<float>(size);
+        for (auto& joint : frame.pose->joints)
+            for (auto& c : joint) c *= size;
+        out.frames.push_back(std::move(frame));
+    }
+    return out;
+}
+
+TEST(ChoiceOfTheCheaper, IsIntraFramesAloneWithoutASkeleton) {
+    auto sequence = on_foot(4);
+    sequence.skeleton = {};
+    for (auto& frame : sequence.frames) frame.pose.reset();
+    auto alone = default_options(Profile::topology);
+    alone.key_interval = 1;
+    EXPECT_EQ(encode(sequence, default_options(Profile::topology)).bytes, encode(sequence, alone).bytes);
+}
+
+TEST(ChoiceOfTheCheaper, TakesNoMoreBitsThanIntraFramesAtAnyQuality) {
+    const auto sequence = on_foot(12);
+    std::size_t enhanced_frames = 0, trials_lost = 0;
+    for (const double step : {12.0, 3.0, 0.5}) {
+        auto options = default_options(Profile::topology);
+        options.geometry_step = step;
+        options.colour_step = 2 + step;
+        const auto chosen = encode(sequence, options);
+        auto alone = options;
+        alone.key_interval = 1;
+        // Where EP-frames do not pay, what is left to lose is the reference of a trial.
+        EXPECT_LE(static_cast<double>(chosen.bytes.size()),
+                  1.01 * static_cast<double>(encode(sequence, alone).bytes.size()))
+            << step;
+        const auto types = types_of(chosen);
+        enhanced_frames += static_cast<std::size_t>(std::count(types.begin(), types.end(), enhanced));
+        trials_lost += types[1] == intra;
+    }
+    EXPECT_GE(enhanced_frames, 11u);
+    EXPECT_GE(trials_lost, 1u);
+}
+
+TEST(SizeOfTheSubject, DoesNotChangeTheKindsOfTrackedFrames) {
+    const auto kinds_at = [](double size) {
+        EncoderOptions options;
+        options.geometry_step = 4 * size;
+        return types_of(encode(on_foot(6, size), options));
+    };
+    const auto kinds = kinds_at(1);
+    EXPECT_GE(std::count(kinds.begin(), kinds.end(), tracked), 4);
+    EXPECT_EQ(kinds_at(0.1), kinds);
+    EXPECT_EQ(kinds_at(10), kinds);
 }
 
 TEST(PredictedFrames, TakeTransformsAndNothingElse) {

@@ -117,7 +117,7 @@ TEST(OptionList, ErrorsAreWholeSentences) {
               "rate.buffer_seconds must be 0.01 to 3600 s, not 0.001");
     EXPECT_EQ(set_option(options, "threads", 5000).error().message, "threads must be 0, or 1 to 1024, not 5000");
     EXPECT_EQ(set_option(options, "topology.frame_choice", "best").error().message,
-              "topology.frame_choice must be fixed, motion or rd, not 'best'");
+              "topology.frame_choice must be fixed, motion, rd or cheaper, not 'best'");
     EXPECT_EQ(set_option(options, "topology.scene_changes", "yes").error().message,
               "topology.scene_changes must be on or off, not 'yes'");
     for (const char* text : {"", " 1", "1 ", "1,5", "nan", "inf", "0x10", "1e400", "one"})
@@ -203,17 +203,17 @@ TEST(OptionList, ContradictionsAreRefused) {
                   "topology.intra_above does nothing unless topology.frame_choice is motion");
     }
     EXPECT_THAT(message(Profile::tracked, [](auto& o) { o.profile = static_cast<Profile>(3); }), HasSubstr("profile"));
-    EXPECT_THAT(message(Profile::topology, [](auto& o) { o.topology.frame_choice = static_cast<FrameChoice>(3); }),
-                HasSubstr("topology.frame_choice must be fixed, motion or rd, not 3"));
+    EXPECT_THAT(message(Profile::topology, [](auto& o) { o.topology.frame_choice = static_cast<FrameChoice>(4); }),
+                HasSubstr("topology.frame_choice must be fixed, motion, rd or cheaper, not 4"));
 }
 
-TEST(Profiles, ThePapersDifferFromTopologyInThreeChoices) {
+TEST(Profiles, ThePapersDifferFromTopologyInFourChoices) {
     std::set<std::string> differ;
     for (const auto& option : option_list())
         if (option.get(default_options(Profile::paper)) != option.get(default_options(Profile::topology)))
             differ.insert(option.name);
-    EXPECT_EQ(differ,
-              (std::set<std::string>{"topology.reference_vertices", "topology.registration", "topology.weight_width"}));
+    EXPECT_EQ(differ, (std::set<std::string>{"topology.frame_choice", "topology.reference_vertices",
+                                             "topology.registration", "topology.weight_width"}));
     for (const auto& option : option_list())
         EXPECT_EQ(option.get(default_options(Profile::tracked)), option.get(default_options(Profile::topology)))
             << option.name;
