@@ -115,13 +115,13 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
 // What is found of one frame, each when first asked for, and kept. Lengths in lattice units.
 class FrameWork {
 public:
-    FrameWork(const Configuration& configuration, const Sequence& sequence, LatticeMesh captured, CodedPose pose,
-              std::vector<StageTime>& stages)
-        : configuration(configuration),
-          sequence(sequence),
+    FrameWork(const Configuration& settled, const Sequence& before, LatticeMesh captured, CodedPose captured_pose,
+              std::vector<StageTime>& times)
+        : configuration(settled),
+          sequence(before),
           mesh(std::move(captured)),
-          pose(std::move(pose)),
-          stages(stages) {}
+          pose(std::move(captured_pose)),
+          stages(times) {}
 
     const Configuration& configuration;
     const Sequence& sequence;
