@@ -623,7 +623,7 @@ Result<std::vector<SeamStages>> code_in_stages(const std::vector<std::shared_ptr
 
 Result<SeamCounts> count_seams(const Mesh& original, const SeamStages& stages, unsigned threads) {
     TopologyMeasureOptions options;
-    options.crack_width = 2 * mean_edge_length(original);
+    options.crack_width = 2 * internal::mean_edge(original.positions, original.triangles);
     SeamCounts out;
     out.frame = stages.frame;
     const std::pair<const Mesh*, Topology*> meshes[] = {{&original, &out.original},

@@ -544,7 +544,7 @@ Result<Figure> zippering_figure(const Mesh& original, const SeamStages& stages, 
     if (!row) return tl::unexpected(row.error());
     figure.tiles.push_back(std::move(*row));
     std::vector<Picture> strip(whole->begin(), whole->end());
-    const double radius = 8 * mean_edge_length(original);
+    const double radius = 8 * internal::mean_edge(original.positions, original.triangles);
     if (const auto spot = busiest_seam(stages, radius)) {
         const auto close =
             draw_spot({overlapping, trimmed, zippered, stages.zippered}, *spot, radius, 440, options.threads);

@@ -144,7 +144,8 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     const auto& mesh = simplify ? simple : work.mesh;
     StageClock clock(work.stages);
     IntraFrameOptions options;
-    options.geometry_step = referred_to ? step_for_reference(mean_edge(mesh), asked.geometry) : asked.geometry;
+    options.geometry_step =
+        referred_to ? step_for_reference(mean_edge(mesh.positions, mesh.triangles), asked.geometry) : asked.geometry;
     options.colour_step = asked.colour;
     options.merge_duplicates = configuration.options.topology.merge_duplicates;
     options.external = configuration.options.intra_coder ? &*configuration.options.intra_coder : nullptr;

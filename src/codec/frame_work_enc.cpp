@@ -76,11 +76,11 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
 }
 
 double FrameWork::edge() {
-    if (!edge_) edge_ = mean_edge(mesh);
+    if (!edge_) edge_ = mean_edge(mesh.positions, mesh.triangles);
     return *edge_;
 }
 
-const TargetSurface& FrameWork::target() {
+const SurfaceIndex& FrameWork::target() {
     if (!target_) {
         StageClock clock(stages);
         target_ = captured_surface(mesh, deformation_options(configuration));
@@ -133,7 +133,7 @@ SurfaceErrors FrameWork::errors_of(const LatticeMesh& decoded) {
     options.every = 4;
     if (!captured_) {
         auto points = points_of(mesh.positions);
-        SurfaceSearch search(points, mesh.triangles);
+        SurfaceIndex search(points, mesh.triangles);
         captured_ = CapturedSurface{std::move(points), std::move(search)};
     }
     const auto shown = points_of(decoded.positions);

@@ -132,8 +132,8 @@ public:
     // The reference in force; there must be one.
     const ReferenceInUse& reference() const { return *sequence.reference; }
     std::int64_t frames_since_intra() const { return std::int64_t{sequence.next_frame} - reference().decoded.number; }
-    double edge();                  // mean edge of the captured mesh
-    const TargetSurface& target();  // the captured surface, to be registered to
+    double edge();                 // mean edge of the captured mesh
+    const SurfaceIndex& target();  // the captured surface, to be registered to
     // Of each bone, and each node, against the reference.
     const FrameMotion& bone_motion();
     const std::vector<RigidMotion>& node_motion();
@@ -146,10 +146,10 @@ public:
 private:
     struct CapturedSurface {
         std::vector<Point3f> points;
-        SurfaceSearch search;
+        SurfaceIndex search;
     };
     std::optional<double> edge_;
-    std::optional<TargetSurface> target_;
+    std::optional<SurfaceIndex> target_;
     std::optional<FrameMotion> bone_motion_;
     std::optional<std::vector<RigidMotion>> node_motion_;
     std::optional<AnimationFit> animation_fit_;

@@ -4,17 +4,10 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/geometry.h"
+
 namespace htvm::internal {
 namespace {
-
-Vector3d operator+(const Vector3d& a, const Vector3d& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-Vector3d operator-(const Vector3d& a, const Vector3d& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vector3d operator*(const Vector3d& a, double s) { return {a[0] * s, a[1] * s, a[2] * s}; }
-double dot(const Vector3d& a, const Vector3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vector3d cross(const Vector3d& a, const Vector3d& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-double length(const Vector3d& a) { return std::sqrt(dot(a, a)); }
 
 // Makes v a unit vector; false where it has no direction: shorter than a millionth of a millimetre, or not finite.
 bool normalise(Vector3d& v) {

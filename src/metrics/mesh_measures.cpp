@@ -6,13 +6,6 @@
 
 namespace htvm {
 
-double length(const Point3& a) { return std::sqrt(dot(a, a)); }
-
-Point3 normalised(const Point3& a) {
-    const double norm = length(a);
-    return norm > 0 ? a * (1 / norm) : Point3{};
-}
-
 Result<void> check_measurable(const Mesh& mesh, const std::string& name) {
     constexpr std::size_t most = std::size_t{1} << 31;
     const std::size_t vertices = mesh.positions.size();
@@ -72,26 +65,14 @@ std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh) {
 
 std::vector<Vector3f> welded_normals(const Mesh& mesh) {
     const auto first = first_coincident_vertex(mesh);
-    std::vector<Point3> sums(mesh.positions.size());
-    for (const auto& t : mesh.triangles) {
-        const Point3 a = to_point(mesh.positions[t[0]]);
-        const Point3 n = cross(to_point(mesh.positions[t[1]]) - a, to_point(mesh.positions[t[2]]) - a);
-        for (std::uint32_t v : t) sums[first[v]] = sums[first[v]] + n;
-    }
-    std::vector<Vector3f> normals(sums.size());
-    for (std::size_t v = 0; v < sums.size(); ++v) {
-        const Point3 n = normalised(sums[first[v]]);
-        normals[v] = {static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])};
-    }
+    std::vector<Triangle> triangles;
+    triangles.reserve(mesh.triangles.size());
+    for (const auto& t : mesh.triangles) triangles.push_back({first[t[0]], first[t[1]], first[t[2]]});
+    const auto by_place = internal::vertex_normals(mesh.positions, triangles);
+    std::vector<Vector3f> normals;
+    normals.reserve(first.size());
+    for (const auto place : first) normals.push_back(internal::to_floats(by_place[place]));
     return normals;
-}
-
-double mean_edge_length(const Mesh& mesh) {
-    double sum = 0;
-    for (const auto& t : mesh.triangles)
-        for (std::size_t i = 0; i < 3; ++i)
-            sum += length(to_point(mesh.positions[t[i]]) - to_point(mesh.positions[t[(i + 1) % 3]]));
-    return mesh.triangles.empty() ? 0 : sum / (3.0 * static_cast<double>(mesh.triangles.size()));
 }
 
 }  // namespace htvm

@@ -6,29 +6,17 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 
 namespace htvm {
 
 // A point or vector in mm.
-struct Point3 {
-    std::array<double, 3> at{0, 0, 0};
-    double& operator[](std::size_t i) { return at[i]; }
-    double operator[](std::size_t i) const { return at[i]; }
-};
-
-inline Point3 to_point(const Vector3f& v) { return {{v[0], v[1], v[2]}}; }
-inline Point3 operator+(const Point3& a, const Point3& b) { return {{a[0] + b[0], a[1] + b[1], a[2] + b[2]}}; }
-inline Point3 operator-(const Point3& a, const Point3& b) { return {{a[0] - b[0], a[1] - b[1], a[2] - b[2]}}; }
-inline Point3 operator*(const Point3& a, double s) { return {{a[0] * s, a[1] * s, a[2] * s}}; }
-inline double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-inline Point3 cross(const Point3& a, const Point3& b) {
-    return {{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}};
-}
-double length(const Point3& a);
-// a / |a|; zero stays zero.
-Point3 normalised(const Point3& a);
+using Point3 = Vector3d;
+using internal::operator+, internal::operator-, internal::operator*;
+using internal::cross, internal::dot, internal::length, internal::normalised;
+inline Point3 to_point(const Vector3f& v) { return internal::to_vector(v); }
 
 // Coordinates beyond this are refused: squared distances would leave the float range of the search structures.
 inline constexpr float largest_coordinate = 1e9f;  // mm
@@ -40,7 +28,7 @@ Result<void> check_measurable(const Mesh& mesh, const std::string& name);
 
 // Axis-aligned box in mm; empty until something was put in.
 struct Box {
-    Point3 low, high;
+    Point3 low{}, high{};
     bool empty = true;
 };
 void extend(Box& box, const Box& other);
@@ -54,8 +42,5 @@ std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh);
 // position share one normal, so that a surface cut along texture seams stays smooth. Zero where no triangle with an
 // area touches the position. The mesh's own normals are not looked at.
 std::vector<Vector3f> welded_normals(const Mesh& mesh);
-
-// Mean length of the three sides over all triangles, mm; 0 without triangles.
-double mean_edge_length(const Mesh& mesh);
 
 }  // namespace htvm

@@ -30,18 +30,11 @@ struct SurfaceIndex::Impl {
 
 namespace {
 
-Point3 closest_point_on_segment(const Point3& p, const Point3& a, const Point3& b) {
-    const Point3 ab = b - a;
-    const double squared = dot(ab, ab);
-    const double along = squared > 0 ? std::clamp(dot(p - a, ab) / squared, 0.0, 1.0) : 0.0;
-    return a + ab * along;
-}
-
 double squared_distance_to(const Mesh& mesh, std::uint32_t triangle, const Point3& p) {
     const auto& t = mesh.triangles[triangle];
-    const Point3 d = p - closest_point_on_triangle(p, to_point(mesh.positions[t[0]]), to_point(mesh.positions[t[1]]),
-                                                   to_point(mesh.positions[t[2]]));
-    return dot(d, d);
+    return closest_on_triangle(p, to_point(mesh.positions[t[0]]), to_point(mesh.positions[t[1]]),
+                               to_point(mesh.positions[t[2]]))
+        .squared_distance;
 }
 
 // How far the hierarchy must be searched to be sure of everything within `distance`: float coordinates, boxes and
@@ -113,29 +106,6 @@ bool fill_scene(RTCDevice device, RTCScene scene, const Mesh& mesh) {
 }
 
 }  // namespace
-
-// Beyond a side, the nearest point lies on a side that separates p from the triangle.
-Point3 closest_point_on_triangle(const Point3& p, const Point3& a, const Point3& b, const Point3& c) {
-    const Point3 ab = b - a, ac = c - a, ap = p - a;
-    const Point3 normal = cross(ab, ac);
-    const double squared_area = dot(normal, normal);
-    const double at_c = dot(normal, cross(ab, ap)), at_b = dot(normal, cross(ap, ac));
-    const double at_a = squared_area - at_b - at_c;
-    const bool flat = !(squared_area > 0);
-    if (!flat && at_a >= 0 && at_b >= 0 && at_c >= 0) return p - normal * (dot(ap, normal) / squared_area);
-    Point3 best;
-    double best_distance = std::numeric_limits<double>::infinity();
-    auto try_side = [&](double weight, const Point3& from, const Point3& to) {
-        if (!flat && weight >= 0) return;
-        const Point3 candidate = closest_point_on_segment(p, from, to);
-        const double d = dot(p - candidate, p - candidate);
-        if (d < best_distance) best_distance = d, best = candidate;
-    };
-    try_side(at_c, a, b);
-    try_side(at_a, b, c);
-    try_side(at_b, c, a);
-    return best;
-}
 
 Result<SurfaceIndex> SurfaceIndex::build(const Mesh& mesh, Threads threads) {
     if (mesh.triangles.empty()) return fail(ErrorKind::bad_input, "A mesh without triangles has no surface to index.");

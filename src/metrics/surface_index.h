@@ -15,7 +15,9 @@
 namespace htvm {
 
 // The nearest point of triangle abc to p; a triangle without area counts as its three sides.
-Point3 closest_point_on_triangle(const Point3& p, const Point3& a, const Point3& b, const Point3& c);
+inline Point3 closest_point_of(const Point3& p, const Point3& a, const Point3& b, const Point3& c) {
+    return internal::point_at(internal::closest_on_triangle(p, a, b, c).shares, a, b, c);
+}
 
 struct ClosestTriangle {
     double squared_distance = 0;  // mm^2

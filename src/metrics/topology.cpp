@@ -72,8 +72,7 @@ Point3 corner(const Mesh& mesh, std::uint32_t triangle, std::size_t i) {
 
 // Twice the area, along the normal.
 Point3 area_normal(const Mesh& mesh, std::uint32_t t) {
-    const Point3 a = corner(mesh, t, 0);
-    return cross(corner(mesh, t, 1) - a, corner(mesh, t, 2) - a);
+    return internal::area_vector(std::span<const Vector3f>(mesh.positions), mesh.triangles[t]);
 }
 
 std::uint64_t count_duplicates(const Mesh& mesh) {
@@ -187,7 +186,7 @@ std::uint32_t across_the_crack(const Mesh& lines, const OpenEdge& edge, std::uin
     index.visit_near(middle, width, [&](std::uint32_t f) {
         if (f == e) return true;
         const Point3 c = corner(lines, f, 0), d = corner(lines, f, 1);
-        const Point3 gap = closest_point_on_triangle(middle, c, d, d) - middle;
+        const Point3 gap = closest_point_of(middle, c, d, d) - middle;
         const bool outside = dot(gap, edge.outward) >= -1e-6 * width;
         if (length(gap) <= width && outside && dot(along, normalised(d - c)) < -std::sqrt(0.5))
             best.offer(f, length(gap));
@@ -236,7 +235,7 @@ std::uint32_t other_layer(const Mesh& mesh, const SurfaceIndex& index, std::uint
     index.visit_near(centre, distance, [&](std::uint32_t u) {
         if (share_a_vertex(mesh.triangles[t], mesh.triangles[u])) return true;
         const Point3 gap =
-            closest_point_on_triangle(centre, corner(mesh, u, 0), corner(mesh, u, 1), corner(mesh, u, 2)) - centre;
+            closest_point_of(centre, corner(mesh, u, 0), corner(mesh, u, 1), corner(mesh, u, 2)) - centre;
         const bool steep = std::abs(dot(gap, normal)) >= std::sqrt(0.5) * length(gap);
         const bool same_way = dot(normal, normalised(area_normal(mesh, u))) >= std::sqrt(0.5);
         if (length(gap) <= distance && steep && same_way) best.offer(u, length(gap));
@@ -270,7 +269,7 @@ Result<Topology> topology(const Mesh& mesh, const TopologyMeasureOptions& option
     count_parts(mesh, out);
     if (!options.defects) return out;
     const Mesh surface = welded(mesh);
-    const double half_edge = mean_edge_length(surface) / 2;
+    const double half_edge = internal::mean_edge(surface.positions, surface.triangles) / 2;
     const double width = options.crack_width > 0 ? options.crack_width : half_edge;
     const double distance = options.flap_distance > 0 ? options.flap_distance : half_edge;
     if (const auto done = find_cracks(surface, width, threads, out); !done) return tl::unexpected(done.error());

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "surface/nearest_points.h"
+#include "surface/surface_index.h"
 
 namespace htvm::internal {
 

@@ -70,16 +70,18 @@ struct Collapse {
 
 struct Simplifier {
     const SimplificationOptions& options;
-    std::vector<Vector3d> positions;
-    std::vector<Triangle> triangles;
-    std::vector<bool> triangle_lives;
-    std::vector<std::vector<std::uint32_t>> fans;  // triangles round each vertex
-    std::vector<Quadric> quadrics;
-    std::vector<ColourCluster> colours;
-    std::vector<std::uint64_t> age;
-    std::vector<bool> lives;
-    std::priority_queue<Collapse> queue;
-    std::vector<std::uint32_t> ring_a, ring_b;  // reused
+    std::vector<Vector3d> positions{};
+    std::vector<Triangle> triangles{};
+    std::vector<bool> triangle_lives{};
+    std::vector<std::vector<std::uint32_t>> fans{};  // triangles round each vertex, dead ones among them
+    std::vector<std::uint32_t> dead{};               // how many of those there are; less than half
+    std::vector<Quadric> quadrics{};
+    std::vector<ColourCluster> colours{};
+    std::vector<std::uint64_t> age{};
+    std::vector<bool> lives{};
+    std::priority_queue<Collapse> queue{};
+    std::vector<std::uint32_t> ring_a{}, ring_b{};  // reused
+    mutable std::uint64_t looked_at = 0;            // triangles
 
     void prepare(std::span<const Colour> input_colours);
     void add_borders();
@@ -90,15 +92,28 @@ struct Simplifier {
     bool keeps_shape(std::uint32_t moving, std::uint32_t other, const Vector3d& to) const;
     void collapse(std::uint32_t keep, std::uint32_t drop, const Vector3d& to);
     void neighbours(std::uint32_t v, std::vector<std::uint32_t>& out) const;
+    std::size_t valence(std::uint32_t v) const { return fans[v].size() - dead[v]; }
+    void bury(std::uint32_t v);
+    template <class Visit>  // visit(triangle) for all that live around a vertex
+    void for_each_around(std::uint32_t v, const Visit& visit) const {
+        looked_at += fans[v].size();
+        for (const auto t : fans[v])
+            if (triangle_lives[t]) visit(t);
+    }
 };
+
+// A collapse at a vertex looks at all its triangles, and so does every try of one: at a hub of thousands that would
+// take the square of their number. A hub stays where it is; what lies around it is collapsed all the same.
+constexpr std::size_t most_around = 256;
 
 Vector3d area_normal(const Vector3d& a, const Vector3d& b, const Vector3d& c) { return (b - a).cross(c - a); }
 
 void Simplifier::neighbours(std::uint32_t v, std::vector<std::uint32_t>& out) const {
     out.clear();
-    for (const auto t : fans[v])
+    for_each_around(v, [&](std::uint32_t t) {
         for (const auto corner : triangles[t])
             if (corner != v) out.push_back(corner);
+    });
     std::sort(out.begin(), out.end());
     out.erase(std::unique(out.begin(), out.end()), out.end());
 }
@@ -138,6 +153,7 @@ void Simplifier::add_borders() {
 
 void Simplifier::prepare(std::span<const Colour> input_colours) {
     fans.resize(positions.size());
+    dead.assign(positions.size(), 0);
     quadrics.resize(positions.size());
     age.assign(positions.size(), 0);
     lives.assign(positions.size(), true);
@@ -174,6 +190,7 @@ Vector3d Simplifier::merged_position(std::uint32_t a, std::uint32_t b) const {
 }
 
 void Simplifier::judge(std::uint32_t a, std::uint32_t b) {
+    if (valence(a) > most_around || valence(b) > most_around) return;
     if (options.longest_edge > 0 && (positions[a] - positions[b]).norm() > options.longest_edge) return;
     Quadric q = quadrics[a];
     q.add(quadrics[b]);
@@ -193,10 +210,10 @@ double roundness(const Vector3d& area_normal, const std::array<Vector3d, 3>& p) 
 // The mean normal of the triangles round a vertex, by area.
 Vector3d Simplifier::facing(std::uint32_t v) const {
     Vector3d out = Vector3d::Zero();
-    for (const auto t : fans[v]) {
+    for_each_around(v, [&](std::uint32_t t) {
         const auto& [a, b, c] = triangles[t];
         out += area_normal(positions[a], positions[b], positions[c]);
-    }
+    });
     return out;
 }
 
@@ -205,7 +222,9 @@ Vector3d Simplifier::facing(std::uint32_t v) const {
 bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Vector3d& to) const {
     constexpr double least_turn = 0.3, least_facing = 0.2, least_roundness = 0.3;
     const Vector3d around = facing(moving);
+    looked_at += fans[moving].size();
     for (const auto t : fans[moving]) {
+        if (!triangle_lives[t]) continue;
         const auto& corners = triangles[t];
         if (std::find(corners.begin(), corners.end(), other) != corners.end()) continue;
         std::array<Vector3d, 3> before, after;
@@ -229,9 +248,12 @@ bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Ve
 
 // The link condition (what both ends neighbour is what the edge's triangles have opposite), and shape.
 bool Simplifier::allowed(std::uint32_t a, std::uint32_t b, const Vector3d& to) {
+    // They may have become hubs since the edge was judged.
+    if (valence(a) > most_around || valence(b) > most_around) return false;
     std::size_t shared_triangles = 0;
-    for (const auto t : fans[a])
+    for_each_around(a, [&](std::uint32_t t) {
         if (std::find(triangles[t].begin(), triangles[t].end(), b) != triangles[t].end()) ++shared_triangles;
+    });
     if (shared_triangles < 1 || shared_triangles > 2) return false;
     neighbours(a, ring_a);
     neighbours(b, ring_b);
@@ -246,23 +268,33 @@ bool Simplifier::allowed(std::uint32_t a, std::uint32_t b, const Vector3d& to) {
     return keeps_shape(a, b, to) && keeps_shape(b, a, to);
 }
 
+// Counts a triangle of v that has died; they are cleared away when they are half of all, so that a hub of which one
+// after another dies is not gone through for each.
+void Simplifier::bury(std::uint32_t v) {
+    if (2 * ++dead[v] < fans[v].size()) return;
+    looked_at += fans[v].size();
+    std::erase_if(fans[v], [&](std::uint32_t t) { return !triangle_lives[t]; });
+    dead[v] = 0;
+}
+
 void Simplifier::collapse(std::uint32_t keep, std::uint32_t drop, const Vector3d& to) {
     positions[keep] = to;
     quadrics[keep].add(quadrics[drop]);
     colours[keep] = colours[keep].merged(colours[drop]);
     lives[drop] = false;
-    for (const auto t : fans[drop]) {
+    for_each_around(drop, [&](std::uint32_t t) {
         auto& corners = triangles[t];
         if (std::find(corners.begin(), corners.end(), keep) != corners.end()) {
             triangle_lives[t] = false;
             for (const auto v : corners)
-                if (v != drop) std::erase(fans[v], t);
-            continue;
+                if (v != drop) bury(v);
+            return;
         }
         std::replace(corners.begin(), corners.end(), drop, keep);
         fans[keep].push_back(t);
-    }
+    });
     fans[drop].clear();
+    dead[drop] = 0;
     ++age[keep];
     neighbours(keep, ring_a);
     for (const auto v : ring_a) judge(keep, v);
@@ -270,6 +302,7 @@ void Simplifier::collapse(std::uint32_t keep, std::uint32_t drop, const Vector3d
 
 SimplifiedMesh compacted(const Simplifier& simplifier, bool coloured) {
     SimplifiedMesh out;
+    out.looked_at = simplifier.looked_at;
     std::vector<std::uint32_t> number(simplifier.positions.size(), 0);
     for (std::size_t v = 0; v < number.size(); ++v) {
         if (!simplifier.lives[v]) continue;
@@ -289,18 +322,9 @@ SimplifiedMesh compacted(const Simplifier& simplifier, bool coloured) {
 
 SimplifiedMesh simplify(std::span<const Vector3d> positions, std::span<const Triangle> triangles,
                         std::span<const Colour> colours, const SimplificationOptions& options) {
-    Simplifier simplifier{options,
-                          {positions.begin(), positions.end()},
-                          {triangles.begin(), triangles.end()},
-                          {},
-                          {},
-                          {},
-                          {},
-                          {},
-                          {},
-                          {},
-                          {},
-                          {}};
+    Simplifier simplifier{.options = options,
+                          .positions = {positions.begin(), positions.end()},
+                          .triangles = {triangles.begin(), triangles.end()}};
     simplifier.prepare(colours);
     if (options.surface_error > 0) simplifier.add_borders();
     while (!simplifier.queue.empty()) {

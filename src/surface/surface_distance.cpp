@@ -18,7 +18,7 @@ Level level(const Colour& c) { return {float(c[0]), float(c[1]), float(c[2])}; }
 // The surface that is measured to.
 struct Target {
     const SurfaceView& surface;
-    const SurfaceSearch& search;
+    const SurfaceIndex& search;
     bool colours;  // compare them
 
     Level colour_at(const SurfacePoint& p) const {
@@ -26,7 +26,7 @@ struct Target {
         Level out{};
         for (std::size_t i = 0; i < 3; ++i) {
             const Level corner = level(surface.colours[surface.triangles[p.triangle][i]]);
-            for (std::size_t c = 0; c < 3; ++c) out[c] += p.barycentric[i] * corner[c];
+            for (std::size_t c = 0; c < 3; ++c) out[c] += p.shares[i] * corner[c];
         }
         return out;
     }
@@ -75,15 +75,6 @@ Sums sum_blocks(std::size_t count, Threads threads, const Body& body) {
     return total;
 }
 
-double area_of(const SurfaceView& mesh, const Triangle& t) {
-    std::array<double, 3> ab{}, ac{};
-    for (std::size_t i = 0; i < 3; ++i) {
-        ab[i] = double{mesh.positions[t[1]][i]} - mesh.positions[t[0]][i];
-        ac[i] = double{mesh.positions[t[2]][i]} - mesh.positions[t[0]][i];
-    }
-    return std::hypot(ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2], ab[0] * ac[1] - ab[1] * ac[0]) / 2;
-}
-
 struct Weights {
     std::vector<double> vertices, triangles;
 };
@@ -93,7 +84,7 @@ Weights weigh(const SurfaceView& mesh) {
     out.triangles.reserve(mesh.triangles.size());
     double whole = 0;
     for (const auto& t : mesh.triangles) {
-        const double area = area_of(mesh, t);
+        const double area = length(area_vector(mesh.positions, t)) / 2;
         out.triangles.push_back(area);
         for (const auto v : t) out.vertices[v] += area;
         whole += area;
@@ -139,7 +130,7 @@ Sums measure_centres(const SurfaceView& from, const std::vector<double>& weights
 
 }  // namespace
 
-OneSidedErrors one_sided_errors(const SurfaceView& from, const SurfaceView& to, const SurfaceSearch& search_to,
+OneSidedErrors one_sided_errors(const SurfaceView& from, const SurfaceView& to, const SurfaceIndex& search_to,
                                 const SurfaceDistanceOptions& options) {
     if (from.positions.empty()) return {};
     constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -159,12 +150,12 @@ OneSidedErrors one_sided_errors(const SurfaceView& from, const SurfaceView& to, 
 }
 
 SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceView& b, const SurfaceDistanceOptions& options) {
-    return surface_errors(a, SurfaceSearch(a.positions, a.triangles), b, options);
+    return surface_errors(a, SurfaceIndex(a.positions, a.triangles), b, options);
 }
 
-SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceSearch& search_a, const SurfaceView& b,
+SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceIndex& search_a, const SurfaceView& b,
                              const SurfaceDistanceOptions& options) {
-    const SurfaceSearch search_b(b.positions, b.triangles);
+    const SurfaceIndex search_b(b.positions, b.triangles);
     const auto forward = one_sided_errors(a, b, search_b, options);
     const auto backward = one_sided_errors(b, a, search_a, options);
     return {std::sqrt(std::max(forward.squared_distance, backward.squared_distance)),
@@ -172,7 +163,7 @@ SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceSearch& search_a
 }
 
 std::vector<RegionErrors> region_errors(const SurfaceView& from, std::span<const std::uint16_t> labels,
-                                        std::size_t regions, const SurfaceView& to, const SurfaceSearch& search_to,
+                                        std::size_t regions, const SurfaceView& to, const SurfaceIndex& search_to,
                                         const SurfaceDistanceOptions& options) {
     std::vector<RegionErrors> out(regions);
     const std::size_t every = std::max(1u, options.every), count = std::min(from.positions.size(), labels.size());

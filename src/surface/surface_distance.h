@@ -14,7 +14,7 @@
 
 #include "core/thread.h"
 #include "htvm/mesh.hpp"
-#include "surface/surface_search.h"
+#include "surface/surface_index.h"
 
 namespace htvm::internal {
 
@@ -42,7 +42,7 @@ struct OneSidedErrors {
 // From samples of `from` to `to`, whose search is given so that it may be built once for many comparisons. Vertices
 // that no triangle uses are not sampled. A mesh without triangles, or whose triangles have no area, is sampled at its
 // vertices, all alike.
-OneSidedErrors one_sided_errors(const SurfaceView& from, const SurfaceView& to, const SurfaceSearch& search_to,
+OneSidedErrors one_sided_errors(const SurfaceView& from, const SurfaceView& to, const SurfaceIndex& search_to,
                                 const SurfaceDistanceOptions& options = {});
 
 struct SurfaceErrors {
@@ -53,7 +53,7 @@ struct SurfaceErrors {
 // Both ways between two meshes. Two empty meshes are equal; one empty mesh is infinitely far away.
 SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceView& b, const SurfaceDistanceOptions& options = {});
 // The same with a search of `a` that is there already, for comparing one mesh with several.
-SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceSearch& search_a, const SurfaceView& b,
+SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceIndex& search_a, const SurfaceView& b,
                              const SurfaceDistanceOptions& options = {});
 
 // What the samples of one region are away; sums of several frames add up.
@@ -68,7 +68,7 @@ struct RegionErrors {
 // counting for the region it is labelled with. Labels: one per vertex; those >= regions are left out. Infinite
 // distances where `to` is empty.
 std::vector<RegionErrors> region_errors(const SurfaceView& from, std::span<const std::uint16_t> labels,
-                                        std::size_t regions, const SurfaceView& to, const SurfaceSearch& search_to,
+                                        std::size_t regions, const SurfaceView& to, const SurfaceIndex& search_to,
                                         const SurfaceDistanceOptions& options = {});
 
 }  // namespace htvm::internal

@@ -252,7 +252,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
     if (handles.empty()) return mesh;
     mesh.samples = spread_samples(mesh.weights, handles.size(), options.samples);
     mesh.sample_gap = point_gap(positions, triangles, mesh.samples.size());
-    const auto normals = vertex_normals(positions, triangles, options.threads);
+    const auto normals = points_of(vertex_normals(positions, triangles));
     for (const std::uint32_t v : mesh.samples) {
         mesh.fine.samples.push_back(static_cast<std::uint32_t>(mesh.fine.samples.size()));
         mesh.sample_normals.push_back(normals[v]);
@@ -350,7 +350,7 @@ float match_weight(const OrientedMatch& match, const Round& round) {
 }
 
 // Both ways: each sample to the target, and each of the target's samples to the nearest moved sample.
-std::vector<Match> find_matches(const Moved& moved, const TargetSurface& target, const Round& round, float cell,
+std::vector<Match> find_matches(const Moved& moved, const SurfaceIndex& target, const Round& round, float cell,
                                 const DeformationOptions& options, Guesses& guesses) {
     const std::size_t skip = round.every * (round.far ? 2 : 1);
     const std::size_t forward = moved.points.size() / round.every, back = target.samples.size() / skip;
@@ -407,7 +407,7 @@ struct Pull {
 };
 
 // Of the samples from `begin` to before `end`.
-std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& moved, const TargetSurface& target,
+std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& moved, const SurfaceIndex& target,
                             double point_share, std::size_t begin, std::size_t end) {
     std::vector<Pull> pulls(end - begin);
     for (const Match& match : matches) {
@@ -523,7 +523,7 @@ double apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>&
 }
 
 // Gives how far it moved the handles, see apply_step.
-double run_round(Stage& stage, const TargetSurface& target, const Round& round, float cell, BlockSystem (&systems)[2],
+double run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell, BlockSystem (&systems)[2],
                  Guesses& guesses, const DeformationOptions& options) {
     const Moved moved = move_samples(stage, options.threads);
     const auto matches = find_matches(moved, target, round, cell, options, guesses);
@@ -598,7 +598,7 @@ double between(double from, double to, int step, int steps) {
 
 }  // namespace
 
-std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const TargetSurface& target,
+std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const SurfaceIndex& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options) {
     std::vector<RigidMotion> motion(start.begin(), start.end());
     motion.resize(mesh.handles.size());
@@ -642,7 +642,7 @@ std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const Ri
     return next;
 }
 
-double deformation_error(const DeformableMesh& mesh, const TargetSurface& target, std::span<const RigidMotion> motions,
+double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
                          const DeformationOptions& options) {
     if (mesh.samples.empty() || target.samples.empty()) return 0;
     const Stage stage = fine_stage(mesh, {motions.begin(), motions.end()});

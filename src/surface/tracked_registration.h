@@ -17,7 +17,7 @@
 #include "core/vertex_weights.h"
 #include "htvm/mesh.hpp"
 #include "surface/rigid_registration.h"
-#include "surface/target_surface.h"
+#include "surface/surface_index.h"
 
 namespace htvm::internal {
 
@@ -117,7 +117,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
 
 // The motions, one per handle, reference -> frame, that lay the reference on the target, from `start` (one per handle;
 // or empty: no motion). The same for any number of threads.
-std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const TargetSurface& target,
+std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const SurfaceIndex& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options);
 
 // A start for the next frame: each handle takes the step from `before` to `last` once more. One motion a handle each.
@@ -126,7 +126,7 @@ std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const Ri
 
 // Mean distance of the samples to the target's planes and of the target's samples to the reference, each bounded by
 // near_reach: to choose between starts.
-double deformation_error(const DeformableMesh& mesh, const TargetSurface& target, std::span<const RigidMotion> motions,
+double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
                          const DeformationOptions& options);
 
 // The reference moved, in floats: to look ahead with. What is coded moves in integers.

@@ -7,6 +7,8 @@
 
 #include "codec/enhanced_options.h"
 #include "codec/hostile_bytes.h"
+#include "codec/intra/intra_frame.h"
+#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "surface/surface_distance.h"
 
@@ -165,22 +167,61 @@ TEST(TrackedFrames, GiveWayToAnIntraFrameWhereTheSurfaceIsAnother) {
     EXPECT_EQ(types, (std::vector{FrameType::intra, FrameType::tracked, FrameType::intra, FrameType::tracked}));
 }
 
+// A stream's first two frames, an I-frame and a T-frame that refers to it, as the decoder works on them.
+struct FirstTrackedFrame {
+    TrackedReference reference;
+    std::vector<std::uint8_t> payload;
+};
+
+FirstTrackedFrame first_tracked_frame() {
+    const auto coded = encode(walking(2, true, 300), tracked());
+    const auto header = read_sequence_header(coded.packets[0].payload).value();
+    const auto intra = read_frame_payload(coded.packets[1].payload).value();
+    return {make_tracked_reference(decode_intra_frame(intra, nullptr).value(), header.node_spacing,
+                                   static_cast<std::int32_t>(intra.header.geometry_step))
+                .value(),
+            coded.packets[2].payload};
+}
+
+void expect_on_lattice(const DecodedTrackedFrame& frame, const TrackedReference& reference) {
+    ASSERT_EQ(frame.positions.size(), reference.mesh.positions.size());
+    for (const auto p : frame.positions) ASSERT_TRUE(on_lattice(p)) << p.x << " " << p.y << " " << p.z;
+}
+
 TEST(TrackedFrames, WithDamagedLayersAreRefusedOrStayWithinTheLattice) {
-    const auto coded = encode(walking(3, true, 300), tracked());
-    for (const auto& packet : coded.packets) {
-        if (packet.kind != PacketKind::tracked || packet.reference != 0) continue;
-        std::mt19937 random(5);
-        for (int i = 0; i < 300; ++i) {
-            Decoder decoder;
-            for (std::size_t k = 0; k < 2; ++k) ASSERT_TRUE(decoder.push(coded.packets[k]).has_value());
-            auto damaged = packet;
-            auto& byte = damaged.payload[below(random, static_cast<std::uint32_t>(damaged.payload.size()))];
-            byte = static_cast<std::uint8_t>(byte ^ (1u << below(random, 8)));
-            if (i % 3 == 0) damaged.payload.resize(below(random, static_cast<std::uint32_t>(damaged.payload.size())));
-            const auto frame = decoder.push(damaged);
-            if (!frame || !*frame) continue;
-            EXPECT_EQ((*frame)->mesh.positions.size(), coded.reconstructions[0].positions.size());
-        }
+    const auto [reference, whole] = first_tracked_frame();
+    std::mt19937 random(5);
+    int decoded = 0, refused = 0;
+    for (int i = 0; i < 300; ++i) {
+        auto damaged = whole;
+        auto& byte = damaged[below(random, static_cast<std::uint32_t>(damaged.size()))];
+        byte = static_cast<std::uint8_t>(byte ^ (1u << below(random, 8)));
+        if (i % 3 == 0) damaged.resize(below(random, static_cast<std::uint32_t>(damaged.size())));
+        const auto payload = read_frame_payload(damaged);
+        DecodedTrackedFrame frame;
+        const bool good = payload && decode_tracked_frame(*payload, reference, nullptr, {}, frame);
+        ++(good ? decoded : refused);
+        if (good) expect_on_lattice(frame, reference);
+    }
+    EXPECT_GT(decoded, 0);
+    EXPECT_GT(refused, 0);
+}
+
+TEST(TrackedFrames, ThatMoveBeyondTheLatticeEndAtItsEdge) {
+    const auto [reference, whole] = first_tracked_frame();
+    auto payload = copy_of(read_frame_payload(whole).value());
+    NodeMotionOptions steps;
+    steps.shift_exponent = 20;
+    const std::vector<QuantisedTransform> far(reference.pivots.size(),
+                                              {{}, {2 * lattice_limit, -2 * lattice_limit, 0}});
+    payload.set(Layer::transforms, encode_node_motion(far, reference.parents, reference.pivots, {}, steps).bytes);
+    DecodedTrackedFrame frame;
+    ASSERT_TRUE(decode_tracked_frame(view_of(payload), reference, nullptr, {}, frame).has_value());
+    expect_on_lattice(frame, reference);
+    const auto moved = moved_by_nodes(reference, frame.state.transforms, {});
+    for (const auto p : moved) {
+        EXPECT_EQ(p.x, lattice_limit);
+        EXPECT_EQ(p.y, -lattice_limit);
     }
 }
 

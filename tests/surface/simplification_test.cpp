@@ -182,5 +182,25 @@ TEST(Simplification, random_soups_stay_sound) {
     }
 }
 
+// One vertex in the middle of a disc, in all its triangles.
+Input hub(std::uint32_t triangles) {
+    Input out;
+    out.positions.emplace_back(0, 0, 0);
+    for (std::uint32_t i = 0; i < triangles; ++i) {
+        const double turn = 2 * std::acos(-1.0) * i / triangles;
+        out.positions.emplace_back(1000 * std::cos(turn), 1000 * std::sin(turn), 0);
+        out.triangles.push_back({0, 1 + i, 1 + (i + 1) % triangles});
+    }
+    return out;
+}
+
+TEST(Simplification, of_a_hub_takes_work_in_proportion_to_its_triangles) {
+    const auto small = simplified(hub(20000), 1), large = simplified(hub(200000), 1);
+    EXPECT_LT(small.positions.size(), 300u);
+    EXPECT_LT(large.positions.size(), 300u);
+    EXPECT_LT(small.looked_at, 200u * 20000);
+    EXPECT_LT(large.looked_at, 12 * small.looked_at);
+}
+
 }  // namespace
 }  // namespace htvm::internal

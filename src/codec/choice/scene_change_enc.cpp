@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "surface/nearest_points.h"
+#include "surface/surface_index.h"
 
 namespace htvm::internal {
 namespace {

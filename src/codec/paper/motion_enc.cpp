@@ -20,51 +20,17 @@ LatticePoint rounded(const Eigen::Vector3d& v) {
     return {whole(v.x()), whole(v.y()), whole(v.z())};
 }
 
-std::vector<Eigen::Vector3f> vertex_normals(const LatticeMesh& mesh) {
-    std::vector<Eigen::Vector3f> normals(mesh.positions.size(), Eigen::Vector3f::Zero());
-    for (const auto& t : mesh.triangles) {
-        const Eigen::Vector3d a = vector_of(mesh.positions[t[0]]);
-        const Eigen::Vector3d b = vector_of(mesh.positions[t[1]]) - a, c = vector_of(mesh.positions[t[2]]) - a;
-        const Eigen::Vector3f area = b.cross(c).cast<float>();
-        for (const auto v : t) normals[v] += area;
-    }
-    for (auto& n : normals) n.normalize();
-    return normals;
-}
-
 }  // namespace
-
-double mean_edge(const LatticeMesh& mesh) {
-    double sum = 0;
-    for (const auto& t : mesh.triangles)
-        for (std::size_t i = 0; i < 3; ++i)
-            sum +=
-                std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i]], mesh.positions[t[(i + 1) % 3]])));
-    return mesh.triangles.empty() ? 0 : sum / (3.0 * static_cast<double>(mesh.triangles.size()));
-}
-
-double sampled_mean_edge(const LatticeMesh& mesh) {
-    constexpr std::size_t every = 8;
-    double sum = 0;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < mesh.triangles.size(); i += every) {
-        const auto& t = mesh.triangles[i];
-        sum +=
-            std::sqrt(static_cast<double>(squared_distance(mesh.positions[t[i % 3]], mesh.positions[t[(i + 1) % 3]])));
-        ++count;
-    }
-    return count > 0 ? sum / static_cast<double>(count) : 0;
-}
 
 ReferenceSearch make_reference_search(const ReferenceMesh& reference) {
     ReferenceSearch out;
-    const auto normals = vertex_normals(reference.mesh);
+    const auto normals = vertex_normals(reference.mesh.positions, reference.mesh.triangles);
     for (std::size_t bone = 0; bone < reference.pivots.size(); ++bone) {
         std::vector<Point3f> points;
         out.normals.emplace_back();
         for (const auto v : reference.sub_meshes.of(bone)) {
             points.push_back(point_of(reference.mesh.positions[v]));
-            out.normals.back().push_back(normals[v]);
+            out.normals.back().push_back(Eigen::Map<const Eigen::Vector3d>(normals[v].data()).cast<float>());
         }
         out.sub_mesh.emplace_back(points);
     }

@@ -20,11 +20,6 @@ struct ReferenceSearch {
 };
 ReferenceSearch make_reference_search(const ReferenceMesh& reference);
 
-// The mean length of the triangles' sides, lattice units; 0 without triangles.
-double mean_edge(const LatticeMesh& mesh);
-// About that, from every eighth triangle.
-double sampled_mean_edge(const LatticeMesh& mesh);
-
 // eq. 4: the motion of each bone from the reference's pose to this frame's.
 std::vector<RigidMotion> skeletal_motion(const ReferenceMesh& reference, const std::vector<Bone>& bones,
                                          const CodedPose& pose);

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "surface/target_surface.h"
+#include "surface/surface_index.h"
 
 namespace htvm::internal {
 namespace {
@@ -15,8 +15,8 @@ struct Planes {
     std::vector<Point3f> normals;
     float reach = 0;  // farther from the nearest vertex than this, the surface has ended
 
-    Planes(std::span<const Point3f> points, std::span<const Triangle> triangles, double edge, Threads threads)
-        : tree(points), normals(vertex_normals(points, triangles, threads)), reach(static_cast<float>(3 * edge)) {}
+    Planes(std::span<const Point3f> points, std::span<const Triangle> triangles, double edge)
+        : tree(points), normals(points_of(vertex_normals(points, triangles))), reach(static_cast<float>(3 * edge)) {}
     float distance(const Point3f& query, const Neighbour& nearest) const {
         const auto &point = tree.point(nearest.index), &normal = normals[nearest.index];
         const float far = std::sqrt(nearest.squared_distance);
@@ -42,12 +42,12 @@ AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& ref
                                std::span<const LatticePoint> predicted, bool both_ways, Threads threads) {
     constexpr std::size_t stride = 4;  // the way back is sampled
     const auto captured_points = points_of(mesh.positions), predicted_points = points_of(predicted);
-    const double edge = mean_edge(reference.mesh);
+    const double edge = mean_edge(reference.mesh.positions, reference.mesh.triangles);
     const std::size_t bones = reference.pivots.size();
     AnimationFit out;
     out.nearest.resize(captured_points.size());
     out.distance.resize(captured_points.size());
-    const Planes surface(predicted_points, reference.mesh.triangles, edge, threads);
+    const Planes surface(predicted_points, reference.mesh.triangles, edge);
     parallel_for(captured_points.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const auto found = surface.tree.nearest(captured_points[k]);
@@ -59,7 +59,7 @@ AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& ref
     for (std::size_t k = 0; k < captured_points.size(); ++k)
         forth[reference.bone_of_vertex[out.nearest[k]]].add(out.distance[k]);
     if (both_ways && !captured_points.empty()) {
-        const Planes captured(captured_points, mesh.triangles, edge, threads);
+        const Planes captured(captured_points, mesh.triangles, edge);
         std::vector<float> distance((predicted_points.size() + stride - 1) / stride);
         parallel_for(distance.size(), threads, 512, [&](std::size_t begin, std::size_t end) {
             for (std::size_t k = begin; k < end; ++k) {

@@ -169,6 +169,7 @@ struct Cover {
     std::vector<Distance> distance;
     std::vector<std::uint8_t> reached;  // how many nodes came nearer to each vertex than those before
     std::vector<std::uint32_t> nodes;
+    std::uint64_t searched = 0;
 };
 // On surfaces a few nodes do. A star whose rays are nodes, each a little nearer to the hub than the last, could make
 // every one of them search all that lies behind the hub.
@@ -186,6 +187,7 @@ void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover
         heap.pop_back();
         if (distance != cover.distance[vertex]) continue;
         ++cover.reached[vertex];
+        ++cover.searched;
         for (const Step& step : graph.from(vertex)) {
             const Distance there = distance + step.length;  // both are below 2^26
             if (there > spacing || there >= cover.distance[step.vertex]) continue;
@@ -413,6 +415,7 @@ DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> position
     if (!covered) take_nearest_in_space(positions, cover.nodes, lists);
 
     nodes.vertex = std::move(cover.nodes);
+    nodes.searched = cover.searched;
     nodes.handle_of_vertex.reserve(positions.size());
     nodes.weights.reserve(positions.size());
     for (const auto& list : lists) {

@@ -36,6 +36,8 @@ struct DeformationNodes {
     std::vector<std::uint16_t> handle_of_vertex;  // the nearest node along the mesh, of equally near ones the lower
     HandleWeights weights;                        // of the nearest nodes along the mesh, falling to nothing where the
                                                   // next nearest one takes over
+    std::uint64_t searched = 0;                   // vertices that the searches from the nodes came to, some many times:
+                                                  // what choosing took, at most 16 per vertex and attempt
     std::vector<NodePair> neighbours;             // ascending, each once: nodes whose regions touch, and what ties
                                                   // groups apart from each other to the nearest: all are connected
 };

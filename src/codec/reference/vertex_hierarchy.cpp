@@ -6,21 +6,18 @@
 #include <string>
 #include <utility>
 
+#include "core/geometry.h"
+
 namespace htvm::internal {
 
 namespace {
 
 constexpr std::size_t most_elements = std::size_t{1} << 28;
 
-using Vector = std::array<double, 3>;
-
-Vector operator-(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
 // What the next coarser level is built from.
 struct Layer {
     std::vector<std::uint32_t> vertices;  // below each node
-    std::vector<Vector> centre;           // of them
+    std::vector<Vector3d> centre;         // of them
     std::vector<std::uint32_t> first_neighbour, neighbours;
 
     std::size_t size() const { return vertices.size(); }
@@ -34,23 +31,16 @@ Layer layer_of_vertices(std::span<const LatticePoint> positions, std::span<const
     const std::size_t n = positions.size();
     layer.vertices.assign(n, 1);
     layer.centre.reserve(n);
-    for (const LatticePoint p : positions)
-        layer.centre.push_back({static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)});
-    std::vector<std::uint32_t> first(n + 1, 0), used;
-    for (const Triangle& t : triangles)
-        for (const std::uint32_t v : t) ++first[v + 1];
-    for (std::size_t v = 0; v < n; ++v) first[v + 1] += first[v];
-    std::vector<std::uint32_t> at(first.begin(), first.end() - 1), corners(triangles.size() * 3);
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (const std::uint32_t v : triangles[t]) corners[at[v]++] = static_cast<std::uint32_t>(t);
+    for (const LatticePoint p : positions) layer.centre.push_back(to_vector(p));
+    const TrianglesAround around = triangles_around(n, triangles);
     std::vector<std::uint32_t> seen(n, no_node);
     layer.first_neighbour.assign(1, 0);
     layer.first_neighbour.reserve(n + 1);
     layer.neighbours.reserve(triangles.size() * 3 + n);
     for (std::uint32_t v = 0; v < n; ++v) {
         seen[v] = v;
-        for (std::uint32_t k = first[v]; k < first[v + 1]; ++k)
-            for (const std::uint32_t u : triangles[corners[k]]) {
+        for (const std::uint32_t t : around.of(v))
+            for (const std::uint32_t u : triangles[t]) {
                 if (seen[u] == v) continue;
                 seen[u] = v;
                 layer.neighbours.push_back(u);
@@ -61,7 +51,7 @@ Layer layer_of_vertices(std::span<const LatticePoint> positions, std::span<const
 }
 
 // Interleaves the bits of the cell of a point, for an order in which near points are mostly near.
-std::uint64_t morton_code(const Vector& p) {
+std::uint64_t morton_code(const Vector3d& p) {
     std::uint64_t code = 0;
     std::array<std::uint32_t, 3> cell{};
     for (std::size_t c = 0; c < 3; ++c)  // 21 bits each
@@ -85,7 +75,7 @@ std::vector<std::uint32_t> match(const Layer& layer) {
         double least = 0;
         for (const std::uint32_t u : layer.around(v)) {
             if (partner[u] != no_node) continue;
-            const Vector apart = layer.centre[u] - layer.centre[v];
+            const Vector3d apart = layer.centre[u] - layer.centre[v];
             const double score = (dot(apart, apart) + 1.0) * layer.vertices[u];
             if (best != no_node && score >= least) continue;
             best = u;
@@ -123,7 +113,7 @@ Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, Hierarc
         if (u != no_node) parent[u] = node;
         level.first.push_back(v);
         level.second.push_back(u);
-        Vector centre = fine.centre[v];
+        Vector3d centre = fine.centre[v];
         if (u != no_node)
             for (std::size_t c = 0; c < 3; ++c) centre[c] += (fine.centre[u][c] - centre[c]) * b / (1.0 * a + b);
         coarse.centre.push_back(centre);
@@ -153,11 +143,8 @@ Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, Hierarc
 }
 
 // Solves the symmetric m x = b by Cramer's rule.
-Vector solve(const std::array<Vector, 3>& m, const Vector& b) {
-    auto minor = [](const Vector& p, const Vector& q) -> Vector {
-        return {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
-    };
-    const Vector c0 = minor(m[1], m[2]), c1 = minor(m[2], m[0]), c2 = minor(m[0], m[1]);
+Vector3d solve(const std::array<Vector3d, 3>& m, const Vector3d& b) {
+    const Vector3d c0 = cross(m[1], m[2]), c1 = cross(m[2], m[0]), c2 = cross(m[0], m[1]);
     const double determinant = dot(m[0], c0);
     if (!(determinant > 0)) return {};
     return {(c0[0] * b[0] + c1[0] * b[1] + c2[0] * b[2]) / determinant,
@@ -171,21 +158,21 @@ Vector solve(const std::array<Vector, 3>& m, const Vector& b) {
 void find_slopes(const Layer& fine, const Layer& coarse, std::uint32_t p, HierarchyLevel& level) {
     constexpr double hold = 0.01;
     const auto around = coarse.around(p);
-    std::array<Vector, 3> m{};
+    std::array<Vector3d, 3> m{};
     double trace = 0;
-    auto weight_of = [&](std::uint32_t q, const Vector& way) { return coarse.vertices[q] / (dot(way, way) + 1.0); };
+    auto weight_of = [&](std::uint32_t q, const Vector3d& way) { return coarse.vertices[q] / (dot(way, way) + 1.0); };
     for (const std::uint32_t q : around) {
-        const Vector way = coarse.centre[q] - coarse.centre[p];
+        const Vector3d way = coarse.centre[q] - coarse.centre[p];
         const double weight = weight_of(q, way);
         for (std::size_t i = 0; i < 3; ++i)
             for (std::size_t j = 0; j < 3; ++j) m[i][j] += weight * way[i] * way[j];
         trace += weight * dot(way, way);
     }
     for (std::size_t i = 0; i < 3; ++i) m[i][i] += hold * trace + 1e-3;
-    const Vector turned = solve(m, fine.centre[level.first[p]] - fine.centre[level.second[p]]);
+    const Vector3d turned = solve(m, fine.centre[level.first[p]] - fine.centre[level.second[p]]);
     std::size_t at = coarse.first_neighbour[p];
     for (const std::uint32_t q : around) {
-        const Vector way = coarse.centre[q] - coarse.centre[p];
+        const Vector3d way = coarse.centre[q] - coarse.centre[p];
         const double slope = dot(way, turned) * weight_of(q, way) * (1 << slope_bits);
         constexpr double most = 1 << 15;
         level.slopes[at++] = static_cast<std::int32_t>(std::floor(std::clamp(slope, -most, most) + 0.5));

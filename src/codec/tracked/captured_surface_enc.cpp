@@ -9,9 +9,8 @@
 
 #include "codec/intra/duplicates.h"
 #include "core/parallel.h"
-#include "surface/nearest_points.h"
 #include "surface/simplification.h"
-#include "surface/surface_search.h"
+#include "surface/surface_index.h"
 
 namespace htvm::internal {
 
@@ -49,12 +48,25 @@ void fill_gaps(std::vector<double>& values, std::vector<bool> known, std::span<c
     }
 }
 
+// Where one surface looks for the other.
+struct SurfaceSamples {
+    std::vector<Point3f> points, normals;  // unit length
+};
+
+void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::span<const Point3f> normals,
+                const Triangle& triangle) {
+    Vector3d point{}, normal{};
+    for (const auto corner : triangle) {
+        point = point + to_vector(points[corner]) * (1.0 / 3);
+        normal = normal + to_vector(normals[corner]);
+    }
+    samples.points.push_back(to_floats(point));
+    samples.normals.push_back(to_floats(normalised(normal)));
+}
+
 // Where the captured surface is looked at: at the moved reference's vertices, then at its triangles' middles.
 SurfaceSamples samples_of(const MovedReference& moved) {
-    SurfaceSamples out;
-    out.points = points_of(moved.positions);
-    for (const auto& n : moved.normals)
-        out.normals.push_back({static_cast<float>(n.x), static_cast<float>(n.y), static_cast<float>(n.z)});
+    SurfaceSamples out{points_of(moved.positions), points_of(moved.normals)};
     for (const auto& t : moved.triangles) add_middle(out, out.points, out.normals, t);
     return out;
 }
@@ -71,7 +83,7 @@ struct SurfaceFit {
     std::vector<double> fitted(const std::vector<double>& seen) const;
 };
 
-SurfaceFit make_surface_fit(const MovedReference& moved, const std::vector<SurfaceTarget>& targets) {
+SurfaceFit make_surface_fit(const MovedReference& moved, const std::vector<SurfacePoint>& targets) {
     const std::size_t vertices = moved.positions.size();
     SurfaceFit out;
     out.triangles = moved.triangles;
@@ -79,14 +91,10 @@ SurfaceFit make_surface_fit(const MovedReference& moved, const std::vector<Surfa
     out.middle_weight.assign(moved.triangles.size(), 0);
     for (std::size_t t = 0; t < moved.triangles.size(); ++t) {
         const auto& corners = moved.triangles[t];
-        const auto at = [&](std::size_t i) {
-            const auto p = moved.positions[corners[i]];
-            return Eigen::Vector3d(p.x, p.y, p.z);
-        };
-        const double area = (at(1) - at(0)).cross(at(2) - at(0)).norm() / 2;
+        const double area = length(area_vector(moved.positions, corners)) / 2;
         for (const auto v : corners)
-            if (targets[v].valid) out.corner_weight[v] += area / 12;
-        if (targets[vertices + t].valid) out.middle_weight[t] = area * 3 / 4;
+            if (targets[v].found()) out.corner_weight[v] += area / 12;
+        if (targets[vertices + t].found()) out.middle_weight[t] = area * 3 / 4;
     }
     out.diagonal = out.corner_weight;
     for (std::size_t t = 0; t < moved.triangles.size(); ++t)
@@ -149,10 +157,10 @@ std::vector<double> SurfaceFit::fitted(const std::vector<double>& seen) const {
 }
 
 // How far along its normal each sample is from the surface, lattice units.
-std::vector<double> distances(const SurfaceSamples& samples, const std::vector<SurfaceTarget>& targets) {
+std::vector<double> distances(const SurfaceSamples& samples, const std::vector<SurfacePoint>& targets) {
     std::vector<double> out(targets.size(), 0);
     for (std::size_t i = 0; i < targets.size(); ++i) {
-        if (!targets[i].valid) continue;
+        if (!targets[i].found()) continue;
         for (std::size_t axis = 0; axis < 3; ++axis)
             out[i] +=
                 (static_cast<double>(targets[i].point[axis]) - samples.points[i][axis]) * samples.normals[i][axis];
@@ -160,33 +168,19 @@ std::vector<double> distances(const SurfaceSamples& samples, const std::vector<S
     return out;
 }
 
-std::array<double, 3> barycentric(const Point3f& p, const Point3f& a, const Point3f& b, const Point3f& c) {
-    const auto vector = [](const Point3f& from, const Point3f& to) {
-        return Eigen::Vector3d(to[0] - from[0], to[1] - from[1], to[2] - from[2]);
-    };
-    const auto u = vector(a, b), v = vector(a, c), w = vector(a, p);
-    const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), wu = w.dot(u), wv = w.dot(v);
-    const double area = uu * vv - uv * uv;
-    if (!(area > 0)) return {1, 0, 0};
-    const double s = std::clamp((vv * wu - uv * wv) / area, 0.0, 1.0);
-    const double t = std::clamp((uu * wv - uv * wu) / area, 0.0, 1.0 - s);
-    return {1 - s - t, s, t};
-}
-
-// What the surface shows at each sample less what the reference shows there: a list of levels a component.
+// What the surface shows at each sample less what the reference shows there: a list of levels per component.
 std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const LatticeMesh& captured,
-                                                  const TargetSurface& surface,
-                                                  const std::vector<SurfaceTarget>& targets, Threads threads) {
+                                                  const std::vector<SurfacePoint>& targets, Threads threads) {
     std::array<std::vector<double>, 3> out;
     for (auto& component : out) component.assign(targets.size(), 0);
     const std::size_t vertices = moved.positions.size();
     const auto look_at = [&](std::size_t i) {
         const auto& t = captured.triangles[targets[i].triangle];
-        const auto share =
-            barycentric(targets[i].point, surface.positions[t[0]], surface.positions[t[1]], surface.positions[t[2]]);
+        const auto& share = targets[i].shares;
         for (std::size_t c = 0; c < 3; ++c) {
             double level = 0;
-            for (std::size_t corner = 0; corner < 3; ++corner) level += share[corner] * captured.colours[t[corner]][c];
+            for (std::size_t corner = 0; corner < 3; ++corner)
+                level += static_cast<double>(share[corner]) * captured.colours[t[corner]][c];
             if (i < vertices) {
                 level -= moved.colours[i][c];
             } else {
@@ -197,33 +191,43 @@ std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, c
     };
     parallel_for(targets.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
-            if (targets[i].valid) look_at(i);
+            if (targets[i].found()) look_at(i);
     });
     return out;
 }
 
 }  // namespace
 
+SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
+    // Cells no finer than the search can go through: of captures with tiny triangles, or none. Every eighth triangle
+    // tells the edges well enough for that.
+    const double edge =
+        std::max({mean_edge(mesh.positions, mesh.triangles, 8), options.far_reach * options.millimetre / 48, 1.0});
+    return {points_of(mesh.positions),
+            mesh.triangles,
+            {.cell = static_cast<float>(2 * edge), .samples = options.back_samples, .threads = options.threads}};
+}
+
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const TargetSurface& surface, double reach, Threads threads) {
+                                    const SurfaceIndex& surface, double reach, Threads threads) {
     const auto samples = samples_of(moved);
-    SurfaceTargetOptions search;
-    search.reach = static_cast<float>(reach);
-    search.threads = threads;
-    const auto targets = surface_targets(samples.points, samples.normals, surface, search);
+    const auto targets =
+        closest_facing(surface, samples.points, samples.normals, {.reach = static_cast<float>(reach)}, threads);
     const auto fit = make_surface_fit(moved, targets);
     std::vector<std::vector<double>> seen(1);
     seen[0] = distances(samples, targets);
     if (!moved.colours.empty())
-        for (auto& component : colour_changes(moved, captured, surface, targets, threads))
-            seen.push_back(std::move(component));
+        for (auto& component : colour_changes(moved, captured, targets, threads)) seen.push_back(std::move(component));
     parallel_for(seen.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t c = begin; c < end; ++c) seen[c] = fit.fitted(seen[c]);
     });
     TrackedTargets out;
     const std::size_t vertices = moved.positions.size();
     out.displacement.resize(vertices);
-    for (std::size_t v = 0; v < vertices; ++v) out.displacement[v] = static_cast<std::int32_t>(std::lround(seen[0][v]));
+    // A field codes no more than that: on the finest lattice 16 mm. The surface then lags behind by the rest.
+    constexpr double most = field_limit;
+    for (std::size_t v = 0; v < vertices; ++v)
+        out.displacement[v] = static_cast<std::int32_t>(std::lround(std::clamp(seen[0][v], -most, most)));
     if (moved.colours.empty()) return out;
     out.colours.resize(3 * vertices);
     for (std::size_t v = 0; v < vertices; ++v)
@@ -289,26 +293,17 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
 
 // The captured surface is so fine that the triangles round the nearest vertex suffice, and a side is told from the
 // other, as of a sleeve, by its normals.
-std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, const TargetSurface& captured,
+std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, const SurfaceIndex& captured,
                                          const TrackedFitOptions& options) {
-    SurfaceTargetOptions search;
-    search.reach = static_cast<float>(options.reach);
-    search.agreement = 0;
-    search.threads = options.threads;
-    const auto found = surface_targets(decoded.points, decoded.normals, captured, search);
+    const auto found = closest_facing(captured, decoded.points, decoded.normals,
+                                      {.reach = static_cast<float>(options.reach), .agreement = 0}, options.threads);
     std::vector<double> squared(found.size(), options.reach * options.reach);
-    for (std::size_t i = 0; i < found.size(); ++i) {
-        if (!found[i].valid) continue;
-        squared[i] = 0;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const double d = static_cast<double>(found[i].point[axis]) - decoded.points[i][axis];
-            squared[i] += d * d;
-        }
-    }
+    for (std::size_t i = 0; i < found.size(); ++i)
+        if (found[i].found()) squared[i] = static_cast<double>(found[i].squared_distance);
     return squared;
 }
 
-TrackedFit fit_of_captured(const SurfaceSamples& captured, const SurfaceSearch& decoded,
+TrackedFit fit_of_captured(const SurfaceSamples& captured, const SurfaceIndex& decoded,
                            const TrackedFitOptions& options) {
     std::vector<double> squared(captured.points.size(), options.reach * options.reach);
     if (!decoded.empty())
@@ -321,13 +316,13 @@ TrackedFit fit_of_captured(const SurfaceSamples& captured, const SurfaceSearch& 
 
 }  // namespace
 
-TrackedFit measure_tracked_fit(const TargetSurface& captured, const LatticeMesh& decoded,
+TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const double> intra_squared, const TrackedFitOptions& options) {
     const auto points = points_of(decoded.positions);
     const auto forth = fit_of_captured(sparse_samples_of(captured.positions, captured.normals, captured.triangles),
-                                       SurfaceSearch(points, decoded.triangles), options);
+                                       SurfaceIndex(points, decoded.triangles), options);
     const auto samples =
-        sparse_samples_of(points, vertex_normals(points, decoded.triangles, options.threads), decoded.triangles);
+        sparse_samples_of(points, points_of(vertex_normals(decoded.positions, decoded.triangles)), decoded.triangles);
     auto squared = distances_of_decoded(samples, captured, options);
     std::vector<double> more(squared.size(), 0);
     if (intra_squared.size() == squared.size())
@@ -370,9 +365,9 @@ LatticeMesh with_fewer_vertices(const LatticeMesh& captured, const SimplifiedRef
 
 // Vertices and colours where the triangles between them come nearest to the captured surface: after the collapses each
 // vertex was placed for itself alone.
-void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const TargetSurface& surface,
+void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const SurfaceIndex& surface,
                     const SimplifiedReferenceOptions& options) {
-    const auto normals = exact_normals(mesh.positions, mesh.triangles);
+    const auto normals = vertex_normals(mesh.positions, mesh.triangles);
     const auto targets = find_tracked_targets({mesh.positions, normals, mesh.triangles, mesh.colours}, captured,
                                               surface, options.reach, options.threads);
     mesh.positions = displaced(mesh.positions, normals, targets.displacement);
@@ -381,12 +376,12 @@ void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const Target
 
 }  // namespace
 
-LatticeMesh simplified_reference(const LatticeMesh& captured, const TargetSurface& surface,
+LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options) {
     if (captured.triangles.empty() || !captured.texcoords.empty()) return captured;
     auto out = with_fewer_vertices(welded(captured), options);
     fit_to_surface(out, captured, surface, options);
-    if (!captured.normals.empty()) out.normals = quantised_normals(exact_normals(out.positions, out.triangles));
+    if (!captured.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, out.triangles));
     return out;
 }
 

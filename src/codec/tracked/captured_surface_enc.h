@@ -9,14 +9,18 @@
 #include "codec/tracked/tracked_frame.h"
 #include "core/lattice.h"
 #include "core/thread.h"
-#include "surface/target_surface.h"
+#include "surface/surface_index.h"
+#include "surface/tracked_registration.h"
 
 namespace htvm::internal {
+
+// The captured mesh, ready to be registered to.
+SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options);
 
 // A reference mesh moved by its nodes.
 struct MovedReference {
     std::span<const LatticePoint> positions;
-    std::span<const ExactNormal> normals;  // one per vertex
+    std::span<const Vector3d> normals;  // one per vertex
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;  // one per vertex, or none
 };
@@ -30,7 +34,7 @@ struct TrackedTargets {
 // neighbours. Least squares over the whole surface, not at the vertices alone: a coarse reference's vertices lie
 // outside a round limb, so that its triangles lie half outside and half inside.
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const TargetSurface& surface, double reach, Threads threads);
+                                    const SurfaceIndex& surface, double reach, Threads threads);
 
 // From a few thousand samples each way, the worse direction of the two; lattice units.
 struct TrackedFit {
@@ -50,7 +54,7 @@ struct TrackedFitOptions {
 // captured: of the captured mesh. intra_squared: `squared` of the I-frame, whose connectivity `decoded` has; what its
 // samples were off there is not held against the frame, since the search does not find every long triangle of a sole,
 // nor are those of the I-frame itself, for which it is empty.
-TrackedFit measure_tracked_fit(const TargetSurface& captured, const LatticeMesh& decoded,
+TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const double> intra_squared, const TrackedFitOptions& options);
 
 struct SimplifiedReferenceOptions {
@@ -64,7 +68,7 @@ struct SimplifiedReferenceOptions {
 // Normals are made anew where the capture has them. Texture coordinates cannot be simplified: a mesh that has some, or
 // has no triangles, comes back as it is.
 // surface: of `captured`.
-LatticeMesh simplified_reference(const LatticeMesh& captured, const TargetSurface& surface,
+LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options);
 
 }  // namespace htvm::internal

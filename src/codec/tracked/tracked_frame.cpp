@@ -79,32 +79,7 @@ std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
     return out;
 }
 
-std::vector<ExactNormal> exact_normals(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
-    std::vector<ExactNormal> out(positions.size());
-    for (const auto& t : triangles) {
-        const LatticePoint u = positions[t[1]] - positions[t[0]], v = positions[t[2]] - positions[t[0]];
-        const double ux = u.x, uy = u.y, uz = u.z, vx = v.x, vy = v.y, vz = v.z;
-        const double x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
-        for (const auto corner : t) {
-            out[corner].x += x;
-            out[corner].y += y;
-            out[corner].z += z;
-        }
-    }
-    for (auto& n : out) {
-        const double length = std::sqrt(n.x * n.x + n.y * n.y + n.z * n.z);
-        if (!(length > 0)) {
-            n = {};
-            continue;
-        }
-        n.x = n.x / length;
-        n.y = n.y / length;
-        n.z = n.z / length;
-    }
-    return out;
-}
-
-std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const ExactNormal> normals,
+std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                                     std::span<const std::int32_t> displacement) {
     const auto along = [](std::int32_t own, double normal, double distance) {
         return within_lattice(own + static_cast<std::int64_t>(std::floor(normal * distance + 0.5)));
@@ -113,8 +88,8 @@ std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std
     out.reserve(positions.size());
     for (std::size_t v = 0; v < positions.size(); ++v) {
         const double d = displacement[v];
-        out.push_back({along(positions[v].x, normals[v].x, d), along(positions[v].y, normals[v].y, d),
-                       along(positions[v].z, normals[v].z, d)});
+        out.push_back({along(positions[v].x, normals[v][0], d), along(positions[v].y, normals[v][1], d),
+                       along(positions[v].z, normals[v][2], d)});
     }
     return out;
 }
@@ -127,11 +102,11 @@ std::vector<Colour> recoloured(std::span<const Colour> colours, std::span<const 
     return out;
 }
 
-std::vector<QuantisedNormal> quantised_normals(std::span<const ExactNormal> normals) {
+std::vector<QuantisedNormal> quantised_normals(std::span<const Vector3d> normals) {
     const auto quantised = [](double c) { return static_cast<std::int32_t>(std::floor(c * 127 + 0.5)); };
     std::vector<QuantisedNormal> out;
     out.reserve(normals.size());
-    for (const auto& n : normals) out.push_back({quantised(n.x), quantised(n.y), quantised(n.z)});
+    for (const auto& n : normals) out.push_back({quantised(n[0]), quantised(n[1]), quantised(n[2])});
     return out;
 }
 
@@ -166,12 +141,12 @@ Result<void> decode_tracked_frame(const FramePayloadView& payload, const Tracked
                                         before ? &before->displacement : nullptr);
             if (!displacement) return;
             const auto moved = moved_by_nodes(reference, out.state.transforms, {});
-            out.positions = displaced(moved, exact_normals(moved, mesh.triangles), displacement->values);
+            out.positions = displaced(moved, vertex_normals(moved, mesh.triangles), displacement->values);
         });
     if (!colours) return tl::unexpected(colours.error());
     if (!displacement) return tl::unexpected(displacement.error());
     out.state.displacement = std::move(displacement->history);
-    if (!mesh.normals.empty()) out.normals = quantised_normals(exact_normals(out.positions, mesh.triangles));
+    if (!mesh.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, mesh.triangles));
     return {};
 }
 

@@ -14,6 +14,8 @@
 #include "codec/stream/frame_payload.h"
 #include "codec/tracked/node_motion.h"
 #include "codec/tracked/vertex_field.h"
+#include "core/geometry.h"
+#include "core/lattice.h"
 #include "core/thread.h"
 
 namespace htvm::internal {
@@ -60,20 +62,14 @@ Result<void> decode_tracked_frame(const FramePayloadView& payload, const Tracked
 std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
                                          std::span<const QuantisedTransform> transforms, Threads threads);
 
-// Unit normals of a mesh's vertices, weighted by area; zero where there are no triangles. Doubles from + - * / sqrt.
-struct ExactNormal {
-    double x = 0, y = 0, z = 0;
-};
-std::vector<ExactNormal> exact_normals(std::span<const LatticePoint> positions, std::span<const Triangle> triangles);
-
 // Each point moved along its normal by so many lattice units, kept on the lattice.
-std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const ExactNormal> normals,
+std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                                     std::span<const std::int32_t> displacement);
 
 // Each colour changed by its residual, three components per vertex, kept within 0..255.
 std::vector<Colour> recoloured(std::span<const Colour> colours, std::span<const std::int32_t> residuals);
 
 // The normals that a displaced mesh shows, as the codec holds normals.
-std::vector<QuantisedNormal> quantised_normals(std::span<const ExactNormal> normals);
+std::vector<QuantisedNormal> quantised_normals(std::span<const Vector3d> normals);
 
 }  // namespace htvm::internal

@@ -47,14 +47,7 @@ DeformableMesh make_tracked_deformable(const TrackedReference& reference, const 
                            handles, pairs_of(reference), options);
 }
 
-TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
-    // Cells no finer than the search can go through: of captures with tiny triangles, or none.
-    const double edge = std::max({sampled_mean_edge(mesh), options.far_reach * options.millimetre / 48, 1.0});
-    return make_target_surface(points_of(mesh.positions), mesh.triangles, static_cast<float>(2 * edge),
-                               options.back_samples, options.threads);
-}
-
-std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const TargetSurface& surface,
+std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
                                         const NodeStarts& starts, const DeformationOptions& options) {
     std::vector<std::vector<RigidMotion>> from;
     if (starts.last.empty())
@@ -74,7 +67,7 @@ std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const 
     return register_deformation(deformable, surface, from[best], options);
 }
 
-Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TargetSurface& surface,
+Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
                                                  const TrackedReference& reference, std::span<const RigidMotion> motion,
                                                  const TrackedState* before, const TrackedFrameOptions& options,
                                                  std::vector<StageTime>& stages) {
@@ -86,7 +79,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
         motion_options(options.geometry_step));
     const auto moved = moved_by_nodes(reference, coded_motion.transforms, options.threads);
-    const auto normals = exact_normals(moved, triangles);
+    const auto normals = vertex_normals(moved, triangles);
     TrackedTargets targets;
     if (options.motion_alone) {
         targets.displacement.resize(moved.size());
@@ -125,7 +118,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     out.mesh.triangles = triangles;
     out.mesh.texcoords = reference.mesh.texcoords;
     if (!reference.mesh.normals.empty())
-        out.mesh.normals = quantised_normals(exact_normals(out.mesh.positions, triangles));
+        out.mesh.normals = quantised_normals(vertex_normals(out.mesh.positions, triangles));
     out.state.transforms = std::move(coded_motion.transforms);
     out.state.displacement = std::move(displacement->history);
     auto& header = out.payload.header;

@@ -25,16 +25,13 @@ struct TrackedFrameOptions {
 // The reference, ready to be registered; made once for an I-frame.
 DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options);
 
-// The captured mesh, ready to be registered to.
-TargetSurface captured_surface(const LatticeMesh& mesh, const DeformationOptions& options);
-
 // Where a registration may start: each one motion per node, or empty. last, before_last: of the two frames before.
 // skeletal: where the skeleton moves each node.
 struct NodeStarts {
     std::span<const RigidMotion> last, before_last, skeletal;
 };
 // The motion of each node, reference -> frame, from the start whose surface lies nearest.
-std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const TargetSurface& surface,
+std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
                                         const NodeStarts& starts, const DeformationOptions& options);
 
 struct EncodedTrackedFrame {
@@ -45,7 +42,7 @@ struct EncodedTrackedFrame {
 
 // mesh: as captured; surface: of it, see captured_surface(). motion: of each node, as registered. before: of the frame
 // that this one refers to; null where that is the I-frame.
-Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const TargetSurface& surface,
+Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
                                                  const TrackedReference& reference, std::span<const RigidMotion> motion,
                                                  const TrackedState* before, const TrackedFrameOptions& options,
                                                  std::vector<StageTime>& stages);

@@ -1,3 +1,5 @@
+#include "surface/tracked_registration.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -5,8 +7,6 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
-
-#include "surface/tracked_registration.h"
 
 namespace htvm::internal {
 namespace {
@@ -84,12 +84,13 @@ struct Rest {
     double valid = 0;             // their share
 };
 
-Rest rest_after(const DeformableMesh& mesh, const TargetSurface& target, std::span<const RigidMotion> motions) {
+Rest rest_after(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions) {
     const auto now = deform(mesh, motions, {});
-    const auto targets = surface_targets(now, vertex_normals(now, mesh.triangles), target, {.reach = 60});
+    const auto normals = points_of(vertex_normals(now, mesh.triangles));
+    const auto targets = closest_facing(target, now, normals, {.reach = 60}, {});
     Rest out;
     for (std::size_t v = 0; v < now.size(); ++v) {
-        if (!targets[v].valid) continue;
+        if (!targets[v].found()) continue;
         const double d = (vector(targets[v].point) - vector(now[v])).norm();
         out.rms += d * d;
         out.largest = std::max(out.largest, d);
@@ -100,8 +101,8 @@ Rest rest_after(const DeformableMesh& mesh, const TargetSurface& target, std::sp
     return out;
 }
 
-TargetSurface target_of(const Surface& surface, const DeformationOptions& options) {
-    return make_target_surface(surface.first, surface.second, 20, options.back_samples, {});
+SurfaceIndex target_of(const Surface& surface, const DeformationOptions& options) {
+    return {surface.first, surface.second, {.cell = 20, .samples = options.back_samples}};
 }
 
 // Bent about z: a quarter circle per 600 mm.
@@ -168,7 +169,8 @@ TEST(RegisterDeformation, IsTheSameForAnyNumberOfThreads) {
     for (const unsigned threads : {2u, 3u, 7u}) {
         const ThreadPool pool(threads);
         options.threads = pool;
-        const auto target = make_target_surface(bent_arm.first, bent_arm.second, 20, options.back_samples, pool);
+        const SurfaceIndex target(bent_arm.first, bent_arm.second,
+                                  {.cell = 20, .samples = options.back_samples, .threads = pool});
         const auto many = register_deformation(mesh, target, {}, options);
         for (std::size_t h = 0; h < one.size(); ++h) {
             EXPECT_EQ(one[h].rotation, many[h].rotation);
@@ -188,7 +190,7 @@ TEST(RegisterDeformation, WorksInLatticeUnitsAsInMillimetres) {
     const auto finer = with_handles_along_x(moved(reference, scale), 0, 9600, 9, options);
     target = moved(target, scale);
     const auto on_lattice = register_deformation(
-        finer, make_target_surface(target.first, target.second, 320, options.back_samples, {}), {}, options);
+        finer, SurfaceIndex(target.first, target.second, {.cell = 320, .samples = options.back_samples}), {}, options);
     for (std::size_t h = 0; h < in_mm.size(); ++h) EXPECT_LT((in_mm[h].shift - on_lattice[h].shift / 16).norm(), 0.5);
 }
 
@@ -253,52 +255,16 @@ TEST(SurfaceTargets, AreTheClosestPointsThatFaceTheSameWay) {
         for (int i = 0; i < 4; ++i)
             sheets.first.push_back({static_cast<float>(i % 2) * 100, static_cast<float>(i / 2) * 100, z});
     sheets.second = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}};
-    const auto target = make_target_surface(sheets.first, sheets.second, 20, 8, {});
+    const SurfaceIndex target(sheets.first, sheets.second, {.cell = 20, .samples = 8});
     const std::vector<Point3f> at = {{20, 20, 2}, {20, 20, 2}, {20, 20, 2}, {20, 20, 900}};
     const std::vector<Point3f> normals = {{0, 0, 1}, {0, 0, -1}, {1, 0, 0}, {0, 0, 1}};
-    const auto found = surface_targets(at, normals, target, {.reach = 150});
-    ASSERT_TRUE(found[0].valid && found[1].valid);
+    const auto found = closest_facing(target, at, normals, {.reach = 150}, {});
+    ASSERT_TRUE(found[0].found() && found[1].found());
     EXPECT_EQ(found[0].point, (Point3f{20, 20, 10}));
     EXPECT_EQ(found[1].point, (Point3f{20, 20, 0}));
-    EXPECT_EQ(found[1].normal, (Point3f{0, 0, -1}));
-    EXPECT_FALSE(found[2].valid);
-    EXPECT_FALSE(found[3].valid);
-}
-
-TEST(OrientedPoints, AgreeWithASearchThroughAllWhateverTheGuess) {
-    std::uint32_t state = 7;
-    auto next = [&] { return state = state * 1664525 + 1013904223, static_cast<float>(state >> 8) / (1 << 24); };
-    std::vector<Point3f> points, normals;
-    for (int i = 0; i < 400; ++i) {
-        points.push_back({next() * 100, next() * 100, next() * 20});
-        normals.push_back(point(Vector3d(next() - 0.5, next() - 0.5, next() - 0.5).normalized()));
-    }
-    const OrientedPoints search(points, normals, 9);
-    for (int trial = 0; trial < 300; ++trial) {
-        const Point3f query = {next() * 140 - 20, next() * 140 - 20, next() * 60 - 20};
-        const Point3f normal = point(Vector3d(next() - 0.5, next() - 0.5, next() - 0.5).normalized());
-        const float reach = 5 + next() * 60;
-        OrientedMatch best{0, reach * reach, false};
-        for (std::uint32_t i = 0; i < points.size(); ++i) {
-            const float d = static_cast<float>((vector(points[i]) - vector(query)).squaredNorm());
-            if (vector(normals[i]).dot(vector(normal)) >= 0.3 && d < best.squared_distance) best = {i, d, true};
-        }
-        const auto guess = static_cast<std::uint32_t>(next() * 400);
-        for (const std::uint32_t first : {OrientedPoints::no_point, guess, 4000u}) {
-            const auto found = search.nearest(query, normal, reach, 0.3f, first);
-            EXPECT_EQ(found.found, best.found);
-            if (best.found) {
-                EXPECT_EQ(found.index, best.index);
-            }
-        }
-    }
-}
-
-TEST(OrientedPoints, PassOverWhatIsNotFinite) {
-    const std::vector<Point3f> points = {{NAN, 0, 0}, {INFINITY, 0, 0}, {3, 0, 0}}, normals(3);
-    const OrientedPoints search(points, normals, 1);
-    EXPECT_EQ(search.nearest({0, 0, 0}, {0, 0, 1}, 10, 0.5f).index, 2u);
-    EXPECT_FALSE(search.nearest({NAN, 0, 0}, {0, 0, 1}, 10, 0.5f).found);
+    EXPECT_EQ(target.triangle_normals[found[1].triangle], (Point3f{0, 0, -1}));
+    EXPECT_FALSE(found[2].found());
+    EXPECT_FALSE(found[3].found());
 }
 
 TEST(Solve, FindsTheSolutionOfASystemOfBlocks) {

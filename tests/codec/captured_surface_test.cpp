@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "codec/tracked/captured_surface_enc.h"
-#include "surface/nearest_points.h"
+#include "surface/surface_index.h"
 
 namespace htvm::internal {
 namespace {
@@ -33,13 +33,13 @@ LatticeMesh height_field(std::int32_t cells, std::int32_t cell, const Height& he
 double flat(double, double) { return 0; }
 double bowl(double x, double y) { return -(x * x + y * y) / 4000; }
 
-TargetSurface surface_of(const LatticeMesh& mesh) {
-    return make_target_surface(points_of(mesh.positions), mesh.triangles, 80, 1000, {});
+SurfaceIndex surface_of(const LatticeMesh& mesh) {
+    return {points_of(mesh.positions), mesh.triangles, {.cell = 80, .samples = 1000}};
 }
 
 TrackedTargets targets_of(const LatticeMesh& reference, const LatticeMesh& captured, double reach = 500,
                           Threads threads = {}) {
-    const auto normals = exact_normals(reference.positions, reference.triangles);
+    const auto normals = vertex_normals(reference.positions, reference.triangles);
     return find_tracked_targets({reference.positions, normals, reference.triangles, reference.colours}, captured,
                                 surface_of(captured), reach, threads);
 }
@@ -54,7 +54,7 @@ TEST(TrackedTargets, lay_the_triangles_of_a_coarse_mesh_on_a_bent_surface_not_on
     const auto reference = height_field(8, 200, bowl);  // vertices on the surface, triangles below it
     const auto targets = targets_of(reference, captured);
     const auto moved =
-        displaced(reference.positions, exact_normals(reference.positions, reference.triangles), targets.displacement);
+        displaced(reference.positions, vertex_normals(reference.positions, reference.triangles), targets.displacement);
     EXPECT_GT(std::accumulate(targets.displacement.begin(), targets.displacement.end(), 0), 0);
     auto fitted = reference;
     fitted.positions = moved;
@@ -62,6 +62,19 @@ TEST(TrackedTargets, lay_the_triangles_of_a_coarse_mesh_on_a_bent_surface_not_on
     const auto before = measure_tracked_fit(surface_of(captured), reference, {}, options);
     const auto after = measure_tracked_fit(surface_of(captured), fitted, {}, options);
     EXPECT_LT(after.rms, 0.75 * before.rms);
+}
+
+TEST(TrackedTargets, beyond_what_a_field_can_code_are_clamped_to_it) {
+    const auto reference = height_field(4, 100, flat);
+    for (const int side : {1, -1}) {
+        const auto captured = height_field(4, 100, [&](double, double) { return side * (field_limit + 5000.0); });
+        const auto targets = targets_of(reference, captured, 2.0 * field_limit);
+        EXPECT_EQ(targets.displacement, std::vector<std::int32_t>(25, side * field_limit));
+        const auto hierarchy = build_vertex_hierarchy(reference.positions, reference.triangles).value();
+        const auto coded = encode_field(hierarchy, targets.displacement, 1);
+        ASSERT_TRUE(coded.has_value()) << coded.error().message;
+        for (const auto d : coded->values) EXPECT_NEAR(d, side * field_limit, 32);
+    }
 }
 
 TEST(TrackedTargets, are_taken_from_neighbours_where_nothing_is_in_reach) {
@@ -175,13 +188,24 @@ TEST(TrackedFit, counts_what_one_surface_lacks_as_strays_both_ways) {
 }
 
 TEST(TrackedFit, does_not_hold_against_a_frame_what_its_intra_frame_was_off_already) {
-    const auto captured = height_field(64, 25, flat);
-    const auto off = height_field(64, 25, [](double x, double) { return x > 0 ? 60 : 0; });
-    const auto intra = measure_tracked_fit(surface_of(captured), off, {}, {});
-    auto moved = captured;  // so that only the decoded mesh's samples are off
-    for (auto& p : moved.positions) p.z += 30;
-    EXPECT_EQ(intra.squared.size(), measure_tracked_fit(surface_of(moved), off, intra.squared, {}).squared.size());
-    EXPECT_LT(measure_tracked_fit(surface_of(off), off, intra.squared, {}).rms, 0.5);
+    // The decoded mesh goes on where the captured one has ended, as far as in the I-frame or farther.
+    const auto ending_at = [](std::int32_t end) {
+        auto mesh = height_field(64, 25, flat);
+        std::erase_if(mesh.triangles, [&](const Triangle& t) {
+            return std::any_of(t.begin(), t.end(), [&](std::uint32_t v) { return mesh.positions[v].x > end; });
+        });
+        return surface_of(mesh);
+    };
+    const auto decoded = height_field(64, 25, flat);
+    const auto intra = measure_tracked_fit(ending_at(600), decoded, {}, {});
+    EXPECT_GT(*std::max_element(intra.squared.begin(), intra.squared.end()), 100 * 100);
+    const auto same = measure_tracked_fit(ending_at(600), decoded, intra.squared, {});
+    EXPECT_EQ(same.rms, 0);
+    EXPECT_EQ(same.worst_region, 0);
+    EXPECT_EQ(same.squared, intra.squared);  // what is told on is what was measured
+    const std::vector<double> perfect(intra.squared.size(), 0);
+    EXPECT_GT(measure_tracked_fit(ending_at(600), decoded, perfect, {}).rms, 10);
+    EXPECT_GT(measure_tracked_fit(ending_at(300), decoded, intra.squared, {}).rms, 10);
 }
 
 }  // namespace

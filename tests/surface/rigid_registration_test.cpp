@@ -1,10 +1,10 @@
+#include "surface/rigid_registration.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <random>
 #include <vector>
-
-#include "surface/rigid_registration.h"
 
 namespace htvm::internal {
 namespace {

@@ -1,0 +1,473 @@
+#include "surface/surface_index.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <nanoflann.hpp>
+
+#include "core/parallel.h"
+
+namespace htvm::internal {
+
+std::vector<Point3f> points_of(std::span<const LatticePoint> positions) {
+    std::vector<Point3f> out;
+    out.reserve(positions.size());
+    for (const auto p : positions) out.push_back(point_of(p));
+    return out;
+}
+
+std::vector<Point3f> points_of(std::span<const Vector3d> vectors) {
+    std::vector<Point3f> out;
+    out.reserve(vectors.size());
+    for (const auto& v : vectors) out.push_back(to_floats(v));
+    return out;
+}
+
+// ---- The tree
+
+struct NearestPoints::Tree {
+    explicit Tree(std::span<const Point3f> given) : points(given.begin(), given.end()) {
+        if (!points.empty()) index = std::make_unique<Index>(3, *this, nanoflann::KDTreeSingleIndexAdaptorParams(12));
+    }
+    std::size_t kdtree_get_point_count() const { return points.size(); }
+    float kdtree_get_pt(std::size_t i, std::size_t axis) const { return points[i][axis]; }
+    template <class Box>
+    bool kdtree_get_bbox(Box&) const {
+        return false;
+    }
+    using Index =
+        nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Tree>, Tree, 3, std::uint32_t>;
+    std::vector<Point3f> points;
+    std::unique_ptr<Index> index;
+};
+
+NearestPoints::NearestPoints(std::span<const Point3f> points) : tree_(std::make_unique<Tree>(points)) {}
+NearestPoints::NearestPoints(NearestPoints&&) noexcept = default;
+NearestPoints& NearestPoints::operator=(NearestPoints&&) noexcept = default;
+NearestPoints::~NearestPoints() = default;
+
+Neighbour NearestPoints::nearest(const Point3f& query) const {
+    Neighbour out;
+    tree_->index->knnSearch(query.data(), 1, &out.index, &out.squared_distance);
+    return out;
+}
+
+std::size_t NearestPoints::size() const { return tree_->points.size(); }
+const Point3f& NearestPoints::point(std::size_t index) const { return tree_->points[index]; }
+
+// ---- The grid
+
+namespace {
+
+constexpr std::int32_t most_cell = 1 << 24;  // the cells at the ends hold all that is beyond
+
+bool finite(const Point3f& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
+
+// The largest whole number that is not above x; for what is far out, or not a number, an end of the cells' range.
+std::int32_t floor_of(float x) {
+    if (!(x > -static_cast<float>(most_cell))) return -most_cell;
+    if (x >= static_cast<float>(most_cell)) return most_cell;
+    const auto whole = static_cast<std::int32_t>(x);
+    return whole - (static_cast<float>(whole) > x ? 1 : 0);
+}
+
+float product(const Point3f& a, const Point3f& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+}  // namespace
+
+OrientedPoints::OrientedPoints(std::span<const Point3f> points, std::span<const Point3f> normals, float cell)
+    : side_(cell), per_side_(1 / cell) {
+    mask_ = std::bit_ceil(static_cast<std::uint32_t>(std::max<std::size_t>(points.size() * 2, 64))) - 1;
+    first_.assign(std::size_t{mask_} + 2, 0);
+    std::vector<std::uint32_t> bucket(points.size());
+    place_.assign(points.size(), no_point);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (!finite(points[i])) continue;
+        const std::int32_t z = cell_of(points[i][2]);
+        bucket[i] = block_of(cell_of(points[i][0]), cell_of(points[i][1]), z >> 3) + static_cast<std::uint32_t>(z & 7);
+        ++first_[bucket[i] + 1];
+        ++kept;
+    }
+    for (std::size_t b = 1; b < first_.size(); ++b) first_[b] += first_[b - 1];
+    entries_.resize(kept);
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        if (!finite(points[i])) continue;
+        place_[i] = next[bucket[i]]++;
+        entries_[place_[i]] = {points[i], normals[i], static_cast<std::uint32_t>(i)};
+    }
+}
+
+std::int32_t OrientedPoints::cell_of(float coordinate) const { return floor_of(coordinate * per_side_); }
+
+// The first of the eight buckets of a block; z counts blocks.
+std::uint32_t OrientedPoints::block_of(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    const std::uint32_t h = static_cast<std::uint32_t>(x) * 73856093u ^ static_cast<std::uint32_t>(y) * 19349663u ^
+                            static_cast<std::uint32_t>(z) * 83492791u;
+    return ((h ^ (h >> 15)) << 3) & mask_;
+}
+
+void OrientedPoints::look_at(std::uint32_t begin, std::uint32_t end, const Query& query, OrientedMatch& best) const {
+    for (std::uint32_t e = begin; e < end; ++e) {
+        const Entry& entry = entries_[e];
+        const Point3f apart = {entry.point[0] - query.point[0], entry.point[1] - query.point[1],
+                               entry.point[2] - query.point[2]};
+        const float d = product(apart, apart);
+        if (d > best.squared_distance) continue;
+        if (d == best.squared_distance && best.found && entry.index >= best.index) continue;
+        if (product(entry.normal, query.normal) < query.agreement && entry.normal != Point3f{}) continue;
+        best = {entry.index, d, true};
+    }
+}
+
+// All cells that are no further away than the radius, nor than the best so far. True where that was all points.
+bool OrientedPoints::look_into_ball(float radius, const Query& query, OrientedMatch& best) const {
+    const auto& p = query.point;
+    const float rounding = 1e-6f * (side_ + std::abs(p[0]) + std::abs(p[1]) + std::abs(p[2]));
+    Cell low{}, high{};
+    double cells = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+        low[k] = cell_of(p[k] - radius - rounding);
+        high[k] = cell_of(p[k] + radius + rounding);
+        cells *= static_cast<double>(high[k]) - low[k] + 1;
+    }
+    if (cells > 8.0 * static_cast<double>(entries_.size())) {  // it is quicker to try them all
+        look_at(0, static_cast<std::uint32_t>(entries_.size()), query, best);
+        return true;
+    }
+    const auto squared_gap = [&](std::size_t axis, std::int32_t cell) {
+        if (std::abs(cell) >= most_cell) return 0.0f;
+        const float below = static_cast<float>(cell) * side_ - p[axis];
+        const float gap = std::max({below - rounding, -below - side_ - rounding, 0.0f});
+        return gap * gap;
+    };
+    for (std::int32_t x = low[0]; x <= high[0]; ++x) {
+        const float gap_x = squared_gap(0, x);
+        if (gap_x > best.squared_distance) continue;
+        for (std::int32_t y = low[1]; y <= high[1]; ++y) {
+            if (gap_x + squared_gap(1, y) > best.squared_distance) continue;
+            for (std::int32_t z = low[2]; z <= high[2];) {
+                const std::int32_t last = std::min(z | 7, high[2]);
+                const std::uint32_t block = block_of(x, y, z >> 3);
+                look_at(first_[block + static_cast<std::uint32_t>(z & 7)],
+                        first_[block + static_cast<std::uint32_t>(last & 7) + 1], query, best);
+                z = last + 1;
+            }
+        }
+    }
+    return false;
+}
+
+OrientedMatch OrientedPoints::nearest(const Point3f& query, const Point3f& normal, float reach, float agreement,
+                                      std::uint32_t guess) const {
+    OrientedMatch best;
+    if (entries_.empty() || !finite(query)) return best;
+    best.squared_distance = reach * reach;
+    const Query wanted{query, normal, agreement};
+    if (guess < place_.size() && place_[guess] != no_point) look_at(place_[guess], place_[guess] + 1, wanted, best);
+    const std::int32_t z = cell_of(query[2]);
+    const std::uint32_t own =
+        block_of(cell_of(query[0]), cell_of(query[1]), z >> 3) + static_cast<std::uint32_t>(z & 7);
+    look_at(first_[own], first_[own + 1], wanted, best);
+    // Balls that double until the best lies within.
+    for (float radius = 0.5f * side_;; radius *= 2) {
+        const float bound = std::sqrt(best.squared_distance);
+        const bool all = look_into_ball(std::min(radius, bound), wanted, best);
+        if (all || radius >= bound || best.squared_distance <= radius * radius) break;
+    }
+    return best;
+}
+
+// ---- Surfaces
+
+namespace {
+
+constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+TrianglePoint closest_on(std::span<const Point3f> positions, const Triangle& t, const Vector3d& query) {
+    return closest_on_triangle(query, to_vector(positions[t[0]]), to_vector(positions[t[1]]),
+                               to_vector(positions[t[2]]));
+}
+
+SurfacePoint surface_point(const SurfaceIndex& surface, std::uint32_t triangle, const TrianglePoint& found) {
+    SurfacePoint out{triangle, to_floats(found.shares), {}, static_cast<float>(found.squared_distance)};
+    const auto& t = surface.triangles[triangle];
+    for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t c = 0; c < 3; ++c) out.point[i] += out.shares[c] * surface.positions[t[c]][i];
+    return out;
+}
+
+double area_of(std::span<const Point3f> positions, std::span<const Triangle> triangles) {
+    double doubled = 0;
+    for (const auto& t : triangles) doubled += length(area_vector(positions, t));
+    return doubled / 2;
+}
+
+// Between so many points that are spread over so much surface.
+float gap_of(double area, std::size_t count) {
+    const double gap = count > 0 ? std::sqrt(area / static_cast<double>(count)) : 0;
+    return std::isfinite(gap) ? static_cast<float>(gap) : 0.0f;
+}
+
+}  // namespace
+
+// ---- Surfaces: from anywhere
+
+namespace {
+
+std::size_t hash_of(const Point3f& p) {
+    std::uint64_t hash = 0;
+    for (const float c : p)
+        hash = (hash ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9E3779B97F4A7C15ull;  // -0 hashes as 0
+    return static_cast<std::size_t>(hash ^ (hash >> 32));
+}
+
+// A triangle on its longest side, from a to b, with the third corner c across.
+struct LongTriangle {
+    Point3f a{}, b{}, c{};
+    double length = 0, height = 0;
+};
+
+LongTriangle lay_along_longest_side(const Point3f& p, const Point3f& q, const Point3f& r) {
+    LongTriangle best;
+    const std::array<Point3f, 3> corners = {p, q, r};
+    for (std::size_t i = 0; i < 3; ++i) {
+        const auto &a = corners[i], &b = corners[(i + 1) % 3], &c = corners[(i + 2) % 3];
+        const Vector3d side = to_vector(b) - to_vector(a);
+        const double long_side = length(side);
+        if (!(long_side > best.length)) continue;
+        best = {a, b, c, long_side, length(cross(side, to_vector(c) - to_vector(a))) / long_side};
+    }
+    return best;
+}
+
+// Rows of points parallel to the longest side, and points in the longest row.
+double rows_on(const LongTriangle& t, double spacing) { return std::ceil(t.height / spacing + 0.5); }
+double columns_on(const LongTriangle& t, double spacing) { return std::ceil(t.length / spacing); }
+double points_on(const LongTriangle& t, double spacing) { return rows_on(t, spacing) * columns_on(t, spacing); }
+
+// Adds about points_on(t, spacing) / 2 points, at most points_on(t, spacing).
+void spread_points(const LongTriangle& t, double spacing, std::vector<Point3f>& places) {
+    const double rows = rows_on(t, spacing), columns = columns_on(t, spacing);
+    for (double row = 0; row < rows; ++row) {
+        const double across = (row + 0.5) / rows, in_row = std::max(1.0, std::floor(columns * (1 - across)));
+        for (double i = 0; i < in_row; ++i) {
+            const double along = (i + 0.5) / in_row;
+            Point3f p{};
+            for (std::size_t k = 0; k < 3; ++k)
+                p[k] = static_cast<float>((1 - across) * ((1 - along) * t.a[k] + along * t.b[k]) + across * t.c[k]);
+            places.push_back(p);
+        }
+    }
+}
+
+}  // namespace
+
+struct SurfaceIndex::Anywhere {
+    explicit Anywhere(const SurfaceIndex& surface);
+    void place_vertices(const SurfaceIndex& surface);
+    void spread_over_long_triangles();
+    std::vector<Point3f> places;             // the different positions of the surface's vertices, then points of long
+                                             // triangles
+    std::vector<std::uint32_t> vertex_at;    // the mesh's first vertex at each of its positions
+    std::vector<Triangle> corners;           // the triangles by places
+    TrianglesAround around;                  // each place of a vertex
+    std::vector<std::uint32_t> spread_over;  // the triangle of each point of a long triangle
+    double doubtful = 0;                     // squared distance beyond which another sheet of the surface may be nearer
+    NearestPoints tree{std::span<const Point3f>{}};
+};
+
+SurfaceIndex::Anywhere::Anywhere(const SurfaceIndex& surface) {
+    place_vertices(surface);
+    around = triangles_around(places.size(), corners);
+    spread_over_long_triangles();
+    tree = NearestPoints(places);
+}
+
+// By an open hash table of vertices, twice as long as there are vertices.
+void SurfaceIndex::Anywhere::place_vertices(const SurfaceIndex& surface) {
+    const auto& positions = surface.positions;
+    std::vector<bool> used(positions.size(), surface.triangles.empty());
+    for (const auto& t : surface.triangles)
+        for (const auto v : t) used[v] = true;
+    const std::size_t mask = std::bit_ceil(2 * positions.size() + 1) - 1;
+    std::vector<std::uint32_t> table(mask + 1, none), place_of(positions.size(), none);
+    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+        if (!used[v]) continue;
+        std::size_t slot = hash_of(positions[v]) & mask;
+        while (table[slot] != none && places[table[slot]] != positions[v]) slot = (slot + 1) & mask;
+        if (table[slot] == none) {
+            table[slot] = static_cast<std::uint32_t>(places.size());
+            places.push_back(positions[v]);
+            vertex_at.push_back(v);
+        }
+        place_of[v] = table[slot];
+    }
+    corners.reserve(surface.triangles.size());
+    for (const auto& t : surface.triangles) corners.push_back({place_of[t[0]], place_of[t[1]], place_of[t[2]]});
+}
+
+// Points on every triangle much longer than the median one, about as dense as the vertices elsewhere, or less so where
+// that would be more points than vertices.
+void SurfaceIndex::Anywhere::spread_over_long_triangles() {
+    if (corners.empty()) return;
+    std::vector<LongTriangle> laid;
+    std::vector<double> lengths;
+    laid.reserve(corners.size());
+    lengths.reserve(corners.size());
+    for (const auto& t : corners) {
+        laid.push_back(lay_along_longest_side(places[t[0]], places[t[1]], places[t[2]]));
+        lengths.push_back(laid.back().length);
+    }
+    const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+    std::nth_element(lengths.begin(), middle, lengths.end());
+    doubtful = 0.09 * *middle * *middle;
+    const double least = 2 * *middle;
+    if (!(least > 0)) return;
+    const double most_points = 1000 + static_cast<double>(places.size());
+    double spacing = *middle;
+    for (double count = most_points + 1; count > most_points; spacing *= 1.5) {
+        count = 0;
+        for (const auto& t : laid)
+            if (t.length > least) count += points_on(t, spacing * 1.5);
+    }
+    for (std::uint32_t i = 0; i < laid.size(); ++i) {
+        if (!(laid[i].length > least)) continue;
+        spread_points(laid[i], spacing, places);
+        spread_over.resize(places.size() - vertex_at.size(), i);
+    }
+}
+
+struct SurfaceIndex::OnDemand {
+    std::once_flag once;
+    std::unique_ptr<const Anywhere> anywhere;
+};
+
+const SurfaceIndex::Anywhere& SurfaceIndex::anywhere() const {
+    std::call_once(on_demand_->once, [&] { on_demand_->anywhere = std::make_unique<Anywhere>(*this); });
+    return *on_demand_->anywhere;
+}
+
+SurfacePoint SurfaceIndex::closest(const Point3f& query) const {
+    const Anywhere& search = anywhere();
+    const auto nearest = search.tree.nearest(query);
+    if (triangles.empty())
+        return {search.vertex_at[nearest.index], {1, 0, 0}, search.places[nearest.index], nearest.squared_distance};
+    const Vector3d from = to_vector(query);
+    TrianglePoint best;
+    best.squared_distance = std::numeric_limits<double>::infinity();
+    std::uint32_t best_triangle = 0;
+    constexpr std::size_t most_tried = 24;  // places; a walk longer than this is not worth its time
+    std::array<std::uint32_t, most_tried> tried{};
+    std::size_t count = 0;
+    const auto try_triangle = [&](std::uint32_t triangle) {
+        const auto found = closest_on(search.places, search.corners[triangle], from);
+        if (found.squared_distance < best.squared_distance) best = found, best_triangle = triangle;
+    };
+    const auto try_around = [&](std::uint32_t place) {
+        const auto tried_end = tried.begin() + static_cast<std::ptrdiff_t>(count);
+        if (count == most_tried || std::find(tried.begin(), tried_end, place) != tried_end) return;
+        tried[count++] = place;
+        for (const auto triangle : search.around.of(place)) try_triangle(triangle);
+    };
+    const auto walk_from = [&](std::uint32_t place) {
+        if (place < search.vertex_at.size())
+            try_around(place);
+        else
+            try_triangle(search.spread_over[place - search.vertex_at.size()]);
+        for (double before = std::numeric_limits<double>::infinity(); best.squared_distance < before;) {
+            before = best.squared_distance;
+            for (const auto corner : Triangle(search.corners[best_triangle])) try_around(corner);
+        }
+    };
+    walk_from(nearest.index);
+    if (best.squared_distance > search.doubtful) {
+        const auto& t = triangles[best_triangle];
+        const Vector3d found =
+            point_at(best.shares, to_vector(positions[t[0]]), to_vector(positions[t[1]]), to_vector(positions[t[2]]));
+        const auto other = search.tree.nearest(to_floats(from * 2 - found)).index;
+        if (other != nearest.index) walk_from(other);
+    }
+    return surface_point(*this, best_triangle, best);
+}
+
+// ---- Surfaces: facing the same way
+
+void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
+    around = triangles_around(positions.size(), triangles);
+    normals = points_of(vertex_normals(positions, triangles));
+    triangle_normals.reserve(triangles.size());
+    double area = 0;
+    for (const auto& t : triangles) {
+        const Vector3d across = area_vector(std::span<const Point3f>(positions), t);
+        area += length(across) / 2;
+        triangle_normals.push_back(to_floats(normalised(across)));
+    }
+    const std::size_t count = std::min(options.samples, positions.size());
+    std::vector<Point3f> chosen_points(count), chosen_normals(count);
+    samples.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        samples[i] = static_cast<std::uint32_t>(i * positions.size() / count);
+        chosen_points[i] = positions[samples[i]];
+        chosen_normals[i] = normals[samples[i]];
+    }
+    // Samples are farther apart than vertices by the root of how many fewer they are.
+    const float wider = count == 0 ? 1.0f : std::sqrt(static_cast<float>(positions.size()) / static_cast<float>(count));
+    parallel_invoke(
+        options.threads, [&] { coarse = OrientedPoints(chosen_points, chosen_normals, options.cell * wider); },
+        [&] { fine = OrientedPoints(positions, normals, options.cell); });
+    fine_gap = gap_of(area, positions.size());
+    coarse_gap = gap_of(area, count);
+}
+
+SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
+                                          std::uint32_t& guess) const {
+    SurfacePoint out;
+    const auto match = fine.nearest(query, normal, within.reach, within.agreement, guess);
+    if (!match.found) return out;
+    guess = match.index;
+    const Vector3d from = to_vector(query);
+    std::uint32_t best_triangle = none;
+    TrianglePoint best;
+    best.squared_distance = std::numeric_limits<double>::infinity();
+    for (const auto triangle : around.of(match.index)) {
+        const Point3f& across = triangle_normals[triangle];
+        if (product(across, normal) < within.agreement || across == Point3f{}) continue;
+        // Its plane may be farther away than what was found.
+        const Point3f& corner = positions[triangles[triangle][0]];
+        const float height = product(across, {query[0] - corner[0], query[1] - corner[1], query[2] - corner[2]});
+        if (static_cast<double>(height * height) > best.squared_distance) continue;
+        const auto found = closest_on(positions, triangles[triangle], from);
+        if (found.squared_distance < best.squared_distance) best = found, best_triangle = triangle;
+    }
+    return best_triangle == none ? out : surface_point(*this, best_triangle, best);
+}
+
+std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<const Point3f> queries,
+                                         std::span<const Point3f> normals, const FacingReach& within, Threads threads) {
+    std::vector<SurfacePoint> out(queries.size());
+    parallel_for(queries.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t guess = OrientedPoints::no_point;
+        for (std::size_t i = begin; i < end; ++i)
+            out[i] = surface.closest_facing(queries[i], normals[i], within, guess);
+    });
+    return out;
+}
+
+SurfaceIndex::SurfaceIndex(std::span<const Point3f> mesh_positions, std::span<const Triangle> mesh_triangles,
+                           const SurfaceIndexOptions& options)
+    : positions(mesh_positions.begin(), mesh_positions.end()),
+      triangles(mesh_triangles.begin(), mesh_triangles.end()),
+      on_demand_(std::make_unique<OnDemand>()) {
+    if (options.cell > 0) find_directions(options);
+}
+SurfaceIndex::SurfaceIndex(SurfaceIndex&&) noexcept = default;
+SurfaceIndex& SurfaceIndex::operator=(SurfaceIndex&&) noexcept = default;
+SurfaceIndex::~SurfaceIndex() = default;
+
+float point_gap(std::span<const Point3f> positions, std::span<const Triangle> triangles, std::size_t count) {
+    return gap_of(area_of(positions, triangles), count);
+}
+
+}  // namespace htvm::internal
