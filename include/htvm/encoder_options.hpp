@@ -34,7 +34,7 @@ enum class FrameChoice : std::uint8_t {
     fixed,            // an I-frame every key_interval frames, EP-frames between
     motion,           // the paper's (section III-B): by skeletal motion since the last I-frame
     rate_distortion,  // by measured bits and errors: the fewest bits among those no worse than an I-frame
-    cheaper,          // as fixed, but an I-frame wherever an EP-frame takes more bits, or there is no skeleton
+    cheaper,          // as fixed, but an I-frame wherever an EP-frame takes more bits
 };
 
 enum class TrackedReferences : std::uint8_t {

@@ -122,9 +122,7 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
             options.tracked.node_spacing > 0 ? options.tracked.node_spacing : spacing_on_adults * adult;
         header.node_spacing = std::max(on_lattice(spacing * units), 1);
     }
-    configuration.intra_alone = options.key_interval == 1 ||
-                                (options.profile != Profile::tracked &&
-                                 options.topology.frame_choice == FrameChoice::cheaper && !header.skeleton_tracked);
+    configuration.intra_alone = options.key_interval == 1;
     return {};
 }
 

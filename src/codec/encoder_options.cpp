@@ -87,8 +87,9 @@ constexpr Option list[] = {
      .least = 1,
      .most = 1e6,
      .zero = "told from the first mesh",
-     .meaning = "longest side of the subject, which reaches, spacings and thresholds are in proportion to; adults, 1100 "
-                "to 2500 mm, are what these are known from",
+     .meaning =
+         "longest side of the subject, which reaches, spacings and thresholds are in proportion to; adults, 1100 "
+         "to 2500 mm, are what these are known from",
      .get = [](const EncoderOptions& o) -> double { return o.subject_size; },
      .set = [](EncoderOptions& o, double value) { o.subject_size = value; },
      .flag = "--subject-size"},
@@ -203,7 +204,7 @@ constexpr Option list[] = {
      .kind = OptionKind::word,
      .meaning = "choice of frames: fixed, an I-frame every key interval and EP-frames between; motion, by how far the "
                 "skeleton's bones are from the last I-frame; rd, by measured bits and errors (slow); cheaper, as "
-                "fixed, but an I-frame wherever an EP-frame takes more bits, or there is no skeleton",
+                "fixed, but an I-frame wherever an EP-frame takes more bits",
      .words = frame_choices,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.topology.frame_choice); },
      .set = [](EncoderOptions& o, double value) { o.topology.frame_choice = static_cast<FrameChoice>(value); },

@@ -140,12 +140,15 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     const bool tracked = configuration.tracked(), referred_to = use == IntraUse::reference;
     const auto asked = tracked ? tracked_steps(steps) : steps;
     const bool simplify = tracked && configuration.options.tracked.simplify > 0;
+    // Without a skeleton EP-frames may never pay, and a finer I-frame that nothing refers to would be wasted.
+    const bool finer = referred_to && (configuration.header.skeleton_tracked || tracked ||
+                                       configuration.options.topology.frame_choice != FrameChoice::cheaper);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
     const auto& mesh = simplify ? simple : work.mesh;
     StageClock clock(work.stages);
     IntraFrameOptions options;
     options.geometry_step =
-        referred_to ? step_for_reference(mean_edge(mesh.positions, mesh.triangles), asked.geometry) : asked.geometry;
+        finer ? step_for_reference(mean_edge(mesh.positions, mesh.triangles), asked.geometry) : asked.geometry;
     options.colour_step = asked.colour;
     options.merge_duplicates = configuration.options.topology.merge_duplicates;
     options.external = configuration.options.intra_coder ? &*configuration.options.intra_coder : nullptr;

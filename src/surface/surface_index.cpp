@@ -287,19 +287,19 @@ SurfaceIndex::Anywhere::Anywhere(const SurfaceIndex& surface) {
 
 // By an open hash table of vertices, twice as long as there are vertices.
 void SurfaceIndex::Anywhere::place_vertices(const SurfaceIndex& surface) {
-    const auto& positions = surface.positions;
-    std::vector<bool> used(positions.size(), surface.triangles.empty());
+    const auto& vertices = surface.positions;
+    std::vector<bool> used(vertices.size(), surface.triangles.empty());
     for (const auto& t : surface.triangles)
         for (const auto v : t) used[v] = true;
-    const std::size_t mask = std::bit_ceil(2 * positions.size() + 1) - 1;
-    std::vector<std::uint32_t> table(mask + 1, none), place_of(positions.size(), none);
-    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+    const std::size_t mask = std::bit_ceil(2 * vertices.size() + 1) - 1;
+    std::vector<std::uint32_t> table(mask + 1, none), place_of(vertices.size(), none);
+    for (std::uint32_t v = 0; v < vertices.size(); ++v) {
         if (!used[v]) continue;
-        std::size_t slot = hash_of(positions[v]) & mask;
-        while (table[slot] != none && places[table[slot]] != positions[v]) slot = (slot + 1) & mask;
+        std::size_t slot = hash_of(vertices[v]) & mask;
+        while (table[slot] != none && places[table[slot]] != vertices[v]) slot = (slot + 1) & mask;
         if (table[slot] == none) {
             table[slot] = static_cast<std::uint32_t>(places.size());
-            places.push_back(positions[v]);
+            places.push_back(vertices[v]);
             vertex_at.push_back(v);
         }
         place_of[v] = table[slot];
