@@ -105,10 +105,10 @@ TEST(TfanMpeg, gives_back_mixed_orientation) {
 TEST(TfanMpeg, gives_back_any_triangles) {
     std::mt19937 random(7);
     for (int round = 0; round < 50; ++round) {
-        const std::uint32_t vertices = 1 + random() % 40;
+        const std::uint32_t vertices = static_cast<std::uint32_t>(1 + random() % 40);
         std::vector<Triangle> triangles(random() % 120);
         for (auto& t : triangles)
-            for (auto& v : t) v = random() % vertices;
+            for (auto& v : t) v = static_cast<std::uint32_t>(random() % vertices);
         expect_the_same(with_vertices(vertices, triangles));
     }
 }
@@ -151,7 +151,7 @@ TEST(TfanMpeg, quantises_positions_to_cells_of_the_longest_side) {
                 largest =
                     std::max(largest, std::abs(double{mesh.positions[frame->order[v]][i]} - back.positions[v][i]));
                 largest_colour = std::max(
-                    largest_colour, std::abs(double{mesh.colours[frame->order[v]][i]} - double{back.colours[v][i]}));
+                    largest_colour, std::abs(1.0 * mesh.colours[frame->order[v]][i] - 1.0 * back.colours[v][i]));
             }
         EXPECT_LE(largest, 0.501 * side / (std::exp2(bits) - 1)) << bits;
         EXPECT_GT(largest, 0.4 * side / (std::exp2(bits) - 1)) << bits;

@@ -125,7 +125,9 @@ TEST(DecoderMemory, SkinningIsNotMadeForTrackedFrames) {
         for (const auto& packet : packets) {
             EXPECT_TRUE(decoder.decode(packet).has_value());
             // Moves the I-frame's mesh by its bones.
-            if (skinned && packet.kind == PacketKind::intra) EXPECT_TRUE(decoder.stand_in(0, 0).has_value());
+            if (skinned && packet.kind == PacketKind::intra) {
+                EXPECT_TRUE(decoder.stand_in(0, 0).has_value());
+            }
         }
         return allocations().live - live;
     };

@@ -1,4 +1,5 @@
 // Edge collapse, flips and relaxation on closed surfaces.
+#include "core/thread.h"
 #include "synth/remesh.h"
 
 #include <gtest/gtest.h>
@@ -142,14 +143,15 @@ TEST(Flips, MakeAThinDiagonalShortAndKeepTheSurfaceClosed) {
 
 TEST(Relax, LeavesARegularSurfaceWhereItIsAndDoesNotDependOnThreads) {
     HalfEdgeMesh regular = build(octahedron());
-    relax(regular, 0.5, 1);
+    relax(regular, 0.5, {});
     for (std::size_t v = 0; v < 6; ++v) EXPECT_LT((regular.positions[v] - octahedron().positions[v]).norm(), 1e-12);
 
     Soup soup = torus(60, 30);
     for (std::size_t v = 0; v < soup.positions.size(); v += 3) soup.positions[v] += Vector3d(0.05, -0.04, 0.03);
     HalfEdgeMesh one = build(soup), many = build(soup);
-    relax(one, 0.5, 1);
-    relax(many, 0.5, 4);
+    internal::ThreadPool pool(4);
+    relax(one, 0.5, {});
+    relax(many, 0.5, pool.threads());
     EXPECT_EQ(one.positions, many.positions);
 }
 
