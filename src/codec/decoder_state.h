@@ -42,13 +42,13 @@ struct ShownFrame {
 };
 
 // What EP- and P-frames since the I-frame left.
-struct BoneHistory {
+struct DecodedBones {
     std::vector<QuantisedTransform> transforms;  // of the last, one per bone; empty: none since
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
 // What T-frames since the I-frame left: of the last, and arrays for the next, which takes the place of the one before.
-struct TrackedHistory {
+struct DecodedNodes {
     std::optional<std::uint32_t> frame;  // number of the last; none: none since
     DecodedTrackedFrame last, next;
     Pose pose;
@@ -64,8 +64,8 @@ struct DecoderState {
     std::optional<Reference> reference;
     std::uint32_t reference_topology = 0;
     std::uint32_t topologies = 0;  // given out so far
-    BoneHistory bones;
-    TrackedHistory tracked;
+    DecodedBones bones;
+    DecodedNodes tracked;
     ShownFrame shown;
 };
 
