@@ -46,12 +46,9 @@ std::optional<double> optional_number(const nlohmann::json& json, const char* ke
 }
 
 nlohmann::json frame_to_json(const RdFrame& frame) {
-    return {{"type", kind_of(frame.type).letter},
-            {"vertices", frame.vertices},
-            {"bytes", layers_json(frame.bytes)},
-            {"encode_ms", frame.encode_ms},
-            {"decode_ms", optional_json(frame.decode_ms)},
-            {"m1_mm", optional_json(frame.m1_mm)},
+    return {{"type", kind_of(frame.type).letter},          {"vertices", frame.vertices},
+            {"bytes", layers_json(frame.bytes)},           {"encode_ms", frame.encode_ms},
+            {"decode_ms", optional_json(frame.decode_ms)}, {"m1_mm", optional_json(frame.m1_mm)},
             {"m2_mm", optional_json(frame.m2_mm)}};
 }
 

@@ -9,7 +9,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
-using namespace htvm::internal;
+    using namespace htvm::internal;
     using fuzz::require;
     fuzz::FuzzInput input(data, size);
     const auto mesh = fuzz::small_mesh(input);

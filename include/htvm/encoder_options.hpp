@@ -45,10 +45,10 @@ enum class TrackedReferences : std::uint8_t {
 // Profile::tracked alone: with others, anything but the defaults is refused.
 struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
-    double simplify = 0.4;     // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
-                               // their surface, in geometry steps; 0: they keep every vertex and their connectivity
-    double node_spacing = 0;   // mm, between the nodes of the deformation graph; 0: 80 on an adult, in proportion on
-                               // larger and smaller subjects
+    double simplify = 0.4;    // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
+                              // their surface, in geometry steps; 0: they keep every vertex and their connectivity
+    double node_spacing = 0;  // mm, between the nodes of the deformation graph; 0: 80 on an adult, in proportion on
+                              // larger and smaller subjects
 };
 
 // Profile::topology and Profile::paper alone, likewise.

@@ -201,7 +201,7 @@ htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* dam
 typedef struct htvm_mesh_view {
     uint32_t struct_size; /* bytes of this struct that were filled */
     uint32_t vertices, triangles;
-    uint32_t topology; /* as in htvm_frame_info: where it is the last frame's, indices and texcoords are too */
+    uint32_t topology;       /* as in htvm_frame_info: where it is the last frame's, indices and texcoords are too */
     const float* positions;  /* mm, 3 a vertex */
     const uint32_t* indices; /* 3 a triangle, counter-clockwise seen from outside */
     const uint8_t* colours;  /* red, green, blue a vertex; NULL: the frame has none */

@@ -25,7 +25,7 @@ struct Skeleton {
 
 // S_t: the skeleton in one frame.
 struct Pose {
-    std::vector<Vector3d> joints;        // mm, one per joint of the skeleton
+    std::vector<Vector3d> joints;  // mm, one per joint of the skeleton
     // One per joint, false where the tracker lost it and its position is a guess (coded as given all the same);
     // empty: all tracked.
     std::vector<bool> tracked;

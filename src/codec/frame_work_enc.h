@@ -28,7 +28,7 @@ struct Configuration {
     Threads threads = {};
     double units = 16;             // lattice units per millimetre
     double adult_millimetre = 16;  // lattice units: what a millimetre on an adult is on this subject
-    bool intra_alone = false;       // nothing refers to anything
+    bool intra_alone = false;      // nothing refers to anything
     bool tracked() const { return options.profile == Profile::tracked; }
     double to_millimetres(double lattice_units) const { return lattice_units / units; }
 };

@@ -1,8 +1,9 @@
+#include "codec/intra/duplicates.h"
+
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "codec/intra/duplicates.h"
 #include "codec/random_numbers.h"
 
 namespace htvm::internal {

@@ -10,7 +10,6 @@
 
 namespace htvm::hostile {
 
-
 // Calls decode(bytes) on every beginning of the bytes (of long ones, on some 400), on many copies with a few flipped
 // bits, and on pure noise. Whatever decode gives is right: it must only come back.
 template <class Decode>

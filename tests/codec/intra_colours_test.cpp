@@ -1,9 +1,8 @@
-#include "codec/intra/colours.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 
+#include "codec/intra/colours.h"
 #include "codec/intra_test_meshes.h"
 
 namespace htvm::internal {

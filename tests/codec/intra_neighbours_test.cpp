@@ -1,10 +1,9 @@
-#include "codec/intra/neighbours.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 
+#include "codec/intra/neighbours.h"
 #include "codec/intra_test_meshes.h"
 
 namespace htvm::internal {

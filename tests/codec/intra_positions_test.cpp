@@ -1,7 +1,6 @@
-#include "codec/intra/positions.h"
-
 #include <gtest/gtest.h>
 
+#include "codec/intra/positions.h"
 #include "codec/intra_test_meshes.h"
 
 namespace htvm::internal {

@@ -1,11 +1,10 @@
-#include "codec/reference/skinning.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <random>
 
 #include "codec/random_numbers.h"
+#include "codec/reference/skinning.h"
 
 namespace htvm::internal {
 namespace {

@@ -5,9 +5,9 @@
 #include <functional>
 #include <random>
 
-#include "codec/random_numbers.h"
 #include "codec/choice/rate_control_enc.h"
 #include "codec/choice/rate_plan_enc.h"
+#include "codec/random_numbers.h"
 
 namespace htvm::internal {
 namespace {

@@ -53,7 +53,8 @@ TEST(DracoPositionBits, stay_within_1_and_30) {
 TEST(BuiltInCoders, have_different_names) {
     std::set<std::string> names;
     for (const auto& coder : built_in_coders(30)) EXPECT_TRUE(names.insert(coder.name).second) << coder.name;
-    for (const char* name : {"paper", "htvm-ep", "htvm-motion", "htvm-rd", "htvm-t", "tfan", "tfan-mpeg", "draco10", "draco7"})
+    for (const char* name :
+         {"paper", "htvm-ep", "htvm-motion", "htvm-rd", "htvm-t", "tfan", "tfan-mpeg", "draco10", "draco7"})
         EXPECT_TRUE(names.contains(name));
 }
 

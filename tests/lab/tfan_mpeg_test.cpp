@@ -150,8 +150,8 @@ TEST(TfanMpeg, quantises_positions_to_cells_of_the_longest_side) {
             for (std::size_t i = 0; i < 3; ++i) {
                 largest =
                     std::max(largest, std::abs(double{mesh.positions[frame->order[v]][i]} - back.positions[v][i]));
-                largest_colour = std::max(
-                    largest_colour, std::abs(1.0 * mesh.colours[frame->order[v]][i] - 1.0 * back.colours[v][i]));
+                largest_colour = std::max(largest_colour,
+                                          std::abs(1.0 * mesh.colours[frame->order[v]][i] - 1.0 * back.colours[v][i]));
             }
         EXPECT_LE(largest, 0.501 * side / (std::exp2(bits) - 1)) << bits;
         EXPECT_GT(largest, 0.4 * side / (std::exp2(bits) - 1)) << bits;

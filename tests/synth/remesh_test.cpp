@@ -1,10 +1,11 @@
 // Edge collapse, flips and relaxation on closed surfaces.
-#include "core/thread.h"
 #include "synth/remesh.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "core/thread.h"
 
 namespace htvm::synth {
 namespace {

@@ -128,7 +128,8 @@ Colour add_colour(Colour reference, const std::array<std::int32_t, 3>& residual)
     return out;
 }
 
-Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayloadView& payload, const EnhancedFrameContext& context) {
+Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayloadView& payload,
+                                                   const EnhancedFrameContext& context) {
     if (auto ok = check(context); !ok) return tl::unexpected(ok.error());
     const auto& reference = context.reference;
     DecodedEnhancedFrame out;

@@ -25,7 +25,8 @@ struct DecodedEnhancedFrame {
     std::vector<QuantisedTransform> transforms;
 };
 
-Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayloadView& payload, const EnhancedFrameContext& context);
+Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayloadView& payload,
+                                                   const EnhancedFrameContext& context);
 
 // Motion-based coding (paper, section V): which bones' sub-meshes the frame codes; the rest is animated, and zippered
 // to what is coded. One bit per bone, bone i in bit i % 8 of byte i / 8.
