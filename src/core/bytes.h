@@ -1,4 +1,4 @@
-// Little-endian bytes, written to a growing buffer and read with every access checked.
+// Little-endian bytes: a writer with a growing buffer, and a reader that checks every access.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +14,7 @@ public:
     void u16(std::uint16_t v) { put(v, 2); }
     void u32(std::uint32_t v) { put(v, 4); }
     void u64(std::uint64_t v) { put(v, 8); }
-    // LEB128: seven bits a byte, least significant first, the top bit set on all but the last.
+    // LEB128: seven bits per byte, least significant first; the top bit is set on all bytes except the last.
     void varint(std::uint64_t v) {
         for (; v >= 0x80; v >>= 7) bytes_.push_back(static_cast<std::uint8_t>(v | 0x80));
         bytes_.push_back(static_cast<std::uint8_t>(v));
@@ -35,7 +35,7 @@ private:
     std::vector<std::uint8_t> bytes_;
 };
 
-// Reads past the end give zero and make ok() false for good; check ok() before using what was read to allocate.
+// Reading past the end gives zero and makes ok() false for good. Check ok() before allocating by what was read.
 class ByteReader {
 public:
     explicit ByteReader(std::span<const std::uint8_t> data) : data_(data) {}
@@ -58,7 +58,7 @@ public:
         const std::uint64_t v = varint();
         return static_cast<std::int64_t>(v >> 1) ^ -static_cast<std::int64_t>(v & 1);
     }
-    // The next n bytes; empty, with ok() false, where fewer are left.
+    // The next n bytes; if fewer are left, none, and ok() becomes false.
     std::span<const std::uint8_t> bytes(std::uint64_t n) {
         if (n > remaining()) {
             ok_ = false;

@@ -1,6 +1,6 @@
-// Refuses compilers' settings under which doubles are not those of IEEE 754, each operation rounded by itself: a stream
-// could decode to other meshes (docs/bitstream.md, section 1). Contraction to fused multiply-add cannot be seen here:
-// CMakeLists.txt turns it off and refuses flags that turn it on.
+// Refuses compiler settings under which doubles do not follow IEEE 754 with every operation rounded separately: the
+// same stream could decode to a different mesh (docs/bitstream.md, section 1). Contraction to fused multiply-add cannot
+// be detected here: CMakeLists.txt turns it off and refuses flags that turn it on.
 #pragma once
 
 #include <cfloat>

@@ -27,10 +27,10 @@ double mean_edge_of(std::span<const Point> positions, std::span<const Triangle> 
     return count > 0 ? sum / static_cast<double>(count) : 0;
 }
 
-// Corners relative to the point asked for: what is sought is the point nearest to the origin.
+// Corners relative to the query point, so the task is to find the point nearest to the origin.
 using Corners = std::array<Vector3d, 3>;
 
-// Keeps the point of the side opposite to `corner` nearest to the origin, if it is nearer than what was found.
+// Takes the point of the side opposite to `corner` that is nearest to the origin, if it beats the best so far.
 void try_side(const Corners& corners, std::size_t corner, TrianglePoint& best) {
     const std::size_t i = (corner + 1) % 3, j = (corner + 2) % 3;
     const auto &a = corners[i], &b = corners[j];
@@ -62,8 +62,8 @@ double mean_edge(std::span<const Vector3f> positions, std::span<const Triangle> 
     return mean_edge_of(positions, triangles, every);
 }
 
-// Seen from outside the triangle, the nearest point lies on a side that has the origin's projection beyond it. Trying
-// those sides one by one is robust where telling the regions around a sliver apart is not.
+// If the origin projects outside the triangle, the nearest point lies on a side that has the projection beyond it.
+// Trying these sides one by one stays robust for slivers, where classifying the region of the projection does not.
 TrianglePoint closest_on_triangle(const Vector3d& p, const Vector3d& first, const Vector3d& second,
                                   const Vector3d& third) {
     const Corners corners = {first - p, second - p, third - p};

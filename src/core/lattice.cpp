@@ -11,7 +11,7 @@ namespace {
 constexpr double normal_scale = 127.0;
 constexpr double texcoord_scale = 4096.0;
 constexpr double texcoord_limit = 4096.0;
-// Half the lattice, so that predictions and residuals of what is captured stay on it.
+// Half the lattice, so that predictions and residuals of captured values stay on it.
 constexpr std::int32_t capture_limit = lattice_limit / 2;
 
 bool finite(const Vector3f& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }

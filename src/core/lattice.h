@@ -1,5 +1,5 @@
-// The integer lattice on which every decoded position lives (docs/bitstream.md, section 1), exact on every machine: the
-// arithmetic of its points, and meshes to and from it. The meshes themselves are declared in htvm/lattice_mesh.hpp.
+// The integer lattice on which every decoded position lives (docs/bitstream.md, section 1): exact arithmetic of its
+// points, and conversion of meshes to and from it. The meshes are declared in htvm/lattice_mesh.hpp.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,7 @@ inline bool on_lattice(LatticePoint p) {
     return inside(p.x) && inside(p.y) && inside(p.z);
 }
 
-// The nearest coordinate that is on the lattice.
+// The nearest coordinate on the lattice.
 inline std::int32_t within_lattice(std::int64_t c) {
     return static_cast<std::int32_t>(
         std::clamp<std::int64_t>(c, -std::int64_t{lattice_limit}, std::int64_t{lattice_limit}));
@@ -42,28 +42,28 @@ inline std::int64_t divide_rounded(std::int64_t numerator, std::int64_t denomina
     return numerator >= 0 ? (numerator + half) / denominator : -((-numerator + half) / denominator);
 }
 
-// Where lattice coordinates lie in space: millimetres = origin + coordinates * 2^-bits.
+// Where lattice coordinates are in space: millimetres = origin + coordinates * 2^-bits.
 struct Lattice {
     std::array<std::int32_t, 3> origin{};  // mm
     int bits = 4;                          // 0..16
     double step() const { return 1.0 / static_cast<double>(1 << bits); }
 };
 
-// The origin for a sequence that begins with this mesh: the middle of its bounding box, in whole millimetres.
+// The origin for a sequence that begins with this mesh: the centre of its bounding box, in whole millimetres.
 Result<std::array<std::int32_t, 3>> lattice_origin(const Mesh& mesh);
 
-// Every vertex rounded to the nearest lattice point, attributes to their integers. Errors: a position, normal or
-// texture coordinate that is not finite or too far away, a triangle index out of range, an attribute array of
-// another length than positions (bad_input, with the first offender named).
+// Rounds every vertex to the nearest lattice point and attributes to integers. Errors (bad_input, naming the first
+// offender): a position, normal or texture coordinate that is not finite or too large, a triangle index out of range,
+// an attribute array whose length differs from that of the positions.
 Result<LatticeMesh> to_lattice(const Mesh& mesh, const Lattice& lattice);
 Result<LatticePoint> to_lattice(const std::array<double, 3>& point, const Lattice& lattice);
 
-// Parts of a mesh as it is shown, in floats, into arrays that may have been used before: positions in millimetres,
-// normals of unit length (of no length, where they have none), texture coordinates as they were captured.
+// Parts of a mesh as floats for display, written into arrays that may be reused: positions in millimetres, normals of
+// unit length (zero where the mesh has none), texture coordinates as captured.
 void to_millimetres(std::span<const LatticePoint> positions, const Lattice& lattice, std::vector<Vector3f>& out);
 void to_unit_normals(std::span<const QuantisedNormal> normals, std::vector<Vector3f>& out);
 void to_texcoords(std::span<const QuantisedTexcoord> texcoords, std::vector<Vector2f>& out);
-// All of it.
+// The whole mesh as floats.
 Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice);
 std::array<double, 3> to_millimetres(LatticePoint point, const Lattice& lattice);
 

@@ -9,7 +9,7 @@
 namespace htvm::internal {
 namespace {
 
-// Makes v a unit vector; false where it has no direction: shorter than a millionth of a millimetre, or not finite.
+// Makes v a unit vector; false if it has no direction: shorter than a millionth of a millimetre, or not finite.
 bool normalise(Vector3d& v) {
     const double size = length(v);
     if (!(size > 1e-6) || !std::isfinite(size)) return false;
@@ -19,7 +19,7 @@ bool normalise(Vector3d& v) {
 
 Vector3d column(const Rotation& r, std::size_t c) { return {r[c], r[3 + c], r[6 + c]}; }
 
-// The unit vector nearest to the hint among those perpendicular to the unit vector v.
+// Of the unit vectors perpendicular to the unit vector v, the one nearest to the hint.
 Vector3d perpendicular(const Vector3d& v, const Vector3d& hint) {
     Vector3d p = hint - v * dot(hint, v);
     if (std::isfinite(dot(p, p)) && dot(p, p) > 1e-6 && normalise(p)) return p;
@@ -33,7 +33,7 @@ Vector3d perpendicular(const Vector3d& v, const Vector3d& hint) {
     return p;
 }
 
-// The rotation about a unit axis by the angle of which the cosine and sine are given.
+// The rotation about a unit axis, by an angle given as its cosine and sine.
 Rotation axis_rotation(const Vector3d& axis, double cosine, double sine) {
     Rotation r;
     for (std::size_t i = 0; i < 3; ++i)
@@ -57,14 +57,14 @@ Rotation reference_orientation(const Skeleton& skeleton, std::size_t b, const Po
     return bone_orientation(reference.joints[bone.first], reference.joints[bone.second], nullptr);
 }
 
-// The minimal rotation from the reference's bone to this pose's.
+// The minimal rotation from the bone in the reference to the bone in this pose.
 Rotation swing(const Bone& bone, const Pose& pose, const Pose& reference, const Rotation& orientation) {
     Vector3d from = direction(bone, reference);
     if (!normalise(from)) from = column(orientation, 0);
     return minimal_rotation(from, direction(bone, pose), column(orientation, 1));
 }
 
-// The body's rotation, then the minimal rotation from the bone so turned to this pose's.
+// The body's rotation, followed by the minimal rotation from the bone turned by it to the bone in this pose.
 Rotation swing_after(const Rotation& body, const Bone& bone, const Pose& pose, const Pose& reference,
                      const Rotation& orientation) {
     Vector3d from = direction(bone, reference);
@@ -109,8 +109,8 @@ Vector3d centre(const Pose& pose) {
     return sum * (1 / static_cast<double>(pose.joints.size()));
 }
 
-// The rotation that brings the reference's joints closest to this pose's, as one rigid body (least squares; Horn 1987,
-// "Closed-form solution of absolute orientation using unit quaternions").
+// The rotation that brings the joints of the reference closest to those of this pose, as one rigid body (least squares;
+// Horn 1987, "Closed-form solution of absolute orientation using unit quaternions").
 Rotation body_rotation(const Pose& pose, const Pose& reference) {
     const Vector3d from = centre(reference), to = centre(pose);
     double h[3][3] = {};
@@ -124,7 +124,7 @@ Rotation body_rotation(const Pose& pose, const Pose& reference) {
     if (!(size > 1e-6) || !std::isfinite(size)) return identity_rotation;
     for (auto& row : h)
         for (double& element : row) element /= size;
-    for (std::size_t i = 0; i < 3; ++i) h[i][i] += 1e-6;  // joints all in a line: turn no more than needed
+    for (std::size_t i = 0; i < 3; ++i) h[i][i] += 1e-6;  // for joints in one line: turn no more than needed
     const auto q = largest_eigenvector({{
         {h[0][0] + h[1][1] + h[2][2], h[1][2] - h[2][1], h[2][0] - h[0][2], h[0][1] - h[1][0]},
         {h[1][2] - h[2][1], h[0][0] - h[1][1] - h[2][2], h[0][1] + h[1][0], h[2][0] + h[0][2]},
@@ -137,7 +137,7 @@ Rotation body_rotation(const Pose& pose, const Pose& reference) {
                             1 - 2 * (x * x + y * y)});
 }
 
-// For each joint the number of bones between it and the nearer end of bone b; a large number where none lead there.
+// For each joint, the number of bones between it and the nearer end of bone b; a large number if it is not connected.
 std::vector<int> bones_away(const Skeleton& skeleton, const std::vector<std::vector<std::size_t>>& neighbours,
                             std::size_t b, std::size_t joint_count) {
     constexpr int unreachable = 1000;
@@ -155,8 +155,9 @@ std::vector<int> bones_away(const Skeleton& skeleton, const std::vector<std::vec
     return away;
 }
 
-// The rotation about the bone that brings the joints around it, already swung with it, closest to this pose's
-// (least squares, weight 1/4 for each bone further away). Closed form: only the parts across the bone matter.
+// The rotation about the bone that brings the joints around it, after the swing, closest to those of this pose (least
+// squares; the weight falls to 1/4 with each bone further away). Closed form, since only the components perpendicular
+// to the bone matter.
 Rotation twist(const Bone& bone, const Pose& pose, const Pose& reference, const Rotation& swung,
                const std::vector<int>& away) {
     Vector3d axis = direction(bone, pose);
@@ -173,8 +174,8 @@ Rotation twist(const Bone& bone, const Pose& pose, const Pose& reference, const 
         sine += weight * dot(cross(a, b), axis);
         size += weight * length(a) * length(b);
     }
-    // Where little lies across the bone, or the joints around disagree, lean towards no twist; with less than this the
-    // legs of a real dancer twisted by half turns from frame to frame.
+    // If the joints around lie close to the bone's line, or disagree, prefer no twist. With a smaller value the legs of
+    // a real dancer twisted by half turns from frame to frame.
     const double enough = 0.4 * size;
     double known = std::sqrt(cosine * cosine + sine * sine);
     if (known < enough) cosine += enough - known;
@@ -211,7 +212,7 @@ Rotation minimal_rotation(const Vector3d& from, const Vector3d& to, const Vector
     Vector3d a = from, b = to;
     if (!normalise(a) || !normalise(b)) return identity_rotation;
     const Vector3d sum = a + b;
-    const double one_plus_cosine = dot(sum, sum) / 2;  // not 1 + a.b, which cancels where a is nearly -b
+    const double one_plus_cosine = dot(sum, sum) / 2;  // not 1 + a.b, which suffers cancellation where a is nearly -b
     if (one_plus_cosine < 1e-14) return axis_rotation(perpendicular(a, hint), -1, 0);
     const Vector3d v = cross(a, b);
     const double cosine = one_plus_cosine - 1;

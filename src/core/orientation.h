@@ -1,6 +1,6 @@
-// Bone orientations from joint positions, for trackers that give positions alone (T^i of the paper, section IV-B).
-// Positions say where a bone points, not how it is twisted about itself: the functions here differ in where the
-// twist comes from. All use + - x / and square roots only.
+// Bone orientations from joint positions, for trackers that report positions alone (T^i of the paper, section IV-B).
+// Positions say where a bone points, but not how it is twisted about its own axis; the functions here differ in where
+// the twist comes from. All use + - x / and square roots only.
 #pragma once
 
 #include <vector>
@@ -17,32 +17,33 @@ Rotation multiply(const Rotation& a, const Rotation& b);
 // The rotation applied to a vector.
 Vector3d rotate(const Rotation& rotation, const Vector3d& v);
 
-// The nearby exact rotation: rows kept as far as possible, made orthonormal (Gram-Schmidt) and right-handed.
-// Rows that are zero, parallel or not finite give the identity.
+// The nearest exact rotation: orthonormal (Gram-Schmidt) and right-handed, its rows kept as far as possible. Rows that
+// are zero, parallel or not finite give the identity.
 Rotation orthonormalised(const Rotation& rotation);
 
-// The rotation by the smallest angle that takes direction `from` to direction `to` (any lengths). Opposite
-// directions turn half round about `hint` made perpendicular to `from`, or about some perpendicular axis where the
-// hint is parallel to it; a zero or non-finite vector gives the identity.
+// The rotation by the smallest angle that takes direction `from` to direction `to` (any lengths). Opposite directions
+// turn by 180 degrees about `hint` made perpendicular to `from`, or about any perpendicular axis if the hint is
+// parallel to it. A zero or non-finite vector gives the identity.
 Rotation minimal_rotation(const Vector3d& from, const Vector3d& to, const Vector3d& hint = {0, 1, 0});
 
-// The orientation of the bone from joint `first` to joint `second` (mm): its first axis (the matrix's first column)
-// lies along the bone. Where `previous` is given, the other two follow by parallel transport of it: no twist from
-// it to the result; else by parallel transport of the identity, whose bone lies along +x. A bone of zero length
-// keeps the previous orientation, or the identity.
+// The orientation of the bone from joint `first` to joint `second` (mm): its first axis (the first column of the
+// matrix) lies along the bone. The other two axes follow by parallel transport, that is without twist, from `previous`
+// if given, else from the identity, whose bone lies along +x. A bone of zero length keeps the previous orientation, or
+// the identity.
 Rotation bone_orientation(const Vector3d& first, const Vector3d& second, const Rotation* previous);
 
-// One orientation per bone of the skeleton, from the joints of the pose. Without a reference: bone_orientation of
-// each bone. With one: the minimal rotation that takes the reference's bone direction to this pose's, times the
-// reference's orientation (its own where it has orientations, else bone_orientation). A bone of zero length in this
-// pose keeps the reference's orientation. Bones whose joints the pose lacks get the identity.
+// One orientation per bone of the skeleton, from the joints of the pose. Without a reference: bone_orientation of each
+// bone. With one: the minimal rotation that takes the bone's direction in the reference to that in this pose, times the
+// reference's orientation (given, or else from bone_orientation). A bone of zero length in this pose keeps the
+// reference's orientation. Bones whose joints the pose lacks get the identity.
 std::vector<Rotation> derive_orientations(const Skeleton& skeleton, const Pose& pose, const Pose* reference);
 
-// As derive_orientations with a reference, but a body that turns as a whole turns all its bones, also the upright
-// ones, which minimal rotations alone leave where they were: the reference is first turned as one rigid body onto this
-// pose (least squares over all joints), then each bone by the minimal rotation onto its direction, then about itself
-// so that the joints around it (nearer along the skeleton: more weight) come as close as they can, as far as they tell.
-// Joints all in one line give the minimal rotation alone. Falls back to derive_orientations where joints are missing.
+// Like derive_orientations with a reference, except that a body that turns as a whole turns all its bones, including
+// the upright ones, which minimal rotations alone would leave as they were. First the reference is turned as one rigid
+// body onto this pose (least squares over all joints). Then each bone gets the minimal rotation onto its direction, and
+// a twist about its own axis that brings the joints around it as close as possible (joints nearer along the skeleton
+// weigh more). If all joints lie in one line there is no twist. Falls back to derive_orientations if joints are
+// missing.
 std::vector<Rotation> derive_turning_orientations(const Skeleton& skeleton, const Pose& pose, const Pose& reference);
 
 }  // namespace htvm::internal

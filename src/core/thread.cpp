@@ -1,7 +1,7 @@
-// The pool of threads that stay. A call of its runner is a job, which lies on its caller's stack. Whoever is free, the
-// caller first of all, takes the next task of a job under the pool's mutex; the caller waits only for tasks that others
-// have taken. So a thread that wakes late, as on a busy machine, costs nothing, nested jobs cannot wait for each other,
-// and nothing is allocated.
+// A pool of threads that stay. A call of its runner is a job, which lives on its caller's stack. Whoever is free, first
+// of all the caller, takes the next task of a job under the pool's mutex; the caller waits only for tasks that others
+// have taken. So a thread that wakes late, as on a busy machine, costs nothing, nested jobs cannot deadlock, and
+// nothing is allocated.
 #include "core/thread.h"
 
 #include <utility>
@@ -23,11 +23,11 @@ using Task = std::function<void(std::size_t)>;
 
 #ifdef __STDCPP_THREADS__
 
-// How long a thread looks out for what comes next before it sleeps. To sleep and to be woken takes 5 to 50 us, so that
-// longer would gain little, and cost others the core.
+// How long a thread spins for its next task before it sleeps. Sleeping and waking takes 5 to 50 us, so spinning longer
+// would gain little and keep the core from others.
 constexpr std::chrono::microseconds patience{30};
 
-// Whether done() came true within that time.
+// Spins until done() is true, at most that long; gives whether it became true.
 template <class Done>
 bool came_soon(const Done& done) {
     const auto end = std::chrono::steady_clock::now() + patience;
@@ -37,14 +37,14 @@ bool came_soon(const Done& done) {
     return false;
 }
 
-// All members but `running` under the pool's mutex.
+// All members except `running` are guarded by the pool's mutex.
 struct Job {
     const Task& task;
     std::size_t tasks;
-    std::size_t next = 1;                  // the first task that none has taken; the caller begins with task 0
-    std::atomic<std::size_t> running = 0;  // tasks that other threads than the caller's have taken and not finished
+    std::size_t next = 1;                  // the first task that nobody has taken; the caller begins with task 0
+    std::atomic<std::size_t> running = 0;  // tasks taken by threads other than the caller's and not finished yet
     bool caller_sleeps = false;
-    Job* older = nullptr;  // among those with tasks to take
+    Job* older = nullptr;  // the next older job that has tasks to take
 };
 
 class Pool {
@@ -90,11 +90,11 @@ private:
         try {
             while (workers_.size() < wanted) workers_.emplace_back([this] { work(); });
         } catch (const std::exception&) {
-            // system_error: no thread to be had; bad_alloc: no memory for one. The caller does what is left.
+            // system_error: no thread available; bad_alloc: no memory for one. The caller does the remaining work.
         }
     }
 
-    // The next task, or job.tasks where there is none. The mutex must be locked.
+    // The next task, or job.tasks if there is none left. The mutex must be locked.
     std::size_t take_locked(Job& job) {
         if (job.next == job.tasks) return job.tasks;
         const std::size_t t = job.next++;
@@ -120,7 +120,7 @@ private:
         finished_.wait(lock, finished);
     }
 
-    // The newest job first: where jobs are nested, the others wait for it.
+    // The newest job first: of nested jobs, the outer ones wait for it.
     void work() {
         std::unique_lock lock(mutex_);
         while (!ending_) {
@@ -132,7 +132,7 @@ private:
                 job.task(t);
                 lock.lock();
                 if (job.caller_sleeps) finished_.notify_all();
-                job.running.fetch_sub(1, std::memory_order_release);  // the job may be gone from here on
+                job.running.fetch_sub(1, std::memory_order_release);  // the job may no longer exist after this
                 continue;
             }
             lock.unlock();
@@ -146,10 +146,10 @@ private:
 
     const std::size_t most_workers_;
     std::mutex mutex_;
-    std::condition_variable posted_, finished_;  // a job; its last task
+    std::condition_variable posted_, finished_;  // signalled when a job is posted, and when its last task is finished
     std::vector<std::thread> workers_;
-    Job* newest_ = nullptr;           // of those with tasks to take
-    std::atomic<bool> open_ = false;  // whether there is one, to be read without the mutex
+    Job* newest_ = nullptr;           // the newest job that has tasks to take
+    std::atomic<bool> open_ = false;  // whether there is such a job; readable without the mutex
     std::size_t asleep_ = 0;
     bool ending_ = false;
 };

@@ -1,5 +1,5 @@
 // Who runs the pieces of a loop (core/parallel.h): Threads, the handle that every function with loops takes, and
-// ThreadPool, the owner of what it points to.
+// ThreadPool, which owns what the handle points to.
 #pragma once
 
 #include <algorithm>
@@ -9,26 +9,27 @@
 
 namespace htvm::internal {
 
-// How many threads a call may use, its own among them, and who runs their tasks. The default is the caller's alone.
+// How many threads a call may use, including its own, and who runs their tasks. The default: the caller's thread alone.
 struct Threads {
     const TaskRunner* runner = nullptr;  // set where count > 1; outlives the handle
     unsigned count = 1;
 
-    // The same, but no more than `most`.
+    // The same runner with at most `most` threads.
     Threads at_most(unsigned most) const { return {runner, std::min(count, most)}; }
 };
 
-// Threads to use for a requested count; 0 asks for one per core. 1 in a build without threads (WebAssembly).
+// The number of threads for a requested count: 0 means one per core; always 1 in a build without threads (WebAssembly).
 unsigned thread_count(unsigned requested);
 
-// Of an encoder, a decoder or a command: the caller's runner, or one whose threads stay as long as this and its copies.
+// The threads of an encoder, a decoder or a command: the caller's runner, or threads of its own, which live as long as
+// this object and its copies.
 class ThreadPool {
 public:
-    ThreadPool() = default;  // the caller's thread alone
+    ThreadPool() = default;  // uses the caller's thread alone
     explicit ThreadPool(unsigned requested, TaskRunner runner = {});
 
     Threads threads() const { return {runner_.get(), count_}; }
-    operator Threads() const { return threads(); }  // valid as long as this and its copies
+    operator Threads() const { return threads(); }  // valid as long as this object or a copy of it
 
 private:
     std::shared_ptr<const TaskRunner> runner_;

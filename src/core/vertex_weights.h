@@ -1,6 +1,6 @@
 // How much each handle moves a vertex. A handle is a rigid transform with a smooth region of influence: a bone, or a
-// node of a deformation graph. codec/reference/skinning.h derives the weights of bones, codec/reference/
-// deformation_nodes.h those of nodes.
+// node of a deformation graph. The weights of bones come from codec/reference/skinning.h, those of nodes from
+// codec/reference/deformation_nodes.h.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@ namespace htvm::internal {
 inline constexpr int weight_bits = 12;
 inline constexpr std::size_t handles_per_vertex = 4;
 
-// The handles that move one vertex, by descending weight, of equal ones the lower handle first. The weights sum to
+// The handles that move one vertex, by descending weight; of equal weights, the lower handle first. The weights sum to
 // 2^weight_bits; unused entries have weight 0 and handle 0.
 struct VertexWeights {
     std::array<std::uint16_t, handles_per_vertex> handle{};

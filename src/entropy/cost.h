@@ -1,5 +1,5 @@
-// Counts the bits that a RangeEncoder would write, for choices made by rate and distortion. Encoder side only: the
-// counts are doubles from std::log2, and nothing in a stream depends on their last digits being the same elsewhere.
+// Counts the bits that a RangeEncoder would write, for decisions by rate and distortion. Encoder only: the counts are
+// doubles from std::log2, and nothing in a stream requires their last digits to be the same on every machine.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace htvm::internal {
 
-// The bits a decision costs under a model, without adapting it.
+// The bits of a decision under a model, which is not adapted.
 inline double decision_cost(const BinaryModel& model, bool bit) {
     static const auto table = [] {
         std::array<float, 4097> t{};

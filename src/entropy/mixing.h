@@ -1,5 +1,6 @@
-// One decision predicted from several contexts at once: each context's adaptive probability votes with its log odds,
-// weighted by how well it has been doing (logistic mixing; Mahoney 2005). Integers only, so that every machine agrees.
+// Predicts one decision from several contexts at once: the adaptive probability of each context votes with its log
+// odds, weighted by how well it has predicted so far (logistic mixing; Mahoney 2005). Integers only, so every machine
+// gets the same result.
 #pragma once
 
 #include <algorithm>
@@ -11,8 +12,8 @@
 
 namespace htvm::internal {
 
-// Log odds are natural, in 1/256, from -2047 to 2047; probabilities in 1/65536.
-// 65536 / (1 + exp(-x / 256)) for x = -2048, -1920, ..., 2048.
+// 65536 / (1 + exp(-x / 256)) for x = -2048, -1920, ..., 2048. Log odds are natural logarithms in units of 1/256, from
+// -2047 to 2047; probabilities are in units of 1/65536.
 inline constexpr std::array<std::int32_t, 33> logistic_knots = {
     22,    36,    60,    98,    162,   267,   439,   720,   1179,  1921,  3108,
     4971,  7812,  11955, 17625, 24743, 32768, 40793, 47911, 53581, 57724, 60565,
@@ -25,7 +26,7 @@ constexpr std::int32_t probability_of_log_odds(std::int32_t log_odds) {
     return (logistic_knots[knot] * (128 - part) + logistic_knots[knot + 1] * part) >> 7;
 }
 
-// By probability / 16: the inverse of the above.
+// The inverse of the above, indexed by probability / 16.
 inline constexpr auto log_odds_table = [] {
     std::array<std::int16_t, 4096> table{};
     std::int32_t log_odds = -2047;
@@ -36,7 +37,7 @@ inline constexpr auto log_odds_table = [] {
     return table;
 }();
 
-// Weights of N votes, in 1/65536.
+// Weights of N votes, in units of 1/65536.
 template <std::size_t N>
 struct Mixer {
     std::array<std::int32_t, N> weights = [] {
@@ -49,7 +50,7 @@ struct Mixer {
 
 inline constexpr std::int32_t mixing_rate = 5;
 
-// Codes one decision; each of the models and the mixer adapt.
+// Codes one decision; the models and the mixer adapt.
 template <class Coder, std::size_t N>
 bool code_mixed(Coder& coder, Mixer<N>& mixer, const std::array<BinaryModel*, N>& models, bool wanted) {
     std::array<std::int32_t, N> votes;

@@ -23,8 +23,8 @@
 
 namespace htvm::internal {
 
-// The probability that the next decision is 1, in 1/65536, adapted by 1/(n + 1.5) for the n-th decision down to
-// 1/128: it learns a stationary source as fast as counting does and follows one that drifts.
+// The probability that the next decision is 1, in units of 1/65536. The n-th decision adapts it by 1/(n + 1.5), but
+// never by less than 1/128: it learns a stationary source as fast as counting does, and follows one that drifts.
 struct BinaryModel {
     std::uint16_t one = 32768;
     std::uint8_t seen = 0;
@@ -84,8 +84,8 @@ std::uint32_t decode_symbol(Reader& reader, SymbolModel& model) {
     return node - (1u << model.bits());
 }
 
-// Whole numbers of any size up to 2^32 - 2: an adaptive exponential Golomb code. u + 1 = 2^k + m: k in unary, then the
-// k bits of m, the top three of them adaptive. Values up to 14 have a fully adaptive distribution.
+// Whole numbers from 0 to 2^32 - 2: an adaptive exponential Golomb code. u + 1 = 2^k + m: first k in unary, then the k
+// bits of m, of which the top three are adaptive. Values up to 14 thus have a fully adaptive distribution.
 struct UnsignedModel {
     std::array<BinaryModel, 33> prefix;
     std::array<std::array<BinaryModel, 8>, 33> mantissa;
@@ -120,10 +120,10 @@ std::uint32_t decode_unsigned(Reader& reader, UnsignedModel& model) {
         shifted = shifted * 2 + bit;
     }
     if (left > 0) shifted = (shifted << left) | reader.raw(left);
-    return static_cast<std::uint32_t>(shifted - 1);  // k = 32 in a corrupt stream wraps, which is harmless
+    return static_cast<std::uint32_t>(shifted - 1);  // in a corrupt stream k = 32 wraps around, which is harmless
 }
 
-// Whole numbers of either sign, |v| <= 2^31 - 1: whether zero, the sign, then |v| - 1.
+// Signed whole numbers, |v| <= 2^31 - 1: whether v is zero, its sign, then |v| - 1.
 struct SignedModel {
     BinaryModel zero;
     BinaryModel negative;

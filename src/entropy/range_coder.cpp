@@ -31,7 +31,7 @@ void RangeEncoder::raw(std::uint32_t value, int n) {
 
 std::vector<std::uint8_t> RangeEncoder::finish() {
     if (!used_) return {};
-    // Of the values in [low, low + range), the one with the most zero bytes at its end.
+    // Any value in [low, low + range) would do: take the one that ends in the most zero bytes.
     for (int zeros = 24; zeros > 0; zeros -= 8) {
         const std::uint64_t mask = (std::uint64_t{1} << zeros) - 1;
         const std::uint64_t value = (low_ + mask) & ~mask;
@@ -41,7 +41,7 @@ std::vector<std::uint8_t> RangeEncoder::finish() {
         }
     }
     for (int i = 0; i < 5; ++i) shift_low();
-    // The decoder reads zeros past the end, so up to four of them need not be sent.
+    // The decoder reads zeros past the end, so up to four trailing zeros need not be sent.
     for (int i = 0; i < 4 && !bytes_.empty() && bytes_.back() == 0; ++i) bytes_.pop_back();
     return std::move(bytes_);
 }

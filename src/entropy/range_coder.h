@@ -1,9 +1,10 @@
-// The arithmetic coder under every layer: a byte-wise range coder with carry, after Martin (1979). Integers throughout.
+// The arithmetic coder under every layer: a byte-wise range coder with carry, after Martin (1979), in integers
+// throughout.
 //
-// Both sides keep a range of 32 bits, cut at each decision in proportion to the model's probability, and shift a byte
-// out or in whenever the range falls below 2^24. Encoder and decoder stand side by side: each step of one is the
-// other's, read backwards. Decisions rather than symbols: a binary model adapts in a few instructions, and several can
-// be mixed (mixing.h).
+// Both sides keep a range of 32 bits. Each decision cuts it in proportion to the model's probability, and a byte is
+// shifted out or in whenever the range falls below 2^24. Encoder and decoder stand side by side here, since each step
+// of one mirrors a step of the other. It codes decisions rather than symbols, because a binary model adapts in a few
+// instructions and several can be mixed (mixing.h).
 #pragma once
 
 #include <cstddef>
@@ -19,7 +20,7 @@ class RangeEncoder {
 public:
     void bit(BinaryModel& model, bool bit);
     void raw(std::uint32_t value, int n);
-    // Flushes and hands over the bytes; the encoder is then spent. An encoder that coded nothing gives no bytes.
+    // Flushes and returns the bytes; the encoder cannot be used afterwards. Without any decision there are no bytes.
     std::vector<std::uint8_t> finish();
 
 private:
@@ -27,7 +28,7 @@ private:
     std::uint64_t low_ = 0;
     std::uint32_t range_ = 0xFFFFFFFFu;
     std::uint8_t pending_ = 0;        // the last byte, which a carry may still change
-    std::uint64_t pending_ones_ = 0;  // 0xFF bytes that wait behind it
+    std::uint64_t pending_ones_ = 0;  // number of 0xFF bytes that wait behind it
     bool started_ = false;
     bool used_ = false;
     std::vector<std::uint8_t> bytes_;
@@ -49,8 +50,8 @@ inline void RangeEncoder::bit(BinaryModel& model, bool bit) {
     }
 }
 
-// Reads zeros past the end of the data. A stream that was not cut short never needs more than four of them:
-// exhausted() says that more were read, and a loop that decodes many symbols checks it to stop early.
+// Reads zeros past the end of the data. A complete stream never needs more than four of them. exhausted() says that
+// more were read; loops that decode many symbols check it to stop early.
 class RangeDecoder {
 public:
     explicit RangeDecoder(std::span<const std::uint8_t> data) : data_(data) {
@@ -76,7 +77,7 @@ public:
             n -= now;
             range_ >>= now;
             std::uint32_t part = code_ / range_;
-            if (part >> now) part = (1u << now) - 1;  // only in a corrupt stream
+            if (part >> now) part = (1u << now) - 1;  // happens only in a corrupt stream
             code_ -= part * range_;
             value = (value << now) | part;
             normalise();
@@ -86,7 +87,7 @@ public:
     bool exhausted() const { return past_end_ > allowed_past_end; }
 
 private:
-    static constexpr std::size_t allowed_past_end = 4;  // the zeros that the encoder may cut off its end
+    static constexpr std::size_t allowed_past_end = 4;  // the zeros that the encoder may cut off at the end
     std::uint8_t next() {
         if (position_ < data_.size()) return data_[position_++];
         ++past_end_;

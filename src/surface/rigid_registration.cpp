@@ -15,8 +15,8 @@ struct Pair {
 
 Eigen::Vector3d vector_of(const Point3f& p) { return {p[0], p[1], p[2]}; }
 
-// Closest pairs of the sampled frame points, without the worst; the search runs in the reference's space, where the
-// tree is, which a rigid motion allows.
+// Closest pairs of the sampled frame points, without the worst. A rigid motion keeps distances, so the search can run
+// in the reference's space, where the tree is.
 std::vector<Pair> closest_pairs(const NearestPoints& reference, std::span<const Point3f> frame,
                                 const RigidMotion& motion, const RegistrationOptions& options) {
     const std::size_t count = std::min(options.samples, frame.size());
@@ -47,7 +47,7 @@ RigidMotion align_pairs(const NearestPoints& reference, const std::vector<Pair>&
     return align(from, to);
 }
 
-// One Gauss-Newton step on the distances along the reference's normals (Chen and Medioni 1992).
+// One Gauss-Newton step that minimises the distances along the reference's normals (Chen and Medioni 1992).
 RigidMotion step_to_planes(const NearestPoints& reference, std::span<const Eigen::Vector3f> normals,
                            const std::vector<Pair>& pairs, const RigidMotion& motion) {
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -63,7 +63,7 @@ RigidMotion step_to_planes(const NearestPoints& reference, std::span<const Eigen
         matrix += row * row.transpose();
         right += row * normal.dot(pair.frame_point - moved);
     }
-    // What the planes leave open (sliding along a limb, turning about it) stays as it was.
+    // Motions that the planes do not determine (sliding along a limb, turning about it) stay as they were.
     matrix.diagonal().array() += 1e-3 * (matrix.diagonal().array() + 1.0);
     const Eigen::Matrix<double, 6, 1> x = matrix.ldlt().solve(right);
     const Eigen::Vector3d turn = x.head<3>();
@@ -96,7 +96,7 @@ RigidMotion align(std::span<const Eigen::Vector3d> from, std::span<const Eigen::
         covariance += (to[i] - to_mean) * (from[i] - from_mean).transpose();
         spread += (to[i] - to_mean).squaredNorm() + (from[i] - from_mean).squaredNorm();
     }
-    // A trace of the identity settles a turn that the points leave open.
+    // A small multiple of the identity decides a turn that the points leave undetermined.
     covariance += Eigen::Matrix3d::Identity() * (1e-9 * spread + 1e-12);
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
     Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
@@ -121,8 +121,7 @@ RigidMotion register_points(const NearestPoints& reference, std::span<const Eige
         motion = next;
         if (done) break;
     }
-    // Distances to planes say nothing where the normals do not, as in a soup of triangles; the steps may then lead
-    // away.
+    // Where normals are meaningless, as in a triangle soup, distances to planes are too, and the steps may lead away.
     constexpr double astray = 4;
     if (options.point_to_plane && !normals.empty() &&
         registration_error(reference, frame, motion, options) >

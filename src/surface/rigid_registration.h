@@ -16,26 +16,28 @@ struct RigidMotion {
     RigidMotion inverse() const { return {rotation.transpose(), -(rotation.transpose() * shift)}; }
 };
 
-// The rigid motion that takes `from` nearest to `to` in the least-squares sense (Kabsch 1976), pair by pair; at least
-// one pair. Where the pairs leave a turn open (fewer than three, or in a line), it is the one nearest to none.
+// The rigid motion that takes `from` nearest to `to` pair by pair in the least-squares sense (Kabsch 1976); needs at
+// least one pair. If the pairs leave a turn undetermined (fewer than three, or all in a line), the smallest turn is
+// taken.
 RigidMotion align(std::span<const Eigen::Vector3d> from, std::span<const Eigen::Vector3d> to);
 
 struct RegistrationOptions {
-    int iterations = 12;              // at most; stops when the motion no longer changes
-    std::size_t samples = 400;        // points of the frame used, evenly spread
-    double trim = 0.1;                // share of the worst pairs left out in each iteration: mis-skinned vertices
-    std::size_t minimum_points = 12;  // with fewer on either side the start is returned
+    int iterations = 12;              // at most; it stops earlier once the motion no longer changes
+    std::size_t samples = 400;        // number of points of the frame that are used, evenly spread
+    double trim = 0.1;                // share of the worst pairs to leave out in each iteration, such as mis-skinned
+                                      // vertices
+    std::size_t minimum_points = 12;  // with fewer points on either side, the start is returned
     bool point_to_plane = false;      // needs normals
 };
 
-// Moves the reference points (in the tree, in their own space) onto the frame's points: from `start`, returns the
-// motion reference -> frame. normals: one per reference point, or empty. Steps to planes that lead far away from the
-// frame give back the start.
+// Registers the reference points (in the tree, in their own space) to the frame's points, beginning at `start`; returns
+// the motion reference -> frame. normals: one per reference point, or empty. If steps to planes lead far away from the
+// frame, the start is returned.
 RigidMotion register_points(const NearestPoints& reference, std::span<const Eigen::Vector3f> normals,
                             std::span<const Point3f> frame, const RigidMotion& start,
                             const RegistrationOptions& options);
 
-// The mean squared distance of the nearest (1 - trim) of the sampled frame points to the moved reference.
+// Mean squared distance of the sampled frame points to the moved reference, over the nearest (1 - trim) of them.
 double registration_error(const NearestPoints& reference, std::span<const Point3f> frame, const RigidMotion& motion,
                           const RegistrationOptions& options);
 

@@ -41,7 +41,7 @@ struct Quadric {
 struct ColourCluster {
     double count = 1;
     std::array<double, 3> mean{};
-    double squares = 0;  // sum of squared distances from the mean
+    double squares = 0;  // sum of squared distances from their mean
 
     ColourCluster merged(const ColourCluster& other) const {
         ColourCluster out;
@@ -60,8 +60,8 @@ struct ColourCluster {
 struct Collapse {
     double cost = 0;
     std::uint32_t keep = 0, drop = 0;
-    std::uint64_t age = 0;  // of both ends together when it was judged
-    // The cheapest first, ties by index: the same on every run.
+    std::uint64_t age = 0;  // sum of the ages of both ends when the edge was judged
+    // Cheapest first, ties by index: every run gives the same order.
     bool operator<(const Collapse& other) const {
         if (cost != other.cost) return cost > other.cost;
         return keep != other.keep ? keep > other.keep : drop > other.drop;
@@ -73,15 +73,15 @@ struct Simplifier {
     std::vector<Vector3d> positions{};
     std::vector<Triangle> triangles{};
     std::vector<bool> triangle_lives{};
-    std::vector<std::vector<std::uint32_t>> fans{};  // triangles round each vertex, dead ones among them
-    std::vector<std::uint32_t> dead{};               // how many of those there are; less than half
+    std::vector<std::vector<std::uint32_t>> fans{};  // triangles around each vertex, including dead ones
+    std::vector<std::uint32_t> dead{};               // the number of dead ones among them; fewer than half
     std::vector<Quadric> quadrics{};
     std::vector<ColourCluster> colours{};
     std::vector<std::uint64_t> age{};
     std::vector<bool> lives{};
     std::priority_queue<Collapse> queue{};
-    std::vector<std::uint32_t> ring_a{}, ring_b{};  // reused
-    mutable std::uint64_t looked_at = 0;            // triangles
+    std::vector<std::uint32_t> ring_a{}, ring_b{};  // reused between calls
+    mutable std::uint64_t looked_at = 0;            // triangles examined
 
     void prepare(std::span<const Colour> input_colours);
     void add_borders();
@@ -94,7 +94,7 @@ struct Simplifier {
     void neighbours(std::uint32_t v, std::vector<std::uint32_t>& out) const;
     std::size_t valence(std::uint32_t v) const { return fans[v].size() - dead[v]; }
     void bury(std::uint32_t v);
-    template <class Visit>  // visit(triangle) for all that live around a vertex
+    template <class Visit>  // calls visit(triangle) for all live triangles around a vertex
     void for_each_around(std::uint32_t v, const Visit& visit) const {
         looked_at += fans[v].size();
         for (const auto t : fans[v])
@@ -102,8 +102,9 @@ struct Simplifier {
     }
 };
 
-// A collapse at a vertex looks at all its triangles, and so does every try of one: at a hub of thousands that would
-// take the square of their number. A hub stays where it is; what lies around it is collapsed all the same.
+// A collapse at a vertex examines all its triangles, and so does every attempt. At a hub of thousands of triangles this
+// would take time in proportion to the square of their number. So hubs stay where they are; everything around them can
+// still be collapsed.
 constexpr std::size_t most_around = 256;
 
 Vector3d area_normal(const Vector3d& a, const Vector3d& b, const Vector3d& c) { return (b - a).cross(c - a); }
@@ -118,7 +119,7 @@ void Simplifier::neighbours(std::uint32_t v, std::vector<std::uint32_t>& out) co
     out.erase(std::unique(out.begin(), out.end()), out.end());
 }
 
-// An edge of one triangle, or of more than two, holds its vertices by a plane that stands on it.
+// An edge of one triangle, or of more than two, is a border: a plane perpendicular to the triangle keeps it in place.
 void Simplifier::add_borders() {
     struct Side {
         std::uint32_t low, high, triangle;
@@ -175,7 +176,7 @@ void Simplifier::prepare(std::span<const Colour> input_colours) {
         for (std::size_t c = 0; c < 3; ++c) colours[v].mean[c] = input_colours[v][c];
 }
 
-// Where the merged vertex errs least; along a flat surface, halfway.
+// Where the merged vertex has the least error; on a flat surface, where all points are equal, the midpoint.
 Vector3d Simplifier::merged_position(std::uint32_t a, std::uint32_t b) const {
     constexpr double towards_middle = 1e-2;
     Quadric q = quadrics[a];
@@ -201,13 +202,13 @@ void Simplifier::judge(std::uint32_t a, std::uint32_t b) {
     if (cost <= 1) queue.push({cost, std::min(a, b), std::max(a, b), age[a] + age[b]});
 }
 
-// 1 of an equilateral triangle, 0 of one without area.
+// 1 for an equilateral triangle, 0 for one without area.
 double roundness(const Vector3d& area_normal, const std::array<Vector3d, 3>& p) {
     const double sides = (p[1] - p[0]).squaredNorm() + (p[2] - p[1]).squaredNorm() + (p[0] - p[2]).squaredNorm();
     return sides > 0 ? 2 * std::sqrt(3.0) * area_normal.norm() / sides : 0;
 }
 
-// The mean normal of the triangles round a vertex, by area.
+// The area-weighted mean normal of the triangles around a vertex.
 Vector3d Simplifier::facing(std::uint32_t v) const {
     Vector3d out = Vector3d::Zero();
     for_each_around(v, [&](std::uint32_t t) {
@@ -217,8 +218,9 @@ Vector3d Simplifier::facing(std::uint32_t v) const {
     return out;
 }
 
-// The triangles round a vertex neither turn over, nor become slivers, when it moves; those of the edge go. Triangles
-// without area, as captures on a coarse grid have, must come to face as those around them do.
+// Whether the triangles around a vertex neither flip nor become slivers when it moves (those of the collapsed edge
+// disappear). Triangles without area, as captures on a coarse grid have, must end up facing the way their neighbours
+// do.
 bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Vector3d& to) const {
     constexpr double least_turn = 0.3, least_facing = 0.2, least_roundness = 0.3;
     const Vector3d around = facing(moving);
@@ -246,9 +248,9 @@ bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Ve
     return true;
 }
 
-// The link condition (what both ends neighbour is what the edge's triangles have opposite), and shape.
+// The link condition (the common neighbours of both ends are exactly the corners opposite to the edge), and the shape.
 bool Simplifier::allowed(std::uint32_t a, std::uint32_t b, const Vector3d& to) {
-    // They may have become hubs since the edge was judged.
+    // The ends may have become hubs since the edge was judged.
     if (valence(a) > most_around || valence(b) > most_around) return false;
     std::size_t shared_triangles = 0;
     for_each_around(a, [&](std::uint32_t t) {
@@ -263,13 +265,13 @@ bool Simplifier::allowed(std::uint32_t a, std::uint32_t b, const Vector3d& to) {
             ++shared, ++i, ++j;
         else
             ring_a[i] < ring_b[j] ? ++i : ++j;
-    // A tetrahedron's edge would leave two triangles on each other.
+    // Collapsing an edge of a tetrahedron would leave two triangles on top of each other.
     if (shared != shared_triangles || ring_a.size() + ring_b.size() - shared <= 4) return false;
     return keeps_shape(a, b, to) && keeps_shape(b, a, to);
 }
 
-// Counts a triangle of v that has died; they are cleared away when they are half of all, so that a hub of which one
-// after another dies is not gone through for each.
+// Counts a dead triangle of v. Dead triangles are removed from the list once they are half of it, so that a hub that
+// loses its triangles one by one is not scanned for each of them.
 void Simplifier::bury(std::uint32_t v) {
     if (2 * ++dead[v] < fans[v].size()) return;
     looked_at += fans[v].size();

@@ -9,17 +9,18 @@
 namespace htvm::internal {
 namespace {
 
-using Level = std::array<float, 3>;  // a colour between two
+using Level = std::array<float, 3>;  // a colour interpolated between vertices
 
-constexpr std::size_t block = 512;  // samples that are summed together, whatever the number of threads
+constexpr std::size_t block = 512;  // samples summed together; fixed, so that sums do not depend on the number of
+                                    // threads
 
 Level level(const Colour& c) { return {float(c[0]), float(c[1]), float(c[2])}; }
 
-// The surface that is measured to.
+// The surface to measure the distance to.
 struct Target {
     const SurfaceView& surface;
     const SurfaceIndex& search;
-    bool colours;  // compare them
+    bool colours;  // whether to compare colours
 
     Level colour_at(const SurfacePoint& p) const {
         if (surface.triangles.empty()) return level(surface.colours[p.triangle]);
@@ -62,7 +63,7 @@ struct Sums {
     }
 };
 
-// Sums of body(i, sums) over [0, count), cut the same way for any number of threads.
+// Sums of body(i, sums) over [0, count). The cuts are the same for any number of threads, hence the sums too.
 template <class Body>
 Sums sum_blocks(std::size_t count, Threads threads, const Body& body) {
     std::vector<Sums> parts((count + block - 1) / block);

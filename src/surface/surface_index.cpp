@@ -59,11 +59,11 @@ const Point3f& NearestPoints::point(std::size_t index) const { return tree_->poi
 
 namespace {
 
-constexpr std::int32_t most_cell = 1 << 24;  // the cells at the ends hold all that is beyond
+constexpr std::int32_t most_cell = 1 << 24;  // coordinates beyond this are clamped to the cells at the ends
 
 bool finite(const Point3f& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
 
-// The largest whole number that is not above x; for what is far out, or not a number, an end of the cells' range.
+// floor(x); values that are out of range, or not a number, give an end of the range of cells.
 std::int32_t floor_of(float x) {
     if (!(x > -static_cast<float>(most_cell))) return -most_cell;
     if (x >= static_cast<float>(most_cell)) return most_cell;
@@ -101,7 +101,7 @@ OrientedPoints::OrientedPoints(std::span<const Point3f> points, std::span<const 
 
 std::int32_t OrientedPoints::cell_of(float coordinate) const { return floor_of(coordinate * per_side_); }
 
-// The first of the eight buckets of a block; z counts blocks.
+// The first of the eight buckets of a block; z counts blocks here.
 std::uint32_t OrientedPoints::block_of(std::int32_t x, std::int32_t y, std::int32_t z) const {
     const std::uint32_t h = static_cast<std::uint32_t>(x) * 73856093u ^ static_cast<std::uint32_t>(y) * 19349663u ^
                             static_cast<std::uint32_t>(z) * 83492791u;
@@ -121,7 +121,7 @@ void OrientedPoints::look_at(std::uint32_t begin, std::uint32_t end, const Query
     }
 }
 
-// All cells that are no further away than the radius, nor than the best so far. True where that was all points.
+// Searches all cells that are within the radius and within the best distance so far. True if this covered all points.
 bool OrientedPoints::look_into_ball(float radius, const Query& query, OrientedMatch& best) const {
     const auto& p = query.point;
     const float rounding = 1e-6f * (side_ + std::abs(p[0]) + std::abs(p[1]) + std::abs(p[2]));
@@ -132,7 +132,7 @@ bool OrientedPoints::look_into_ball(float radius, const Query& query, OrientedMa
         high[k] = cell_of(p[k] + radius + rounding);
         cells *= static_cast<double>(high[k]) - low[k] + 1;
     }
-    if (cells > 8.0 * static_cast<double>(entries_.size())) {  // it is quicker to try them all
+    if (cells > 8.0 * static_cast<double>(entries_.size())) {  // trying all points is faster
         look_at(0, static_cast<std::uint32_t>(entries_.size()), query, best);
         return true;
     }
@@ -170,7 +170,7 @@ OrientedMatch OrientedPoints::nearest(const Point3f& query, const Point3f& norma
     const std::uint32_t own =
         block_of(cell_of(query[0]), cell_of(query[1]), z >> 3) + static_cast<std::uint32_t>(z & 7);
     look_at(first_[own], first_[own + 1], wanted, best);
-    // Balls that double until the best lies within.
+    // Balls whose radius doubles until the best match lies within.
     for (float radius = 0.5f * side_;; radius *= 2) {
         const float bound = std::sqrt(best.squared_distance);
         const bool all = look_into_ball(std::min(radius, bound), wanted, best);
@@ -204,7 +204,7 @@ double area_of(std::span<const Point3f> positions, std::span<const Triangle> tri
     return doubled / 2;
 }
 
-// Between so many points that are spread over so much surface.
+// The spacing of `count` points that are spread over `area`.
 float gap_of(double area, std::size_t count) {
     const double gap = count > 0 ? std::sqrt(area / static_cast<double>(count)) : 0;
     return std::isfinite(gap) ? static_cast<float>(gap) : 0.0f;
@@ -219,11 +219,11 @@ namespace {
 std::size_t hash_of(const Point3f& p) {
     std::uint64_t hash = 0;
     for (const float c : p)
-        hash = (hash ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9E3779B97F4A7C15ull;  // -0 hashes as 0
+        hash = (hash ^ std::bit_cast<std::uint32_t>(c + 0.0f)) * 0x9E3779B97F4A7C15ull;  // so that -0 hashes like 0
     return static_cast<std::size_t>(hash ^ (hash >> 32));
 }
 
-// A triangle on its longest side, from a to b, with the third corner c across.
+// A triangle seen on its longest side, from a to b; c is the opposite corner.
 struct LongTriangle {
     Point3f a{}, b{}, c{};
     double length = 0, height = 0;
@@ -242,7 +242,7 @@ LongTriangle lay_along_longest_side(const Point3f& p, const Point3f& q, const Po
     return best;
 }
 
-// Rows of points parallel to the longest side, and points in the longest row.
+// The number of rows of points parallel to the longest side, and of points in the longest row.
 double rows_on(const LongTriangle& t, double spacing) { return std::ceil(t.height / spacing + 0.5); }
 double columns_on(const LongTriangle& t, double spacing) { return std::ceil(t.length / spacing); }
 double points_on(const LongTriangle& t, double spacing) { return rows_on(t, spacing) * columns_on(t, spacing); }
@@ -268,12 +268,12 @@ struct SurfaceIndex::Anywhere {
     explicit Anywhere(const SurfaceIndex& surface);
     void place_vertices(const SurfaceIndex& surface);
     void spread_over_long_triangles();
-    std::vector<Point3f> places;             // the different positions of the surface's vertices, then points of long
+    std::vector<Point3f> places;             // the distinct positions of the surface's vertices, then points on long
                                              // triangles
-    std::vector<std::uint32_t> vertex_at;    // the mesh's first vertex at each of its positions
-    std::vector<Triangle> corners;           // the triangles by places
-    TrianglesAround around;                  // each place of a vertex
-    std::vector<std::uint32_t> spread_over;  // the triangle of each point of a long triangle
+    std::vector<std::uint32_t> vertex_at;    // for each of these positions, the mesh's first vertex there
+    std::vector<Triangle> corners;           // the triangles, as indices into places
+    TrianglesAround around;                  // the triangles around each place that is a vertex
+    std::vector<std::uint32_t> spread_over;  // for each point on a long triangle, that triangle
     double doubtful = 0;                     // squared distance beyond which another sheet of the surface may be nearer
     NearestPoints tree{std::span<const Point3f>{}};
 };
@@ -285,7 +285,7 @@ SurfaceIndex::Anywhere::Anywhere(const SurfaceIndex& surface) {
     tree = NearestPoints(places);
 }
 
-// By an open hash table of vertices, twice as long as there are vertices.
+// Merges vertices at the same position, with an open-addressing hash table of twice as many slots as vertices.
 void SurfaceIndex::Anywhere::place_vertices(const SurfaceIndex& surface) {
     const auto& vertices = surface.positions;
     std::vector<bool> used(vertices.size(), surface.triangles.empty());
@@ -308,8 +308,8 @@ void SurfaceIndex::Anywhere::place_vertices(const SurfaceIndex& surface) {
     for (const auto& t : surface.triangles) corners.push_back({place_of[t[0]], place_of[t[1]], place_of[t[2]]});
 }
 
-// Points on every triangle much longer than the median one, about as dense as the vertices elsewhere, or less so where
-// that would be more points than vertices.
+// Puts points on every triangle much longer than the median one: about as dense as the vertices elsewhere, or sparser
+// if that would give more points than there are vertices.
 void SurfaceIndex::Anywhere::spread_over_long_triangles() {
     if (corners.empty()) return;
     std::vector<LongTriangle> laid;
@@ -358,7 +358,7 @@ SurfacePoint SurfaceIndex::closest(const Point3f& query) const {
     TrianglePoint best;
     best.squared_distance = std::numeric_limits<double>::infinity();
     std::uint32_t best_triangle = 0;
-    constexpr std::size_t most_tried = 24;  // places; a walk longer than this is not worth its time
+    constexpr std::size_t most_tried = 24;  // number of places after which a walk is given up as not worth its time
     std::array<std::uint32_t, most_tried> tried{};
     std::size_t count = 0;
     const auto try_triangle = [&](std::uint32_t triangle) {
@@ -412,7 +412,7 @@ void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
         chosen_points[i] = positions[samples[i]];
         chosen_normals[i] = normals[samples[i]];
     }
-    // Samples are farther apart than vertices by the root of how many fewer they are.
+    // Samples are spaced more widely than vertices, by the square root of the ratio of their numbers.
     const float wider = count == 0 ? 1.0f : std::sqrt(static_cast<float>(positions.size()) / static_cast<float>(count));
     parallel_invoke(
         options.threads, [&] { coarse = OrientedPoints(chosen_points, chosen_normals, options.cell * wider); },
@@ -434,7 +434,7 @@ SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& n
     for (const auto triangle : around.of(match.index)) {
         const Point3f& across = triangle_normals[triangle];
         if (product(across, normal) < within.agreement || across == Point3f{}) continue;
-        // Its plane may be farther away than what was found.
+        // The triangle is skipped if even its plane is farther away than the best so far.
         const Point3f& corner = positions[triangles[triangle][0]];
         const float height = product(across, {query[0] - corner[0], query[1] - corner[1], query[2] - corner[2]});
         if (static_cast<double>(height * height) > best.squared_distance) continue;

@@ -1,10 +1,11 @@
-// The encoder's index of a surface: what lies nearest to a point, from anywhere, or among what faces the same way
-// within reach. Used to choose, to register and to steer, never to predict: the decoder has none of it, and ties may
-// fall either way. Positions are in lattice units or millimetres, as the caller has them.
+// The encoder's index of a surface: finds what lies nearest to a point, either in any direction, or among points that
+// face the same way within reach. Used to choose, to register and to control quality, never to predict: the decoder
+// does not have it, and ties may be resolved either way. Positions are in lattice units or millimetres, as the caller's
+// are.
 //
-// Two searches, since each fails at the other's task: a tree finds the nearest point however far it is, but knows no
-// directions; a grid finds only within a few cells, but passes over what faces elsewhere, and begins where a
-// neighbouring query ended.
+// There are two searches, since neither can do the other's task. A tree finds the nearest point however far away it is,
+// but ignores directions. A grid finds only what is within a few cells, but skips points that face elsewhere, and can
+// begin where the search of a neighbouring query ended.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@ namespace htvm::internal {
 
 using Point3f = Vector3f;
 
-// A lattice point as the searches take it.
+// A lattice point as the float point that the searches take.
 inline Point3f point_of(LatticePoint p) {
     return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
 }
@@ -61,19 +62,19 @@ struct OrientedMatch {
     bool found = false;
 };
 
-// Points with normals in the cells of a hashed grid: registration must not match the front of an arm to its back, nor a
-// hand to the hip beside it.
+// Points with normals in the cells of a hashed grid. Normals matter because registration must not match the front of an
+// arm to its back, nor a hand to the hip beside it.
 class OrientedPoints {
 public:
     static constexpr std::uint32_t no_point = std::numeric_limits<std::uint32_t>::max();
 
     OrientedPoints() : OrientedPoints({}, {}, 1) {}
-    // Copies the points; normals: one per point, of unit length or zero (a zero normal matches any). cell: the side of
-    // the grid's cells, > 0; searches are fast up to a few cells far. Points that are not finite are never found.
+    // Copies the points. normals: one per point, of unit length or zero (a zero normal matches any). cell: side length
+    // of the grid's cells, > 0; searches are fast within a few cells. Points that are not finite are never found.
     OrientedPoints(std::span<const Point3f> points, std::span<const Point3f> normals, float cell);
-    // The nearest point within reach whose normal agrees with the given one: their product is at least `agreement`.
-    // Of equally near ones the lowest. guess: the index of a point that may be near, such as a neighbouring query's
-    // match, or no_point: where it is right the search is quicker; what is found does not depend on it.
+    // The nearest point within reach whose normal agrees with the given one: their dot product is at least `agreement`.
+    // Of equally near points, the lowest index. guess: the index of a point that may be near, such as the match of a
+    // neighbouring query, or no_point. A good guess makes the search faster; it never changes the result.
     OrientedMatch nearest(const Point3f& query, const Point3f& normal, float reach, float agreement,
                           std::uint32_t guess = no_point) const;
 
@@ -94,77 +95,83 @@ private:
 
     float side_, per_side_;
     std::uint32_t mask_ = 0;
-    // Eight cells that follow each other along z are a block, and its buckets too: a row of cells is one run of
-    // entries. Points of several blocks may share one.
-    std::vector<std::uint32_t> first_;  // of each bucket
+    // Eight cells in a row along z form a block, and their buckets are consecutive too, so that a row of cells is one
+    // run of entries. Points of several blocks may share a bucket.
+    std::vector<std::uint32_t> first_;  // where each bucket begins
     std::vector<Entry> entries_;
-    std::vector<std::uint32_t> place_;  // of each point among the entries; no_point where it is not finite
+    std::vector<std::uint32_t> place_;  // the place of each point among the entries; no_point for points that are not
+                                        // finite
 };
 
 // ---- Surfaces
 
 struct SurfacePoint {
     static constexpr std::uint32_t nothing = std::numeric_limits<std::uint32_t>::max();
-    std::uint32_t triangle = nothing;  // index; of a mesh without triangles: the vertex's; nothing: nothing was found
-    std::array<float, 3> shares{};     // of the triangle's corners, sum 1, each 0..1; without triangles 1, 0, 0
+    std::uint32_t triangle = nothing;  // index of the triangle, or of the vertex if the mesh has no triangles;
+                                       // `nothing` if nothing was found
+    std::array<float, 3> shares{};     // weights of the triangle's corners, each 0..1, sum 1; without triangles 1, 0, 0
     Point3f point{};
     float squared_distance = 0;
     bool found() const { return triangle != nothing; }
 };
 
 struct FacingReach {
-    float reach = 30;         // the positions' unit: farther away nothing is found
-    float agreement = 0.35F;  // least product of the two normals
+    float reach = 30;         // in the unit of the positions: nothing farther away is found
+    float agreement = 0.35F;  // least dot product of the two normals
 };
 
 struct SurfaceIndexOptions {
-    // The side of the grid's cells for searches that mind directions, about two edges long, > 0; 0: there are none.
+    // Side length of the grid's cells for searches by direction, about two edges long, > 0; 0: no such searches.
     float cell = 0;
-    std::size_t samples = 0;  // about how many vertices the coarse grid knows
+    std::size_t samples = 0;  // approximate number of vertices in the coarse grid
     Threads threads = {};
 };
 
-// A mesh's surface, ready for searches; read-only once made.
+// The surface of a mesh, prepared for searches; read-only once built.
 class SurfaceIndex {
 public:
-    // Copies what it needs. Every index < positions.size(), positions finite.
+    // Copies what it needs. Every index must be < positions.size(), positions must be finite.
     SurfaceIndex(std::span<const Point3f> positions, std::span<const Triangle> triangles,
                  const SurfaceIndexOptions& options = {});
     SurfaceIndex(SurfaceIndex&&) noexcept;
     SurfaceIndex& operator=(SurfaceIndex&&) noexcept;
     ~SurfaceIndex();
 
-    // Whether there is nothing to be close to: no vertices.
+    // Whether there are no vertices, so that nothing can be found.
     bool empty() const { return positions.empty(); }
 
-    // The closest point of all, almost always; never one farther than the nearest vertex. From the nearest vertex the
-    // triangles around it are tried, then those around the corners of the best, as long as that comes nearer; triangles
-    // much longer than most are also found by points spread over them, and where the result is far, beside short edges,
-    // a second search begins on the query's other side, where another sheet may pass with no vertex as near. Vertices
-    // at the same place count as one, so that the seams of a mesh in pieces, or of one that was quantised coarsely,
-    // stop no walk. Vertices that no triangle uses are no part of the surface, unless there are no triangles: then the
-    // vertices are the surface.
-    // Must not be empty(), the query finite. Threads may call it at once; the first call makes the tree.
+    // The closest point of the whole surface, almost always exactly; never farther away than the nearest vertex.
+    //
+    // The search begins at the nearest vertex: the triangles around it are tried, then those around the corners of the
+    // best one, as long as the distance shrinks. Two additions find most of what this would miss: triangles much longer
+    // than most also have points spread over them that can be found; and if the result is far away compared to the
+    // edges there, a second search begins on the other side of the query, where another sheet may pass by without
+    // having a vertex as near.
+    //
+    // Vertices at the same position count as one, so that walks do not stop at the seams of a mesh in pieces or of a
+    // coarsely quantised one. Vertices that no triangle uses are not part of the surface, unless there are no triangles
+    // at all: then the vertices are the surface. The surface must not be empty(), the query must be finite. Several
+    // threads may call it at once; the first call builds the tree.
     SurfacePoint closest(const Point3f& query) const;
 
-    // The closest point on the triangles around the nearest vertex within reach that faces as `normal` does, and which
-    // face so themselves. Along a seam each side has vertices of its own, which face as their side does: made one, they
-    // would face between the two, and T-frames took 1 to 2 % more bits on captures in pieces.
-    // Made with options.cell > 0. guess: the vertex to begin with, OrientedPoints::no_point for none; becomes the one
-    // that was found.
+    // The closest point on the triangles around the nearest vertex within reach; that vertex and the triangles must
+    // face as `normal` does. Vertices at a seam are not merged: each side keeps its own, which face as their side does.
+    // Merged, they would face between the two sides, and T-frames took 1 to 2 % more bits on captures in pieces. Needs
+    // options.cell > 0. guess: the vertex to begin with, or OrientedPoints::no_point; it is set to the vertex found.
     SurfacePoint closest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
                                 std::uint32_t& guess) const;
 
     std::vector<Point3f> positions;  // of the mesh's vertices
     std::vector<Triangle> triangles;
-    // For searches that mind directions; empty without:
+    // For searches by direction; empty if there are none:
     TrianglesAround around;                 // each vertex
     std::vector<Point3f> normals;           // one per vertex, unit length; zero where no triangle has an area
     std::vector<Point3f> triangle_normals;  // likewise
-    std::vector<std::uint32_t> samples;     // every so many vertices, for searches far away and for the way back
-    float fine_gap = 0, coarse_gap = 0;     // about how far apart vertices and samples are
-    OrientedPoints fine;                    // all vertices
-    OrientedPoints coarse;                  // the samples; found indices count in samples
+    std::vector<std::uint32_t> samples;     // every n-th vertex, for far searches and for matching back from the target
+                                            // to the reference
+    float fine_gap = 0, coarse_gap = 0;     // approximate spacing of the vertices and of the samples
+    OrientedPoints fine;                    // contains all vertices
+    OrientedPoints coarse;                  // contains the samples; indices found are indices of samples
 
 private:
     struct Anywhere;
@@ -175,12 +182,11 @@ private:
     std::unique_ptr<OnDemand> on_demand_;
 };
 
-// closest_facing() for many queries, in an order in which neighbours are mostly near each other. normals: one per
-// query.
+// closest_facing() for many queries; neighbouring queries should mostly follow each other. normals: one per query.
 std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<const Point3f> queries,
                                          std::span<const Point3f> normals, const FacingReach& within, Threads threads);
 
-// About how far apart neighbours are where `count` points are spread over the surface.
+// The approximate spacing of `count` points spread over the surface.
 float point_gap(std::span<const Point3f> positions, std::span<const Triangle> triangles, std::size_t count);
 
 }  // namespace htvm::internal

@@ -102,7 +102,7 @@ namespace {
 using Eigen::Vector3d;
 using Places = std::vector<std::pair<std::uint16_t, std::uint16_t>>;
 
-// The strongest few of (weight, handle), their weights made to sum to 1.
+// The handles with the largest weights; their weights are scaled to sum to 1.
 SampleBlend strongest(std::vector<std::pair<float, std::uint16_t>> parts) {
     std::sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
         return a.first != b.first ? a.first > b.first : a.second < b.second;
@@ -122,7 +122,7 @@ SampleBlend strongest(std::vector<std::pair<float, std::uint16_t>> parts) {
     return out;
 }
 
-// As many vertices of each handle's region, evenly through them, as make up about `count` in all.
+// About `count` vertices in all: the same number from the region of each handle, spread evenly through it.
 std::vector<std::uint32_t> spread_samples(const HandleWeights& weights, std::size_t handles, std::size_t count) {
     std::vector<std::vector<std::uint32_t>> region(handles);
     for (std::uint32_t v = 0; v < weights.size(); ++v)
@@ -145,7 +145,7 @@ void find_blocks(std::vector<SampleBlend>& blends, const std::vector<HandlePair>
             for (std::size_t b = a + 1; b < blend.count; ++b) places.emplace_back(blend.handle[a], blend.handle[b]);
     pattern = make_pattern(handles, std::move(places));
     for (auto& blend : blends) {
-        // Ascending handles, so that every pair of a blend is above the diagonal.
+        // Handles in ascending order, so that every pair in a blend lies above the diagonal.
         for (std::size_t a = 1; a < blend.count; ++a)
             for (std::size_t b = a; b > 0 && blend.handle[b] < blend.handle[b - 1]; --b) {
                 std::swap(blend.handle[b], blend.handle[b - 1]);
@@ -158,7 +158,7 @@ void find_blocks(std::vector<SampleBlend>& blends, const std::vector<HandlePair>
     }
 }
 
-// Distances along the graph of pairs from one handle, no further than reach.
+// Distances from one handle along the graph of pairs, no further than `reach`.
 std::vector<double> reach_over_pairs(const std::vector<Vector3d>& handles,
                                      const std::vector<std::vector<std::uint16_t>>& tied, std::uint32_t start,
                                      double reach) {
@@ -181,7 +181,7 @@ std::vector<double> reach_over_pairs(const std::vector<Vector3d>& handles,
     return distance;
 }
 
-// Groups of handles about `spacing` apart along their pairs, and how each handle follows the groups.
+// Forms groups of handles about `spacing` apart along their pairs, and how each handle follows the groups.
 void group_handles(DeformableMesh& mesh, double spacing) {
     std::vector<std::vector<std::uint16_t>> tied(mesh.handles.size());
     for (const auto& pair : mesh.fine.pairs) {
@@ -279,12 +279,12 @@ Point3f point_of(const Vector3d& v) {
     return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
 
-// Handles of one level, and the samples they move from where they rest.
+// The handles of one level, and the samples that they move away from their rest positions.
 struct Stage {
     const DeformationLevel& level;
-    std::vector<Vector3d> rest, rest_normals;  // of the samples
+    std::vector<Vector3d> rest, rest_normals;  // of the samples at rest
     std::vector<Vector3d> centre;              // of the handles, at rest
-    std::vector<HandlePair> pairs;             // their points at rest
+    std::vector<HandlePair> pairs;             // with their points at rest
     std::vector<RigidMotion> motion;
 };
 
@@ -318,29 +318,29 @@ Moved move_samples(const Stage& stage, Threads threads) {
     return out;
 }
 
-// A sample and the target's plane it should lie in.
+// A sample, and the plane of the target that it should lie in.
 struct Match {
     std::uint32_t sample = 0;
-    std::uint32_t vertex = 0;  // of the target
-    float weight = 0;          // 0: none
-    float gap = 0;             // between the points searched
+    std::uint32_t vertex = 0;  // in the target
+    float weight = 0;          // 0: no match
+    float gap = 0;             // spacing of the points that were searched
 };
 
-// Where the searches of the last round ended, which is where those of the next begin.
+// The results of the last round's searches, from which the next round's begin.
 struct Guesses {
-    std::vector<std::uint32_t> forward, back;  // by sample, and by the target's sample
+    std::vector<std::uint32_t> forward, back;  // per sample, and per sample of the target
 };
 
 struct Round {
-    double reach = 0;  // positions' units
+    double reach = 0;  // in units of the positions
     double stiffness = 0;
     double point_share = 0;
-    float gap = 0;          // between samples of the reference
+    float gap = 0;          // spacing of the reference's samples
     bool far = false;       // search among the target's samples; distant matches still count
-    std::size_t every = 1;  // only each so many of the samples
+    std::size_t every = 1;  // use only every n-th sample
 };
 
-// Near matches count fully and fade out at the reach; far ones all pull alike, however far they are.
+// Near matches have full weight, which fades to zero at the reach; distant ones all have the same small pull.
 float match_weight(const OrientedMatch& match, const Round& round) {
     if (!match.found) return 0;
     const double d = std::sqrt(static_cast<double>(match.squared_distance));
@@ -349,7 +349,8 @@ float match_weight(const OrientedMatch& match, const Round& round) {
     return static_cast<float>(fade * fade);
 }
 
-// Both ways: each sample to the target, and each of the target's samples to the nearest moved sample.
+// Matches in both directions: from each sample to the target, and from each of the target's samples to the nearest
+// moved sample.
 std::vector<Match> find_matches(const Moved& moved, const SurfaceIndex& target, const Round& round, float cell,
                                 const DeformationOptions& options, Guesses& guesses) {
     const std::size_t skip = round.every * (round.far ? 2 : 1);
@@ -380,7 +381,7 @@ std::vector<Match> find_matches(const Moved& moved, const SurfaceIndex& target, 
         out[forward + i] = {match.index, vertex, match_weight(match, round), round.gap};
         return guess;
     };
-    // Slices of both, so that threads have the same to do.
+    // Both directions are cut into slices, so that the threads have equal work.
     constexpr std::size_t slices = 64;
     parallel_for(slices, options.threads, 4, [&](std::size_t begin, std::size_t end) {
         std::uint32_t last = OrientedPoints::no_point;
@@ -392,7 +393,7 @@ std::vector<Match> find_matches(const Moved& moved, const SurfaceIndex& target, 
     return out;
 }
 
-// How a point moves with a handle's six unknowns: the turn, about `centre`, and the shift.
+// The derivative of a point's motion by the six unknowns of a handle: the turn about `centre`, and the shift.
 Eigen::Matrix<double, 3, 6> lever(const Vector3d& point, const Vector3d& centre) {
     const Vector3d r = point - centre;
     Eigen::Matrix<double, 3, 6> out;
@@ -400,24 +401,24 @@ Eigen::Matrix<double, 3, 6> lever(const Vector3d& point, const Vector3d& centre)
     return out;
 }
 
-// What all matches of one sample ask of it: the quadratic form of the distances, and its slope.
+// The sum over all matches of one sample: the quadratic form of its distances, and its gradient.
 struct Pull {
     Matrix3d metric = Matrix3d::Zero();
     Vector3d force = Vector3d::Zero();
 };
 
-// Of the samples from `begin` to before `end`.
+// For the samples in [begin, end).
 std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& moved, const SurfaceIndex& target,
                             double point_share, std::size_t begin, std::size_t end) {
     std::vector<Pull> pulls(end - begin);
     for (const Match& match : matches) {
         if (match.sample < begin || match.sample >= end) continue;
         const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
-        // The mean of the two normals: across it, points of one round surface are no distance apart.
+        // The mean of the two normals: measured along it, points of the same round surface are not apart.
         const Vector3d sum = vector_of(target.normals[match.vertex]) + vector_of(moved.normals[match.sample]);
         const double length = sum.norm();
         const Vector3d normal = length > 0 ? Vector3d(sum / length) : Vector3d::Zero();
-        // Samples have gaps between them: only what is further along the surface than that is apart.
+        // Samples have gaps between them, so only a distance along the surface beyond the gap counts as an error.
         const double across = normal.dot(apart);
         const Vector3d along = apart - across * normal;
         const double weight = static_cast<double>(match.weight);
@@ -437,8 +438,8 @@ Matrix3d cross_matrix(const Vector3d& r) {
     return out;
 }
 
-// A sample moves with the turn and the shift of handle k by weight_k (turn x r_k + shift): the blocks are written out,
-// for this is where the time goes.
+// A sample moves with the turn and shift of handle k by weight_k (turn x r_k + shift). The blocks are written out by
+// hand, because this is where most of the time is spent.
 void add_pull(const Stage& stage, const std::vector<Vector3d>& centres, std::size_t sample, const Pull& pull,
               BlockSystem& system) {
     const SampleBlend& blend = stage.level.blends[sample];
@@ -504,7 +505,8 @@ void add_pairs(const Stage& stage, const std::vector<Vector3d>& centres, double 
     }
 }
 
-// Gives how far the handle that goes farthest goes, its turn counted a hand's breadth from it.
+// Applies the step and gives the largest distance that a handle moves, counting its turn at a hand's breadth from its
+// centre.
 double apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>& centres, double breadth,
                   Stage& stage) {
     double farthest = 0;
@@ -522,7 +524,7 @@ double apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>&
     return farthest;
 }
 
-// Gives how far it moved the handles, see apply_step.
+// Gives the largest distance that a handle moved, see apply_step.
 double run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell, BlockSystem (&systems)[2],
                  Guesses& guesses, const DeformationOptions& options) {
     const Moved moved = move_samples(stage, options.threads);
@@ -542,7 +544,7 @@ double run_round(Stage& stage, const SurfaceIndex& target, const Round& round, f
     systems[0] += systems[1];
     const double load = static_cast<double>(stage.rest.size()) / static_cast<double>(centres.size());
     add_pairs(stage, centres, round.stiffness * load, systems[0]);
-    // What nothing holds stays where it is.
+    // Handles that nothing holds stay where they are.
     const double unit = options.millimetre * options.millimetre;
     for (auto& diagonal : systems[0].diagonal) {
         diagonal.topLeftCorner<3, 3>().diagonal().array() += 10 * load * unit;
@@ -561,7 +563,7 @@ Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
     return stage;
 }
 
-// Groups of handles move on from where `fine` has them.
+// Groups of handles start from where `fine` has their handles.
 Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, Threads threads) {
     Stage stage{mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size())};
     const Moved moved = move_samples(fine, threads);
@@ -574,7 +576,8 @@ Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, Threads thread
     return stage;
 }
 
-// Each handle moves on as its groups do, blended: the turn as a quaternion, the shift so that it arrives with them.
+// Each handle takes the blended motion of its groups: the turns blended as quaternions, the shift chosen so that the
+// handle ends where its groups take it.
 void follow_groups(const DeformableMesh& mesh, const Stage& coarse, std::vector<RigidMotion>& motion) {
     for (std::size_t h = 0; h < motion.size(); ++h) {
         const SampleBlend& blend = mesh.groups[h];
@@ -615,7 +618,9 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
             const double moved = run_round(coarse, target, round, cell, systems, guesses, options);
-            if (moved < options.settled * unit) i = std::max(i, options.coarse_rounds - 2);  // the last one is next
+            if (moved < options.settled * unit)
+                i = std::max(i, options.coarse_rounds - 2);  // the next round is the
+                                                             // last
         }
         follow_groups(mesh, coarse, fine.motion);
     }
