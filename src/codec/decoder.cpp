@@ -1,4 +1,4 @@
-// The decoder, top to bottom: a packet is checked, its kind's decoder makes a mesh of it, and the mesh is shown.
+// The decoder: checks a packet, has the decoder of its kind make a mesh of it, and shows that mesh.
 #include "htvm/decoder.hpp"
 
 #include <new>
@@ -71,12 +71,12 @@ SequenceInfo describe(const SequenceHeader& header) {
     return info;
 }
 
-// Whatever can fail, or find no memory, comes first: then nothing of the state has changed.
+// Everything that can fail or run out of memory comes first, so that the state is unchanged on failure.
 Result<void> take_header(DecoderState& state, const Packet& packet) {
     auto header = read_sequence_header(packet.payload);
     if (!header) return tl::unexpected(header.error());
     if (auto ok = check_limits(*header, state.options); !ok) return tl::unexpected(ok.error());
-    // A repeated header changes nothing; another one begins another sequence.
+    // A repeated header changes nothing; a different one begins another sequence.
     if (state.header && state.header_payload == packet.payload) return {};
     auto info = describe(*header);
     auto payload = packet.payload;
@@ -101,7 +101,7 @@ Result<void> take_codebook(DecoderState& state, const Packet& packet) {
 
 MeshCounts counts(const LatticeMesh& mesh) { return {mesh.positions.size(), mesh.triangles.size()}; }
 
-// What the decoder holds, and what is yet to be derived for the frame.
+// Memory that the decoder holds, including what this frame still has to derive.
 std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, MeshCounts coded) {
     const auto held = state.reference ? counts(state.reference->mesh()) : MeshCounts{};
     std::uint64_t kept = state.reference ? memory_of_reference(held) : 0;
@@ -111,7 +111,7 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
     return kept;
 }
 
-// The payload of a frame that this decoder may decode, as far as its header tells.
+// The payload of a frame, once its header shows that this decoder may decode it.
 Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
     if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
     auto payload = read_frame_payload(packet.payload);
@@ -147,7 +147,7 @@ FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView&
     return out;
 }
 
-// Lends what is shown. Motion-based coding counts only what it codes in its header.
+// Lends the shown frame. Counts come from the mesh, since with motion-based coding a header counts only what it codes.
 FrameView lend(const ShownFrame& shown, const FrameInfo& info) {
     FrameView out;
     out.info = info;
@@ -159,7 +159,7 @@ FrameView lend(const ShownFrame& shown, const FrameInfo& info) {
     return out;
 }
 
-// Frees what only the frame that is lent needs, before there are two.
+// Frees the arrays that only the frame on loan needs, so that there are never two sets of them.
 void take_back(ShownFrame& shown) {
     shown.topology = 0;
     shown.own = {};
@@ -180,14 +180,14 @@ Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet)
     if (packet.kind == PacketKind::sequence) taken = take_header(state, packet);
     if (packet.kind == PacketKind::codebook) taken = take_codebook(state, packet);
     if (!taken) return tl::unexpected(taken.error());
-    return Taken{};  // what this version does not know is skipped
+    return Taken{};  // skip what this version does not know
 }
 
 tl::unexpected<Error> out_of_memory(const Packet& packet) {
     try {
         return fail(ErrorKind::limit, "out of memory at frame " + std::to_string(packet.frame));
     } catch (const std::bad_alloc&) {
-        return fail(ErrorKind::limit, "out of memory");  // short enough to need none
+        return fail(ErrorKind::limit, "out of memory");  // this message is short enough to need no memory
     }
 }
 

@@ -1,4 +1,4 @@
-// Decoding of EP- and P-frames: the I-frame's mesh moved by its bones, and corrected.
+// Decodes EP- and P-frames: the I-frame's mesh, moved by its bones and corrected.
 #include "codec/decoder_state.h"
 #include "codec/frame_kinds.h"
 #include "codec/paper/animated_frame.h"
@@ -7,13 +7,13 @@
 namespace htvm::internal {
 namespace {
 
-// What follows from the bones is made when the first frame asks for it.
+// Builds what is derived from the bones when the first frame asks for it.
 const ReferenceMesh& skinned(DecoderState& state) {
     derive_bones(*state.reference, *state.header, state.threads);
     return state.reference->skinned;
 }
 
-// The I-frame's joints, each moved by the first bone that it belongs to.
+// The I-frame's joints, each moved by the first bone it belongs to.
 Pose moved_pose(const DecoderState& state, std::span<const QuantisedTransform> transforms) {
     const auto& reference = state.reference->skinned;
     const auto& bones = state.header->skeleton.bones;
@@ -34,7 +34,7 @@ Pose moved_pose(const DecoderState& state, std::span<const QuantisedTransform> t
     return pose;
 }
 
-// Connectivity, colours and texture coordinates are the I-frame's.
+// Connectivity, colours and texture coordinates are those of the I-frame.
 void show_animated(DecoderState& state, const AnimatedFrame& frame) {
     const auto& mesh = state.reference->mesh();
     show(state, {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords},
@@ -55,13 +55,13 @@ Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const Fr
                                        state.header->nearest_vertices, state.threads};
     auto decoded = decode_enhanced_frame(payload, context);
     if (!decoded) {
-        // This much may still serve to conceal the frame.
+        // The transforms alone may still help to conceal the frame.
         if (auto moved = decode_transforms(payload.of(Layer::transforms), reference.pivots.size()))
             history.transforms = std::move(*moved);
         return tl::unexpected(decoded.error());
     }
     history.transforms = std::move(decoded->transforms);
-    // Zippered frames count only what they code in their headers.
+    // Headers of zippered frames count only what the frame codes.
     if (decoded->mesh.positions.size() > state.options.max_vertices ||
         decoded->mesh.triangles.size() > state.options.max_triangles)
         return fail(ErrorKind::limit, "frame " + std::to_string(packet.frame) +
@@ -84,7 +84,7 @@ bool show_moved_by_bones(DecoderState& state) {
     if (!state.reference) return false;
     const auto& reference = skinned(state);
     auto transforms = state.bones.transforms;
-    transforms.resize(reference.pivots.size());  // none since the I-frame: where it was
+    transforms.resize(reference.pivots.size());  // no frame since the I-frame: leave the bones where they were
     show_animated(state, animated_frame(reference, std::move(transforms), state.threads));
     return true;
 }

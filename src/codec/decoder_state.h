@@ -1,4 +1,4 @@
-// What a decoder keeps from frame to frame, and how a decoded mesh comes to be shown.
+// What a decoder keeps from frame to frame, and how a decoded mesh is shown.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,8 @@
 
 namespace htvm::internal {
 
-// A decoded mesh where it lies, on the lattice: what a frame has in common with its reference is the reference's own.
+// A decoded mesh on the lattice. What a frame shares with its reference is not copied: the spans point into the
+// reference.
 struct LatticeMeshView {
     std::span<const LatticePoint> positions;
     std::span<const Triangle> triangles;
@@ -27,29 +28,30 @@ inline LatticeMeshView view_of(const LatticeMesh& mesh) {
     return {mesh.positions, mesh.triangles, mesh.colours, mesh.normals, mesh.texcoords};
 }
 
-// The frame that was decoded last, in millimetres. The arrays are kept from frame to frame; triangles and colours lie
-// where they were decoded to.
+// The frame decoded last, in millimetres. Arrays are reused from frame to frame; triangles and colours stay where they
+// were decoded.
 struct ShownFrame {
     std::uint32_t topology = 0;  // 0: there is none
     std::vector<Vector3f> positions;
     std::vector<Vector3f> normals;
     std::vector<Vector2f> texcoords;
-    std::uint32_t texcoords_topology = 0;  // of which frames they are
+    std::uint32_t texcoords_topology = 0;  // topology number of the frame they belong to
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;
-    LatticeMesh own;  // of a frame that has nothing in common with its reference
+    LatticeMesh own;  // the mesh of a frame that shares nothing with its reference
     Pose pose;
 };
 
-// What EP- and P-frames since the I-frame left.
+// State left by the EP- and P-frames since the I-frame.
 struct DecodedBones {
-    std::vector<QuantisedTransform> transforms;  // of the last, one per bone; empty: none since
+    std::vector<QuantisedTransform> transforms;  // of the last such frame, one per bone; empty if there was none
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
-// What T-frames since the I-frame left: of the last, and arrays for the next, which takes the place of the one before.
+// State left by the T-frames since the I-frame: the last one's, and arrays for the next, which replaces the previous
+// one.
 struct DecodedNodes {
-    std::optional<std::uint32_t> frame;  // number of the last; none: none since
+    std::optional<std::uint32_t> frame;  // number of the last one, if any
     DecodedTrackedFrame last, next;
     Pose pose;
 };
@@ -57,35 +59,35 @@ struct DecodedNodes {
 struct DecoderState {
     DecoderOptions options;
     ThreadPool pool;
-    Threads threads = {};  // of the pool
+    Threads threads = {};  // those of the pool
     std::optional<SequenceHeader> header;
     std::vector<std::uint8_t> header_payload;
     std::optional<SequenceInfo> info;
     std::optional<Reference> reference;
     std::uint32_t reference_topology = 0;
-    std::uint32_t topologies = 0;  // given out so far
+    std::uint32_t topologies = 0;  // how many numbers were given out
     DecodedBones bones;
     DecodedNodes tracked;
     ShownFrame shown;
 };
 
-// The number of a frame whose triangles are like no other's.
+// The topology number for a frame whose triangles differ from those of all others.
 inline std::uint32_t new_topology(DecoderState& state) {
-    if (++state.topologies == 0) ++state.topologies;  // after 2^32 of them; 0 is none
+    if (++state.topologies == 0) ++state.topologies;  // wraps after 2^32; 0 means none
     return state.topologies;
 }
 
-// Makes the mesh the one that is shown. It is lent: where it moves afterwards, its arrays must stay where they are, as
-// those of a std::vector do. Throws std::bad_alloc, nothing else; nothing is shown then.
+// Makes this the mesh that is shown. The mesh is not copied: if the object is moved later, its arrays must stay in
+// place, as those of a std::vector do. Throws only std::bad_alloc; then nothing is shown.
 void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topology, Pose pose);
 
-// An error where the packet does not refer to the I-frame in force.
+// An error if the packet does not refer to the current I-frame.
 Result<void> check_reference(const DecoderState& state, const Packet& packet);
 
 Rotation to_rotation(const RotationMatrix& matrix);
 Rotation product(const Rotation& a, const Rotation& b);
 
-// Stand-ins for a frame that is missing: shown as if decoded. False where there is nothing to go by.
+// Stand-ins for a missing frame, shown as if decoded. False if there is nothing to derive one from.
 bool show_last_tracked(DecoderState& state);
 bool show_moved_by_bones(DecoderState& state);
 

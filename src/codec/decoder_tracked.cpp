@@ -1,11 +1,11 @@
-// Decoding of T-frames: the I-frame's mesh moved by the nodes of a deformation graph, and displaced.
+// Decodes T-frames: the I-frame's mesh, moved by the nodes of a deformation graph and displaced.
 #include "codec/decoder_state.h"
 #include "codec/frame_kinds.h"
 
 namespace htvm::internal {
 namespace {
 
-// The I-frame's joints, each moved as the node nearest to it.
+// The I-frame's joints, each moved like the node nearest to it.
 Pose tracked_pose(const DecoderState& state, std::span<const QuantisedTransform> transforms) {
     const auto& reference = state.reference->skinned;
     const auto& pivots = state.reference->tracked->pivots;

@@ -1,6 +1,6 @@
-// The encoder, as a block diagram: a captured mesh and its pose go onto the lattice; the frame's work is found from
-// them, the configuration and the sequence so far; the choice codes it in one way or several and gives the candidate to
-// send; the sequence advances by it, and its packets are numbered and queued.
+// The encoder at a glance. A captured mesh and its pose are put on the lattice. The frame's work derives from them, the
+// configuration and the sequence so far. The choice codes the frame in one or several ways and returns the candidate to
+// send. The sequence advances by it, and its packets are numbered and queued.
 #include "htvm/encoder.hpp"
 
 #include <algorithm>
@@ -23,12 +23,12 @@ using namespace internal;
 
 namespace {
 
-// What was given out, and waits to be.
+// Packets that were handed out or wait to be.
 struct Output {
     std::deque<Packet> packets;
     std::uint64_t stream_bytes = 0;
     std::vector<IndexEntry> index;
-    std::uint32_t header_sent = 0;  // number of the frame that the sequence header came with last
+    std::uint32_t header_sent = 0;  // number of the frame with which the sequence header was last sent
 };
 
 }  // namespace
@@ -42,7 +42,7 @@ struct Encoder::State {
     QualityControl control;
     Output output;
     std::optional<std::int64_t> last_timestamp;
-    // Of the last frame.
+    // Cost of the last frame.
     FrameCost cost;
     FrameInfo info;
     LatticeMesh decoded;
@@ -54,7 +54,7 @@ namespace {
 
 using State = Encoder::State;
 
-// 1/16 mm, or as fine as makes the step eight units.
+// 1/16 mm, or finer if needed for a step of at least eight units.
 int lattice_bits(const EncoderOptions& options) {
     if (options.lattice_bits > 0) return options.lattice_bits;
     const bool controlled = options.rate.bits_per_second > 0 || options.rate.target_error > 0;
@@ -63,8 +63,9 @@ int lattice_bits(const EncoderOptions& options) {
     return std::clamp(needed, 4, 16);
 }
 
-// What a millimetre on an adult is on this subject, millimetres. Reaches, spacings and thresholds are known from
-// adults; a doll's or a giant's follow from its size. Adults differ by pose, and half an arm's length changes nothing.
+// The length on this subject that corresponds to a millimetre on an adult, in millimetres. Reaches, spacings and
+// thresholds are known for adults; those for a doll or a giant follow from its size. The extent of an adult depends on
+// the pose, so a subject from 1.1 to 2.5 m counts as an adult.
 double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
     constexpr double adult = 1750, shortest = 1100, longest = 2500;
     double size = options.subject_size;
@@ -82,8 +83,8 @@ double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
 // Short enough to need no memory itself.
 tl::unexpected<Error> out_of_memory() { return fail(ErrorKind::limit, "out of memory"); }
 
-// The configuration settles with the first frame: the lattice's origin, the subject's size and, where none were given,
-// the skeleton and the radii come from there.
+// Completes the configuration from the first frame: the origin of the lattice, the subject's size and, where not given,
+// the skeleton and the radii.
 Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
     auto& configuration = state.configuration;
     const auto& options = configuration.options;
@@ -126,8 +127,8 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
     return {};
 }
 
-// The sequence header goes before the first frame, and before I-frames now and then, so that who joins later, or lost
-// it, can begin there.
+// The sequence header is sent before the first frame and repeated before some I-frames, so that a receiver that joins
+// later, or lost it, can begin there.
 bool brings_header(const State& state, const Candidate& candidate) {
     constexpr std::uint32_t repeated_after = 10;  // frames
     return !state.begun || (candidate.type == FrameType::intra &&
@@ -154,7 +155,7 @@ void send_header(State& state, std::int64_t timestamp_us) {
     send(state.output, std::move(header));
 }
 
-// Numbers and queues a frame's packets, and adds up where their bytes went.
+// Numbers and queues a frame's packets, and counts their bytes by layer.
 void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us) {
     LayerBytes codebooks;
     for (auto& packet : candidate.packets) {
@@ -195,7 +196,7 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     derivation.done("reference");
     if (brings_header(state, *chosen)) send_header(state, timestamp_us);
     send_frame(state, *chosen, timestamp_us);
-    // From here on nothing can fail.
+    // Nothing can fail from here on.
     state.sequence = std::move(*sequence);
     state.begun = true;
     state.last_timestamp = timestamp_us;
@@ -206,8 +207,8 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     return {};
 }
 
-// Where a frame's packets begin: where it fails, what is queued from there on is taken back, and the sequence stays as
-// it was.
+// Marks where a frame's packets begin in the queue. If the frame fails, packets queued since are removed and the
+// sequence stays as it was.
 struct Queued {
     std::size_t packets, index;
     std::uint64_t stream_bytes;

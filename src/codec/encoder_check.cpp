@@ -10,7 +10,7 @@ namespace {
 
 tl::unexpected<Error> bad(std::string what) { return fail(ErrorKind::bad_input, std::move(what)); }
 
-// An option that would have no effect is refused: whoever sets it expects one.
+// An option that would have no effect is refused, because whoever sets it expects one.
 Result<void> check_that_options_go_together(const EncoderOptions& o) {
     const auto usual = default_options(o.profile);
     for (const auto& option : option_list())

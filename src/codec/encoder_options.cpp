@@ -1,4 +1,4 @@
-// The one list of the encoder's options, and what follows from it for all who set them: ranges, texts, names.
+// The one list of the encoder's options, and what users of the list derive from it: ranges, texts, names.
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -16,7 +16,7 @@ constexpr std::array<const char*, 4> frame_choices = {"fixed", "motion", "rd", "
 constexpr std::array<const char*, 2> reference_vertices = {"bone", "any"};
 constexpr std::array<const char*, 2> bone_registrations = {"point", "plane"};
 
-// Each group in the order in which people will want its options.
+// Within each group, the options that people need most come first.
 constexpr Option list[] = {
     {.name = "geometry_step",
      .group = OptionGroup::common,
@@ -312,7 +312,7 @@ constexpr Option list[] = {
      .flag = "--weights"},
 };
 
-// Whole numbers in full, small powers of two as such, others as short as they can be.
+// Whole numbers in full, small powers of two as powers, others as short as possible.
 std::string number_text(double value) {
     int exponent = 0;
     if (value > 0 && value < 1e-3 && std::frexp(value, &exponent) == 0.5) return "2^" + std::to_string(exponent - 1);
@@ -323,7 +323,7 @@ std::string number_text(double value) {
     return {text.data(), end.ptr};
 }
 
-// "bone or any", "fixed, motion or rd".
+// Joins words as in "bone or any", "fixed, motion or rd".
 std::string words_text(const Option& option) {
     std::string out;
     for (std::size_t w = 0; w < option.words.size(); ++w) {
@@ -335,7 +335,7 @@ std::string words_text(const Option& option) {
 
 std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
 
-// How many characters must be put in, taken out or changed to make one text of the other.
+// Edit distance: the number of characters to insert, remove or change to turn one text into the other.
 std::size_t edits(std::string_view a, std::string_view b) {
     std::vector<std::size_t> row(b.size() + 1);
     std::iota(row.begin(), row.end(), std::size_t{0});

@@ -76,7 +76,7 @@ Result<CodedPose> PoseTracker::next(const Mesh& mesh, const Pose* pose, const La
         now = rest;
         if (!mesh.positions.empty()) {
             const auto middle = middle_of(mesh);
-            // The mesh may reach the end of the lattice: its stand-in skeleton stays on it.
+            // The mesh may reach the end of the lattice; the stand-in skeleton must stay on it.
             const double reach = (lattice_limit / 2 - 1) * lattice.step();
             for (auto& joint : now.joints)
                 for (std::size_t axis = 0; axis < 3; ++axis)

@@ -1,4 +1,5 @@
-// The pose of each frame as the codec needs it: on the lattice, complete, with an orientation for every bone.
+// The pose of each frame in the form that the codec needs: on the lattice, complete, with an orientation for every
+// bone.
 #pragma once
 
 #include "codec/reference/transforms.h"
@@ -10,16 +11,17 @@ namespace htvm::internal {
 
 struct PoseTracker {
     Skeleton skeleton;
-    bool tracked = true;  // false: one bone that spans the first mesh stands in, carried along by each mesh's middle
-    Pose rest;            // the first pose: where orientations are not given, they are turned from it
-    Pose last;            // kept where a frame has no pose
+    bool tracked = true;  // false: one bone that spans the first mesh stands in, and moves with each mesh's centre
+    Pose rest;            // the first pose, from which orientations are derived where they are not given
+    Pose last;            // repeated for a frame without a pose
     Vector3d rest_middle{};
 
-    // bad_input where the pose has another number of joints or orientations than the skeleton, or one not finite.
+    // bad_input if the number of joints or orientations differs from the skeleton's, or a value is not finite.
     Result<CodedPose> next(const Mesh& mesh, const Pose* pose, const Lattice& lattice);
 };
 
-// skeleton without bones: none is tracked. bad_input where there is a skeleton but no pose for the first frame.
+// A skeleton without bones means that none is tracked. bad_input if there is a skeleton but no pose for the first
+// frame.
 Result<PoseTracker> make_pose_tracker(const Skeleton& skeleton, const Mesh& first_mesh, const Pose* first_pose);
 
 }  // namespace htvm::internal

@@ -20,27 +20,28 @@ Packet frame_packet(PacketKind kind, const FramePayload& payload) {
 
 std::uint32_t count(std::size_t n) { return static_cast<std::uint32_t>(n); }
 
-// Where EP-frames refer to an I-frame, its step is no wider than half an edge: they then save more than it costs. Their
-// quantiser starts from the same cells; the price of a bit stays that of the step asked for, so that it is the entropy
-// constraint that makes it coarse. At 8 mm and 35,000 vertices: a fifth fewer bits at the same error.
+// If EP-frames refer to an I-frame, its step is at most half an edge: EP-frames then save more than the finer step
+// costs. Their quantiser starts from the same cells, but the price of a bit stays that of the step asked for, so that
+// only the entropy constraint makes it coarser. At 8 mm and 35,000 vertices this takes a fifth fewer bits at the same
+// error.
 std::int32_t step_for_reference(double edge, std::int32_t step) {
     const double half_edge = edge / 2;
     return half_edge >= 1 && half_edge < step ? static_cast<std::int32_t>(half_edge) : step;
 }
 
-// Steps at which the simplified I-frame and the T-frames behind it err about as much as other frames do at the steps
-// asked for: see docs/algorithm.md for the measurement.
+// The steps at which the simplified I-frame and its T-frames have about the same error as other frames have at the
+// steps asked for; docs/algorithm.md gives the measurements.
 FrameSteps tracked_steps(const FrameSteps& steps) {
     constexpr double finer = 0.55, coarser_colours = 1.3;
     const auto scaled = [](double factor, std::int32_t step) {
         return std::max(1, static_cast<std::int32_t>(std::lround(factor * step)));
     };
-    constexpr std::int32_t coarsest_colours = 255;  // that a frame's header can say
+    constexpr std::int32_t coarsest_colours = 255;  // the largest step that a frame header can hold
     return {scaled(finer, steps.geometry), std::min(scaled(coarser_colours, steps.colour), coarsest_colours)};
 }
 
 LatticeMesh simplified(FrameWork& work, const FrameSteps& steps) {
-    constexpr double longest_edge = 40, reach = 30;  // of an adult's millimetres
+    constexpr double longest_edge = 40, reach = 30;  // mm on an adult
     constexpr double colour_steps = 2.5;
     const auto& surface = work.target();
     StageClock clock(work.stages);
@@ -72,8 +73,8 @@ EnhancedFrameOptions enhanced_options(const FrameWork& work, const FrameSteps& s
     return out;
 }
 
-// New codebooks, and now and then the one in force: a lost packet costs the frames that name it, but not for long.
-// Every tenth frame it takes 0.2 to 0.4 % of the bits.
+// Sends new codebooks and, from time to time, repeats the current one: if a packet is lost, the frames that use the
+// codebook are lost too, but not for long. Every tenth frame costs 0.2 to 0.4 % of the bits.
 void send_codebook(std::uint32_t frame, std::uint8_t purpose, CodebookInUse& use, std::vector<Packet>& packets) {
     constexpr std::uint32_t repeated_after = 10;  // frames
     if (!use.codebook || (!use.is_new && frame - use.sent < repeated_after)) return;
@@ -97,7 +98,7 @@ EnhancedFrameSource source_of(FrameWork& work) {
     return out;
 }
 
-// Whole EP-frames are compared with the cheapest since the I-frame: see intra_is_paid_for() in choice/frame_choice.cpp.
+// Compares whole EP-frames with the cheapest since the I-frame: see intra_is_paid_for() in choice/frame_choice.cpp.
 void count_bytes(BoneHistory& history, double bytes) {
     if (history.least_bytes == 0 || bytes < history.least_bytes) history.least_bytes = bytes;
     history.excess_bytes += bytes - history.least_bytes;
@@ -140,7 +141,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     const bool tracked = configuration.tracked(), referred_to = use == IntraUse::reference;
     const auto asked = tracked ? tracked_steps(steps) : steps;
     const bool simplify = tracked && configuration.options.tracked.simplify > 0;
-    // Without a skeleton EP-frames may never pay, and a finer I-frame that nothing refers to would be wasted.
+    // Without a skeleton EP-frames may never pay off, and then the bits of a finer I-frame would be wasted.
     const bool finer = referred_to && (configuration.header.skeleton_tracked || tracked ||
                                        configuration.options.topology.frame_choice != FrameChoice::cheaper);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
@@ -208,8 +209,8 @@ Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, con
 }
 
 Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts) {
-    // Re-meshing alone makes colours at the same place differ from frame to frame: finer steps would code that noise.
-    constexpr double coarser_colours = 6, reach = 30;  // the reach of an adult's millimetres
+    // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
+    constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
     const auto& configuration = work.configuration;
     const auto& reference = work.reference().decoded;
     const auto& nodes = work.sequence.nodes;

@@ -7,8 +7,8 @@ namespace internal {
 
 using enum Layer;
 
-// Memory: about half as much again as was measured of the worst meshes (tests/memory), bytes per coded vertex and
-// triangle, per vertex and triangle of the reference.
+// Memory limits: about one and a half times what was measured on the worst meshes (tests/memory), in bytes per coded
+// vertex and triangle, and per vertex and triangle of the reference.
 constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
     {.type = FrameType::intra,
      .packet = PacketKind::intra,
@@ -50,7 +50,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
 
 namespace {
 
-// Rows are found by their place.
+// Rows are indexed by FrameType.
 constexpr bool in_order() {
     for (std::size_t i = 0; i < frame_type_count; ++i)
         if (frame_kinds[i].type != static_cast<FrameType>(i) || frame_rules[i].type != static_cast<FrameType>(i))

@@ -1,6 +1,6 @@
-// The table of frame kinds: what the codec must know of each, in the order of FrameType. Names and letters are in
-// htvm/frame.hpp. A new kind is a row here and there, a packet kind, its decoder, and a chapter of docs/bitstream.md;
-// tables of the encoder's are indexed by FrameType likewise.
+// The table of frame kinds: everything the codec must know about each, in the order of FrameType. Names and letters are
+// in htvm/frame.hpp. A new kind needs a row in both, a packet kind, its decoder, and a chapter of docs/bitstream.md;
+// the encoder's tables are indexed by FrameType too.
 #pragma once
 
 #include <array>
@@ -17,18 +17,18 @@ namespace htvm::internal {
 
 struct DecoderState;
 
-// What must have been decoded before a frame, besides the sequence header.
+// What must have been decoded before a frame can be, besides the sequence header.
 enum class RefersTo : std::uint8_t {
     nothing,
-    intra,            // the I-frame in force
-    intra_or_before,  // that, or the last frame of its own kind since
+    intra,            // the current I-frame
+    intra_or_before,  // the current I-frame, or the last frame of the same kind since then
 };
 
-// What rate control takes for alike.
+// Kinds whose sizes rate control models together.
 enum class RateClass : std::uint8_t {
-    intra,    // many bits, that follow the quality
-    between,  // fewer, that follow it too
-    moved,    // hardly any, at whatever quality
+    intra,    // many bits, depending on quality
+    between,  // fewer bits, depending on quality
+    moved,    // very few bits, whatever the quality
 };
 
 struct LayerSet {
@@ -42,15 +42,17 @@ struct LayerSet {
 struct FrameRules {
     FrameType type;
     PacketKind packet;
-    LayerSet layers;  // that it may have; others are ignored
+    LayerSet layers;  // the layers that it may have; others are ignored
     RefersTo refers_to;
-    bool codebooks;      // it names codebooks that came in packets of their own
-    bool codes_mesh;     // it codes as many vertices and triangles as its header says, so that its payload has at least
-                         // least_payload() bytes; else it has its reference's, and its header must say so
-    MemoryBound memory;  // of decoding it
+    bool codebooks;      // whether it names codebooks, which come in packets of their own
+    bool codes_mesh;     // true: it codes as many vertices and triangles as its header says, so its payload has at
+                         // least least_payload() bytes; false: it has the counts of its reference, and its header must
+                         // say so
+    MemoryBound memory;  // for decoding it
     RateClass rate;
-    // Decodes and shows it, once its header was found within all limits and what it refers to, where that is the
-    // I-frame alone, is there. After an error the state is as before, but for what conceals.
+    // Decodes and shows the frame. Called once the header is known to be within all limits; if the frame refers to the
+    // I-frame alone, that is known to exist. After an error the state is unchanged, except for what helps to conceal
+    // the frame.
     Result<void> (*decode)(DecoderState&, const Packet&, const FramePayloadView&);
 };
 
@@ -58,7 +60,7 @@ extern const std::array<FrameRules, frame_type_count> frame_rules;
 
 inline const FrameRules& rules_of(FrameType type) { return frame_rules[static_cast<std::size_t>(type)]; }
 
-// The decoders of the rows, each in decoder_NAME.cpp.
+// The decoders of the rows; each is in decoder_NAME.cpp.
 Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
 Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
 Result<void> decode_predicted(DecoderState& state, const Packet& packet, const FramePayloadView& payload);

@@ -9,23 +9,23 @@ namespace {
 RegistrationOptions registration_options(const EncoderOptions& options) {
     RegistrationOptions out;
     out.point_to_plane = options.topology.registration == BoneRegistration::plane;
-    if (!out.point_to_plane) {  // slower to settle
+    if (!out.point_to_plane) {  // converges more slowly
         out.iterations = 16;
         out.samples = 500;
     }
     return out;
 }
 
-// What frames behind an I-frame may refer to. Where the skeleton was tracked, the bones also tell the nodes' motion a
-// start.
+// What to derive for the frames that may refer to an I-frame. If the skeleton is tracked, the bones also give a start
+// for the motion of the nodes.
 Derived derived_of(const Configuration& configuration) {
-    // Under rate control also what stands in for a frame that does not fit.
+    // Under rate control a stand-in for a frame that does not fit also refers to the I-frame.
     const bool referred_to = !configuration.intra_alone || configuration.options.rate.bits_per_second > 0;
     return {.bones = referred_to && (configuration.header.skeleton_tracked || !configuration.tracked()),
             .nodes = referred_to && configuration.tracked()};
 }
 
-// Where the skeleton moves each node: with the bone of the vertex that it sits on.
+// Where the skeleton moves each node: with the bone of the vertex that the node sits on.
 std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration, const Reference& reference,
                                               const CodedPose& pose) {
     if (!configuration.header.skeleton_tracked) return {};
@@ -143,7 +143,7 @@ SurfaceErrors FrameWork::errors_of(const LatticeMesh& decoded) {
 
 TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_edge,
                                   std::span<const double> intra_squared) {
-    constexpr double stray_in_edges = 2, reach = 25, region = 100;  // of an adult's millimetres
+    constexpr double stray_in_edges = 2, reach = 25, region = 100;  // in mean edges; mm on an adult
     const auto& surface = target();
     StageClock clock(stages);
     TrackedFitOptions options;

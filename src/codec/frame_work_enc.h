@@ -1,6 +1,7 @@
-// What the encoder's stages hand to each other. Configuration and reference never change once made; the history of each
-// kind of frame is a value; the work of a frame is found once, whatever rate or error control tries; coding a candidate
-// takes all of these as constants and gives a value. The sequence goes on with the candidate that is sent (advance()).
+// What the encoder's stages hand to each other. Configuration and reference never change once made. The history of each
+// kind of frame is a value. The work of a frame is found once, however often rate or error control tries. Coding a
+// candidate takes all of these as constants and returns a value. The sequence goes on with the candidate that is sent
+// (advance()).
 #pragma once
 
 #include <memory>
@@ -21,14 +22,15 @@
 
 namespace htvm::internal {
 
-// Settled with the first frame.
+// Fixed with the first frame.
 struct Configuration {
     EncoderOptions options;
     SequenceHeader header;
     Threads threads = {};
     double units = 16;             // lattice units per millimetre
-    double adult_millimetre = 16;  // lattice units: what a millimetre on an adult is on this subject
-    bool intra_alone = false;      // nothing refers to anything
+    double adult_millimetre = 16;  // the length on this subject that corresponds to a millimetre on an adult, in
+                                   // lattice units
+    bool intra_alone = false;      // no frame refers to another
     bool tracked() const { return options.profile == Profile::tracked; }
     double to_millimetres(double lattice_units) const { return lattice_units / units; }
 };
@@ -39,80 +41,81 @@ struct FrameSteps {
     std::int32_t colour = 6;     // levels
 };
 
-// What the encoder knows of an I-frame besides what the decoder does.
+// What the encoder knows about an I-frame and the decoder does not.
 struct IntraFacts {
-    std::int32_t step = 1;  // of its positions, lattice units
-    FrameSteps steps;       // as asked for
-    double edge = 0;        // mean edge of the captured mesh, lattice units
-    TrackedFit fit;         // of the I-frame itself, where T-frames refer to it
-    SurfaceErrors plain;    // choice by rate and distortion: of an I-frame at `steps` that nothing refers to
+    std::int32_t step = 1;  // of its positions, in lattice units
+    FrameSteps steps;       // the steps asked for
+    double edge = 0;        // mean edge of the captured mesh, in lattice units
+    TrackedFit fit;         // of the I-frame itself, if T-frames refer to it
+    SurfaceErrors plain;    // for choice by rate and distortion: the errors of an I-frame at `steps` that nothing
+                            // refers to
 };
 
-// The reference in force, and what the encoder derives from it.
+// The current reference, and what the encoder derives from it.
 struct ReferenceInUse {
     Reference decoded;
     IntraFacts intra;
-    double bytes = 0;           // what the I-frame took
-    ReferenceSearch search;     // of the bones' sub-meshes, where frames refer to bones
-    DeformableMesh deformable;  // where they refer to nodes
+    double bytes = 0;           // size of the I-frame
+    ReferenceSearch search;     // over the bones' sub-meshes, if frames refer to bones
+    DeformableMesh deformable;  // if frames refer to nodes
 };
 
-// What the EP- and P-frames since the I-frame leave for the next.
+// What the EP- and P-frames since the I-frame leave for the next one.
 struct BoneHistory {
-    std::vector<RigidMotion> motion;  // of each bone in the frame before; empty behind the I-frame
+    std::vector<RigidMotion> motion;  // of each bone in the previous frame; empty after the I-frame
     Codebooks codebooks;
-    double least_bytes = 0;   // of the cheapest whole EP-frame; 0: none yet
-    double excess_bytes = 0;  // what the others cost above it
+    double least_bytes = 0;   // size of the cheapest whole EP-frame; 0: none yet
+    double excess_bytes = 0;  // how much more the others took, in total
     double plain_intra_bytes =
-        0;  // choice of the cheaper: of an I-frame that nothing refers to, per vertex; 0: unknown
+        0;  // bytes per vertex of an I-frame that nothing refers to, for the choice of the cheaper; 0: unknown
 };
 
-// What the T-frames since the I-frame leave for the next.
+// What the T-frames since the I-frame leave for the next one.
 struct NodeHistory {
     std::optional<std::uint32_t> frame;          // number of the last one
-    std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty where there is none
+    std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
     TrackedState state;                          // of the last one
-    double best_fit = 0;                         // root mean square, of the best so far; 0: none yet
+    double best_fit = 0;                         // RMS of the best so far; 0: none yet
 };
 
-// Where EP-frames are tried against I-frames: when next, and how often in a row they lost.
+// Trials of EP-frames against I-frames: when the next is due, and how often in a row EP-frames lost.
 struct EnhancedTrial {
-    std::uint32_t next = 0;  // number of the first frame that may be one
+    std::uint32_t next = 0;  // number of the first frame that may be a trial
     int losses = 0;
 };
 
-// A frame coded in one way.
+// A frame, coded in one way.
 struct Candidate {
     FrameType type = FrameType::intra;
-    std::vector<Packet> packets;  // new codebooks first, the frame last; numbered when they are sent
-    std::uint32_t reference = 0;  // number of the frame that it refers to; an I-frame's own
-    LatticeMesh decoded;          // what the decoder will have
-    double quality = 50;          // under rate or error control: of the quality knob
-    bool stands_in = false;       // P or T of motion alone, where nothing better fits the buffer
-    // What it leaves for the sequence: one of the first three.
+    std::vector<Packet> packets;  // new codebooks first, the frame last; numbered when sent
+    std::uint32_t reference = 0;  // number of the frame that it refers to; of an I-frame, its own
+    LatticeMesh decoded;          // the mesh that the decoder will have
+    double quality = 50;          // the quality setting used, under rate or error control
+    bool stands_in = false;       // a P- or T-frame of motion alone, because nothing better fits the buffer
+    // What it leaves for the sequence; one of the first three is set.
     std::optional<IntraFacts> intra;                   // I
     std::optional<BoneHistory> bones;                  // P, EP
     std::optional<NodeHistory> nodes;                  // T
-    std::optional<EnhancedTrial> trial;                // where EP- and I-frame were compared
+    std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
     CodedPose pose;                                    // I
     std::vector<std::uint32_t> distance_order_counts;  // EP
     std::size_t bytes() const;
 };
 
-// Where the sequence stands between two frames.
+// The state of the sequence between two frames.
 struct Sequence {
     std::uint32_t next_frame = 0;
-    std::shared_ptr<const ReferenceInUse> reference;  // none before the first I-frame
+    std::shared_ptr<const ReferenceInUse> reference;  // null before the first I-frame
     BoneHistory bones;
     NodeHistory nodes;
     EnhancedTrial trial;
 };
 
-// The sequence behind a candidate that is sent, which loses what the sequence takes over. Errors: as of
+// The sequence after this candidate was sent; parts of the candidate are moved into it. Errors: those of
 // make_reference().
 Result<Sequence> advance(const Configuration& configuration, const Sequence& before, Candidate& sent);
 
-// What is found of one frame, each when first asked for, and kept. Lengths in lattice units.
+// What is derived from one frame, computed on first use and kept. Lengths are in lattice units.
 class FrameWork {
 public:
     FrameWork(const Configuration& settled, const Sequence& before, LatticeMesh captured, CodedPose captured_pose,
@@ -129,18 +132,18 @@ public:
     const CodedPose pose;
     std::vector<StageTime>& stages;
 
-    // The reference in force; there must be one.
+    // The current reference; there must be one.
     const ReferenceInUse& reference() const { return *sequence.reference; }
     std::int64_t frames_since_intra() const { return std::int64_t{sequence.next_frame} - reference().decoded.number; }
     double edge();                 // mean edge of the captured mesh
-    const SurfaceIndex& target();  // the captured surface, to be registered to
-    // Of each bone, and each node, against the reference.
+    const SurfaceIndex& target();  // the captured surface, prepared for registration to it
+    // The motion of each bone, and of each node, relative to the reference.
     const FrameMotion& bone_motion();
     const std::vector<RigidMotion>& node_motion();
-    const AnimationFit& animation_fit();  // how well the bones' motion alone stands for the frame
-    // How far a decoded mesh is from the captured one, both ways.
+    const AnimationFit& animation_fit();  // how well the motion of the bones alone represents the frame
+    // The distance between a decoded mesh and the captured one, in both directions.
     SurfaceErrors errors_of(const LatticeMesh& decoded);
-    // Whether a tracked mesh still stands for the captured one. intra_squared: see measure_tracked_fit().
+    // Whether a tracked mesh still represents the captured one. intra_squared: see measure_tracked_fit().
     TrackedFit tracked_fit(const LatticeMesh& decoded, double reference_edge, std::span<const double> intra_squared);
 
 private:
@@ -156,7 +159,7 @@ private:
     std::optional<CapturedSurface> captured_;
 };
 
-// The registration's options on this subject.
+// The registration's options, scaled to this subject.
 DeformationOptions deformation_options(const Configuration& configuration);
 
 }  // namespace htvm::internal

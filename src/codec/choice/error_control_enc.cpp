@@ -14,7 +14,7 @@ double ErrorController::quality(FrameType type) const {
 }
 
 bool ErrorController::accept(FrameType type, double quality, double error) {
-    constexpr double tolerance = 0.04;  // log2: 3 %
+    constexpr double tolerance = 0.04;  // log2 of 3 %
     if (!(error > 0) || !std::isfinite(error)) return true;
     auto& ratio = log_ratio_[static_cast<std::size_t>(type)];
     ratio = std::log2(error) - std::log2(quality_steps(quality).geometry_step);

@@ -25,7 +25,7 @@ bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
            a.texcoords.empty() == b.texcoords.empty();
 }
 
-// Whether the reference's bones or nodes can move it to this frame.
+// Whether the bones or nodes of the reference can move it to this frame.
 bool can_be_moved(const FrameWork& work) {
     if (!work.sequence.reference) return false;
     const auto& reference = work.reference().decoded;
@@ -41,7 +41,7 @@ bool is_due(const FrameWork& work) {
     return !can_refer(work) || work.frames_since_intra() >= work.configuration.options.key_interval;
 }
 
-// The least key interval has passed: an I-frame may come for the sake of bits.
+// The shortest key interval has passed: an I-frame is allowed if it saves bits.
 bool may_be_intra(const FrameWork& work) {
     return work.frames_since_intra() >= work.configuration.options.least_key_interval;
 }
@@ -49,13 +49,13 @@ bool may_be_intra(const FrameWork& work) {
 bool is_scene_change(FrameWork& work) {
     const auto& configuration = work.configuration;
     if (!configuration.options.topology.scene_changes || configuration.tracked()) return false;
-    constexpr double far = 150;  // of an adult's millimetres
+    constexpr double far = 150;  // mm on an adult
     return scene_changed(work.mesh.positions, work.bone_motion().predicted, far * configuration.adult_millimetre);
 }
 
 // ---- what may be animated -------------------------------------------------------------------------------------------
 
-// What may be animated is at most this far off, lattice units; 0: unchecked.
+// The largest error, in lattice units, that a part may have and still be animated; 0: not checked.
 double largest_animation_error(const Configuration& configuration) {
     const auto& options = configuration.options;
     double largest = options.topology.animation_error;
@@ -74,7 +74,7 @@ std::vector<double> shifts_of_bones(const FrameWork& work) {
     return bone_shifts(work.reference().decoded.skinned, work.configuration.header.skeleton.bones, work.pose);
 }
 
-// Motion-based coding where it is asked for and leaves something out; else all of the frame.
+// Uses motion-based coding if it is enabled and leaves something out; otherwise codes the whole frame.
 Result<Candidate> code_what_moves(FrameWork& work, const FrameSteps& steps) {
     const double still_below = work.configuration.options.topology.still_below * work.configuration.units;
     if (!(still_below > 0)) return code_enhanced(work, steps);
@@ -100,7 +100,7 @@ Result<Candidate> choose_by_motion(FrameWork& work, const FrameSteps& steps) {
 
 // ---- FrameChoice::cheaper -------------------------------------------------------------------------------------------
 
-// Bytes of an I-frame that nothing refers to, by vertex: found once for a reference, since that hardly changes.
+// Bytes per vertex of an I-frame that nothing refers to: found once per reference, since it hardly changes.
 Result<double> plain_intra_bytes(FrameWork& work, const FrameSteps& steps) {
     const auto& known = work.sequence.bones.plain_intra_bytes;
     const auto& reference = work.reference();
@@ -111,15 +111,15 @@ Result<double> plain_intra_bytes(FrameWork& work, const FrameSteps& steps) {
     return static_cast<double>(plain->bytes()) / static_cast<double>(work.mesh.positions.size());
 }
 
-// A codebook serves some ten frames: a tenth of it counts.
+// A codebook is used for about ten frames, so a tenth of it counts.
 double bytes_in_the_long_run(const Candidate& candidate) {
     const auto frame = static_cast<double>(candidate.packets.back().payload.size() + packet_overhead);
     return frame + (static_cast<double>(candidate.bytes()) - frame) / 10;
 }
 
-// An EP-frame where it takes fewer bits than an I-frame at the same steps, at which both err alike. Where it does not,
-// as at high quality or where the bones do not say how the surface moves, EP-frames are tried again only after a
-// while, so that a capture that they do not suit costs hardly more time than I-frames.
+// An EP-frame if it takes fewer bits than an I-frame at the same steps, where both have the same error. If it does not,
+// as at high quality or where bones do not describe how the surface moves, EP-frames are tried again only after a
+// while. So a capture that EP-frames do not suit takes hardly more time than I-frames alone.
 Result<Candidate> choose_the_cheaper(FrameWork& work, const FrameSteps& steps) {
     if (work.configuration.options.topology.still_below > 0) return code_what_moves(work, steps);
     const bool suspended = work.sequence.next_frame < work.sequence.trial.next && may_be_intra(work);
@@ -130,15 +130,16 @@ Result<Candidate> choose_the_cheaper(FrameWork& work, const FrameSteps& steps) {
         if (!plain) return tl::unexpected(plain.error());
         enhanced->bones->plain_intra_bytes = *plain;
         const double intra = *plain * static_cast<double>(work.mesh.positions.size());
-        // One bone that stands in for a skeleton leaves larger residuals, which err more at the same steps: 0.75 for
-        // 0.65 mm on a man who talks, where they take 28 % fewer bits at the same error all the same.
+        // A single bone that stands in for a skeleton leaves larger residuals, which have a larger error at the same
+        // steps: 0.75 instead of 0.65 mm on a man who talks. At the same error, EP-frames still take 28 % fewer bits
+        // there.
         const double share = work.configuration.header.skeleton_tracked ? 1 : 0.9;
         if (bytes_in_the_long_run(*enhanced) < share * intra) {
             enhanced->trial = EnhancedTrial{};
             return enhanced;
         }
     }
-    // The I-frame before the next trial serves as its reference.
+    // The I-frame sent before the next trial will be its reference.
     EnhancedTrial trial = work.sequence.trial;
     if (!suspended) {
         trial.losses = std::min(trial.losses + 1, 6);
@@ -152,7 +153,7 @@ Result<Candidate> choose_the_cheaper(FrameWork& work, const FrameSteps& steps) {
 
 // ---- FrameChoice::rate_distortion -----------------------------------------------------------------------------------
 
-// What a frame's errors may be: the I-frame's at the same quality, and a little for the estimate.
+// The errors that a frame may have: those of an I-frame at the same quality, plus a margin for the estimate.
 SurfaceErrors allowed_errors(const ReferenceInUse& reference, const FrameSteps& steps) {
     constexpr double tolerance = 1.05;
     const double geometry = static_cast<double>(steps.geometry) / reference.intra.steps.geometry;
@@ -165,7 +166,7 @@ bool within(const SurfaceErrors& errors, const SurfaceErrors& allowed) {
     return errors.geometry_rms <= allowed.geometry_rms && errors.colour_rms <= allowed.colour_rms;
 }
 
-// An I-frame, and what one that nothing refers to would err.
+// Codes an I-frame, and measures the errors of one that nothing refers to.
 Result<Candidate> code_measured_intra(FrameWork& work, const FrameSteps& steps) {
     auto out = code_intra(work, steps, IntraUse::reference);
     if (!out) return out;
@@ -177,7 +178,7 @@ Result<Candidate> code_measured_intra(FrameWork& work, const FrameSteps& steps) 
     return out;
 }
 
-// An I-frame would hardly cost more.
+// Whether an I-frame would hardly cost more.
 bool is_expensive(const FrameWork& work, const Candidate& enhanced) {
     const auto& reference = work.reference();
     const auto vertices = static_cast<double>(work.mesh.positions.size());
@@ -185,7 +186,7 @@ bool is_expensive(const FrameWork& work, const Candidate& enhanced) {
     return static_cast<double>(enhanced.bytes()) >= 0.95 * reference.bytes * vertices / of_reference;
 }
 
-// The frames without residuals, or with some, where they are good enough; none where no bone fits.
+// The cheapest sufficient frame among those without residuals and those with few; nothing if no bone fits.
 Result<std::optional<Candidate>> choose_animation(FrameWork& work, const FrameSteps& steps,
                                                   const SurfaceErrors& allowed) {
     using Choice = std::optional<Candidate>;
@@ -206,8 +207,8 @@ Result<std::optional<Candidate>> choose_animation(FrameWork& work, const FrameSt
     return Choice(std::move(*candidate));
 }
 
-// True where what the frames since the I-frame have cost above the cheapest of them, this one too, would have paid for
-// a new one.
+// Sums up how much more each frame since the I-frame, including this one, has cost than the cheapest of them. True if
+// that would have paid for a new I-frame.
 bool intra_is_paid_for(const FrameWork& work, const Candidate& enhanced) {
     const auto& history = work.sequence.bones;
     const auto bytes = static_cast<double>(enhanced.bytes());
@@ -233,11 +234,11 @@ Result<Candidate> choose_by_cost(FrameWork& work, const FrameSteps& steps) {
 
 // ---- Profile::tracked -----------------------------------------------------------------------------------------------
 
-// Whether a T-frame does worse than those behind its I-frame can: over all, or in one region, such as a hand, as far as
-// that shows.
+// Whether a T-frame fits visibly worse than the T-frames of its I-frame can: over the whole surface, or in one region,
+// such as a hand.
 bool lost_track(const FrameWork& work, const TrackedFit& fit) {
     constexpr double more_strays = 0.004, worst_to_best = 2.2, region_to_best = 7, region_to_intra = 1.5;
-    constexpr double visible = 6, visible_in_edges = 0.5;  // of an adult's millimetres; of the capture's edges
+    constexpr double visible = 6, visible_in_edges = 0.5;  // mm on an adult; in mean edges of the capture
     const auto& reference = work.reference();
     const double best_fit = work.sequence.nodes.best_fit;
     const double best = best_fit > 0 ? best_fit : fit.rms;
@@ -247,9 +248,9 @@ bool lost_track(const FrameWork& work, const TrackedFit& fit) {
                          visible * work.configuration.adult_millimetre, visible_in_edges * reference.intra.edge});
 }
 
-// A T-frame where it fits the capture: where a hand has left a pocket, or an arm was lost, the I-frame's mesh no longer
-// serves, and an I-frame is due; so it is, at the earliest the least key interval behind the last, where the T-frame
-// takes more bits than the I-frame did.
+// A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the I-frame's mesh can no
+// longer follow, so an I-frame is sent. An I-frame is also sent once a T-frame takes more bits than the last I-frame
+// did, if the shortest key interval has passed.
 Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps) {
     auto tracked = code_tracked(work, steps, TrackedParts::all);
     if (!tracked) return tracked;
@@ -293,7 +294,7 @@ FrameType expected_type(const FrameWork& work, bool force_intra) {
 
 // ---- quality by rate ------------------------------------------------------------------------------------------------
 
-// Of a frame that takes so many bits even at the lowest quality.
+// The error for a frame that takes this many bits even at the lowest quality.
 tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, double bits) {
     const double capacity = options.bits_per_second * options.buffer_seconds;
     const auto number = [](double x) {
@@ -304,7 +305,7 @@ tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, doub
     std::string message = "the frame takes " + number(bits / 8000) +
                           " kB even at the lowest quality, and the buffer has room for " + number(room / 8000) +
                           " kB of its " + number(capacity / 8000) + " kB; give ";
-    // Rounded up, as what is asked for must do.
+    // Rounded up, so that the numbers in the message suffice.
     const auto enough = [&](double x) { return number(1.01 * x); };
     if (bits > capacity)
         message += "a bitrate of at least " + enough(bits / options.buffer_seconds / 1e6) +
@@ -314,7 +315,7 @@ tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, doub
     return fail(ErrorKind::limit, message);
 }
 
-// What takes the fewest bits: the motion alone, of the nodes or of the bones.
+// The cheapest frame there is: the motion of the nodes or bones alone.
 Result<Candidate> code_stand_in(FrameWork& work, double quality) {
     auto out = work.configuration.tracked() ? code_tracked(work, steps_of(work.configuration, quality_steps(quality)),
                                                            TrackedParts::motion_alone)
@@ -323,8 +324,8 @@ Result<Candidate> code_stand_in(FrameWork& work, double quality) {
     return out;
 }
 
-// Coarser until the frame fits into the buffer; its motion alone at the last. The first frames of a kind are coded up
-// to four times, until their quality is what the rate allows.
+// Lowers the quality until the frame fits the buffer; at last, only its motion is coded. The first frames of a kind are
+// coded up to four times, until their quality is the one that the rate allows.
 Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, const BitsOf& bits_of, bool force_intra) {
     const auto fits = [&](const Candidate& candidate) { return bits_of(candidate) <= rate.room(); };
     double quality = rate.quality(expected_type(work, force_intra)), bits = 0;
@@ -335,7 +336,7 @@ Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, cons
         candidate->quality = quality;
         bits = bits_of(*candidate);
         if (trials-- > 0 && rate.is_guess(candidate->type)) {
-            // The codebooks that come with the first frame are not in every one.
+            // Without the codebooks that come with the first frame, as later frames do not need them.
             const auto own = static_cast<double>(candidate->packets.back().payload.size() + packet_overhead);
             rate.tried(candidate->type, quality, 8 * own);
             const double better = rate.quality(candidate->type);
@@ -362,7 +363,7 @@ Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, cons
 
 // ---- quality by error -----------------------------------------------------------------------------------------------
 
-// Again with what was learnt where the error is off; of several attempts, the nearest.
+// Codes the frame again, with what was learned, if the error is off; of several attempts, the nearest is taken.
 Result<Candidate> code_to_error(FrameWork& work, ErrorController& control, bool force_intra) {
     constexpr int attempts = 4;
     FrameType type = expected_type(work, force_intra);

@@ -1,4 +1,5 @@
-// Which kind of frame a frame becomes, and how coarse (paper, section III-B; past it, by rate and distortion).
+// Decides which kind of frame a frame becomes and how coarsely it is quantised (paper, section III-B; beyond it, by
+// rate and distortion).
 #pragma once
 
 #include <functional>
@@ -10,21 +11,22 @@
 
 namespace htvm::internal {
 
-// What follows the stream as it grows, where quality follows from a rate or an error. They learn from every attempt;
-// what was sent the encoder tells them.
+// The controllers through which quality follows from a rate or an error. They learn from every attempt; the encoder
+// tells them what was sent.
 struct QualityControl {
     std::optional<RateController> rate;
     std::optional<ErrorController> error;
 };
 
-// Bits of a candidate were it sent next, with all that would come with it, such as the sequence header.
+// The bits of a candidate if it were sent next, including everything sent along, such as the sequence header.
 using BitsOf = std::function<double(const Candidate&)>;
 
-// The frame coded the way it is to be sent. Errors: of the mesh or its coding; limit where the rate's buffer cannot
-// hold it even at the lowest quality.
+// Codes the frame as it will be sent. Errors: those of the mesh or its coding; `limit` if the frame does not fit the
+// buffer even at the lowest quality.
 Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra);
 
-// As which kind the rate controller counts a candidate: one that stands in costs what it costs, as P-frames do.
+// The kind that the rate controller takes a candidate for: a stand-in's size does not depend on quality, like that of a
+// P-frame.
 FrameType rate_type(const Candidate& candidate);
 
 }  // namespace htvm::internal

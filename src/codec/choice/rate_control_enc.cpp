@@ -11,7 +11,7 @@ namespace {
 
 std::size_t index_of(FrameType type) { return static_cast<std::size_t>(type); }
 
-// Frames that were seen of a class.
+// Number of frames seen of a class.
 int seen_of(const FrameSizeModel& model, RateClass rate) {
     int seen = 0;
     for (const auto& rules : frame_rules)
@@ -19,7 +19,8 @@ int seen_of(const FrameSizeModel& model, RateClass rate) {
     return seen;
 }
 
-// How much of a surprise is believed: little of the usual noise; half of a jump, and nearly all when it comes again.
+// How far the model follows a surprise: little for the usual noise, half for a jump, almost fully if the jump comes
+// twice.
 double belief(const FrameSizeModel& model, double surprise) {
     constexpr double jump = 0.35;
     const double last_surprise = model.last_surprise;
@@ -27,8 +28,9 @@ double belief(const FrameSizeModel& model, double surprise) {
     return surprise * last_surprise > 0 && std::abs(last_surprise) >= jump ? 0.8 : 0.4;
 }
 
-// The slope from neighbouring frames of a type: a content that changes moves bits and quality against each other, so
-// that levels would teach the wrong slope; steps that do not look like a step of quality are left out.
+// Learns the slope from neighbouring frames of a type, not from their levels: if the content changes, bits and quality
+// move in opposite directions, and levels would teach the wrong slope. Steps that cannot come from a step of quality
+// are ignored.
 void learn_slope(FrameSizeModel& model, const FrameCost& before, const FrameCost& now) {
     const double step = now.quality - before.quality, change = std::log2(now.bits / before.bits);
     if (std::abs(step) < 1.5 || std::abs(change - model.slope * step) > 0.4 + 0.02 * std::abs(step)) return;
@@ -74,10 +76,10 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
         }
     } else {
         learn_slope(model, model.last[index_of(frame.type)], frame);
-        // The slope turns about the quality of now, where the sizes are known.
+        // Turn the line about the present quality, where the sizes are known.
         const double again = std::log2(frame.bits / expected_bits(model, rate, frame.quality));
         const double believed = belief(model, again) * again;
-        // Of I-frames alone nobody can tell how much more they take than others.
+        // From I-frames alone nobody can tell how much more they take than other frames.
         const bool compared = rate == RateClass::intra && seen_of(model, RateClass::between) > 0;
         model.content += compared ? believed / 2 : believed;
         if (compared) model.intra_extra += believed;
@@ -92,14 +94,14 @@ RateController::RateController(const RateControlOptions& options, std::vector<Fr
     capacity_ = options_.bits_per_second * options_.buffer_seconds;
     level_ = (options_.lowest_quality + options_.highest_quality) / 2;
     model_.intra_extra = options_.intra_extra;
-    // What a large buffer can take need not be followed.
+    // With a large buffer there is no need to follow small changes.
     model_.usual_belief = std::clamp(3 * per_frame_ / capacity_, 0.05, 0.15);
-    // Before anything is seen: as many I-frames as the key interval asks for.
+    // Before any frame is seen, assume as many I-frames as the key interval asks for.
     recent_.assign(static_cast<std::size_t>(std::clamp(options_.key_interval, 1, 1000)), RateClass::between);
     recent_[0] = RateClass::intra;
     if (first_pass_.empty()) return;
     for (auto& cost : first_pass_) cost.bits = std::isfinite(cost.bits) ? std::max(cost.bits, 0.0) : 0.0;
-    // What the first pass taught counts little against what this one will.
+    // What the first pass taught has little weight against what this pass will teach.
     for (const auto& cost : first_pass_) learn(model_, cost);
     plan_slope_ = model_.slope;
     plan_ = plan_qualities(first_pass_, options_, plan_slope_);
@@ -130,8 +132,9 @@ double RateController::quality(FrameType type) const {
     return std::clamp(q, options_.lowest_quality, options_.highest_quality);
 }
 
-// The line's bits, and what brings the buffer to the level wanted just before an I-frame: the bits that the line idled,
-// so that all of them together are on target; at least a little, so that it does not idle, at most half the buffer.
+// The bits the line carries, plus what brings the buffer to the level wanted just before an I-frame: the bits lost
+// while the line was idle, so that the total meets the target. That level is at least a little, so that the line does
+// not idle, and at most half the buffer.
 double RateController::wanted_bits() const {
     const double frames = capacity_ / per_frame_, horizon = std::clamp(1.5 * frames, 4.0, 60.0);
     const double phase = 1 - static_cast<double>(since_intra_) / options_.key_interval;
@@ -156,10 +159,10 @@ double RateController::live_quality(FrameType type) const {
         const double middle = (low + high) / 2;
         (average(middle) <= wanted ? low : high) = middle;
     }
-    // The first frames know little, and may go far from each other.
+    // Little is known during the first frames, so quality may change by more.
     const int seen = seen_of(model_, RateClass::between) + seen_of(model_, RateClass::intra);
     if (is_guess(type)) return low;
-    // An I-frame and the frame behind it may both move at no cost.
+    // At an I-frame and the frame after it, quality can change without extra cost.
     const bool free = since_intra_ == 1 || rules_of(type).rate == RateClass::intra;
     const double change = low - level_, step = std::max(options_.largest_step / (free ? 2 : 1), 20.0 / seen);
     if (std::abs(change) < (free ? 0.5 : options_.stay)) return level_;
@@ -174,7 +177,7 @@ double RateController::planned_bits(std::size_t frame, double correction) const 
                : bits * std::exp2(planned_surprise_ + model_.slope * correction);
 }
 
-// The correction with which the rest of the sequence spends what is left.
+// The correction with which the rest of the sequence spends the remaining bits.
 double RateController::remaining_correction() const {
     const auto& rest = rest_[frames_];
     const double left = per_frame_ * static_cast<double>(plan_.size()) - total_bits_ - rest[0];
@@ -210,7 +213,7 @@ double RateController::planned_quality() const {
 }
 
 double RateController::lower_quality(FrameType type, double quality, double bits) {
-    // What the model says, a tenth more, and at least a step that doubles from call to call.
+    // From the model, with a margin of a tenth; at least a step that doubles from call to call.
     const double range = options_.highest_quality - options_.lowest_quality;
     const double least = range / 20 * std::exp2(calls_++);
     const double excess = bits > 0 ? std::log2(bits / std::max(room(), 1.0)) + 0.15 : 0;
@@ -221,7 +224,7 @@ double RateController::lower_quality(FrameType type, double quality, double bits
 
 void RateController::coded(FrameType type, double quality, double bits) {
     bits = std::isfinite(bits) ? std::max(bits, 0.0) : 0.0;
-    // An I-frame that had to be cut to fit does not pull the EP-frames after it down.
+    // An I-frame that was cut to fit does not lower the quality of the EP-frames after it.
     const auto rate = rules_of(type).rate;
     const bool between = rate == RateClass::between;
     if (between || !sent_between_) level_ = quality;

@@ -6,7 +6,8 @@
 namespace htvm::internal {
 namespace {
 
-// The highest quality within the options' range that fits, where fits() holds for all below one that it holds for.
+// The highest quality in the range of the options that fits. fits() must be monotonic: true for all qualities below one
+// for which it is true.
 template <class Fits>
 double highest_that(const RateControlOptions& options, const Fits& fits) {
     double low = options.lowest_quality, high = options.highest_quality;
@@ -19,11 +20,11 @@ double highest_that(const RateControlOptions& options, const Fits& fits) {
 }
 
 struct Line {
-    double per_frame = 0;  // bits the line takes away in a frame's time
-    double limit = 0;      // bits that the plan lets the buffer hold
+    double per_frame = 0;  // bits that the line carries in the time of a frame
+    double limit = 0;      // most bits that the plan lets into the buffer
 };
 
-// Fills the free frames with the quality that spends what the others leave.
+// Gives the free frames the one quality that spends the bits left by the others.
 void share_out(std::span<const FrameCost> costs, const RateControlOptions& options, double slope, const Line& line,
                const std::vector<bool>& fixed, std::vector<double>& plan) {
     const double quality = highest_that(options, [&](double q) {
@@ -35,7 +36,7 @@ void share_out(std::span<const FrameCost> costs, const RateControlOptions& optio
         if (!fixed[i]) plan[i] = quality;
 }
 
-// A stretch of frames [begin, end) that starts with an empty buffer and ends with its first overflow's highest level.
+// A stretch of frames [begin, end) that begins with an empty buffer and ends at the peak of its first overflow.
 struct Overflow {
     std::size_t begin = 0, end = 0;
 };
@@ -78,7 +79,7 @@ std::vector<double> plan_qualities(std::span<const FrameCost> costs, const RateC
                     0.9 * options.bits_per_second * options.buffer_seconds};
     std::vector<double> plan(costs.size(), options.lowest_quality);
     std::vector<bool> fixed(costs.size(), false);
-    constexpr int most_rounds = 50;  // each lowers one stretch, and lets the rest rise
+    constexpr int most_rounds = 50;  // each round lowers one stretch and lets the rest rise
     for (int round = 0; round < most_rounds; ++round) {
         share_out(costs, options, slope, line, fixed, plan);
         for (int stretch = 0; stretch < most_rounds; ++stretch) {

@@ -1,4 +1,4 @@
-// The second pass's plan: a quality for every frame of a sequence whose costs a first pass has found.
+// The plan for a second pass: a quality for every frame of a sequence whose sizes are known from a first pass.
 #pragma once
 
 #include <span>
@@ -8,12 +8,13 @@
 
 namespace htvm::internal {
 
-// Bits of a frame that cost so much, at another quality; P-frames cost the same at any.
+// The bits of a frame at another quality; those of a P-frame do not depend on it.
 double bits_at(const FrameCost& cost, double quality, double slope);
 
-// One quality for all frames, the one that spends bits_per_second over the sequence; where that would overfill the
-// buffer, a lower one from where the buffer was last empty to the overflow, and more for the rest. slope: of log2(bits)
-// over quality. Expected bits fill the buffer to nine tenths at most, if lowest_quality allows.
+// One quality for all frames, at which the sequence spends bits_per_second. If that would overfill the buffer, the
+// frames from where the buffer was last empty up to the overflow get a lower quality, and the rest a higher one. slope:
+// change of log2(bits) per unit of quality. Expected bits fill the buffer to at most nine tenths, if lowest_quality
+// allows it.
 std::vector<double> plan_qualities(std::span<const FrameCost> costs, const RateControlOptions& options, double slope);
 
 }  // namespace htvm::internal

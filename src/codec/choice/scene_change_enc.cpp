@@ -16,7 +16,7 @@ std::vector<Point3f> every(std::span<const LatticePoint> positions, std::size_t 
 
 bool much_is_far(std::span<const LatticePoint> from, std::span<const LatticePoint> to, double far) {
     constexpr std::size_t samples = 500,
-                          searched = 4000;  // the gaps between the searched ones are far smaller than far
+                          searched = 4000;  // points searched; their gaps are far smaller than `far`
     const auto queries = every(from, std::max<std::size_t>(from.size() / samples, 1));
     const NearestPoints tree(every(to, std::max<std::size_t>(to.size() / searched, 1)));
     const auto strays = std::count_if(queries.begin(), queries.end(), [&](const Point3f& query) {

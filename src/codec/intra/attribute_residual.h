@@ -1,7 +1,7 @@
-// The coding of one prediction residual: a whole number of either sign, under two contexts at once. The probability of
-// each binary decision is the mean of the two contexts' probabilities, and both adapt: a coarse context that learns
-// fast steadies a fine one that has seen little yet. A mean, not logistic mixing (entropy/mixing.h): residuals are most
-// of an I-frame's decisions.
+// Codes one prediction residual, a signed whole number, under two contexts at once. The probability of each binary
+// decision is the mean of both contexts' probabilities, and both adapt: a coarse context that learns fast steadies a
+// fine one that has seen little. A mean rather than logistic mixing (entropy/mixing.h), because it is faster and
+// residuals are most of an I-frame's decisions.
 #pragma once
 
 #include <array>
@@ -15,13 +15,13 @@ namespace htvm::internal {
 
 inline constexpr std::size_t residual_bits = 30;  // |residual| < 2^30
 
-// One context's share: whether zero, the sign, and the position of the magnitude's top bit in unary.
+// The models of one context: whether zero, the sign, and the position of the magnitude's top bit in unary.
 struct ResidualContext {
     BinaryModel zero, negative;
     std::array<BinaryModel, residual_bits> top;
 };
 
-// The bits of a magnitude below its top bit: two are modelled, the others are sent as they are.
+// The bits of a magnitude below its top bit: two are modelled, the rest sent as they are.
 struct ResidualMantissa {
     std::array<std::array<BinaryModel, 4>, residual_bits> node;
 };
@@ -35,8 +35,8 @@ bool code_by_both(Coder& coder, BinaryModel& a, BinaryModel& b, bool wanted) {
     return bit;
 }
 
-// Writes the wanted residual and returns it, or returns the one that is read (models.h). |wanted| < 2^residual_bits,
-// and so is what a corrupt stream gives. a and b must be two different contexts.
+// Writes the wanted residual and returns it, or returns the one it reads (models.h). |wanted| < 2^residual_bits; a
+// corrupt stream gives no larger residuals either. a and b must be two different contexts.
 template <class Coder>
 std::int32_t code_residual(Coder& coder, ResidualContext& a, ResidualContext& b, ResidualMantissa& mantissa,
                            std::int32_t wanted) {
@@ -46,7 +46,7 @@ std::int32_t code_residual(Coder& coder, ResidualContext& a, ResidualContext& b,
     const auto wanted_width = static_cast<std::size_t>(std::bit_width(wanted_magnitude));
     std::size_t top = 0;
     while (top < residual_bits - 1 && code_by_both(coder, a.top[top], b.top[top], top + 1 < wanted_width)) ++top;
-    std::uint32_t magnitude = 1;  // its bits so far, which also name the node of the mantissa's tree
+    std::uint32_t magnitude = 1;  // the bits so far; also the node in the mantissa's tree
     int left = static_cast<int>(top);
     for (; left > 0 && left > static_cast<int>(top) - 2; --left)
         magnitude = magnitude * 2 + coder.bit(mantissa.node[top][magnitude], (wanted_magnitude >> (left - 1)) & 1);

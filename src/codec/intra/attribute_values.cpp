@@ -12,16 +12,16 @@
 namespace htvm::internal {
 namespace {
 
-// As written in the layer's first byte.
+// As written in the first byte of the layer.
 enum class AttributePredictor : std::uint8_t {
-    previous,        // the vertex before, in coding order
-    given,           // what the caller predicts
+    previous,        // the previous vertex in coding order
+    given,           // a prediction passed in by the caller
     neighbours,      // mean of the known neighbours
-    parallelograms,  // mean of the parallelograms; of the neighbours where there are none
-    between,         // midway between the two means
+    parallelograms,  // mean of the parallelograms; of the neighbours if there are none
+    between,         // midway between these two means
 };
 
-// Where predictions come from: one of the two is null.
+// The sources of predictions; one of the two is null.
 template <class Value>
 struct AttributeSource {
     const Neighbours* neighbours = nullptr;
@@ -79,22 +79,22 @@ std::array<std::int64_t, std::tuple_size_v<Value>> predict(const std::vector<Val
     return out;
 }
 
-// Contexts of one component's residual: by the residuals around the vertex (or of the last vertices), and by those of
-// the vertex's own components before.
+// Contexts of the residual of one component: by the residuals around the vertex (or of the last vertices), and by the
+// residuals of the vertex's previous components.
 struct AttributeContexts {
     static constexpr std::size_t classes = 12;
     std::array<ResidualContext, classes> by_surroundings;
     std::array<ResidualContext, classes * classes> by_components;
     ResidualMantissa mantissa;
 
-    // The class of a magnitude in quarters.
+    // The class of a magnitude given in quarters.
     static std::size_t class_of(std::int64_t quarters) {
         const auto q = static_cast<std::uint64_t>(quarters);
         return std::min<std::size_t>(static_cast<std::size_t>(std::bit_width(q)), classes - 1);
     }
 };
 
-// Codes all vertices up to `end`. The encoder's values are not changed; the decoder's become what is read: false where
+// Codes all vertices up to `end`. Encoding leaves the values as they are; decoding fills them in, and gives false if
 // one leaves the limit.
 template <class Value, class Coder>
 bool code_values(Coder&& coder, std::vector<Value>& values, const AttributeSource<Value>& source,
@@ -108,7 +108,7 @@ bool code_values(Coder&& coder, std::vector<Value>& values, const AttributeSourc
         std::span<const std::uint32_t> around;
         if (source.neighbours) around = source.neighbours->neighbours_of(rank);
         auto predicted = predict(values, source, rank, predictor);
-        std::int64_t own = 0;  // of the components before
+        std::int64_t own = 0;  // of the previous components
         for (std::size_t c = 0; c < components; ++c) {
             predicted[c] = std::clamp<std::int64_t>(predicted[c], -attribute_limit, attribute_limit);
             std::int64_t surroundings = recent[c] / 4;
@@ -137,7 +137,7 @@ bool code_values(Coder&& coder, std::vector<Value>& values, const AttributeSourc
 template <class Value>
 std::vector<std::uint8_t> encode_from(std::vector<Value> values, const AttributeSource<Value>& source) {
     if (values.empty()) return {};
-    constexpr std::size_t trial_size = 8192;  // enough vertices to tell the predictors apart
+    constexpr std::size_t trial_size = 8192;  // enough vertices to tell which predictor is best
     AttributePredictor best = AttributePredictor::previous;
     double fewest_bits = 0;
     for (std::uint8_t number = 0; number <= static_cast<std::uint8_t>(AttributePredictor::between); ++number) {

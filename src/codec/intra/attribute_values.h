@@ -1,10 +1,10 @@
-// Attributes that are small arrays of whole numbers (normals, texture coordinates), coded without loss of what they
-// were quantised to: each predicted, the residuals range coded. The encoder tries the predictors at hand and names the
-// cheapest in the layer's first byte.
+// Codes attributes that are small arrays of whole numbers (normals, texture coordinates), lossless after their
+// quantisation: each is predicted, and the residuals are range coded. The encoder tries the available predictors and
+// names the cheapest in the first byte of the layer.
 //
-// Value is std::array<std::int32_t, 2> or <.., 3>, one per vertex. Every component lies within +-attribute_limit. No
-// vertices give no bytes. Errors of decoding: corrupt_stream where the bytes end too early, name a predictor that is
-// not at hand or lead beyond the limit.
+// Value is std::array<std::int32_t, 2> or <.., 3>, one per vertex. Every component is within +-attribute_limit. Without
+// vertices there are no bytes. Decoding gives corrupt_stream if the bytes end too early, name a predictor that is not
+// available or exceed the limit.
 #pragma once
 
 #include <array>
@@ -20,14 +20,14 @@ namespace htvm::internal {
 
 inline constexpr std::int32_t attribute_limit = 1 << 24;
 
-// Intra frames: predicted from the mesh. values.size() == neighbours.vertex_count().
+// For intra frames: predicts from the mesh. values.size() == neighbours.vertex_count().
 template <class Value>
 std::vector<std::uint8_t> encode_attribute_values(const std::vector<Value>& values, const Neighbours& neighbours);
 template <class Value>
 Result<std::vector<Value>> decode_attribute_values(std::span<const std::uint8_t> bytes, const Neighbours& neighbours);
 
-// Frames with a reference: predicted by the caller's values, one per vertex, or by the vertex before.
-// values.size() == predictions.size(), predictions within the limit too.
+// For frames with a reference: predicts by values that the caller passes in, one per vertex, or by the previous vertex.
+// values.size() == predictions.size(); the predictions must be within the limit too.
 template <class Value>
 std::vector<std::uint8_t> encode_attribute_values(const std::vector<Value>& values,
                                                   const std::vector<Value>& predictions);

@@ -26,14 +26,14 @@ constexpr std::array<std::size_t, 3> colour_order{1, 0, 2};  // green, red, blue
 
 using ColourLevels = std::array<std::int32_t, 3>;  // in coding order, sixteenths of a level
 
-// By vertex, what is known of it.
+// What is known about each vertex coded so far.
 struct ColourHistory {
     explicit ColourHistory(std::size_t vertex_count) : level(vertex_count), miss(vertex_count) {}
-    std::vector<std::array<std::int16_t, 3>> level;  // that others are predicted from
-    std::vector<std::array<std::int16_t, 3>> miss;   // how far its own prediction was
+    std::vector<std::array<std::int16_t, 3>> level;  // the colour from which others are predicted
+    std::vector<std::array<std::int16_t, 3>> miss;   // how far off its own prediction was
 };
 
-// The prediction of a vertex, and how restless its surroundings are.
+// The prediction of a vertex, and how much its surroundings vary.
 struct ColourSurroundings {
     ColourLevels predicted{}, spread{}, miss{};
 };
@@ -47,7 +47,7 @@ ColourSurroundings colour_surroundings(std::span<const LatticePoint> positions, 
             out.predicted[k] = rank == 0 ? 16 * 128 : history.level[neighbours.order[rank - 1]][k];
         return out;
     }
-    // Weights fall with the squared distance; a squared distance is below 2^53, the sum of the weights below 2^44.
+    // Weights fall with the squared distance. A squared distance is below 2^53, the sum of the weights below 2^44.
     std::array<std::int64_t, row_limit> weight{};
     std::int64_t sum = 0;
     const LatticePoint here = positions[neighbours.order[rank]];
@@ -78,7 +78,7 @@ ColourSurroundings colour_surroundings(std::span<const LatticePoint> positions, 
     return out;
 }
 
-// The contexts of the residuals, their classes scaled to the step.
+// The contexts of the residuals; their classes scale with the step.
 class ColourContexts {
 public:
     explicit ColourContexts(std::int32_t step) {
@@ -94,7 +94,7 @@ public:
     ResidualContext& by_activity(std::size_t component, std::int32_t activity) {
         return activity_[component][class_of(activity, fine_)];
     }
-    // before: the spread for the first component, else how far the component before was off.
+    // before: for the first component the spread; for others, how far off the previous component was.
     ResidualContext& by_components(std::size_t component, std::int32_t before, std::int32_t miss) {
         return components_[component]
                           [class_of(before, component == 0 ? coarse_ : middle_) * classes + class_of(miss, coarse_)];
@@ -105,7 +105,7 @@ private:
     static constexpr std::size_t classes = 12;
     using Thresholds = std::array<std::int32_t, classes - 1>;
     static std::size_t class_of(std::int32_t value, const Thresholds& thresholds) {
-        std::int32_t k = 0;  // counted without an early way out: it is faster than a branch that is hard to predict
+        std::int32_t k = 0;  // counts without an early exit, which is faster than a branch that is hard to predict
         for (const std::int32_t threshold : thresholds) k += value > threshold;
         return static_cast<std::size_t>(k);
     }
@@ -115,8 +115,8 @@ private:
     std::array<ResidualMantissa, 3> mantissa_;
 };
 
-// Codes the vertex at `rank` and sets its colour to the decoded one, in the encoder too: the next are predicted from
-// it.
+// Codes the vertex at `rank` and sets its colour to the decoded one, in the encoder too, since later vertices are
+// predicted from it.
 template <class Coder>
 void code_colour(Coder& coder, std::span<Colour> colours, std::span<const LatticePoint> positions,
                  const Neighbours& neighbours, std::size_t rank, const ColourPredictor& predictor, std::int32_t step,
@@ -130,7 +130,7 @@ void code_colour(Coder& coder, std::span<Colour> colours, std::span<const Lattic
         if (k == 2) at += (predictor.blue_from_green * off[0] + predictor.blue_from_red * off[1] + 32) >> 6;
         at = std::clamp(at, 0, 16 * 255);
         const std::int32_t nearest = (at + 8) >> 4;
-        // Mirrored so that the prediction is always rounded downwards: one context learns both sides.
+        // Mirrored so that the prediction is always rounded down: one context then learns both sides.
         const std::int32_t side = at < 16 * nearest ? -1 : 1;
         std::uint8_t& level = colours[vertex][colour_order[k]];
         const std::int32_t activity = k == 0 ? (10 * around.miss[0] + 10 * around.spread[0]) / 16
@@ -148,8 +148,8 @@ void code_colour(Coder& coder, std::span<Colour> colours, std::span<const Lattic
     }
 }
 
-// The mean of a colour's decoded value and its prediction serves the next predictions best where the decoded value is
-// noisy: measured on captures.
+// If the decoded value is noisy, the mean of it and its prediction predicts the next vertices best; measured on
+// captures.
 std::uint8_t decoded_weight_for(std::int32_t step) {
     if (step == 1) return 16;
     if (step <= 3) return 15;

@@ -18,7 +18,7 @@ std::uint64_t mixed(std::uint64_t h, std::uint32_t value) {
     return h ^ (h >> 29);
 }
 
-// Of position and attributes, so that many different vertices at one point do not fill one neighbourhood of a table.
+// Hashes position and attributes, so that many different vertices at one point do not collide.
 std::uint64_t hash(const LatticeMesh& mesh, std::uint32_t k) {
     const auto& p = mesh.positions[k];
     std::uint64_t h = 1;
@@ -40,7 +40,7 @@ Merging find_duplicates(const LatticeMesh& mesh) {
     const auto n = static_cast<std::uint32_t>(mesh.positions.size());
     Merging out;
     out.number.resize(n);
-    // Open addressing.
+    // A hash table with open addressing.
     std::vector<std::uint32_t> table(std::bit_ceil(std::size_t{n} * 2 + 1), none);
     for (std::uint32_t k = 0; k < n; ++k) {
         auto slot = hash(mesh, k) & (table.size() - 1);

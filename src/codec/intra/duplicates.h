@@ -1,5 +1,5 @@
-// Removal of duplicate vertices (paper, section IV-C2): vertices that decode to the same point and attributes merge. I-
-// and EP-frames do this before their layers are coded; simplified references weld by the same code.
+// Removes duplicate vertices (paper, section IV-C2): vertices that decode to the same point and attributes are merged.
+// I- and EP-frames do this before their layers are coded; simplified references are welded by the same code.
 #pragma once
 
 #include <cstdint>
@@ -10,19 +10,19 @@
 namespace htvm::internal {
 
 struct Merging {
-    std::vector<std::uint32_t> kept;    // the vertices that stay, ascending: of equal ones the first
-    std::vector<std::uint32_t> number;  // for every vertex, the place in `kept` of the one that stands for it
+    std::vector<std::uint32_t> kept;    // the vertices that are kept, ascending: the first of each set of equals
+    std::vector<std::uint32_t> number;  // for every vertex, the place in `kept` of the vertex that replaces it
 };
 
-// Vertices with the same position and the same of every attribute that the mesh has.
+// Finds vertices that agree in position and in every attribute that the mesh has.
 Merging find_duplicates(const LatticeMesh& mesh);
-// Everything stays.
+// Keeps every vertex.
 Merging no_duplicates(std::size_t vertices);
 
-// Re-indexes the triangles; those with two corners in one vertex are dropped where `drop_collapsed` is set.
+// Re-indexes the triangles; with `drop_collapsed`, those with two corners in one vertex are dropped.
 std::vector<Triangle> merged_triangles(const std::vector<Triangle>& triangles, const Merging& merging,
                                        bool drop_collapsed);
-// The vertices that stay; triangles are left empty.
+// The vertices that are kept; without triangles.
 LatticeMesh kept_vertices(const LatticeMesh& mesh, const std::vector<std::uint32_t>& kept);
 
 }  // namespace htvm::internal

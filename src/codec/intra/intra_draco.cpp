@@ -1,7 +1,7 @@
 // Draco as the coder of I-frames (paper, section III-C: "a low-complexity real-time algorithm can be preferred").
 //
-// The mesh's integers go in as integer attributes, which Draco codes without loss. Draco orders vertices and triangles
-// as it likes, drops isolated vertices and degenerate triangles, and splits non-manifold vertices.
+// The mesh's integers are passed as integer attributes, which Draco codes losslessly. Draco reorders vertices and
+// triangles, drops isolated vertices and degenerate triangles, and splits non-manifold vertices.
 #include <draco/compression/decode.h>
 #include <draco/compression/encode.h>
 
@@ -34,7 +34,7 @@ int add_attribute(draco::PointCloud& cloud, draco::GeometryAttribute::Type type,
     return id;
 }
 
-// Normals and texture coordinates are told apart by their number of components.
+// Normals and texture coordinates are distinguished by their number of components.
 void fill(draco::PointCloud& cloud, const LatticeMesh& mesh) {
     using draco::GeometryAttribute;
     cloud.set_num_points(static_cast<std::uint32_t>(mesh.positions.size()));
@@ -120,15 +120,15 @@ Result<LatticeMesh> decode(std::span<const std::uint8_t> bytes) {
         }
         if (!sound) return corrupt;
     } catch (const std::bad_alloc&) {
-        throw;  // the decoder says so
+        throw;  // rethrown: the decoder reports it
     } catch (const std::exception&) {
         return corrupt;
     }
     return mesh;
 }
 
-// The counts at the beginning of Draco's bytes. Left to itself, its decoder takes memory and time for whatever they
-// say.
+// The counts at the beginning of Draco's bytes. They are checked first, because Draco's decoder would spend memory and
+// time on whatever they claim.
 Result<ClaimedCounts> claims(std::span<const std::uint8_t> bytes) {
     ClaimedCounts out;
     if (bytes.empty()) return out;
@@ -144,7 +144,7 @@ Result<ClaimedCounts> claims(std::span<const std::uint8_t> bytes) {
         out.triangles = in.varint();
         out.vertices = in.varint();
     } else {
-        in.u8();  // the kind of traversal
+        in.u8();  // the method of traversal
         out.vertices = in.varint();
         out.triangles = in.varint();
     }

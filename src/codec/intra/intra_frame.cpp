@@ -13,7 +13,7 @@
 namespace htvm::internal {
 namespace {
 
-// A grid point's place on the lattice.
+// The lattice point of a grid point.
 LatticePoint from_grid(LatticePoint q, std::int32_t step) { return {q.x * step, q.y * step, q.z * step}; }
 
 // Positions in grid steps; colours as captured.
@@ -30,7 +30,7 @@ Colour quantised(Colour colour, std::int32_t step) {
     return colour;
 }
 
-// Vertices merge where position, attributes and quantised colour are the same; the first one's colour stays.
+// Merges vertices with the same position, attributes and quantised colour; the colour of the first is kept.
 LatticeMesh without_duplicates(const LatticeMesh& grid, std::int32_t colour_step) {
     LatticeMesh quantised_colours;
     quantised_colours.positions = grid.positions;
@@ -111,7 +111,7 @@ bool within_attribute_limit(const auto& values) {
     return true;
 }
 
-// What another coder gives back is not trusted: sizes as announced, indices and attributes in range.
+// The output of another coder is not trusted: sizes must be as announced, indices and attributes in range.
 Result<LatticeMesh> decode_by(const ExternalIntraCoder& coder, const FramePayloadView& payload) {
     if (coder.claims) {
         const auto claimed = coder.claims(payload.of(Layer::external_intra));

@@ -1,5 +1,5 @@
 // I-frames (paper, section III-C): positions on a coarser grid of the lattice, connectivity by TFAN, each attribute
-// predicted from its neighbours; or the whole mesh by another static coder.
+// predicted from its neighbours; or the whole mesh coded by another static coder.
 #pragma once
 
 #include "codec/stream/frame_payload.h"
@@ -12,14 +12,14 @@ struct IntraFrameOptions {
     std::int32_t geometry_step = 32;  // lattice units, >= 1
     std::int32_t colour_step = 6;     // levels, 1..255
     bool merge_duplicates = true;
-    const ExternalIntraCoder* external = nullptr;  // none: TFAN
+    const ExternalIntraCoder* external = nullptr;  // null: TFAN
 };
 
-// Fills the payload's header and layers (all but the pose), and gives the mesh that the decoder will have.
+// Fills the payload's header and layers (except the pose), and returns the mesh that the decoder will have.
 Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrameOptions& options,
                                        FramePayload& payload);
 
-// external: of the number that the payload names, or null: unsupported then.
+// external: the coder with the number that the payload names; null gives `unsupported`.
 Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external);
 
 }  // namespace htvm::internal

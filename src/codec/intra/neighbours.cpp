@@ -10,19 +10,19 @@ namespace {
 constexpr std::uint32_t none = 0xFFFFFFFFu;
 constexpr std::size_t size_limit = std::size_t{1} << 28;
 
-// Corner 3 t + i is corner i of triangle t. Degenerate triangles have no corners in the tables.
+// A corner table: corner 3 t + i is corner i of triangle t. Degenerate triangles have no corners in it.
 struct Corners {
     std::vector<std::uint32_t> vertex;    // of each corner
-    std::vector<std::uint32_t> opposite;  // the corner across the edge that faces this corner, or none
-    std::vector<std::uint32_t> first_at;  // rows of `at`, by vertex
+    std::vector<std::uint32_t> opposite;  // the corner on the other side of the edge opposite to this corner, or none
+    std::vector<std::uint32_t> first_at;  // where each vertex's row of `at` begins
     std::vector<std::uint32_t> at;        // the corners at each vertex, in triangle order
 };
 
 std::uint32_t next_corner(std::uint32_t c) { return c % 3 == 2 ? c - 2 : c + 1; }
 std::uint32_t previous_corner(std::uint32_t c) { return c % 3 == 0 ? c + 2 : c - 1; }
 
-// Pairs the corners that face the same edge. Edges are visited by their smaller vertex v, through the corners at v; for
-// each larger vertex, `waiting` holds a corner that still lacks its other side.
+// Pairs the corners that face the same edge. Edges are visited from their smaller vertex v, through the corners at v;
+// for each larger vertex, `waiting` holds a corner that has no opposite yet.
 void pair_opposites(Corners& corners, std::size_t vertex_count) {
     corners.opposite.assign(corners.vertex.size(), none);
     std::vector<std::uint32_t> waiting(vertex_count, none);
@@ -69,16 +69,16 @@ Corners make_corners(std::span<const Triangle> triangles, std::size_t vertex_cou
     return corners;
 }
 
-// The vertex that completes most parallelograms goes first: one that completes none yet is better put off until it can
-// be predicted from several sides. A vertex waits in the queue of its score: the number of parallelograms it completes,
-// at most score_limit. The queues are last in, first out. It may wait in several; the entries that are out of date are
-// passed over.
+// The vertex that completes most parallelograms is coded next; a vertex that completes none is better coded later, when
+// it can be predicted from several sides. A vertex waits in the queue of its score: the number of parallelograms it
+// completes, at most score_limit. The queues are last in, first out. A vertex may be in several of them; outdated
+// entries are skipped.
 constexpr std::size_t score_limit = 4;
 
 struct Traversal {
     std::vector<std::uint8_t> coded;
-    std::vector<std::uint8_t> queued;  // has been put in a queue
-    std::vector<std::uint8_t> score;   // by vertex
+    std::vector<std::uint8_t> queued;  // whether it was ever put in a queue
+    std::vector<std::uint8_t> score;   // one per vertex
     std::array<std::vector<std::uint32_t>, score_limit + 1> queues;
     std::uint32_t seed = 0;
 
@@ -115,15 +115,15 @@ void add_neighbour(Neighbours& out, std::size_t row, std::uint32_t v) {
     out.neighbours.push_back(v);
 }
 
-// Codes vertex v: its candidates are written out, and the vertices that it completes a parallelogram for gain one.
-// Only parallelograms across an edge count for the order; the others come with them.
+// Codes vertex v: writes out its candidates, and raises the score of the vertices that it completes a parallelogram
+// for. Only parallelograms across an edge count for the order, since the others come along with them.
 void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint32_t v) {
     const std::size_t neighbour_row = out.neighbours.size(), parallelogram_row = out.parallelograms.size();
     auto add_parallelogram = [&](std::uint32_t a, std::uint32_t b, std::uint32_t opposite, bool across) {
         if (out.parallelograms.size() - parallelogram_row < row_limit)
             out.parallelograms.push_back({a, b, opposite, across});
     };
-    // The vertex across the edge that this corner faces, or none.
+    // The vertex on the other side of the edge that this corner faces, or none.
     auto beyond = [&](std::uint32_t corner) {
         const std::uint32_t o = corners.opposite[corner];
         return o == none ? none : corners.vertex[o];
@@ -142,7 +142,7 @@ void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint3
                 add_parallelogram(p, q, y, true);
             else if (y != none && y != v)
                 state.gain(y);
-            // An edge at v is seen from both of its triangles, and counted from the one with the lower facing corner.
+            // An edge at v is seen from both its triangles; count it only from the one with the lower facing corner.
             const std::uint32_t past_q = beyond(after), past_p = beyond(before);
             if (is_known(past_p) && past_p != q && before < corners.opposite[before])
                 add_parallelogram(past_p, q, p, false);

@@ -1,8 +1,8 @@
-// What a vertex of an intra frame can be predicted from, found in the connectivity alone: encoder and decoder find the
-// same, before any attribute is decoded.
+// What a vertex of an intra frame can be predicted from. This follows from connectivity alone, so encoder and decoder
+// find the same before any attribute is decoded.
 //
-// Attributes are not coded in the order of the vertices but in a coding order of their own: always the vertex that has
-// the most parallelograms with three corners known, so that most vertices are predicted from several sides.
+// Attributes are coded in an order of their own, not in the order of the vertices: next is always the vertex that has
+// the most parallelograms with three known corners, so that most vertices are predicted from several sides.
 #pragma once
 
 #include <cstddef>
@@ -15,16 +15,16 @@
 
 namespace htvm::internal {
 
-// Two triangles that share an edge, three of their four corners known: the fourth is predicted as a + b - opposite.
-// Either it lies across the shared edge a, b from `opposite`, or it ends the shared edge, as `opposite` does. Where the
-// triangles turn counter-clockwise, (b - opposite) x (a - opposite) points outside.
+// Two triangles that share an edge and of whose four corners three are known: the fourth is predicted as a + b -
+// opposite. It lies either across the shared edge a, b from `opposite`, or at an end of the shared edge, as `opposite`
+// does. If the triangles are counter-clockwise, (b - opposite) x (a - opposite) points outside.
 struct Parallelogram {
     std::uint32_t a = 0, b = 0, opposite = 0;
     bool across = true;
 };
 
-// Arrays over the ranks of the coding order, in compressed rows: row k spans first_x[k] .. first_x[k + 1].
-// Every vertex named in row k has a rank below k. At most eight parallelograms and eight neighbours a row.
+// Arrays over the ranks of the coding order, in compressed rows: row k is first_x[k] .. first_x[k + 1]. Every vertex
+// named in row k has a rank below k. A row has at most eight parallelograms and eight neighbours.
 struct Neighbours {
     std::vector<std::uint32_t> order;  // order[k] = the vertex coded at rank k; a permutation of 0 .. n - 1
     std::vector<std::uint32_t> first_parallelogram;
@@ -42,12 +42,12 @@ struct Neighbours {
     }
 };
 
-inline constexpr std::size_t row_limit = 8;  // parallelograms, and neighbours, kept for a vertex
+inline constexpr std::size_t row_limit = 8;  // most parallelograms, and most neighbours, per vertex
 
-// The coding order and the candidates of each vertex. Any triangles will do (non-manifold, duplicate, open, none);
-// degenerate ones are passed over, and of the triangles at an edge the first pairs with the second, the third with the
-// fourth and so on. Time and memory are proportional to vertices plus triangles.
-// Errors: bad_input where a triangle names a vertex >= vertex_count; limit above 2^28 vertices or triangles.
+// The coding order and the candidates of each vertex. Accepts any triangles (non-manifold, duplicate, open, none).
+// Degenerate triangles are skipped; of the triangles at an edge, the first is paired with the second, the third with
+// the fourth, and so on. Time and memory are linear in vertices plus triangles. Errors: bad_input if a triangle names a
+// vertex >= vertex_count; limit above 2^28 vertices or triangles.
 Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count);
 
 }  // namespace htvm::internal

@@ -15,34 +15,34 @@
 namespace htvm::internal {
 namespace {
 
-// Positions and their differences are in sixteenths of a step: means of a few vertices keep their fraction, which says
-// to which side the residual is likely to fall.
+// Positions and their differences are in sixteenths of a step: means of a few vertices keep their fraction, which tells
+// on which side the residual is likely to fall.
 using Triple = std::array<std::int64_t, 3>;
 
-// Where the known vertices around a vertex suggest that it lies: offsets from the mean of its neighbours.
+// Where the known vertices around a vertex suggest that it is, as offsets from the mean of its neighbours.
 struct PositionFeatures {
-    Triple mean{};            // of the neighbours; where there are none, the vertex coded before
-    Triple across{};          // mean of the parallelograms across an edge, less `mean`; zero where there are none
-    Triple ending{};          // likewise of the parallelograms whose shared edge the vertex ends
-    Triple outer{};           // mean of the neighbours' own neighbour means, less `mean`
-    Triple normal{};          // of the known triangles, components below 2^28; zero where there are none
+    Triple mean{};            // of the neighbours; if there are none, the vertex coded before
+    Triple across{};          // mean of the parallelograms across an edge, minus `mean`; zero if there are none
+    Triple ending{};          // the same for parallelograms where the vertex is an end of the shared edge
+    Triple outer{};           // mean of the neighbours' own neighbour means, minus `mean`
+    Triple normal{};          // of the known triangles, components below 2^28; zero if there are none
     std::int64_t spread = 0;  // mean distance of the parallelograms from their mean, summed over the components
     std::size_t parallelograms = 0;
     bool has_ending = false;
 };
 
 constexpr std::size_t weight_count = 3;                                        // across, ending, outer
-using PositionWeights = std::array<std::array<std::int8_t, weight_count>, 2>;  // by has_ending, in 1/64
+using PositionWeights = std::array<std::array<std::int8_t, weight_count>, 2>;  // in 1/64, indexed by has_ending
 
-// What the coding of a vertex leaves behind for the next ones, by vertex.
+// What coding a vertex leaves for the next ones; one entry per vertex.
 struct PositionHistory {
     explicit PositionHistory(std::size_t vertex_count)
         : ring_mean(vertex_count), along(vertex_count, 0), across(vertex_count, 0) {}
-    std::vector<std::array<std::int32_t, 3>> ring_mean;  // mean of the neighbours known when it was coded
+    std::vector<std::array<std::int32_t, 3>> ring_mean;  // mean of the neighbours that were known when it was coded
     std::vector<std::int32_t> along, across;             // its residual along the surface and across it
 };
 
-// 65536 / n, rounded. Means are taken of differences from a near point, so that the rounding does not show.
+// 65536 / n, rounded. Means are taken of differences from a nearby point, so the rounding has no visible effect.
 constexpr std::array<std::int64_t, row_limit + 1> reciprocals = [] {
     std::array<std::int64_t, row_limit + 1> r{};
     for (std::size_t n = 1; n <= row_limit; ++n)
@@ -54,7 +54,7 @@ std::int64_t mean_of(std::int64_t sum, std::size_t count) { return (sum * recipr
 
 Triple triple(LatticePoint p) { return {p.x, p.y, p.z}; }
 
-// The features that come from the parallelograms; `base` is the point from which differences are taken.
+// The features that come from the parallelograms; differences are taken from `base`.
 void add_parallelograms(std::span<const LatticePoint> points, std::span<const Parallelogram> parallelograms,
                         LatticePoint base, const Triple& base_to_mean, PositionFeatures& out) {
     std::array<Triple, row_limit> at{};
@@ -90,7 +90,7 @@ void add_parallelograms(std::span<const LatticePoint> points, std::span<const Pa
     out.has_ending = count[0] > 0;
 }
 
-// The features of the vertex at `rank`; records its ring mean.
+// The features of the vertex at `rank`; also records its ring mean.
 PositionFeatures position_features(std::span<const LatticePoint> points, const Neighbours& neighbours, std::size_t rank,
                                    PositionHistory& history) {
     PositionFeatures out;
@@ -125,7 +125,7 @@ PositionFeatures position_features(std::span<const LatticePoint> points, const N
     return out;
 }
 
-// The mean and the weighted offsets, kept within reach of the lattice: a corrupt stream cannot make them overflow.
+// The mean plus the weighted offsets, clamped near the lattice so that a corrupt stream cannot cause an overflow.
 Triple predict_position(const PositionFeatures& features, const PositionWeights& weights) {
     constexpr std::int64_t reach = 32 * std::int64_t{lattice_limit};  // sixteenths: twice the lattice
     const auto& w = weights[features.has_ending];
@@ -139,7 +139,7 @@ Triple predict_position(const PositionFeatures& features, const PositionWeights&
     return predicted;
 }
 
-// The activity around a vertex, per component along and across the surface, from the residuals of its neighbours.
+// How large the residuals around a vertex were, along and across the surface, from its neighbours.
 struct Activity {
     std::int64_t along = 0, across = 0;
 };
@@ -153,8 +153,8 @@ Activity activity_around(std::span<const std::uint32_t> around, const PositionHi
     return {mean_of(sum.along, around.size()), mean_of(sum.across, around.size())};
 }
 
-// How many of the ascending thresholds lie below the value. Without an early way out: it is faster than a branch that
-// is hard to predict.
+// The number of ascending thresholds below the value. Without an early exit, which would be a branch that is hard to
+// predict.
 template <std::size_t size>
 std::size_t class_of(std::int64_t value, const std::array<std::int32_t, size>& thresholds) {
     const auto bounded = static_cast<std::int32_t>(std::min<std::int64_t>(value, 1 << 30));
@@ -189,15 +189,15 @@ private:
     std::array<ResidualMantissa, 3> mantissa_;
 };
 
-// Sixteenths to the nearest whole, halves upwards.
+// Sixteenths rounded to whole numbers, halves upwards.
 std::int64_t whole(std::int64_t sixteenths) { return (sixteenths + 8) >> 4; }
 
-// Codes the vertex at `rank`, whose features are given: in the encoder the point is there already and stays as it is,
-// in the decoder it becomes what is read. False where that is off the lattice.
+// Codes the vertex at `rank`, given its features. In the encoder the point is there already and is not changed; the
+// decoder sets it to what it reads. False if the point is off the lattice.
 //
-// The component across the surface is coded last because it is the smallest once the other two are known: the vertex
+// The component across the surface is coded last, because it is the smallest once the other two are known: the vertex
 // lies close to the plane of its known triangles. "Across" is the axis nearest to their normal, so that the division by
-// the normal's component never magnifies.
+// that component of the normal never magnifies.
 template <class Coder>
 bool code_position(Coder& coder, std::span<LatticePoint> points, const Neighbours& neighbours, std::size_t rank,
                    const PositionFeatures& features, const PositionWeights& weights, PositionHistory& history,
@@ -221,7 +221,7 @@ bool code_position(Coder& coder, std::span<LatticePoint> points, const Neighbour
             activity = 3 * around.across + (features.spread + std::abs(off[0]) + std::abs(off[1])) / 2;
         }
         const std::int64_t nearest = whole(at), fraction = at - 16 * nearest;
-        // Mirrored so that the prediction is always rounded downwards: one context learns both sides.
+        // Mirrored so that the prediction is always rounded down: one context then learns both sides.
         const std::int64_t side = fraction < 0 ? -1 : 1;
         const std::int64_t wanted = side * (*component[axis[role]] - nearest);
         const std::int64_t value =
@@ -232,16 +232,17 @@ bool code_position(Coder& coder, std::span<LatticePoint> points, const Neighbour
         *component[axis[role]] = static_cast<std::int32_t>(value);
         off[role] = 16 * value - (role == 2 ? at : predicted[axis[role]]);
     }
-    constexpr std::int64_t remembered = 1 << 20;  // no context tells more apart
+    constexpr std::int64_t remembered = 1 << 20;  // larger values fall in the same context
     history.along[vertex] = static_cast<std::int32_t>(std::min((std::abs(off[0]) + std::abs(off[1])) / 2, remembered));
     history.across[vertex] = static_cast<std::int32_t>(std::min(std::abs(off[2]), remembered));
     return true;
 }
 
-// The encoder's choice of weights. Doubles will do here: the weights are sent.
-using Matrix = std::array<std::array<double, weight_count + 1>, weight_count>;  // normal equations, right side last
+// The encoder's choice of weights. It may use doubles, because the weights are sent.
+using Matrix = std::array<std::array<double, weight_count + 1>, weight_count>;  // normal equations, the right-hand side
+                                                                                // in the last column
 
-// Solves the normal equations by elimination; a direction that the data leave open gets the weight 0.
+// Solves the normal equations by elimination; a direction that the data do not determine gets the weight 0.
 std::array<double, weight_count> solve(Matrix m) {
     std::array<double, weight_count> scale{};
     for (std::size_t i = 0; i < weight_count; ++i) scale[i] = m[i][i];
@@ -260,9 +261,9 @@ std::array<double, weight_count> solve(Matrix m) {
     return weights;
 }
 
-// Least squares over the frame, each vertex weighted by the inverse square of its surroundings' extent and of how far
-// the usual weights leave it, so that neither large triangles nor outliers rule; pulled towards the usual weights,
-// those of most captures, which decide where there are few vertices.
+// Least squares over the frame. Each vertex is weighted by the inverse square of the size of its surroundings and of
+// the error that the usual weights leave, so that neither large triangles nor outliers dominate. The result is drawn
+// towards the usual weights, those of most captures, which decide if there are few vertices.
 PositionWeights fit_weights(std::span<const LatticePoint> q, const Neighbours& neighbours) {
     constexpr std::array<std::array<double, weight_count>, 2> usual{{{0.5, 0.0, -0.4}, {0.46, 0.21, -0.2}}};
     std::array<Matrix, 2> equations{};

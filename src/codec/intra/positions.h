@@ -1,10 +1,10 @@
-// The positions of an intra frame, coded without loss given its connectivity.
+// Codes the positions of an intra frame losslessly, given its connectivity.
 //
-// A vertex is predicted from the vertices known around it: a combination of the mean of its neighbours, its
-// parallelograms and the mean of its neighbours' neighbours, whose weights the encoder fits to the frame and sends. The
-// residual is coded component by component, the one most across the surface last: it is predicted to lie in the plane
-// of the known triangles, given the other two. The contexts are how large the residuals around were, along and across
-// the surface apart, and where within a step the prediction fell.
+// A vertex is predicted from the known vertices around it: a combination of the mean of its neighbours, its
+// parallelograms and the mean of its neighbours' neighbours, with weights that the encoder fits to the frame and sends.
+// The residual is coded component by component. The component most perpendicular to the surface comes last: given the
+// other two, it is predicted to lie in the plane of the known triangles. The contexts are the sizes of the residuals
+// around, separately along and across the surface, and where within a step the prediction fell.
 //
 // Layer: six signed bytes (weights in 1/64), then the range-coded residuals in the order of Neighbours::order.
 #pragma once
@@ -18,10 +18,11 @@
 
 namespace htvm::internal {
 
-// q: one point per vertex, q.size() == neighbours.vertex_count(), every point on_lattice(). No vertices give no bytes.
+// q: one point per vertex, q.size() == neighbours.vertex_count(), every point on_lattice(). Without vertices there are
+// no bytes.
 std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours);
 
-// The points that were encoded. Errors: corrupt_stream where the bytes end too early or lead off the lattice.
+// The points that were encoded. Errors: corrupt_stream if the bytes end too early or lead off the lattice.
 Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::uint8_t> bytes,
                                                          const Neighbours& neighbours);
 

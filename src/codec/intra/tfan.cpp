@@ -7,8 +7,8 @@
 namespace htvm::internal {
 namespace {
 
-// A new vertex takes the next visiting number: there is nothing to say of it, but in the decoder that there must be
-// one.
+// A new vertex takes the next visiting number. Nothing needs to be coded for it; the decoder only checks that a vertex
+// is left.
 struct NextNumberOfEncoder {
     static constexpr bool visits_isolated = false;
     void seed(std::uint32_t) {}

@@ -1,12 +1,12 @@
-// Triangle fans: what TFAN (tfan.h) and M-TFAN (paper/mtfan.h) have in common, which is all but what they say of a
+// Triangle fans: what TFAN (tfan.h) and M-TFAN (paper/mtfan.h) share, which is everything except what they code about a
 // vertex that a fan meets for the first time.
 //
-// From top to bottom: the open edges of what is coded; where a fan stands among them; the contexts and the syntax of
+// From top to bottom: the open edges of what is coded; the state of a fan among them; the contexts and the syntax of
 // its start and its steps; the decoder's traversal; the encoder's, which also chooses the fans.
 //
-// The syntax is written once for both directions: every function that codes one thing takes a coder and what is wanted
-// (entropy/models.h). Vertices are named by their visiting number. At the focus, an open half-edge that enters it comes
-// from a vertex where the coded triangles around the focus end and a fan may start (a start candidate); an open
+// The syntax is written once for both directions: every function that codes one thing takes a coder and the wanted
+// value (entropy/models.h). Vertices are named by their visiting number. At the focus, an open half-edge that enters it
+// comes from a vertex where the coded triangles around the focus end and a fan may start (a start candidate); an open
 // half-edge that leaves it goes to a vertex where they start and a fan may end (an end candidate).
 #pragma once
 
@@ -26,8 +26,8 @@
 
 namespace htvm::internal {
 
-// The open half-edges of the triangles coded so far: those whose opposite half-edge no coded triangle has. They are all
-// that the fans' syntax needs to know of the past. Vertices are named by their visiting number.
+// The open half-edges of the triangles coded so far: those whose opposite half-edge is in no coded triangle. The fans'
+// syntax depends on nothing else that was coded. Vertices are named by their visiting number.
 class OpenEdges {
 public:
     static constexpr std::uint32_t none = 0xFFFFFFFFu;
@@ -35,7 +35,7 @@ public:
     struct HalfEdge {
         std::uint32_t from = none, to = none;
         std::uint32_t apex = none;  // the third vertex of its triangle
-        // Doubly linked lists of the half-edges that leave `from` and of those that enter `to`, latest first.
+        // Doubly linked lists of the half-edges that leave `from`, and of those that enter `to`, latest first.
         std::uint32_t next_out = none, previous_out = none, next_in = none, previous_in = none;
     };
 
@@ -43,10 +43,10 @@ public:
     void add_vertex() { vertices_.push_back({}); }
     std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(vertices_.size()); }
 
-    // How many of the coded triangles' corners are at the vertex.
+    // The number of corners of coded triangles at the vertex.
     std::uint32_t triangle_count(std::uint32_t vertex) const { return vertices_[vertex].triangles; }
 
-    // The latest open half-edge that leaves or enters the vertex, or none; follow next_out or next_in from there.
+    // The latest open half-edge that leaves or enters the vertex, or none; continue with next_out or next_in.
     std::uint32_t first_out(std::uint32_t vertex) const { return vertices_[vertex].first_out; }
     std::uint32_t first_in(std::uint32_t vertex) const { return vertices_[vertex].first_in; }
     const HalfEdge& operator[](std::uint32_t half_edge) const { return half_edges_[half_edge]; }
@@ -64,8 +64,9 @@ private:
     struct Vertex {
         std::uint32_t first_out = none, first_in = none, triangles = 0;
     };
-    // How far the lists are searched for an opposite. Beyond it a half-edge counts as open though it is not, on both
-    // sides alike: that costs bits where two vertices both have many open edges, and bounds the work.
+    // How many list entries are searched for an opposite; this bounds the work. If it is not among them, a half-edge
+    // counts as open on both sides although it is not. That costs bits only where two vertices both have many open
+    // edges.
     static constexpr int search_limit = 32;
 
     void add(std::uint32_t from, std::uint32_t to, std::uint32_t apex) {
@@ -77,7 +78,7 @@ private:
             link(from, to, apex);
         }
     }
-    // Both ends' lists side by side, so that the shorter one decides how long it takes.
+    // Walks both ends' lists side by side, so that the shorter one determines the time.
     std::uint32_t find(std::uint32_t from, std::uint32_t to) const {
         std::uint32_t out = vertices_[from].first_out, in = vertices_[to].first_in;
         for (int i = 0; i < search_limit && out != none && in != none; ++i) {
@@ -118,30 +119,30 @@ private:
     std::uint32_t free_ = none;
 };
 
-// How a fan's boundary goes on from its current vertex.
+// How a fan's boundary continues from its current vertex.
 enum class Step : std::uint8_t {
     new_vertex,    // to a vertex met for the first time
     close,         // to an end candidate, where the fan ends
     left,          // to the vertex that also completes the open edge of the current vertex
     right,         // to the vertex from which the fan can close by completing the open edge of the end candidate
     known_vertex,  // to any other visited vertex
-    stop,          // no further: the fan ends at a boundary of the mesh
+    stop,          // not at all: the fan ends at a boundary of the mesh
 };
 
-inline constexpr std::uint32_t most_candidates = 4;  // start and end candidates that can be named
-inline constexpr std::uint32_t longest_walk = 31;    // steps along open edges in search of a known vertex
+inline constexpr std::uint32_t most_candidates = 4;  // most start and end candidates that can be named
+inline constexpr std::uint32_t longest_walk = 31;    // most steps along open edges in search of a known vertex
 
-// Where a fan stands: what both sides know before its next step.
+// The state of a fan that both sides know before its next step.
 struct FanState {
     std::uint32_t focus = 0;
     std::uint32_t start = OpenEdges::none;     // the boundary's first vertex
     std::uint32_t previous = OpenEdges::none;  // the boundary vertex before the current one
     std::uint32_t current = OpenEdges::none;
     std::uint32_t length = 0;  // triangles in the fan
-    Step last = Step::stop;    // the step that led here; stop: none yet
+    Step last = Step::stop;    // the step that led here; stop: no step yet
     bool from_candidate = false;
 
-    // From the open edges, by look_around():
+    // Set by look_around() from the open edges:
     std::array<std::uint32_t, most_candidates> ends{};
     std::uint32_t end_count = 0;
     std::uint32_t behind = OpenEdges::none;      // the third vertex of the coded triangle before the current vertex
@@ -150,8 +151,7 @@ struct FanState {
     bool fills_hole = false;  // one triangle would complete the open edges on both sides
 };
 
-// Contexts for the next step that come from elsewhere than connectivity: none (all 0) in TFAN, from the decoded
-// positions in M-TFAN.
+// Contexts for the next step that do not come from connectivity: none (all 0) in TFAN, the decoded positions in M-TFAN.
 struct FanHints {
     std::uint32_t gap = 0;    // 0 .. 15: the angle at the focus from the current vertex to the end candidate
     std::uint32_t left = 0;   // 0 .. 7: the angle at the current vertex that the left triangle would fill
@@ -159,11 +159,12 @@ struct FanHints {
 };
 
 struct FanModels {
-    std::array<std::array<std::array<BinaryModel, 4>, 3>, 16> more_fans;  // triangles, start and end candidates
+    std::array<std::array<std::array<BinaryModel, 4>, 3>, 16> more_fans;  // indexed by triangles, start and end
+                                                                          // candidates
     std::array<BinaryModel, 4> starts_at_candidate;
     std::array<BinaryModel, most_candidates> start_index, end_index;
     BinaryModel starts_at_known;
-    std::array<std::array<BinaryModel, 16384>, 5> is_new;  // by five sets of contexts each, see code_is_new()
+    std::array<std::array<BinaryModel, 16384>, 5> is_new;  // five sets of contexts, see code_is_new()
     std::array<Mixer<5>, 64> new_mixer;
     std::array<std::array<BinaryModel, 16384>, 5> closing;
     std::array<Mixer<5>, 64> close_mixer;
@@ -175,7 +176,7 @@ struct FanModels {
     UnsignedModel far;
 };
 
-// The vertex before `vertex` along the open edges, not `avoided` or `also_avoided`; or none.
+// The vertex before `vertex` along the open edges, other than `avoided` and `also_avoided`; or none.
 inline std::uint32_t before_on_border(const OpenEdges& edges, std::uint32_t vertex, std::uint32_t avoided,
                                       std::uint32_t also_avoided) {
     std::uint32_t edge = edges.first_in(vertex);
