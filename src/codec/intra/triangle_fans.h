@@ -185,7 +185,7 @@ inline std::uint32_t before_on_border(const OpenEdges& edges, std::uint32_t vert
     return OpenEdges::none;
 }
 
-// The vertex after `vertex` along the open edges, not `avoided`; or none.
+// The vertex after `vertex` along the open edges, other than `avoided`; or none.
 inline std::uint32_t after_on_border(const OpenEdges& edges, std::uint32_t vertex, std::uint32_t avoided) {
     std::uint32_t edge = edges.first_out(vertex);
     for (int i = 0; i < 4 && edge != OpenEdges::none; ++i, edge = edges[edge].next_out)
@@ -193,7 +193,7 @@ inline std::uint32_t after_on_border(const OpenEdges& edges, std::uint32_t verte
     return OpenEdges::none;
 }
 
-// Of several end candidates, the one that bounds the same gap as the fan's start comes first.
+// Of several end candidates, puts first the one that bounds the same gap as the fan's start.
 inline void put_own_gap_first(const OpenEdges& edges, FanState& fan) {
     std::uint32_t vertex = fan.start;
     for (std::uint32_t i = 0; i < longest_walk && vertex != OpenEdges::none; ++i) {
@@ -207,7 +207,7 @@ inline void put_own_gap_first(const OpenEdges& edges, FanState& fan) {
     }
 }
 
-// The end candidates of the fan, its own start last if it may become one.
+// Finds the end candidates of the fan; its own start comes last, if it may be one.
 inline void find_ends(const OpenEdges& edges, FanState& fan) {
     fan.end_count = 0;
     std::uint32_t edge = edges.first_out(fan.focus);
@@ -222,7 +222,7 @@ inline void find_ends(const OpenEdges& edges, FanState& fan) {
     if (!fan.from_candidate) fan.ends[fan.end_count++] = fan.start;
 }
 
-// Fills in what follows from the open edges at the fan's current vertex.
+// Fills in what the open edges tell about the fan's current vertex.
 inline void look_around(const OpenEdges& edges, FanState& fan) {
     const std::uint32_t end = fan.end_count > 0 ? fan.ends[0] : OpenEdges::none;
     fan.left =
@@ -242,7 +242,7 @@ std::uint32_t code_index(Coder& coder, std::array<BinaryModel, most_candidates>&
     return index;
 }
 
-// Whether the focus has another fan, after the fans before it.
+// Whether the focus has another fan after those already coded.
 template <class Coder>
 bool code_more_fans(Coder& coder, FanModels& models, const OpenEdges& edges, std::uint32_t focus, bool wanted) {
     const auto count = [&](std::uint32_t edge, auto next) {
@@ -256,8 +256,8 @@ bool code_more_fans(Coder& coder, FanModels& models, const OpenEdges& edges, std
     return coder.bit(models.more_fans[triangles][starts][ends], wanted);
 }
 
-// The number of a visited vertex that no candidate names: by a walk along the open edges from the current vertex or
-// from the end candidate, else by how much later than the focus it was visited.
+// The number of a visited vertex that is not among the candidates: by the length of a walk along the open edges from
+// the current vertex or from the end candidate, or else by how much later than the focus it was visited.
 template <class Coder>
 std::uint32_t code_known_vertex(Coder& coder, FanModels& models, const OpenEdges& edges, const FanState& fan,
                                 std::uint32_t wanted) {
@@ -288,16 +288,17 @@ std::uint32_t code_known_vertex(Coder& coder, FanModels& models, const OpenEdges
 
 struct CodedStep {
     Step step;
-    std::uint32_t vertex;  // the visiting number; none for a new vertex and for stop
+    std::uint32_t vertex;  // the visiting number; none if the vertex is new, or for stop
 };
 
 // The contexts of a step, each clipped to a class.
 struct StepContexts {
-    std::uint32_t situation = 0;  // 0: no end candidate, 1: one triangle fills the gap, 2 .. 4: by the last step
+    std::uint32_t situation = 0;  // 0: no end candidate, 1: one triangle fills the gap, 2 .. 4: depending on the last
+                                  // step
     std::uint32_t length = 0;     // triangles in the fan, up to 7
-    std::uint32_t ways = 0;       // 0 .. 3: left and right exist
-    bool turned = false;          // the last step went left or right
-    // Coded triangles at the focus (up to 15) and (up to 7) at the vertices around the gap.
+    std::uint32_t ways = 0;       // 0 .. 3: which of left and right exist
+    bool turned = false;          // whether the last step went left or right
+    // Number of coded triangles at the focus (up to 15) and at the vertices around the gap (up to 7).
     std::uint32_t focus = 0, current = 0, end = 0, left = 0, right = 0, behind = 0, beyond = 0;
     FanHints hints;
 };
@@ -356,7 +357,7 @@ bool code_closes(Coder& coder, FanModels& models, const StepContexts& c, bool wa
         wanted);
 }
 
-// The next step of the fan; wanted.vertex counts for close and known_vertex. In a corrupt stream the vertex may be out
+// The next step of the fan; wanted.vertex is used for close and known_vertex. In a corrupt stream the vertex may be out
 // of range.
 template <class Coder>
 CodedStep code_step(Coder& coder, FanModels& models, const OpenEdges& edges, const FanState& fan, const FanHints& hints,
@@ -380,7 +381,7 @@ CodedStep code_step(Coder& coder, FanModels& models, const OpenEdges& edges, con
     return {Step::known_vertex, code_known_vertex(coder, models, edges, fan, wanted.vertex)};
 }
 
-// How a fan gets to a vertex of this visiting number (none: not visited yet).
+// How a fan reaches the vertex of this visiting number (none: not visited yet).
 inline CodedStep classify_step(const FanState& fan, std::uint32_t number) {
     if (number == OpenEdges::none) return {Step::new_vertex, number};
     for (std::uint32_t i = 0; i < fan.end_count; ++i)
@@ -397,7 +398,7 @@ inline void advance(FanState& fan, const CodedStep& step) {
     ++fan.length;
 }
 
-// Where a fan starts: from_candidate and start are set, start to none for a new vertex. `wanted` is the start, or none.
+// Where a fan starts: sets from_candidate and start (none for a new vertex). `wanted` is the start, or none.
 template <class Coder>
 void code_start(Coder& coder, FanModels& models, const OpenEdges& edges, FanState& fan, std::uint32_t wanted) {
     std::array<std::uint32_t, most_candidates> starts{};
@@ -500,20 +501,21 @@ public:
     }
 
     bool has_triangles(std::uint32_t vertex) const { return first_corner_[vertex] < first_corner_[vertex + 1]; }
-    // Takes the uncoded triangles at the vertex; they count as coded from then on.
+    // Takes the triangles at the vertex that are not coded yet, and marks them as coded.
     void gather(std::uint32_t focus) {
         links_.clear();
         unled_cursor_ = cursor_ = 0;
         for (std::uint32_t c = first_corner_[focus]; c < first_corner_[focus + 1]; ++c) {
             const std::uint32_t t = corner_triangle_[c];
-            if (coded_[t]) continue;  // also the second corner that a degenerate triangle has here
+            if (coded_[t]) continue;  // also skips the second corner of a degenerate triangle here
             coded_[t] = true;
             const Triangle& triangle = triangles_[t];
             const std::size_t corner = triangle[0] == focus ? 0 : triangle[1] == focus ? 1 : 2;
             links_.push_back({triangle[(corner + 1) % 3], triangle[(corner + 2) % 3], none});
         }
         remaining_ = links_.size();
-        for (std::size_t i = links_.size(); i-- > 0;) {  // backwards, so that each vertex's first link is found first
+        for (std::size_t i = links_.size(); i-- > 0;) {  // backwards, so that each vertex's first link ends up at the
+                                                         // front
             links_[i].next = head_[links_[i].from];
             head_[links_[i].from] = static_cast<std::uint32_t>(i);
             ++arriving_[links_[i].to];
@@ -521,7 +523,7 @@ public:
     }
     std::size_t remaining() const { return remaining_; }
     bool leads_on(std::uint32_t vertex) const { return head_[vertex] != none; }
-    // A vertex from which a link leads on, one that no link leads to where there is one. Needs remaining() > 0.
+    // A vertex with an outgoing link; if possible, one without an incoming link. Needs remaining() > 0.
     std::uint32_t any_start() {
         for (; unled_cursor_ < links_.size(); ++unled_cursor_) {
             const std::uint32_t from = links_[unled_cursor_].from;
@@ -547,18 +549,19 @@ private:
     std::span<const Triangle> triangles_;
     std::vector<std::uint32_t> first_corner_, corner_triangle_;  // the triangles at each vertex
     std::vector<bool> coded_;
-    std::vector<Link> links_;              // of the focus
-    std::vector<std::uint32_t> head_;      // by vertex: its first link, or none
-    std::vector<std::uint32_t> arriving_;  // by vertex: how many links lead to it
+    std::vector<Link> links_;              // of the current focus
+    std::vector<std::uint32_t> head_;      // per vertex: its first link, or none
+    std::vector<std::uint32_t> arriving_;  // per vertex: number of links that lead to it
     std::size_t remaining_ = 0, unled_cursor_ = 0, cursor_ = 0;
 };
 
 struct FanOrder {
     std::vector<std::uint32_t> order;  // input index by visiting number
-    std::vector<Triangle> triangles;   // in visiting numbers, as decoded
+    std::vector<Triangle> triangles;   // in visiting numbers, in the order of decoding
 };
 
-// Where the next fan at the focus starts: at a start candidate if a link leads on from one. An input index.
+// Where the next fan at the focus starts: at a start candidate that has an outgoing link, if there is one. An input
+// index.
 inline std::uint32_t choose_start(FocusLinks& links, const OpenEdges& edges, std::uint32_t focus,
                                   const std::vector<std::uint32_t>& order) {
     std::uint32_t edge = edges.first_in(focus);
@@ -587,7 +590,7 @@ FanOrder encode_fans(Coder& coder, FanModels& models, std::uint32_t vertex_count
         edges.add_vertex();
         return number_of[vertex];
     };
-    // One fan at the focus: its start, then its steps.
+    // Codes one fan at the focus: its start, then its steps.
     const auto code_fan = [&](FanState& fan) {
         std::uint32_t vertex = choose_start(links, edges, fan.focus, result.order);
         code_start(coder, models, edges, fan, number_of[vertex]);

@@ -11,7 +11,7 @@ namespace htvm {
 using namespace internal;
 namespace {
 
-// The distances to each bone's axis of the vertices that eq. 3 gives it.
+// The distances of vertices to the axis of the bone that eq. 3 assigns them to, by bone.
 std::vector<std::vector<double>> axis_distances(std::span<const LatticePoint> vertices,
                                                 std::span<const BoneCylinder> bones) {
     std::vector<std::vector<double>> out(bones.size());

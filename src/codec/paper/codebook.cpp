@@ -10,7 +10,7 @@
 namespace htvm::internal {
 namespace {
 
-// 2^-(length / 8), over 2^30.
+// 2^-(length / 8), in units of 2^-30.
 std::uint64_t probability_of_length(std::uint16_t length) {
     // 2^30 * 2^(-i/8) for i = 0..7, rounded.
     constexpr std::array<std::uint32_t, 8> fractions = {1073741824, 984625594, 902905651, 827968132,
@@ -20,8 +20,8 @@ std::uint64_t probability_of_length(std::uint16_t length) {
 
 }  // namespace
 
-// The code lengths say how often each index is expected: with them as starting probabilities no table is sent twice,
-// and a codebook kept from an earlier frame still adapts to this one.
+// The code lengths tell how often each index is expected. Used as starting probabilities, they make a separate table
+// unnecessary, and a codebook kept from an earlier frame still adapts to this one.
 SymbolModel index_model(const Codebook& codebook) {
     const auto symbols = static_cast<std::uint32_t>(codebook.lengths.size());
     auto model = SymbolModel::for_alphabet(symbols);
@@ -33,13 +33,14 @@ SymbolModel index_model(const Codebook& codebook) {
         if (mass[node] == 0) continue;
         const std::uint64_t one = (mass[2 * node + 1] << 16) / mass[node];
         model.node(node).one = static_cast<std::uint16_t>(std::clamp<std::uint64_t>(one, 48, 65535 - 48));
-        model.node(node).seen = 24;  // as sure as after two dozen decisions; 8 to 110 measure alike
+        model.node(node).seen = 24;  // as confident as after about 24 decisions; values from 8 to 110 measure the same
     }
     return model;
 }
 
 std::vector<std::uint8_t> encode_codebook(const Codebook& codebook) {
-    // Codewords are sent over their greatest common divisor: the encoder may have rounded them to a coarser grid.
+    // Codewords are sent divided by their greatest common divisor, since the encoder may have rounded them to a coarser
+    // grid.
     std::int32_t scale = 0;
     for (const auto& codeword : codebook.codewords)
         for (const auto c : codeword) scale = std::gcd(scale, c);

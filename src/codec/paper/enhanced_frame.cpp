@@ -44,7 +44,7 @@ std::vector<Value> of_references(const std::vector<Value>& values, std::span<con
     return out;
 }
 
-// Colours, normals and texture coordinates, where the reference has them.
+// Decodes colours, normals and texture coordinates, if the reference has them.
 Result<void> decode_attributes(const FramePayloadView& payload, const EnhancedFrameContext& context,
                                std::span<const QuantisedTransform> transforms,
                                std::span<const std::uint32_t> reference_of, LatticeMesh& mesh) {

@@ -1,6 +1,6 @@
-// EP-frames (paper, section IV): the reference mesh moved bone by bone, corrected by quantised residuals, with a
-// connectivity of its own. This is the decoder, and the arithmetic that the encoder shares with it so that both see the
-// same mesh; the encoder is in enhanced_frame_enc.h.
+// EP-frames (paper, section IV): the reference mesh moved bone by bone, corrected by quantised residuals, with
+// connectivity of its own. This is the decoder, together with the arithmetic that the encoder shares with it so that
+// both see the same mesh; the encoder is in enhanced_frame_enc.h.
 #pragma once
 
 #include <span>
@@ -14,8 +14,8 @@ namespace htvm::internal {
 
 struct EnhancedFrameContext {
     const ReferenceMesh& reference;
-    const Codebook* geometry_codebook;  // null where it did not arrive
-    const Codebook* colour_codebook;    // likewise; needed only where the reference has colours
+    const Codebook* geometry_codebook;  // null if it did not arrive
+    const Codebook* colour_codebook;    // the same; needed only if the reference has colours
     int nearest_vertices;               // m
     Threads threads;
 };
@@ -28,23 +28,23 @@ struct DecodedEnhancedFrame {
 Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayloadView& payload,
                                                    const EnhancedFrameContext& context);
 
-// Motion-based coding (paper, section V): which bones' sub-meshes the frame codes; the rest is animated, and zippered
-// to what is coded. One bit per bone, bone i in bit i % 8 of byte i / 8.
+// Motion-based coding (paper, section V): the set of bones whose sub-meshes the frame codes. The rest is animated, and
+// zippered to the coded part. One bit per bone, bone i in bit i % 8 of byte i / 8.
 std::vector<std::uint8_t> write_coded_bones(const std::vector<bool>& coded);
 Result<std::vector<bool>> read_coded_bones(std::span<const std::uint8_t> bytes, std::size_t bones);
 
-// One per reference vertex: 1 where its bone is coded. Residuals refer to such vertices alone.
+// One per reference vertex: 1 if its bone is coded. Residuals refer only to such vertices.
 std::vector<std::uint8_t> vertices_of_coded_bones(const ReferenceMesh& reference, const std::vector<bool>& coded);
-// The opposite: 1 where the vertex stands for a part that is animated.
+// The opposite: 1 if the vertex belongs to a part that is animated.
 std::vector<std::uint8_t> still_vertices(const ReferenceMesh& reference, const std::vector<bool>& coded);
 
-// The reference vertex of each residual in E^ord, from how many residuals each reference vertex has.
+// The reference vertex of each residual in E^ord, from the number of residuals of each reference vertex.
 std::vector<std::uint32_t> references_of_residuals(std::span<const std::uint32_t> residuals_of, std::size_t residuals);
 
-// A predicted vertex corrected by a residual, kept within the lattice.
+// A predicted vertex plus a residual, clamped to the lattice.
 LatticePoint add_residual(LatticePoint predicted, const std::array<std::int32_t, 3>& residual);
 
-// A reference colour corrected by a residual, kept within 0..255.
+// A reference colour plus a residual, clamped to 0..255.
 Colour add_colour(Colour reference, const std::array<std::int32_t, 3>& residual);
 
 }  // namespace htvm::internal

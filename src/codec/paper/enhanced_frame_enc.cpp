@@ -17,7 +17,7 @@
 namespace htvm::internal {
 namespace {
 
-// A bone's vertices are eligible together.
+// The vertices of a bone are either all eligible or none.
 bool is_eligible(const ReferenceMesh& reference, std::span<const std::uint8_t> eligible, std::size_t bone) {
     const auto vertices = reference.sub_meshes.of(bone);
     return !vertices.empty() && (eligible.empty() || eligible[vertices.front()] != 0);
@@ -46,7 +46,7 @@ std::vector<std::uint32_t> find_reference_vertices(
         candidates = eligible_references(eligible, predicted.size());
         all.emplace(tree_of(predicted, candidates));
     }
-    // The trees stand in the reference's own space: a vertex is taken back there, not the sub-mesh forth.
+    // The trees are in the reference's own space, so each vertex is moved back there instead of moving the sub-mesh.
     std::vector<RigidMotion> back;
     for (std::size_t bone = 0; bone < transforms.size(); ++bone)
         back.push_back(motion_of(transforms[bone], reference.pivots[bone]).inverse());
@@ -87,11 +87,11 @@ ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex
 
 namespace {
 
-// Everything of the frame's vertices in the order E^ord, one entry a residual.
+// The data of the frame's vertices in the order E^ord, one entry per residual.
 struct OrderedResiduals {
     ResidualOrder order;
     QuantisedResiduals geometry, colour;
-    LatticeMesh decoded;  // vertices only
+    LatticeMesh decoded;  // its vertices only
 };
 
 std::vector<ResidualVector> position_residuals(const LatticeMesh& mesh, std::span<const LatticePoint> predicted,
@@ -117,8 +117,8 @@ std::vector<ResidualVector> colour_residuals(const LatticeMesh& mesh, const Latt
     return out;
 }
 
-// A codebook is tried as it is; only where the frame no longer suits it is a new one trained, and taken if it costs
-// less with the bits that sending it takes.
+// The existing codebook is tried first. A new one is trained only if it no longer suits the frame, and used if it costs
+// less, including the bits for sending it.
 QuantisedResiduals quantise_with(CodebookInUse& use, std::span<const ResidualVector> residuals,
                                  const QuantiserOptions& options) {
     constexpr double worth_training = 1.02;
@@ -147,7 +147,7 @@ QuantisedResiduals quantise_with(CodebookInUse& use, std::span<const ResidualVec
     return fresh;
 }
 
-// What the decoder adds up: predicted vertices and reference attributes plus quantised residuals.
+// The decoder's sum: predicted vertices and reference attributes plus quantised residuals.
 LatticeMesh decode_vertices(const LatticeMesh& mesh, const ReferenceMesh& reference,
                             std::span<const LatticePoint> predicted, const OrderedResiduals& residuals) {
     LatticeMesh out;
@@ -162,7 +162,7 @@ LatticeMesh decode_vertices(const LatticeMesh& mesh, const ReferenceMesh& refere
     return out;
 }
 
-// Residuals against the predicted mesh, quantised, and what they decode to.
+// Residuals against the predicted mesh, quantised, and the values they decode to.
 OrderedResiduals quantise_residuals(const EnhancedFrameSource& source, std::span<const std::uint8_t> eligible,
                                     Codebooks& codebooks, const EnhancedFrameOptions& options, StageClock& clock) {
     const auto& mesh = *source.mesh;
@@ -191,13 +191,13 @@ std::vector<Value> selected(const std::vector<Value>& values, const std::vector<
     return out;
 }
 
-// Leaves out the residuals of merged vertices, before any layer is coded, so that they cost nothing in any; the
-// triangles follow into the numbering of E^ord.
+// Removes the residuals of merged vertices before any layer is coded, so that they cost nothing in any layer. Returns
+// the triangles in the numbering of E^ord.
 std::vector<Triangle> remove_duplicates(OrderedResiduals& residuals, const std::vector<Triangle>& triangles,
                                         bool merge) {
     auto& order = residuals.order;
     const auto merging = merge ? find_duplicates(residuals.decoded) : no_duplicates(order.vertex.size());
-    Merging of_source;  // from the captured mesh's own numbering
+    Merging of_source;  // from the numbering of the captured mesh
     of_source.number.resize(order.vertex.size());
     for (std::size_t k = 0; k < order.vertex.size(); ++k) of_source.number[order.vertex[k]] = merging.number[k];
     auto out = merged_triangles(triangles, of_source, merge);
@@ -213,7 +213,7 @@ std::vector<Triangle> remove_duplicates(OrderedResiduals& residuals, const std::
     return out;
 }
 
-// The layers that need no connectivity.
+// Codes the layers that do not need connectivity.
 void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrameSource& source,
                           std::span<const std::uint8_t> eligible, const Codebooks& codebooks, FramePayload& payload) {
     const auto& reference = *source.reference;

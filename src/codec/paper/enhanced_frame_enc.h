@@ -1,6 +1,6 @@
-// EP-frames, encoding side (paper, section IV and Fig. 2): each vertex of the frame finds its reference vertex on the
-// predicted mesh (eq. 6), the residuals are put in the order E^ord and quantised, duplicates merge, and what is left is
-// coded layer by layer.
+// EP-frames, encoder side (paper, section IV and Fig. 2). Each vertex of the frame finds its reference vertex on the
+// predicted mesh (eq. 6). The residuals are put in the order E^ord and quantised, duplicates are merged, and the rest
+// is coded layer by layer.
 #pragma once
 
 #include <optional>
@@ -16,20 +16,20 @@
 
 namespace htvm::internal {
 
-// Which reference vertices a vertex may be coded against. The stream does not care how the encoder chose.
+// Which reference vertices a vertex may be coded against. The stream does not depend on how the encoder chooses.
 enum class ReferenceChoice : std::uint8_t {
-    bone,  // the paper's: the nearest vertex of A(b_P), the last correspondence of the registration
-    any,   // the nearest vertex of the whole predicted mesh: a vertex whose bone was guessed wrong does not refer to
-           // another limb by a long residual
+    bone,  // as in the paper: the nearest vertex of A(b_P), the last correspondence of the registration
+    any,   // the nearest vertex of the whole predicted mesh, so that a vertex whose bone was guessed wrong does not
+           // refer to another limb with a long residual
 };
 
-// A codebook in use: kept from frame to frame as long as that is cheaper than a new one.
+// A codebook in use: kept from frame to frame as long as this is cheaper than a new one.
 struct CodebookInUse {
     std::optional<Codebook> codebook;
     std::uint32_t number = 0;
-    double cost_when_new = 0;  // lagrangian a residual in the frame that it was trained on
-    bool is_new = false;       // trained in this frame: it must be sent
-    std::uint32_t sent = 0;    // number of the frame that it was sent with last
+    double cost_when_new = 0;  // Lagrangian cost per residual in the frame that it was trained on
+    bool is_new = false;       // trained in this frame, so it must be sent
+    std::uint32_t sent = 0;    // number of the frame that it was last sent with
 };
 
 struct EnhancedFrameOptions {
@@ -40,50 +40,51 @@ struct EnhancedFrameOptions {
     Threads threads = {};
 };
 
-// What of the frame is coded, and against what.
+// The part of the frame to code, and what to code it against.
 struct EnhancedFrameSource {
     const LatticeMesh* mesh = nullptr;          // the captured mesh, or the moving part of it
-    std::span<const BoneIndex> bone_of_vertex;  // of that mesh
+    std::span<const BoneIndex> bone_of_vertex;  // one per vertex of that mesh
     const FrameMotion* motion = nullptr;        // of the whole frame
     const ReferenceMesh* reference = nullptr;
     const ReferenceSearch* search = nullptr;
     std::span<const std::uint32_t>
-        nearest;                    // of each vertex the nearest of the predicted mesh, where known; else empty
-    std::vector<bool> coded_bones;  // motion-based coding: one per bone; empty: all of the frame is coded
+        nearest;                    // for each vertex, the nearest vertex of the predicted mesh, if known; else empty
+    std::vector<bool> coded_bones;  // for motion-based coding, one per bone; empty: the whole frame is coded
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
 };
 
-// Codebooks as they were before the frame go in, and come out as the frame used them.
+// In: the codebooks before the frame. Out: as the frame uses them.
 struct Codebooks {
     CodebookInUse geometry, colour;
 };
 
 struct EncodedEnhancedFrame {
     FramePayload payload;
-    LatticeMesh mesh;  // what the decoder will have
+    LatticeMesh mesh;  // the mesh that the decoder will have
     std::vector<std::uint32_t> distance_order_counts;
 };
 
-// The mesh must have the attributes that the reference has, and the reference a vertex that may be referred to.
-// stages: times are added.
+// The mesh must have the same attributes as the reference, and the reference at least one eligible vertex. stages:
+// times are added to it.
 EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages);
 
-// The first two steps by themselves.
+// The first two steps, available separately for tests.
 
-// The reference vertex of each vertex of the frame. The reference mesh must have a vertex; where A(b_P) is empty, the
-// nearest of all is taken. eligible: empty, or one per reference vertex: those with 0 are never chosen (motion-based
-// coding); at least one must be eligible. nearest: empty, or of each frame vertex the nearest predicted one.
+// The reference vertex of each vertex of the frame. The reference mesh must have a vertex. If A(b_P) is empty, the
+// nearest vertex of all is taken. eligible: empty, or one per reference vertex; those with 0 are never chosen
+// (motion-based coding), and at least one must be eligible. nearest: empty, or for each frame vertex the nearest
+// predicted one.
 std::vector<std::uint32_t> find_reference_vertices(
     const ReferenceMesh& reference, const ReferenceSearch& search, std::span<const LatticePoint> predicted,
     std::span<const QuantisedTransform> transforms, std::span<const LatticePoint> frame,
     std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
     std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads);
 
-// E^ord: the frame's vertices by ascending reference vertex, and in their own order where that is the same. It is set
-// by the geometry, not by the connectivity, and lets the mapping layer say by counts alone where each residual belongs.
+// E^ord: the frame's vertices by ascending reference vertex; vertices with the same one keep their order. It follows
+// from geometry, not from connectivity, so the mapping layer needs only counts to tell where each residual belongs.
 struct ResidualOrder {
-    std::vector<std::uint32_t> vertex;     // of the frame, one per residual
+    std::vector<std::uint32_t> vertex;     // index in the frame, one per residual
     std::vector<std::uint32_t> reference;  // its reference vertex
 };
 ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex, std::size_t references);

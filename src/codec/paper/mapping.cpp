@@ -10,7 +10,7 @@
 namespace htvm::internal {
 namespace {
 
-// Twice the triangle's area; differences have 26 bits, so the products and the root are IEEE doubles' plain ones.
+// Twice the triangle's area. Differences have 26 bits, so the products are exact and the root is that of IEEE 754.
 double double_area(LatticePoint a, LatticePoint b, LatticePoint c) {
     const LatticePoint u = b - a, v = c - a;
     const double ux = u.x, uy = u.y, uz = u.z, vx = v.x, vy = v.y, vz = v.z;
@@ -38,13 +38,13 @@ std::vector<std::uint8_t> area_classes(std::span<const LatticePoint> positions, 
     return out;
 }
 
-// Walks the graph of Fig. 4 and codes the bit c_q of the node it stands on. Of its contexts, the last runs say how
-// dense residuals are here; the area, that a large patch is hit more often; the neighbours' surplus, that a part of the
-// surface which a neighbour has taken is not taken twice. The contexts from the mesh save 6 % of the layer.
+// Walks the graph of Fig. 4 and codes the bit c_q of each node. The contexts: the last runs tell how dense residuals
+// are here; the area tells that a large patch is hit more often; the surplus of the neighbours tells that a residual
+// which a neighbour took is not taken twice. The contexts from the mesh save 6 % of the layer.
 class MappingContext {
 public:
     explicit MappingContext(const MappingPrior& prior) : prior_(prior) {}
-    // To reference vertex k; residuals_of holds the counts of those before it.
+    // Moves to reference vertex k; residuals_of holds the counts of the vertices before it.
     void stand_on(std::size_t k, std::span<const std::uint32_t> residuals_of) {
         area_ = prior_.area_class[k];
         std::uint32_t known = 0;
@@ -56,8 +56,8 @@ public:
         known_ = std::min<std::uint32_t>(known, 7);
         surplus_ = static_cast<std::uint32_t>(std::clamp(surplus, -4, 4) + 4);
     }
-    // The n-th decision at this vertex: from its node (n = 0), whether a residual follows (1) or the next reference
-    // vertex (0); from its n-th residual's node, whether there is no further one (1) or one more (0).
+    // The n-th decision at this vertex. At its own node (n = 0): a residual follows (1) or the next reference vertex
+    // (0). At the node of its n-th residual: there is no further residual (1) or one more (0).
     template <class Coder>
     bool code(Coder& coder, std::uint32_t n, bool wanted) {
         const std::uint32_t stage = std::min<std::uint32_t>(n, 5);
@@ -67,7 +67,7 @@ public:
                                         &by_neighbours_[stage][known_][surplus_], &by_both_[stage][area_][surplus_]},
             wanted);
     }
-    // The reference vertex had n residuals.
+    // Leaves a reference vertex that had n residuals.
     void leave(std::uint32_t n) {
         before_that_ = std::min<std::uint32_t>(before_, 2);
         before_ = last_;
@@ -85,9 +85,9 @@ private:
     std::array<std::array<std::array<BinaryModel, 9>, 10>, 6> by_both_;
 };
 
-// Codes the counts of the reference vertices, of which `left` residuals are to be shared out: the encoder's counts stay
-// as they are, the decoder's become what is read. Behind the last residual, and behind the last reference vertex, both
-// sides know what follows. False where the bytes end too early.
+// Codes how `left` residuals are distributed over the reference vertices. The encoder's counts stay as they are; the
+// decoder's are set to what is read. After the last residual, and after the last reference vertex, nothing more needs
+// to be coded. False if the bytes end too early.
 template <class Coder>
 bool code_counts(Coder coder, const MappingPrior& prior, std::span<const std::uint32_t> references, std::size_t left,
                  std::span<std::uint32_t> residuals_of) {
@@ -118,7 +118,8 @@ MappingPrior make_mapping_prior(std::span<const LatticePoint> positions, std::sp
     constexpr std::uint32_t most_neighbours = 8;
     MappingPrior out;
     out.area_class = area_classes(positions, triangles);
-    // Each triangle (a, b, c) gives each corner the next corner around it: an inner vertex gets every neighbour once.
+    // Each triangle (a, b, c) gives each corner the next corner as a neighbour, so an inner vertex gets every neighbour
+    // once.
     std::vector<std::uint32_t> count(positions.size(), 0);
     const auto each_lower = [&](const auto& take) {
         for (const auto& t : triangles)

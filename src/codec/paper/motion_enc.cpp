@@ -82,7 +82,7 @@ std::vector<RigidMotion> register_bones(const ReferenceSearch& reference, std::s
             out[bone] = register_points(sub_mesh, reference.normals[bone], points, out[bone], options);
         }
     };
-    // Each piece takes the next bone that is left: sub-meshes differ much in size.
+    // Each thread takes the next bone that is left, since sub-meshes differ greatly in size.
     parallel_for(std::min<std::size_t>(threads.count, out.size()), threads, 1, work);
     return out;
 }

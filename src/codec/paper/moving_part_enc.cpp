@@ -9,11 +9,12 @@
 namespace htvm::internal {
 namespace {
 
-// Distances to the surface of a mesh by the plane through its nearest vertex: quick, and near enough to choose by.
+// Distances to the surface of a mesh, estimated by the plane through its nearest vertex: fast, and accurate enough for
+// a choice.
 struct Planes {
     NearestPoints tree;
     std::vector<Point3f> normals;
-    float reach = 0;  // farther from the nearest vertex than this, the surface has ended
+    float reach = 0;  // points farther than this from the nearest vertex are beyond the end of the surface
 
     Planes(std::span<const Point3f> points, std::span<const Triangle> triangles, double edge)
         : tree(points), normals(points_of(vertex_normals(points, triangles))), reach(static_cast<float>(3 * edge)) {}
@@ -40,7 +41,7 @@ struct Sums {
 
 AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& reference,
                                std::span<const LatticePoint> predicted, bool both_ways, Threads threads) {
-    constexpr std::size_t stride = 4;  // the way back is sampled
+    constexpr std::size_t stride = 4;  // in this direction, only every n-th vertex is measured
     const auto captured_points = points_of(mesh.positions), predicted_points = points_of(predicted);
     const double edge = mean_edge(reference.mesh.positions, reference.mesh.triangles);
     const std::size_t bones = reference.pivots.size();

@@ -16,14 +16,14 @@ namespace htvm::internal {
 namespace {
 
 // A triangulation of known points is far from random, and the decoder has all positions before the first triangle. So
-// the distance order is asked candidate by candidate, nearest first, in contexts of the angles that the new triangle
-// would have; and the fans' own decisions get the angles that their next step could close. A context is a class of an
-// angle or of a ratio, compared in doubles by + - * / alone, so that every machine gets the same ones.
+// the distance order is coded candidate by candidate, nearest first, in contexts of the angles that the new triangle
+// would have, and the fans' own decisions get the angles that their next step could close. A context is a class of an
+// angle or a ratio, compared in doubles by + - * / alone, so that every machine finds the same class.
 
 struct DistanceOrderModels {
     std::array<std::array<BinaryModel, 2048>, 4> is_it;
     std::array<Mixer<4>, 64> mixer;
-    UnsignedModel far;  // for an index that no distance order names
+    UnsignedModel far;  // for an index outside the distance order
 };
 
 struct Vector {
@@ -37,10 +37,10 @@ double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Vector cross(Vector a, Vector b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 Vector operator+(Vector a, Vector b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 
-// The square of a cosine, with its sign: compared instead of cosines, so that no root is needed.
+// The square of a cosine, with its sign. Comparing these instead of cosines needs no root.
 constexpr double signed_square(double cosine) { return cosine < 0 ? -cosine * cosine : cosine * cosine; }
 
-// How many of the descending cosines the angle's cosine is below; 0 where a side has no length.
+// How many of the descending cosines are above the cosine of the angle; 0 if a side has no length.
 template <std::size_t N>
 std::uint32_t count_below(Vector a, Vector b, const std::array<double, N>& squares) {
     const double product = dot(a, b), square = product < 0 ? -product * product : product * product;
@@ -50,7 +50,7 @@ std::uint32_t count_below(Vector a, Vector b, const std::array<double, N>& squar
     return count;
 }
 
-// Classes 1 .. 15 of a full turn from a to b around the normal: finer where small.
+// Classes 1 .. 15 of a full turn from a to b around the normal, finer for small turns.
 std::uint32_t turn_class(Vector a, Vector b, Vector normal) {
     constexpr std::array<double, 10> forward = {
         signed_square(0.94), signed_square(0.82),  signed_square(0.68),  signed_square(0.5),   signed_square(0.3),
@@ -60,7 +60,7 @@ std::uint32_t turn_class(Vector a, Vector b, Vector normal) {
     return 15 - count_below(a, b, folded);
 }
 
-// Classes 1 .. 7 of an angle up to a half turn; 7 where it is more.
+// Classes 1 .. 7 of an angle up to 180 degrees; 7 beyond that.
 std::uint32_t angle_class(Vector a, Vector b, Vector normal) {
     constexpr std::array<double, 5> limits = {signed_square(0.76), signed_square(0.5), signed_square(0.2),
                                               signed_square(-0.17), signed_square(-0.5)};
@@ -97,36 +97,36 @@ FanHints VisitedPositions::hints(const FanState& fan) const {
     return hints;
 }
 
-// Most vertices are found among so many; only where one is not are the other m nearest searched for.
+// Most vertices are found among the first few; the rest of the m nearest are searched for only if one is not.
 constexpr std::size_t first_look = 8;
 
-// An unvisited vertex as the next boundary vertex of a fan. Its misfit grows with the cotangent of the new triangle's
-// angle at it (smallest where the triangle would be the Delaunay one), and is huge where the triangle folds back.
+// An unvisited vertex as a candidate for the fan's next boundary vertex. Its misfit grows with the cotangent of the new
+// triangle's angle at the vertex (it is smallest for the Delaunay triangle) and is huge if the triangle folds back.
 struct Candidate {
     std::uint32_t vertex = 0;
     double misfit = 0;
 };
 
-// The contexts in which it is coded whether a candidate is the one.
+// The contexts for coding whether a candidate is the vertex.
 struct CandidateClasses {
     std::uint32_t stage = 0;  // 0: the fan's start, 1: no triangle behind, 2: no end to reach, 3: within a gap
-    std::uint32_t place = 0, left = 0;                  // 0 .. 7: candidates before and after it
-    std::uint32_t better_before = 0, better_after = 0;  // 0 .. 3: of these, the ones with less misfit
+    std::uint32_t place = 0, left = 0;                  // 0 .. 7: number of candidates before it and after it
+    std::uint32_t better_before = 0, better_after = 0;  // 0 .. 3: number of those with less misfit
     std::uint32_t fit = 0;                              // 0 .. 7: class of the misfit
-    std::uint32_t turn = 0;      // 0 .. 15: class of the angle at the focus from the current vertex to it
-    std::uint32_t distance = 0;  // 0 .. 7: class of its distance from the current vertex, by that to the focus
+    std::uint32_t turn = 0;      // 0 .. 15: class of the angle at the focus, from the current vertex to it
+    std::uint32_t distance = 0;  // 0 .. 7: class of its distance from the current vertex relative to that from the
+                                 // focus
 };
 
-// The not yet visited vertices among the m nearest to a focus, nearest first.
+// Of the m vertices nearest to a focus, those not yet visited, nearest first.
 class UnvisitedNear {
 public:
     UnvisitedNear(std::span<const LatticePoint> positions, int m, Threads threads);
     UnvisitedNear(const UnvisitedNear&) = delete;
     UnvisitedNear& operator=(const UnvisitedNear&) = delete;
 
-    // Calls traverse(), which calls what is below. With more than one thread, another searches for the nearest ones of
-    // all vertices meanwhile, ahead of the traversal, which searches itself where it is there first: both find the
-    // same.
+    // Calls traverse(), which uses the functions below. With several threads, another thread meanwhile searches for the
+    // first few nearest of every vertex. Where the traversal is ahead of it, it searches itself; both find the same.
     template <class Traversal>
     void search_beside(const Traversal& traverse) {
         struct Traversed {
@@ -146,8 +146,8 @@ public:
 
     bool visited(std::uint32_t vertex) const { return visited_[vertex]; }
     void visit(std::uint32_t vertex) { visited_[vertex] = true; }
-    // Sets candidates() as they are for the next boundary vertex of the fan: those among the `first_look` nearest, or,
-    // to be called after that, the farther ones too.
+    // look() sets candidates() for the next boundary vertex of the fan, from the `first_look` nearest. look_farther(),
+    // called after it, adds the farther ones.
     void look(const VisitedPositions& known, const FanState& fan, std::uint32_t focus);
     void look_farther(const VisitedPositions& known, const FanState& fan);
     std::span<const Candidate> candidates() const { return {candidates_.data(), count_}; }
@@ -160,12 +160,12 @@ private:
     std::span<const LatticePoint> positions_;
     NearestOrder order_;
     std::size_t m_;
-    std::vector<std::uint32_t> first_nearest_;  // by vertex, first_look each, of the vertices below searched_
+    std::vector<std::uint32_t> first_nearest_;  // first_look each, for the vertices below searched_
     std::atomic<std::size_t> searched_ = 0;
     std::atomic<bool> traversed_ = false;
-    Threads threads_ = {};  // the caller's alone where the mesh is too small for another
+    Threads threads_ = {};  // the caller's thread alone if the mesh is too small for more
     std::vector<bool> visited_;
-    std::uint32_t focus_;  // whose nearest vertices `nearest_` holds
+    std::uint32_t focus_;  // the vertex whose nearest vertices are in `nearest_`
     std::size_t found_ = 0, looked_ = 0, count_ = 0;
     std::array<std::uint32_t, mtfan_max_nearest> nearest_;
     std::array<Candidate, mtfan_max_nearest> candidates_;
@@ -263,7 +263,7 @@ CandidateClasses UnvisitedNear::classes(const VisitedPositions& known, const Fan
     return classes;
 }
 
-// Codes whether a candidate is the next boundary vertex, knowing that none before it is.
+// Codes whether a candidate is the next boundary vertex, given that none before it is.
 template <class Coder>
 bool code_is_it(Coder& coder, DistanceOrderModels& models, const CandidateClasses& c, bool wanted) {
     const std::uint32_t rank = c.better_after * 4 + c.stage;
@@ -277,8 +277,8 @@ bool code_is_it(Coder& coder, DistanceOrderModels& models, const CandidateClasse
         wanted);
 }
 
-// Codes the distance order of the vertex that the fan's step goes to: its place among the candidates, which are then
-// set, or candidates().size() where it is none of them.
+// Codes the distance order of the vertex that the fan's step leads to: its place among the candidates, which are set
+// before, or candidates().size() if it is not among them.
 template <class Coder>
 std::size_t code_distance_order(Coder& coder, DistanceOrderModels& models, UnvisitedNear& unvisited,
                                 const VisitedPositions& known, const FanState& fan, std::uint32_t focus,
@@ -295,9 +295,9 @@ std::size_t code_distance_order(Coder& coder, DistanceOrderModels& models, Unvis
     return place;
 }
 
-// Codes the index z of a vertex that is none of the candidates (the -z - 1 of eq. 8), by how far it is from the current
-// boundary vertex's index: neighbours have indices near each other where the positions come in an order along the
-// surface. In a corrupt stream it may be out of range.
+// Codes the index z of a vertex that is not among the candidates (-z - 1 in eq. 8), relative to the index of the
+// current boundary vertex: if the positions come in an order along the surface, neighbours have similar indices. In a
+// corrupt stream it may be out of range.
 template <class Coder>
 std::uint32_t code_index_directly(Coder& coder, DistanceOrderModels& models, std::uint32_t current,
                                   std::uint32_t wanted) {
@@ -306,7 +306,7 @@ std::uint32_t code_index_directly(Coder& coder, DistanceOrderModels& models, std
     return folded % 2 == 0 ? current + folded / 2 : current - folded / 2 - 1;
 }
 
-// What both sides know while the fans visit the vertices, and how they name the next one.
+// What both sides know while the fans visit the vertices, and how the next vertex is named.
 struct Visits {
     Visits(std::span<const LatticePoint> all, int m, Threads threads) : positions(all), unvisited(all, m, threads) {}
 
@@ -322,9 +322,9 @@ struct Visits {
         order.push_back(vertex);
     }
     struct Named {
-        std::uint32_t vertex = 0;  // in a corrupt stream it may be out of range, or visited
-        std::size_t place = 0;     // its distance order, where it has one
-        bool directly = false;     // it has none: its index is coded
+        std::uint32_t vertex = 0;  // may be out of range, or visited already, in a corrupt stream
+        std::size_t place = 0;     // its distance order, if it has one
+        bool directly = false;     // it has no distance order: its index is coded
     };
     template <class Coder>
     Named code_vertex(Coder coder, const FanState& fan, std::uint32_t wanted) {
@@ -336,12 +336,12 @@ struct Visits {
     }
 };
 
-// What encode_fans() and decode_fans() call for each vertex that the fans visit.
+// The callbacks of encode_fans() and decode_fans() for each vertex that the fans visit.
 struct EncodedOrders {
     static constexpr bool visits_isolated = true;
     Visits visits;
     RangeEncoder encoder;
-    std::vector<std::uint32_t> counts;  // by distance order; the last: coded directly
+    std::vector<std::uint32_t> counts;  // by distance order; the last entry: coded directly
 
     void seed(std::uint32_t vertex) { visits.visit(vertex); }
     FanHints hints(const FanState& fan) const { return visits.known.hints(fan); }
@@ -384,7 +384,7 @@ EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::
     RangeEncoder encoder;
     WritingCoder<RangeEncoder> coder{encoder};
     const auto models = std::make_unique<FanModels>();
-    // On the heap: the models and candidates are large.
+    // On the heap, because the models and candidates are large.
     const auto discovery = std::unique_ptr<EncodedOrders>(
         new EncodedOrders{{decoded_positions, m, threads}, {}, std::move(result.distance_order_counts)});
     FanOrder fans;

@@ -1,6 +1,6 @@
 // Connectivity of an EP-frame: M-TFAN (the paper's section IV-D). The decoder already has the vertices, in an order of
-// their own, so the triangle fans of tfan.h say in addition which vertex each newly visited one is: by its generalised
-// distance order (eq. 8), its place among the not yet visited ones of the m vertices nearest to the fan's centre.
+// their own. So the triangle fans of tfan.h also tell which vertex each newly visited one is, by its generalised
+// distance order (eq. 8): its place among those of the m vertices nearest to the fan's centre that are not yet visited.
 #pragma once
 
 #include <cstdint>
@@ -16,22 +16,22 @@
 namespace htvm::internal {
 
 struct EncodedMtfan {
-    std::vector<std::uint8_t> fans;             // the layer that TFAN has too
-    std::vector<std::uint8_t> distance_orders;  // the layer that maps visits to vertices
-    // What the decoder returns: vertices keep the numbers of the positions; triangles in visiting order, each turned so
-    // that it starts with its focus.
+    std::vector<std::uint8_t> fans;             // the same layer as in TFAN
+    std::vector<std::uint8_t> distance_orders;  // the layer that assigns vertices to visits
+    // What the decoder returns: vertices keep the numbers of the positions; triangles are in visiting order, each
+    // rotated to begin with its focus.
     std::vector<Triangle> triangles;
-    // How often each distance order 0 .. m - 1 was coded; the last entry counts the escapes (directly coded indices).
+    // How often each distance order 0 .. m - 1 was coded; the last entry counts the escapes (indices coded directly).
     std::vector<std::uint32_t> distance_order_counts;
 };
 
-// decoded_positions: as the decoder has them, on the lattice. m: 1 .. mtfan_max_nearest, the paper's are 8, 16, 32.
+// decoded_positions: as the decoder has them, on the lattice. m: 1 .. mtfan_max_nearest; the paper uses 8, 16, 32.
 // Every triangle index must be < decoded_positions.size(). The bytes do not depend on the number of threads.
 EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::span<const Triangle> triangles, int m,
                           Threads threads);
 
-// corrupt_stream where m is out of range, the bytes name a vertex that cannot be, or end early. Work and memory are
-// bounded by the counts, as in decode_tfan, and by a search for nearest vertices for each vertex.
+// corrupt_stream if m is out of range, or if the bytes name an impossible vertex or end early. Time and memory are
+// bounded by the counts, as in decode_tfan, plus a search for the nearest vertices of each vertex.
 Result<std::vector<Triangle>> decode_mtfan(std::span<const std::uint8_t> fans,
                                            std::span<const std::uint8_t> distance_orders,
                                            std::span<const LatticePoint> positions, std::uint32_t triangle_count, int m,

@@ -18,12 +18,12 @@ std::int64_t beyond(std::int32_t low, std::int32_t high, std::int32_t c) {
 
 }  // namespace
 
-// The best found so far, ascending by (distance, index).
+// The best points found so far, ascending by (distance, index).
 struct NearestOrder::Search {
     LatticePoint centre;
     std::uint32_t centre_index = 0;
     std::size_t wanted = 0, found = 0;
-    // What a point must be below to enter.
+    // A point must be nearer than this to enter.
     std::int64_t worst_distance = std::numeric_limits<std::int64_t>::max();
     std::uint32_t worst_index = 0;
     std::array<std::int64_t, most_nearest> distances;
@@ -65,7 +65,7 @@ NearestOrder::NearestOrder(std::span<const LatticePoint> points) : entries_(poin
     bound_nodes();
 }
 
-// Sorts the entries of a range of leaves into its halves, along the longest side of their box.
+// Partitions the entries of a range of leaves into two halves, along the longest side of their box.
 void NearestOrder::split(std::size_t begin_leaf, std::size_t end_leaf) {
     if (end_leaf - begin_leaf < 2) return;
     const std::size_t middle_leaf = (begin_leaf + end_leaf) / 2;

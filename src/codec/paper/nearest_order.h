@@ -1,7 +1,7 @@
 // The exact order of the vertices nearest to a vertex (the paper's section IV-D), the same on every machine.
 //
-// A balanced k-d tree of tight bounding boxes, laid out without pointers. A query starts at the vertex's own leaf and
-// works upwards; ties are pruned too (each node knows its lowest index), so that many equal points cost no more than
+// A balanced k-d tree of tight bounding boxes, stored without pointers. A query starts at the vertex's own leaf and
+// works upwards. Ties are pruned too (each node knows its lowest index), so many equal points take no longer than
 // distinct ones.
 #pragma once
 
@@ -16,12 +16,11 @@ namespace htvm::internal {
 
 class NearestOrder {
 public:
-    // Points on the lattice (|coordinate| <= lattice_limit), at most 2^32 - 2 of them. O(n log n).
+    // Points must be on the lattice (|coordinate| <= lattice_limit), at most 2^32 - 2 of them. O(n log n).
     explicit NearestOrder(std::span<const LatticePoint> points);
 
-    // Writes the indices of the points nearest to points[of], itself left out, by ascending squared distance and, where
-    // equal, by ascending index; as many as there are and as `nearest` holds (at most 64). Returns how many. Many
-    // threads may call it at once.
+    // Writes the indices of the points nearest to points[of], excluding itself, by ascending squared distance, ties by
+    // ascending index: as many as there are and as fit in `nearest` (at most 64). Returns how many. Thread-safe.
     std::size_t find(std::uint32_t of, std::span<std::uint32_t> nearest) const;
 
 private:
@@ -30,7 +29,7 @@ private:
         std::uint32_t index = 0;
     };
     struct Node {
-        LatticePoint low, high;  // the box of the points below
+        LatticePoint low, high;  // the bounding box of the points below it
         std::uint32_t lowest_index = 0;
     };
     struct Search;

@@ -13,7 +13,7 @@
 namespace htvm::internal {
 namespace {
 
-constexpr double minimum_population = 3;  // a codeword takes some 20 bits of codebook, an escape some 15
+constexpr double minimum_population = 3;  // a codeword takes about 20 bits of the codebook, an escape about 15
 
 double lambda_in_units(const QuantiserOptions& o) { return o.lambda * o.step * o.step; }
 
@@ -30,7 +30,7 @@ double squared_error(const ResidualVector& a, const ResidualVector& b) {
     return sum;
 }
 
-// Bits of the escape's three components, roughly: an exponential Golomb code.
+// Approximate bits of the escape's three components, as coded by an exponential Golomb code.
 double escape_bits(const ResidualVector& value, std::int32_t step) {
     double bits = 0;
     for (const auto c : value) {
@@ -40,8 +40,8 @@ double escape_bits(const ResidualVector& value, std::int32_t step) {
     return bits;
 }
 
-// |e - c|^2 + lambda * length is a squared distance in four dimensions, from (e, 0) to (c, sqrt(lambda * length)): the
-// best codeword is an ordinary nearest neighbour.
+// |e - c|^2 + lambda * length is a squared distance in four dimensions, from (e, 0) to (c, sqrt(lambda * length)), so
+// the best codeword is an ordinary nearest neighbour.
 class CodewordSearch {
 public:
     CodewordSearch(const Codebook& codebook, double lambda) {
@@ -52,7 +52,7 @@ public:
         }
         if (!points_.empty()) tree_.emplace(4, *this, nanoflann::KDTreeSingleIndexAdaptorParams(8));
     }
-    // Index of the best codeword and its squared error + lambda * bits; an empty codebook gives infinity.
+    // Index of the best codeword, and its squared error + lambda * bits; infinity for an empty codebook.
     std::pair<std::size_t, double> best(const ResidualVector& e) const {
         if (points_.empty()) return {0, INFINITY};
         const std::array<float, 4> query = {static_cast<float>(e[0]), static_cast<float>(e[1]),
@@ -82,7 +82,7 @@ struct Cell {
     double population = 0;
 };
 
-// The starting cells: those of the cubic lattice that hold enough residuals, the fullest first.
+// The starting cells: those cells of the cubic lattice that hold enough residuals, fullest first.
 std::vector<Cell> lattice_cells(std::span<const ResidualVector> residuals, std::int32_t step) {
     constexpr std::int32_t reach = 1 << 20;
     std::vector<std::pair<std::uint64_t, std::uint32_t>> keys;
@@ -118,7 +118,7 @@ std::uint16_t code_length(double population, double total) {
     return static_cast<std::uint16_t>(std::clamp(std::lround(bits * 8), 0L, static_cast<long>(max_length)));
 }
 
-// Centroids on a grid fine enough to cost no distortion, sorted by code length.
+// Centroids, rounded to a grid that is fine enough not to add distortion, sorted by code length.
 Codebook codebook_of(const std::vector<Cell>& cells, double escapes, std::int32_t step) {
     double total = escapes;
     for (const auto& cell : cells) total += cell.population;
@@ -164,8 +164,8 @@ QuantisedResiduals quantise(std::span<const ResidualVector> residuals, const Cod
         for (std::size_t k = begin; k < end; ++k) {
             const auto& e = residuals[k];
             const auto [index, cost] = search.best(e);
-            // The escape's error is at most that of its cell's corner: where a codeword beats even a perfect escape,
-            // there is no need to look at it.
+            // The escape's error is at most half the diagonal of its cell. If the codeword beats even a perfect escape,
+            // the escape need not be tried.
             if (cost > lambda * (codebook.lengths[escape] / 8.0 + 3)) {
                 ResidualVector value{};
                 for (std::size_t c = 0; c < 3; ++c) value[c] = multiple(e[c], codebook.escape_step);

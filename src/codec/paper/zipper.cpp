@@ -18,13 +18,13 @@ namespace {
 
 using namespace zipping;
 
-// In mean sides of the triangles of both meshes. Cover reaches far enough for what prediction errors displace; a gap of
-// at least half a triangle is left, so that no stitch is a sliver.
+// In mean sides of the triangles of both meshes. Cover reaches far enough for typical prediction errors. A gap of at
+// least half a triangle is left, so that no stitch is a sliver.
 constexpr double cover_reach = 3, cover_clearance = 0.6, bridge_reach = 4, longest_stitch = 6;
 constexpr int rings_beyond_still = 1;
-// Bounds on the work, whatever the stream says.
+// Bounds on the work for any stream, including untrusted ones.
 constexpr int longest_filled = 64;          // edges of a hole
-constexpr std::size_t most_at_vertex = 64;  // edges that are looked at
+constexpr std::size_t most_at_vertex = 64;  // edges examined per vertex
 
 struct Surface {
     std::span<const LatticePoint> positions;
@@ -47,8 +47,8 @@ LatticePoint centre(LatticePoint a, LatticePoint b, LatticePoint c) {
     return {third(a.x, b.x, c.x), third(a.y, b.y, c.y), third(a.z, b.z, c.z)};
 }
 
-// Normals of the vertices with wanted[v] != 0: the sum over the triangles around, in their order, each as long as twice
-// its area. Those of other vertices mean nothing.
+// Normals of the vertices with wanted[v] != 0: the sum over the triangles around them, in their order, each weighted by
+// twice its area. The entries of other vertices are meaningless.
 std::vector<Direction> vertex_normals(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
                                       std::span<const std::uint8_t> wanted) {
     std::vector<Direction> out(positions.size());
@@ -60,7 +60,7 @@ std::vector<Direction> vertex_normals(std::span<const LatticePoint> positions, s
     return out;
 }
 
-// Mean length of the sides of all triangles; 0 where there are none.
+// Mean length of the sides of all triangles; 0 if there are none.
 double mean_side(const Surface& coded, const Surface& animated) {
     double sum = 0;
     std::size_t count = 0;
@@ -74,7 +74,7 @@ double mean_side(const Surface& coded, const Surface& animated) {
     return count == 0 ? 0 : sum / static_cast<double>(count);
 }
 
-// First half: which animated triangles stay, and the two borders that face each other across the gap.
+// First part: decides which animated triangles stay, and finds the two borders that face each other across the gap.
 
 // A side of a triangle, from its corner `side` to the next.
 struct TriangleSide {
@@ -83,12 +83,13 @@ struct TriangleSide {
 
 struct Trimmed {
     std::vector<std::uint8_t> kept;          // one per animated triangle
-    std::vector<TriangleSide> coded_seam;    // border sides of `coded` that lie over the part that is still
-    std::vector<TriangleSide> animated_cut;  // sides between a kept triangle and a dropped one; the kept one's
+    std::vector<TriangleSide> coded_seam;    // border sides of `coded` above the part that is still
+    std::vector<TriangleSide> animated_cut;  // sides between a kept triangle and a dropped one, as sides of the kept
+                                             // one
 };
 
-// The sides that no other triangle of `used` shares, in either direction, by triangle and side.
-// Only sides between two vertices with chosen[v] != 0 are looked at.
+// The sides that no other triangle of `used` shares in either direction, sorted by triangle and side. Only sides
+// between two vertices with chosen[v] != 0 are considered.
 std::vector<TriangleSide> border_sides(std::span<const Triangle> triangles, std::span<const std::uint32_t> used,
                                        std::span<const std::uint8_t> chosen) {
     std::vector<std::uint32_t> begin(chosen.size() + 2);
@@ -103,7 +104,8 @@ std::vector<TriangleSide> border_sides(std::span<const Triangle> triangles, std:
     };
     for_each_side([&](std::uint32_t low, std::uint32_t, TriangleSide) { ++begin[low + 2]; });
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
-    std::vector<std::pair<std::uint32_t, TriangleSide>> sides(begin.back());  // the higher end, by lower end
+    std::vector<std::pair<std::uint32_t, TriangleSide>> sides(begin.back());  // the higher end, grouped by the lower
+                                                                              // end
     for_each_side([&](std::uint32_t low, std::uint32_t high, TriangleSide at) {
         sides[begin[low + 1]++] = {high, at};
     });
@@ -123,7 +125,7 @@ std::vector<TriangleSide> border_sides(std::span<const Triangle> triangles, std:
     return out;
 }
 
-// Per triangle, a bit for each side that is listed; per vertex, whether it ends such a side.
+// For each triangle, one bit for each side that is listed; for each vertex, whether it is an end of such a side.
 struct SideMarks {
     std::vector<std::uint8_t> sides, vertices;
     SideMarks(std::span<const Triangle> triangles, std::size_t count, std::span<const TriangleSide> listed)
@@ -156,7 +158,7 @@ std::vector<std::uint8_t> candidates(const Surface& animated, std::span<const st
     return out;
 }
 
-// The border of the whole animated mesh, as far as it is needed for the triangles that the points lie on.
+// The border of the whole animated mesh, restricted to what the triangles under the points need.
 std::vector<TriangleSide> border_around(const Surface& animated, std::span<const SurfacePoint> points) {
     std::vector<std::uint8_t> own(animated.positions.size()), around(animated.positions.size());
     for (const SurfacePoint& p : points)
@@ -172,7 +174,7 @@ std::vector<TriangleSide> border_around(const Surface& animated, std::span<const
     return border_sides(animated.triangles, used, around);
 }
 
-// The box of all points, wider on every side.
+// The bounding box of all points, widened on every side.
 Box widened_box(std::span<const LatticePoint> points, std::int64_t by) {
     if (points.empty()) return {};
     Box box{points[0], points[0]};
@@ -189,9 +191,9 @@ bool overlap(const Box& a, const Box& b) {
            a.low.z <= b.high.z && b.low.z <= a.high.z;
 }
 
-// The parts of both meshes that may be near each other.
+// The parts of the two meshes that may be near each other.
 struct Near {
-    std::vector<std::uint32_t> coded, animated;  // triangles
+    std::vector<std::uint32_t> coded, animated;  // indices of triangles
 };
 Near near_each_other(const Surface& coded, const Surface& animated, std::span<const std::uint8_t> candidate,
                      std::int64_t reach) {
@@ -219,7 +221,7 @@ Near near_each_other(const Surface& coded, const Surface& animated, std::span<co
     return out;
 }
 
-// The border sides of the triangles listed.
+// The border sides of the listed triangles.
 std::vector<TriangleSide> border_of(const Surface& surface, std::span<const std::uint32_t> triangles) {
     std::vector<std::uint8_t> chosen(surface.positions.size());
     for (const std::uint32_t t : triangles)
@@ -232,7 +234,8 @@ std::vector<TriangleSide> border_of(const Surface& surface, std::span<const std:
     return border_sides(surface.triangles, used, chosen);
 }
 
-// The coded border sides that lie over the animated candidates, not beyond an edge of the captured surface itself.
+// The border sides of the coded mesh above the animated candidates; not those beyond an edge of the captured surface
+// itself.
 std::vector<TriangleSide> coded_seam_sides(const Surface& coded, const Surface& animated, const Near& near,
                                            std::int64_t reach, Threads threads) {
     const std::vector<TriangleSide> border = border_of(coded, near.coded);
@@ -252,7 +255,7 @@ std::vector<TriangleSide> coded_seam_sides(const Surface& coded, const Surface& 
     return out;
 }
 
-// Whether a point of the animated surface has the inside of the coded surface, or its very border, over it.
+// Whether a point of the animated surface is covered by the inside of the coded surface, or by its border.
 struct Cover {
     const Surface& coded;
     const SurfaceGrid& grid;
@@ -274,8 +277,8 @@ bool triangle_covered(const Surface& animated, std::uint32_t triangle, const Cov
            cover.of(middle(b, c), facing) == 2 || cover.of(middle(c, a), facing) == 2;
 }
 
-// Clears kept[t] of the listed triangles that are covered at a corner, or near the coded surface at the middle of a
-// side or at the centre.
+// Clears kept[t] of the listed triangles that are covered at a corner, or that are near the coded surface at the middle
+// of a side or at the centre.
 void drop_covered(const Surface& animated, std::span<const std::uint32_t> triangles, const Cover& cover,
                   Threads threads, std::vector<std::uint8_t>& kept) {
     std::vector<std::uint8_t> listed(animated.positions.size()), covered(animated.positions.size());
@@ -295,7 +298,7 @@ void drop_covered(const Surface& animated, std::span<const std::uint32_t> triang
     });
 }
 
-// Leaves in `kept` only what hangs together, through sides, with a triangle that has a still vertex away from the rim.
+// Keeps only triangles that are connected, through sides, to a triangle with a still vertex away from the rim.
 void drop_scraps(const Surface& animated, std::span<const std::uint8_t> still, std::span<const std::uint8_t> at_rim,
                  std::vector<std::uint8_t>& kept) {
     const auto anchored = [&](const Triangle& t) {
@@ -337,7 +340,7 @@ void drop_scraps(const Surface& animated, std::span<const std::uint8_t> still, s
             const std::uint64_t ends = std::uint64_t{low} << 32 | high;
             auto side = std::lower_bound(sides.begin(), sides.end(), ends,
                                          [](const Side& s, std::uint64_t wanted) { return s.ends < wanted; });
-            // A side is walked over once: what it leads to is reached then.
+            // Each side is visited once, since then everything it leads to has been reached.
             for (; side != sides.end() && side->ends == ends && side->triangle != none; ++side) {
                 if (!kept[side->triangle]) {
                     kept[side->triangle] = 1;
@@ -389,7 +392,7 @@ Trimmed trim(const Surface& coded, const Surface& animated, std::span<const std:
     return out;
 }
 
-// Second half: the gap between the two borders is closed with new triangles.
+// Second part: closes the gap between the two borders with new triangles.
 
 // One side of a border: the surface's triangle has it from `to` to `from`, a stitch has it from `from` to `to`.
 struct BorderSide {
@@ -398,13 +401,13 @@ struct BorderSide {
 };
 
 struct Gap {
-    std::vector<LatticePoint> positions;  // coded vertices, then animated ones
-    std::vector<Direction> normals;       // of vertices, any length; of border vertices only
+    std::vector<LatticePoint> positions;  // first the coded vertices, then the animated ones
+    std::vector<Direction> normals;       // of vertices, any length; set for border vertices only
     std::uint32_t coded_vertices = 0;
     std::vector<BorderSide> coded, animated;
-    std::vector<Triangle> around;    // all triangles of the surface that have two border vertices or more
-    std::vector<std::uint32_t> cut;  // of `around`, the animated ones: indices, ascending
-    double unit = 1;                 // mean side, lattice units
+    std::vector<Triangle> around;    // all triangles of the surface that have at least two border vertices
+    std::vector<std::uint32_t> cut;  // indices of the animated ones in `around`, ascending
+    double unit = 1;                 // mean side length, in lattice units
 };
 
 Gap gap_between(const Surface& coded, const Surface& animated, const Trimmed& trimmed, double unit) {
@@ -455,14 +458,14 @@ struct Edge {
     Direction normal;
 };
 
-struct Corner {  // candidate triangle: edge, and the corner at the end of `arriving`
+struct Corner {  // candidate triangle: an edge, and the corner at the end of `arriving`
     double cost = 0;
     std::uint32_t edge = 0, arriving = 0;
     auto key() const { return std::tuple(cost, edge, arriving); }
     bool operator>(const Corner& other) const { return key() > other.key(); }
 };
 
-// Grows with the directions' angle, counter-clockwise about the normal from `from`: 0 .. 4.
+// Grows with the angle from `from` to the other direction, counter-clockwise about the normal: 0 .. 4.
 double turn(Direction normal, Direction from, Direction to) {
     const Direction left = cross(normal, from), ahead = cross(left, normal);
     const double x = dot(to, ahead), y = dot(to, left);
@@ -476,14 +479,15 @@ Direction unit_vector(Direction v) {
     return length > 0 ? Direction{v.x / length, v.y / length, v.z / length} : Direction{};
 }
 
-// The borders of the gap while it closes: edges with the gap to their left, linked to loops or to open chains.
+// The borders of the gap while it is being closed: edges with the gap on their left, linked into loops or open chains.
 struct Front {
     std::span<const LatticePoint> positions;
     std::span<const Direction> normals;
     std::vector<Edge> edges;
-    std::unordered_map<std::uint64_t, std::uint32_t> open;                   // open edges by their ends
-    std::unordered_map<std::uint64_t, std::uint8_t> taken;                   // directed sides of triangles near the gap
-    std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> arriving;  // edges by the vertex where they end
+    std::unordered_map<std::uint64_t, std::uint32_t> open;                   // open edges, by their two ends
+    std::unordered_map<std::uint64_t, std::uint8_t> taken;                   // directed sides of the triangles near the
+                                                                             // gap
+    std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> arriving;  // edges, by the vertex where they end
     std::vector<Triangle> made;
 
     Direction normal_at(std::uint32_t v) const { return unit_vector(normals[v]); }
@@ -501,7 +505,7 @@ struct Front {
         arriving[side.to].push_back(id);
     }
 
-    // At each vertex, every arriving edge goes on along the first leaving one, clockwise: the narrowest gap.
+    // At each vertex, every arriving edge is followed by the first leaving one, clockwise: the narrowest gap.
     void link_borders() {
         std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> leaving;
         for (std::uint32_t e = 0; e < edges.size(); ++e) leaving[edges[e].from].push_back(e);
@@ -526,7 +530,7 @@ struct Front {
         }
     }
 
-    // Whether the direction to z lies in the gap at the vertex between two edges in a row.
+    // Whether the direction to z lies in the gap between two consecutive edges at their vertex.
     bool in_sector(std::uint32_t arrives, std::uint32_t leaves, std::uint32_t z) const {
         if (arrives == none || leaves == none) return true;
         const std::uint32_t v = edges[leaves].from, x = edges[arrives].from, y = edges[leaves].to;
@@ -536,7 +540,7 @@ struct Front {
         return whole == 0 || part <= whole;
     }
 
-    // Whether the triangle on edge e with its third corner where `arrives` ends may be made.
+    // Whether the triangle on edge e, with its third corner where `arrives` ends, is allowed.
     bool allowed(std::uint32_t e, std::uint32_t arrives) const {
         const Edge& edge = edges[e];
         const std::uint32_t a = edge.from, b = edge.to, c = edges[arrives].to;
@@ -568,7 +572,7 @@ struct Front {
         return id;
     }
 
-    // A new edge that meets an old one closes with it.
+    // A new edge that meets an existing one cancels with it.
     void settle(std::uint32_t e) {
         const std::uint32_t from = edges[e].from, to = edges[e].to;
         const auto other = open.find(directed(to, from));
@@ -590,7 +594,7 @@ struct Front {
         }
     }
 
-    // Gives the two new edges, open or not.
+    // Returns the two new edges, whether open or not.
     std::array<std::uint32_t, 2> add_triangle(std::uint32_t e, std::uint32_t arrives) {
         const std::uint32_t a = edges[e].from, b = edges[e].to, c = edges[arrives].to;
         const std::uint32_t before = edges[e].previous, after = edges[e].next, leaves = edges[arrives].next;
@@ -614,8 +618,8 @@ using Queue = std::priority_queue<Corner, std::vector<Corner>, std::greater<>>;
 struct Zip {
     Front& front;
     const Gap& gap;
-    bool both_sides = true;  // a stitch has vertices of both meshes
-    double longest = 0;      // squared, of new edges
+    bool both_sides = true;  // whether a stitch must have vertices of both meshes
+    double longest = 0;      // squared, for new edges
     bool shaped = true;
     Queue queue;
 
@@ -629,7 +633,7 @@ struct Zip {
         const double cost = static_cast<double>(squared_distance(gap.positions[a], gap.positions[c]));
         if (cost <= longest) queue.push({cost, e, n});
     }
-    // The corners that a change at an edge may open or close.
+    // Queues the corners that a change at an edge may open or close.
     void push_around(std::uint32_t e) {
         if (e == none || !front.edges[e].open) return;
         const std::uint32_t before = front.edges[e].previous;
@@ -655,7 +659,7 @@ struct Zip {
     }
 };
 
-// The vertices of the animated border nearest to each coded edge, by length.
+// For each coded edge, the nearest vertices of the animated border, sorted by length.
 std::vector<std::pair<double, std::array<std::uint32_t, 2>>> bridges(const Gap& gap, const Front& front) {
     const SurfaceGrid grid(gap.positions, gap.around, gap.cut, static_cast<std::int64_t>(bridge_reach * gap.unit) + 1);
     std::vector<std::pair<double, std::array<std::uint32_t, 2>>> out;
@@ -690,7 +694,7 @@ void zip(const Gap& gap, Front& front) {
     }
 }
 
-// Closes loops of at most longest_filled edges.
+// Fills loops of at most longest_filled edges.
 void fill(const Gap& gap, Front& front, bool shaped) {
     Zip filler{front, gap, false, 1e18, shaped, {}};
     std::vector<std::uint8_t> seen(front.edges.size());
@@ -728,7 +732,7 @@ std::vector<Triangle> stitch(const Gap& gap) {
     return front.made;
 }
 
-// What is left of both, and the stitches between.
+// Third part: joins what is left of both surfaces and the stitches.
 
 template <class Value>
 void join_attribute(const std::vector<Value>& coded, const std::vector<Value>& animated, const LatticeMesh& from_coded,
@@ -739,7 +743,7 @@ void join_attribute(const std::vector<Value>& coded, const std::vector<Value>& a
     for (const std::uint32_t v : used) out.push_back(animated[v]);
 }
 
-// The coded mesh, the kept part of the animated one and the stitches, in which animated vertices come after coded ones.
+// The coded mesh, the kept part of the animated one, and the stitches; animated vertices are numbered after coded ones.
 LatticeMesh join(const LatticeMesh& coded, const LatticeMesh& animated, std::span<const std::uint8_t> kept,
                  std::span<const Triangle> stitches) {
     const auto first = static_cast<std::uint32_t>(coded.positions.size());

@@ -7,12 +7,12 @@
 namespace htvm::internal::zipping {
 namespace {
 
-constexpr std::uint32_t most_in_cell = 128;  // triangles of a cell, the first ones
-constexpr std::int64_t most_cells_long = 4;  // a triangle that is longer is left out
+constexpr std::uint32_t most_in_cell = 128;  // only the first triangles of a cell are stored
+constexpr std::int64_t most_cells_long = 4;  // longer triangles are left out
 
-// At most 2^20, as a cell is 32 long at least.
+// At most 2^20, since a cell is at least 32 long.
 std::int64_t cell_coordinate(std::int64_t c, std::int64_t cell) { return (c + (std::int64_t{1} << 24)) / cell; }
-// 1 + coordinate, so that -1 and 0 are keys too; never 0 as a whole.
+// Adds 1 to each coordinate, so that -1 and 0 are possible; a key is never 0.
 std::uint64_t key_of(std::int64_t x, std::int64_t y, std::int64_t z) {
     return (std::uint64_t{1} << 63) | static_cast<std::uint64_t>(x + 1) << 42 |
            static_cast<std::uint64_t>(y + 1) << 21 | static_cast<std::uint64_t>(z + 1);
@@ -22,7 +22,9 @@ struct Cells {
     std::array<std::int64_t, 3> low, high;
 };
 
-constexpr std::uint64_t key_step = (std::uint64_t{1} << 42) + (std::uint64_t{1} << 21) + 1;  // one cell along each axis
+constexpr std::uint64_t key_step = (std::uint64_t{1} << 42) + (std::uint64_t{1} << 21) + 1;  // the difference of keys
+                                                                                             // one cell further along
+                                                                                             // each axis
 constexpr std::size_t filter_bits = std::size_t{1} << 19;
 
 std::uint64_t mixed(std::uint64_t key) {
@@ -48,7 +50,7 @@ Cells cells_of(const Box& box, std::int64_t cell) {
             {cell_coordinate(box.high.x, cell), cell_coordinate(box.high.y, cell), cell_coordinate(box.high.z, cell)}};
 }
 
-// No box is farther away than what it holds; this is for rounding.
+// A box is never farther away than its contents; the margin is for rounding errors.
 double with_margin(double squared_distance) { return squared_distance * 1.001 + 1; }
 
 double distance_to_box(LatticePoint p, const Box& box) {  // squared
@@ -60,7 +62,7 @@ double distance_to_box(LatticePoint p, const Box& box) {  // squared
     return static_cast<double>(dx * dx + dy * dy + dz * dz);
 }
 
-// Of the triangle with corners p and normal n, the point nearest to x.
+// The point nearest to x on the triangle with corners p and normal n.
 SurfacePoint nearest_on_triangle(LatticePoint x, const std::array<LatticePoint, 3>& p, Direction n) {
     SurfacePoint best;
     bool inside = true;
@@ -195,7 +197,7 @@ void SurfaceGrid::look_at(const Entry& entry, LatticePoint point, Direction faci
         best = here;
 }
 
-// Looks at the triangles of one cell; the order does not matter.
+// Searches the triangles of one cell; the result does not depend on the order of the cells.
 void SurfaceGrid::look_into(std::uint64_t key, LatticePoint point, Direction facing, SurfacePoint& best) const {
     const Cell& cell = cells_[slot_of(key)];
     if (cell.key == 0) return;
@@ -216,7 +218,7 @@ void SurfaceGrid::look_into(std::uint64_t key, LatticePoint point, Direction fac
 }
 
 SurfacePoint SurfaceGrid::nearest(LatticePoint point, Direction facing) const {
-    SurfacePoint best;  // none, the last of all, as far as the reach
+    SurfacePoint best;  // triangle none with the reach as its distance; ordered after every triangle
     best.squared_distance = static_cast<double>(reach_) * static_cast<double>(reach_);
     if (entries_.empty()) return best;
     const Cells own = cells_of({point, point}, cell_);

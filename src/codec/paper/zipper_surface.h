@@ -1,4 +1,4 @@
-// The nearest point of a surface, exact and bounded, for zippering. Its rules are part of the stream's meaning
+// The nearest point of a surface, exact and with bounded work, for zippering. Its rules are part of the stream format
 // (bitstream.md, 8.9): a grid of cells, each with a bounded list of triangles.
 #pragma once
 
@@ -20,13 +20,13 @@ inline double dot(Direction a, Direction b) { return a.x * b.x + a.y * b.y + a.z
 inline Direction cross(Direction a, Direction b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-using internal::operator+;  // of lattice points: the one below would hide it
+using internal::operator+;  // for lattice points; the operator below would hide it
 inline Direction operator+(Direction a, Direction b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Direction direction(LatticePoint from, LatticePoint to) {
     const LatticePoint d = to - from;
     return {static_cast<double>(d.x), static_cast<double>(d.y), static_cast<double>(d.z)};
 }
-// Normal of a triangle, as long as twice its area.
+// Normal of a triangle; its length is twice the area.
 inline Direction normal_of(std::span<const LatticePoint> positions, const Triangle& t) {
     return cross(direction(positions[t[0]], positions[t[1]]), direction(positions[t[0]], positions[t[2]]));
 }
@@ -36,43 +36,43 @@ struct Box {
 };
 Box box_of(std::span<const LatticePoint> positions, const Triangle& t);
 
-// The side of a grid's cells for a reach.
+// The side length of a grid's cells for a given reach.
 std::int64_t cell_side(std::int64_t reach);
 
-// Which cells of a grid are near some triangles: changes no result, but saves looking where nothing is. Never misses
-// one; may name too many.
+// Tells which cells of a grid may be near some triangles. It saves searching where nothing is, and changes no result:
+// it never misses a cell, but may name too many.
 class CellFilter {
 public:
     explicit CellFilter(std::int64_t reach);
-    void mark(const Box& box);  // these cells
-    void widen();               // and all cells around the marked ones; call once, after the last mark()
+    void mark(const Box& box);  // marks the cells that the box touches
+    void widen();               // also marks all cells around the marked ones; call once, after the last mark()
     bool may_touch(const Box& box) const;
 
 private:
     std::int64_t cell_;
     bool everything_ = false;
     std::vector<std::uint64_t> bits_;         // hashed
-    std::vector<std::uint64_t> marked_;       // keys, some twice
+    std::vector<std::uint64_t> marked_;       // keys, possibly repeated
     std::vector<std::uint64_t> last_marked_;  // hashed
 };
 
-// Where on a triangle the nearest point lies.
+// The nearest point on a triangle, and where on it the point lies.
 struct SurfacePoint {
     std::uint32_t triangle = none;  // none: nothing within reach
     double squared_distance = 0;    // lattice units
-    int side = -1;                  // 0, 1, 2: within the side from corner `side` to the next
-    int corner = -1;                // 0, 1, 2: at that corner; both -1: inside
+    int side = -1;                  // 0, 1, 2: inside the side from corner `side` to the next
+    int corner = -1;                // 0, 1, 2: at that corner; if side and corner are -1: inside the triangle
 };
 
 // A surface made of some of a mesh's triangles.
 class SurfaceGrid {
 public:
-    // used: indices of triangles, ascending. reach: lattice units, > 0, < 2^26. Keeps the spans.
+    // used: indices of triangles, ascending. reach: lattice units, > 0, < 2^26. Keeps the spans, which must outlive it.
     SurfaceGrid(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
                 std::span<const std::uint32_t> used, std::int64_t reach);
 
     // The nearest point within reach on triangles that face the same way: dot(normal, facing) > 0. Of equally near
-    // triangles the lowest. Many threads may call it at once.
+    // triangles, the lowest index. Thread-safe.
     SurfacePoint nearest(LatticePoint point, Direction facing) const;
 
 private:

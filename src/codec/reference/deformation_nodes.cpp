@@ -14,7 +14,7 @@ namespace {
 using Distance = std::uint32_t;
 constexpr Distance unreached = std::numeric_limits<Distance>::max();
 
-// floor(sqrt(value)) for values up to 2^52, exact: the double root is off by at most one.
+// floor(sqrt(value)) for values up to 2^52, exact: the root computed in doubles is off by at most one.
 std::uint32_t integer_root(std::int64_t value) {
     auto root = static_cast<std::int64_t>(std::sqrt(static_cast<double>(value)));
     while (root * root > value) --root;
@@ -27,7 +27,7 @@ struct Step {
     Distance length;
 };
 
-// Where one can go from each vertex, in compressed rows.
+// The steps from each vertex, in compressed rows.
 struct Graph {
     std::vector<std::uint32_t> first;
     std::vector<Step> steps;
@@ -38,7 +38,7 @@ struct Graph {
 
 using VertexPair = std::pair<std::uint32_t, std::uint32_t>;
 
-// Vertices by the cell of a cubic grid they lie in; within a cell ascending.
+// Vertices grouped by their cell of a cubic grid; ascending within a cell.
 class Cells {
 public:
     using Cell = std::array<std::int32_t, 3>;
@@ -48,7 +48,7 @@ public:
         std::sort(entries_.begin(), entries_.end());
     }
     Cell cell_of(LatticePoint p) const { return {down(p.x), down(p.y), down(p.z)}; }
-    // Up to `most` vertices of a cell, through visit(vertex).
+    // Calls visit(vertex) for up to `most` vertices of a cell.
     template <class Visit>
     void visit(const Cell& cell, std::size_t most, const Visit& visit) const {
         auto it = std::lower_bound(entries_.begin(), entries_.end(), std::pair{cell, std::uint32_t{0}});
@@ -62,7 +62,7 @@ private:
     std::vector<std::pair<Cell, std::uint32_t>> entries_;
 };
 
-// The connected piece of each vertex: the lowest vertex in it.
+// The connected piece of each vertex, represented by its lowest vertex.
 class Pieces {
 public:
     explicit Pieces(std::size_t vertices) : parent_(vertices) {
@@ -83,7 +83,7 @@ private:
     std::vector<std::uint32_t> parent_;
 };
 
-// Vertices at the same place, each with the next of them.
+// Links each vertex with the next one at the same place.
 void link_coincident(std::span<const LatticePoint> positions, Pieces& pieces, std::vector<VertexPair>& links) {
     std::vector<std::pair<LatticePoint, std::uint32_t>> order;
     order.reserve(positions.size());
@@ -96,7 +96,7 @@ void link_coincident(std::span<const LatticePoint> positions, Pieces& pieces, st
         }
 }
 
-// Each vertex with the nearest one of another piece within reach. Crowded cells are looked into only in part.
+// Links each vertex with the nearest one of another piece within reach. Of crowded cells only a part is searched.
 void link_near(std::span<const LatticePoint> positions, std::int32_t reach, Pieces& pieces,
                std::vector<VertexPair>& links) {
     bool several = false;
@@ -118,7 +118,7 @@ void link_near(std::span<const LatticePoint> positions, std::int32_t reach, Piec
     }
 }
 
-// An edge between two triangles comes twice in a row; measures those that stay.
+// An edge between two triangles appears twice in a row: keeps it once, and measures its length.
 void keep_each_step_once(std::span<const LatticePoint> positions, Graph& graph) {
     std::uint32_t kept = 0;
     for (std::uint32_t v = 0; v < positions.size(); ++v) {
@@ -164,18 +164,19 @@ Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triang
     return graph;
 }
 
-// Which vertices the nodes so far reach within the spacing, and the nodes' vertices.
+// The vertices reached so far from the nodes within the spacing, and the nodes' own vertices.
 struct Cover {
     std::vector<Distance> distance;
-    std::vector<std::uint8_t> reached;  // how many nodes came nearer to each vertex than those before
+    std::vector<std::uint8_t> reached;  // for each vertex, how many nodes were nearer than all nodes before them
     std::vector<std::uint32_t> nodes;
     std::uint64_t searched = 0;
 };
-// On surfaces a few nodes do. A star whose rays are nodes, each a little nearer to the hub than the last, could make
-// every one of them search all that lies behind the hub.
+// On surfaces a few are enough. In a star whose rays are nodes, each a little nearer to the hub than the last, every
+// node could otherwise search everything behind the hub.
 constexpr std::uint8_t most_reached = 16;
 
-// Dijkstra's algorithm from a new node, no further than spacing and only where it is nearer than the nodes before it.
+// Dijkstra's algorithm from a new node, no further than `spacing`, and only where it is nearer than all nodes before
+// it.
 void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover& cover,
                 std::vector<std::pair<Distance, std::uint32_t>>& heap) {
     cover.nodes.push_back(start);
@@ -199,7 +200,7 @@ void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover
     }
 }
 
-// Covers all vertices, or stops when that takes more than most_nodes.
+// Covers all vertices with nodes, or stops if more than most_nodes are needed.
 bool cover_all(const Graph& graph, Distance spacing, std::size_t most_nodes, Cover& cover) {
     const std::size_t vertices = graph.first.size() - 1;
     cover.distance.assign(vertices, unreached);
@@ -214,7 +215,8 @@ bool cover_all(const Graph& graph, Distance spacing, std::size_t most_nodes, Cov
     return true;
 }
 
-// The nearest few nodes of a vertex along the mesh: those that move it, and the next, which says how far they count.
+// The few nodes nearest to a vertex along the mesh: those that move it, and one more, which determines where their
+// influence ends.
 struct NearNode {
     Distance distance = 0;
     std::uint16_t node = 0;
@@ -226,7 +228,7 @@ struct NearNodes {
     std::uint8_t count = 0;
 };
 
-// Enters a node where it is one of the nearest, or nearer than known; says whether.
+// Enters a node if it is one of the nearest, or nearer than known; returns whether it was.
 bool enter(NearNodes& list, NearNode candidate) {
     if (list.count == near_nodes && list.near[near_nodes - 1] <= candidate) return false;
     std::size_t place = 0;
@@ -245,9 +247,10 @@ struct Visit {
 };
 
 // A queue by distance, then by node, for Dijkstra's algorithm, which never asks for less than it got last (Ahuja,
-// Mehlhorn, Orlin, Tarjan: Faster algorithms for the shortest path problem, 1990): visits wait by the highest bit in
-// which they differ from the last one, and move to lower bits when their turn comes near. By node too, as a vertex
-// would else be visited again for every lower node at the same distance.
+// Mehlhorn, Orlin, Tarjan: Faster algorithms for the shortest path problem, 1990). Visits wait in a bucket by the
+// highest bit in which they differ from the last one taken, and move to lower buckets as their turn approaches. The
+// node is part of the order because a vertex would otherwise be visited again for every lower node at the same
+// distance.
 class RadixQueue {
 public:
     bool empty() const { return size_ == 0; }
@@ -279,8 +282,8 @@ private:
     std::size_t size_ = 0;
 };
 
-// The shortest ways from all nodes at once. A node that is not among a vertex's nearest is not among those of any
-// vertex beyond it either, so the lists are exact although they are short.
+// The shortest paths from all nodes at once. A node that is not among the nearest of a vertex is not among those of any
+// vertex that it reaches through it either, so the short lists are still exact.
 std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::uint32_t>& nodes) {
     std::vector<NearNodes> lists(graph.first.size() - 1);
     RadixQueue queue;
@@ -300,7 +303,8 @@ std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::
     return lists;
 }
 
-// Sumner's weights, (1 - distance / distance of the next node)^2, made to sum to one: the rest goes to the nearest.
+// Sumner's weights, (1 - distance / distance of the next node)^2, normalised to sum to one; the rounding remainder goes
+// to the nearest node.
 VertexWeights weights_of(const NearNodes& list, Distance spacing) {
     const std::size_t count = std::min<std::size_t>(list.count, handles_per_vertex);
     const Distance last = list.near[count - 1].distance;
@@ -309,12 +313,12 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
     std::array<std::uint64_t, handles_per_vertex> share{};
     std::uint64_t sum = 0;
     for (std::size_t k = 0; k < count; ++k) {
-        // Twelve bits before squaring: the sum fits easily.
+        // Reduced to twelve bits before squaring, so that the sum cannot overflow.
         const std::uint64_t nearness = std::uint64_t{zero - list.near[k].distance} * 4096 / zero;
         share[k] = nearness * nearness;
         sum += share[k];
     }
-    std::array<std::pair<std::int32_t, std::uint16_t>, handles_per_vertex> entries{};  // weight below zero, node
+    std::array<std::pair<std::int32_t, std::uint16_t>, handles_per_vertex> entries{};  // negated weight, node
     std::int32_t rest = 1 << weight_bits;
     for (std::size_t k = 1; k < count; ++k) {
         const auto weight = sum == 0 ? 0 : static_cast<std::int32_t>((share[k] << weight_bits) / sum);
@@ -331,7 +335,7 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
     return out;
 }
 
-// Vertices that no node reaches go to the node nearest in space, the lower of equally near ones.
+// Vertices that no node reaches are assigned to the node nearest in space, of equally near ones the lower.
 void take_nearest_in_space(std::span<const LatticePoint> positions, const std::vector<std::uint32_t>& nodes,
                            std::vector<NearNodes>& lists) {
     for (std::size_t v = 0; v < positions.size(); ++v) {
@@ -358,7 +362,7 @@ std::vector<NodePair> touching_regions(const Graph& graph, const std::vector<std
     return pairs;
 }
 
-// Ties the connected groups of nodes together by the shortest pairs that do it (Prim 1957, existing pairs for nothing).
+// Connects separate groups of nodes by the shortest possible pairs (Prim 1957; existing pairs cost nothing).
 void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>& pairs) {
     const std::size_t count = places.size();
     if (count < 2) return;
@@ -404,7 +408,7 @@ DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> position
     const Graph graph = mesh_graph(positions, triangles, options.link_reach);
     const std::size_t most = std::clamp<std::size_t>(options.most_nodes, 1, most_deformation_nodes);
     Cover cover;
-    // Eight times 1.5 makes the spacing 25 times as wide.
+    // Eight steps of 1.5 make the spacing 25 times as wide.
     std::int64_t spacing = std::clamp<std::int64_t>(options.spacing, 1, 2 * lattice_limit);
     bool covered = cover_all(graph, static_cast<Distance>(spacing), most, cover);
     for (int attempt = 0; attempt < 8 && !covered; ++attempt) {

@@ -18,7 +18,7 @@ struct Projection {
     double axis_distance = 0;
 };
 
-// All integers below fit 53 bits: differences have 26, products 52.
+// All integers below fit in 53 bits: differences have 26, products 52.
 Projection project(LatticePoint v, const BoneCylinder& bone) {
     const LatticePoint u = bone.second - bone.first, d = v - bone.first;
     const double ux = u.x, uy = u.y, uz = u.z, dx = d.x, dy = d.y, dz = d.z;
@@ -85,10 +85,10 @@ namespace {
 
 constexpr std::size_t others_a_vertex = handles_per_vertex - 1;
 
-// The mesh's edges in both directions; those of two triangles come twice.
+// The mesh's edges in both directions; those between two triangles appear twice.
 struct Neighbours {
     std::vector<std::uint32_t> vertices;
-    std::vector<std::size_t> begin;  // one more than vertices
+    std::vector<std::size_t> begin;  // vertices + 1 entries
 };
 
 Neighbours neighbours_of(std::size_t vertices, std::span<const Triangle> triangles) {
@@ -107,20 +107,20 @@ Neighbours neighbours_of(std::size_t vertices, std::span<const Triangle> triangl
     return out;
 }
 
-// Distances along edges are counted in half lattice units, so that half an edge is whole.
+// Distances along edges are in half lattice units, so that half an edge is a whole number.
 struct Near {
     std::int32_t distance = 0;
     std::uint16_t handle = 0;
     auto operator<=>(const Near&) const = default;
 };
 
-// The nearest other handles of each vertex, nearest first, that lie nearer than half the width.
+// For each vertex, the nearest other handles within half the width, nearest first.
 struct NearHandles {
     std::array<Near, others_a_vertex> near{};
     std::uint8_t count = 0;
 };
 
-// Enters a handle where it is one of the nearest, or nearer than known.
+// Enters a handle if it is one of the nearest, or nearer than known; returns whether it was.
 bool enter(NearHandles& list, Near candidate) {
     std::size_t place = 0;
     while (place < list.count && list.near[place].handle != candidate.handle) ++place;
@@ -137,7 +137,7 @@ bool enter(NearHandles& list, Near candidate) {
     return true;
 }
 
-// The length of an edge, at least 1, at most `longest` + 1.
+// The length of an edge, clamped to 1 .. `longest` + 1.
 std::int32_t edge_length(LatticePoint a, LatticePoint b, std::int32_t longest) {
     const std::int64_t squared = squared_distance(a, b);
     if (squared > std::int64_t{longest} * longest) return longest + 1;
@@ -148,11 +148,11 @@ struct Step {
     std::uint32_t vertex;
     Near near;
 };
-struct FartherStep {  // what comes of steps that are equally far does not depend on their order
+struct FartherStep {  // the result does not depend on the order of equally far steps
     bool operator()(const Step& a, const Step& b) const { return a.near.distance > b.near.distance; }
 };
 
-// The lists under way, and the steps that are still to be passed on.
+// The lists so far, and the steps still to be taken.
 struct Spreading {
     std::span<const std::uint16_t> own;
     std::span<const LatticePoint> positions;
@@ -185,8 +185,8 @@ void pass_on(Spreading& state, std::uint32_t v, Near near) {
     }
 }
 
-// Dijkstra's shortest paths from all borders at once. A handle that is not among a vertex's nearest is not among those
-// of any vertex that it would reach through that vertex, so that the lists are exact although they are short.
+// Dijkstra's shortest paths from all borders at once. A handle that is not among the nearest of a vertex is not among
+// those of any vertex that it would reach through it, so the short lists are still exact.
 std::vector<NearHandles> near_handles(Spreading state) {
     cross_borders(state);
     while (!state.steps.empty()) {
@@ -198,8 +198,8 @@ std::vector<NearHandles> near_handles(Spreading state) {
     return std::move(state.lists);
 }
 
-// On the border between two handles both weigh the same; from there the weight of the other one falls in a straight
-// line to 0 at half the width.
+// On the border between two handles both have the same weight. Away from it the weight of the other handle falls
+// linearly to 0 at half the width.
 VertexWeights weights_of(std::uint16_t own, const NearHandles& others, std::int32_t width) {
     struct Entry {
         std::int64_t weight;
@@ -230,7 +230,7 @@ VertexWeights weights_of(std::uint16_t own, const NearHandles& others, std::int3
 
 HandleWeights smooth_weights(std::span<const std::uint16_t> handle_of_vertex, std::span<const LatticePoint> positions,
                              std::span<const Triangle> triangles, std::int32_t width, Threads threads) {
-    static_cast<void>(threads);  // one pass of some milliseconds
+    static_cast<void>(threads);  // not used: a single pass takes only a few milliseconds
     const auto count = positions.size();
     const auto others = near_handles(
         {handle_of_vertex, positions, width, neighbours_of(count, triangles), std::vector<NearHandles>(count), {}});
@@ -298,7 +298,7 @@ std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
                                             std::span<const QuantisedTransform> transforms, Threads threads) {
     const auto rotation = rotation_matrices(transforms);
     std::vector<LatticePoint> out(reference.mesh.positions.size());
-    // Some 10 ns per vertex: a mesh of ordinary size is moved before another thread would be awake.
+    // About 10 ns per vertex: a mesh of ordinary size is done before another thread would be awake.
     parallel_for(out.size(), threads, 1 << 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const LatticePoint v = reference.mesh.positions[k];

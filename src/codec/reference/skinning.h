@@ -1,7 +1,7 @@
 // The skinned reference mesh: which bone each vertex belongs to (paper, section IV-A, eq. 1-2), how smoothly the bones
-// blend into each other, and where the reference's vertices are predicted in another frame (section IV-B, eq. 4-5).
-// Encoder and decoder both derive all of it from the decoded I-mesh, so that nothing is sent for it; everything is
-// exact: integers, or doubles built from + - * / and sqrt alone.
+// blend into each other, and where the vertices of the reference are predicted in another frame (section IV-B, eq.
+// 4-5). Encoder and decoder both derive all of it from the decoded I-mesh, so nothing is sent for it. Everything is
+// exact: integers, or doubles computed with + - * / and sqrt alone.
 #pragma once
 
 #include <cstdint>
@@ -26,14 +26,14 @@ struct BoneCylinder {
     std::int32_t radius = 0;     // r^i, lattice units
 };
 
-// eq. 2: distance to the cylinder's surface (negative inside) where the vertex projects onto the bone's segment, else
-// the distance to the nearer joint. Lattice units. A bone of no length has joints only.
+// eq. 2: if the vertex projects onto the bone's segment, its distance to the cylinder's surface (negative inside);
+// otherwise its distance to the nearer joint. Lattice units. For a bone without length, only the joints count.
 double distance_to_bone(LatticePoint vertex, const BoneCylinder& bone);
 
-// eq. 3: distance to the segment where the vertex projects onto it; negative where it does not.
+// eq. 3: distance to the segment if the vertex projects onto it; otherwise negative.
 double distance_to_axis(LatticePoint vertex, const BoneCylinder& bone);
 
-// The bone of each vertex: the nearest by eq. 2, of equally near ones the lowest. At least one bone.
+// The bone of each vertex: the nearest by eq. 2; of equally near ones, the lowest. At least one bone.
 std::vector<BoneIndex> skin(std::span<const LatticePoint> vertices, std::span<const BoneCylinder> bones,
                             Threads threads);
 
@@ -51,12 +51,13 @@ SubMeshes group_by_bone(std::span<const BoneIndex> bone_of_vertex, std::size_t b
 std::vector<BoneCylinder> cylinders(const std::vector<Bone>& bones, std::span<const LatticePoint> joints,
                                     std::span<const std::int32_t> radii);
 
-// Each vertex has a handle of its own (for bones: its bone; for nodes: the nearest one along the mesh). On the border
-// between two handles both weigh the same; away from it, along the mesh's edges, the weight of the other one falls in a
-// straight line to 0 at half the width, so that the border is `width` lattice units wide. Of more than three others the
-// nearest three count. docs/bitstream.md, section 7.4.
-// handle_of_vertex: one per position; triangles name positions; width 0..lattice_limit, 0: each vertex its own handle.
-// Vertices without triangles keep their handle. The same for any number of threads.
+// Each vertex has a handle of its own (with bones: its bone; with nodes: the nearest one along the mesh). On the border
+// between two handles both have the same weight. Away from it, along the edges of the mesh, the weight of the other
+// handle falls linearly to 0 at half the width, so the border is `width` lattice units wide. At most the nearest three
+// other handles count. docs/bitstream.md, section 7.4.
+//
+// handle_of_vertex: one per position; triangles index positions; width: 0..lattice_limit, 0: each vertex follows its
+// own handle only. Vertices without triangles keep their handle. The result is the same for any number of threads.
 // About 3 ms for 35,000 vertices and 14 bones.
 HandleWeights smooth_weights(std::span<const std::uint16_t> handle_of_vertex, std::span<const LatticePoint> positions,
                              std::span<const Triangle> triangles, std::int32_t width, Threads threads);
