@@ -28,46 +28,46 @@
 namespace htvm {
 
 struct DecoderOptions {
-    // What is larger is refused (ErrorKind::limit) before memory is taken for it.
+    // A frame larger than this is refused (ErrorKind::limit) before memory is allocated for it.
     std::uint32_t max_vertices = 1u << 22;   // of a frame
     std::uint32_t max_triangles = 1u << 23;  // of a frame
-    std::uint32_t max_joints = 1024;         // of the skeleton; the format has no more
+    std::uint32_t max_joints = 1024;         // of the skeleton; the format allows no more
     std::uint32_t max_bones = 1024;          // likewise
     std::uint64_t max_packet_bytes = std::uint64_t{1} << 28;
-    // Bytes that the decoder may take for what it keeps and the frame under way together, by an upper bound from the
-    // counts of vertices and triangles: about 1 KB a vertex of an ordinary mesh. A coder of I-frames that is plugged in
-    // takes its own besides.
+    // Bytes that the decoder may use in total, for what it keeps and for the frame being decoded. It is checked against
+    // an upper bound from the counts of vertices and triangles: about 1 KB per vertex of an ordinary mesh. A plugged-in
+    // coder of I-frames uses its own memory in addition.
     std::uint64_t max_memory = std::uint64_t{1} << 32;
-    unsigned threads = 0;  // at work at once; 0: one per core; the meshes are the same for any number
-    TaskRunner runner;     // gives the threads; none: a pool of the decoder's own
-    std::optional<ExternalIntraCoder> intra_coder;  // for I-frames of another coder; none: they are unsupported
+    unsigned threads = 0;  // that work at the same time; 0: one per core. The meshes are the same for any number
+    TaskRunner runner;     // provides the threads; empty: the decoder has a pool of its own
+    std::optional<ExternalIntraCoder> intra_coder;  // decodes I-frames of another coder; none: they are unsupported
 };
 
-// What the sequence header says.
+// The contents of the sequence header.
 struct SequenceInfo {
-    double lattice_step = 0;  // mm: decoded positions are multiples of it from the origin
+    double lattice_step = 0;  // mm: decoded positions are the origin plus multiples of this
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
-    std::uint32_t unit_micrometres = 1000;  // the unit that the capture came in
-    bool skeleton_tracked = true;           // false: one bone stands in for a skeleton that the capture has not
+    std::uint32_t unit_micrometres = 1000;  // the unit in which the capture was given
+    bool skeleton_tracked = true;           // false: the capture has no skeleton, and one bone stands in for it
     Skeleton skeleton;
-    std::vector<double> radii;  // mm, one a bone
+    std::vector<double> radii;  // mm, one per bone
     int nearest_vertices = 16;  // m of the distance order
 };
 
-// A frame that is lent: valid until the decoder is next told to do anything but tell, or is moved or destroyed.
+// A frame on loan: valid until the next non-const call on the decoder, or until the decoder is moved or destroyed.
 struct FrameView {
     FrameInfo info;
-    // Frames of the same number have the same triangles and texture coordinates: whoever has sent those to a graphics
-    // card need not send them again. T- and P-frames have their I-frame's number, every other frame one of its own.
-    // Never 0; another decoder gives other numbers.
+    // Frames with the same number have the same triangles and texture coordinates, so these need not be sent to a
+    // graphics card again. T- and P-frames have the number of their I-frame; every other frame has a new one. Never 0;
+    // numbers of different decoders are unrelated.
     std::uint32_t topology = 0;
     MeshView mesh;  // mm
-    // Never null. Of an I-frame, the skeleton as sent; of the others, the I-frame's moved by the transforms.
+    // Never null. For an I-frame, the skeleton as sent; for other frames, that of the I-frame moved by the transforms.
     const Pose* pose = nullptr;
-    bool concealed = false;  // a stand-in
+    bool concealed = false;  // a stand-in for a missing frame
 };
 
-// The same, the caller's own.
+// The same as a copy that the caller owns.
 struct DecodedFrame {
     FrameInfo info;
     std::uint32_t topology = 0;
@@ -85,29 +85,29 @@ public:
     Decoder& operator=(Decoder&&) noexcept;
     ~Decoder();
 
-    // Takes one packet; lends the frame that it is, where it is one. Errors cost that packet only: corrupt_stream where
-    // its bytes contradict themselves, or it refers to an I-frame or codebook that is not there; unsupported; limit
-    // where it is beyond the options, or memory ran out. What came before a packet that is refused stays in force,
-    // but a frame that was lent is gone.
+    // Takes one packet, and lends the frame if the packet is one. An error costs that packet only: corrupt_stream if
+    // its bytes contradict themselves, or if it refers to an I-frame or codebook that is missing; unsupported; limit if
+    // it exceeds the options or memory ran out. What was decoded before a refused packet stays valid, but a frame on
+    // loan ends.
     Result<std::optional<FrameView>> decode(const Packet& packet);
-    // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh moved as the last frame
-    // was, or, where that much of a frame could be read, as it is itself; after T-frames, the last of them again.
-    // Nothing before an I-frame, or where memory ran out.
+    // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh, moved as this frame says
+    // if that much of it could be read, else as the last frame; after T-frames, the last of them again. Nothing before
+    // an I-frame, or if memory ran out.
     std::optional<FrameView> stand_in(std::uint32_t frame, std::int64_t timestamp_us);
-    // decode() and stand_in(), copied.
+    // Like decode() and stand_in(), but with a copy.
     Result<std::optional<DecodedFrame>> push(const Packet& packet);
     std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us);
-    // Known once a sequence header was decoded.
+    // Known once a sequence header has been decoded.
     const std::optional<SequenceInfo>& sequence() const;
 
 private:
     std::unique_ptr<State> state_;
 };
 
-// The kind of frame that a packet is, or nothing where it is none.
+// The type of the frame in a packet; nothing if the packet is not a frame.
 std::optional<FrameType> frame_type(PacketKind kind);
 
-// The layer sizes of a frame packet without decoding it, for inspection. Of an EP-frame by motion-based coding,
+// The layer sizes of a frame packet, for inspection without decoding. For an EP-frame with motion-based coding, the
 // vertices and triangles are those coded; DecodedFrame::info has those of the whole mesh.
 Result<FrameInfo> inspect(const Packet& packet);
 

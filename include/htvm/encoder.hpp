@@ -24,11 +24,11 @@
 namespace htvm {
 
 struct CalibrationOptions {
-    double percentile = 70;  // of the distances of a bone's vertices; the paper takes their maximum, 100, which one
-                             // stray vertex can triple: 50 to 80 measured best, up to a third fewer bits
+    double percentile = 70;  // of the distances of a bone's vertices. The paper takes the maximum, 100, which one stray
+                             // vertex can triple; 50 to 80 measured best, with up to a third fewer bits
 };
-// Skinning calibration (paper, section IV-A, eq. 3): the radius r^i of each bone's cylinder, mm, from a mesh in T-pose
-// and its skeleton. Bones to which no vertex projects get 0.
+// Skinning calibration (paper, section IV-A, eq. 3): the radius r^i of each bone's cylinder, in mm, from a mesh in
+// T-pose and its skeleton. Bones that no vertex projects onto get 0.
 Result<std::vector<double>> calibrate(const Mesh& mesh, const Skeleton& skeleton, const Pose& pose,
                                       const CalibrationOptions& options = {});
 
@@ -41,27 +41,27 @@ struct StageTime {
 class Encoder {
 public:
     struct State;  // opaque
-    // bad_input where an option is out of its range or contradicts another.
+    // bad_input if an option is out of range or contradicts another.
     static Result<Encoder> create(const EncoderOptions& options);
     Encoder(Encoder&&) noexcept;
     Encoder& operator=(Encoder&&) noexcept;
     ~Encoder();
 
-    // Codes one frame. pose: of the options' skeleton; null where the tracker lost it, the last one is then kept.
-    // Timestamps must ascend. After an error the frame is not part of the stream; the next may be pushed. Under rate
-    // control a frame that the buffer cannot hold at the lowest quality is a limit error.
+    // Codes one frame. pose: for the skeleton of the options; null if the tracker lost it, and then the last one is
+    // kept. Timestamps must ascend. After an error the frame is not part of the stream, and the next may be pushed.
+    // Under rate control, a frame that does not fit the buffer even at the lowest quality is a limit error.
     Result<void> push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra = false);
     // Ends the sequence: queues the index of I-frames.
     void finish();
-    // The next packet in stream order, or nothing until more is pushed.
+    // The next packet in stream order; nothing if more must be pushed first.
     std::optional<Packet> pull();
 
-    // Of the last frame pushed: what it is, what the decoder will show for it, and how long its stages took.
+    // About the last frame pushed: its type and sizes, the mesh that the decoder will show, and the time of its stages.
     const FrameInfo& last_frame() const;
     FrameCost last_cost() const;
     Mesh reconstruction() const;
     const std::vector<StageTime>& stage_times() const;
-    // Of the last EP-frame: how often each distance order was coded, the escapes last (paper, Fig. 23).
+    // About the last EP-frame: how often each distance order was coded, the escapes last (paper, Fig. 23).
     const std::vector<std::uint32_t>& distance_order_counts() const;
 
 private:

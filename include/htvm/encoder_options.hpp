@@ -1,5 +1,5 @@
-// What an encoder can be told: every option with its default and meaning. Their ranges, and what they are called
-// elsewhere, are in one list (option_list.hpp, docs/options.md).
+// The encoder's options, each with its default and meaning. Their ranges, and their names elsewhere, are in one list
+// (option_list.hpp, docs/options.md).
 #pragma once
 
 #include <cstdint>
@@ -13,86 +13,92 @@
 
 namespace htvm {
 
-// What the stream is for: which frames lie between the I-frames.
+// The purpose of the stream: which frames come between the I-frames.
 enum class Profile : std::uint8_t {
-    tracked,   // the fewest bits: T-frames, the I-frame's mesh laid on each frame's surface
-    topology,  // every frame's own connectivity: EP-frames, or I-frames where those cost less
-    paper,     // the same by the published method's own choices
+    tracked,   // the fewest bits: T-frames, where the I-frame's mesh is laid on each frame's surface
+    topology,  // every frame keeps its own connectivity: EP-frames, or I-frames if they cost less
+    paper,     // the same with the choices of the published method
 };
 
 enum class ReferenceVertices : std::uint8_t {
-    bone,  // the paper's: the nearest vertex of the same bone's predicted sub-mesh
+    bone,  // as in the paper: the nearest vertex of the same bone's predicted sub-mesh
     any,   // the nearest vertex of the whole predicted mesh
 };
 
 enum class BoneRegistration : std::uint8_t {
-    point,  // the paper's: by distances from point to point
-    plane,  // from point to plane
+    point,  // as in the paper: by distances from point to point
+    plane,  // by distances from point to plane
 };
 
 enum class FrameChoice : std::uint8_t {
     fixed,            // an I-frame every key_interval frames, EP-frames between
-    motion,           // the paper's (section III-B): by skeletal motion since the last I-frame
-    rate_distortion,  // by measured bits and errors: the fewest bits among those no worse than an I-frame
-    cheaper,          // as fixed, but an I-frame wherever an EP-frame takes more bits
+    motion,           // as in the paper (section III-B): by skeletal motion since the last I-frame
+    rate_distortion,  // by measured bits and errors: the frame with the fewest bits among those no worse than an
+                      // I-frame
+    cheaper,          // like fixed, but an I-frame wherever an EP-frame takes more bits
 };
 
 enum class TrackedReferences : std::uint8_t {
-    intra,     // T-frames refer to the I-frame alone: any may be lost
-    previous,  // to the frame before: fewer bits; a lost one costs those up to the next I-frame
+    intra,     // T-frames refer to the I-frame alone, so any may be lost
+    previous,  // T-frames refer to the previous frame: fewer bits, but a lost frame costs those up to the next I-frame
 };
 
-// Profile::tracked alone: with others, anything but the defaults is refused.
+// For Profile::tracked only; with other profiles, anything but the defaults is refused.
 struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
-    double simplify = 0.4;    // how far the I-frames' meshes, which the T-frames take over, may be simplified: error of
-                              // their surface, in geometry steps; 0: they keep every vertex and their connectivity
-    double node_spacing = 0;  // mm, between the nodes of the deformation graph; 0: 80 on an adult, in proportion on
-                              // larger and smaller subjects
+    double simplify = 0.4;    // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
+                              // its surface in geometry steps; 0: it keeps all vertices and its connectivity
+    double node_spacing = 0;  // mm between the nodes of the deformation graph; 0: 80 on an adult, in proportion to size
+                              // on other subjects
 };
 
-// Profile::topology and Profile::paper alone, likewise.
+// For Profile::topology and Profile::paper only; with Profile::tracked, anything but the defaults is refused.
 struct TopologyOptions {
-    FrameChoice frame_choice = FrameChoice::cheaper;  // Profile::paper: fixed
-    double predicted_below = 400;  // mm, FrameChoice::motion: with less skeletal motion since the I-frame, a P-frame
-    double intra_above = 0;        // mm, FrameChoice::motion: with more, an I-frame; 0: never
+    FrameChoice frame_choice = FrameChoice::cheaper;  // in Profile::paper: fixed
+    double predicted_below = 400;  // mm, for FrameChoice::motion: a P-frame if there was less skeletal motion since the
+                                   // I-frame
+    double intra_above = 0;        // mm, for FrameChoice::motion: an I-frame if there was more; 0: never
     double still_below = 0;        // mm, motion-based coding (section V): bones that moved less since the I-frame are
-                                   // animated, not coded; 0: all are coded
-    double animation_error = 2;  // mm: what is animated is coded after all where it is farther (root mean square, bone
-                                 // by bone) from the capture's surface; 0: unchecked, as in the paper
-    bool scene_changes = true;   // an I-frame where much of the mesh is nowhere near the reference's
-    bool merge_duplicates = true;  // merge vertices that decode to the same, drop triangles that collapse
+                                   // animated instead of coded; 0: all are coded
+    double animation_error = 2;    // mm: a part that would be animated is coded after all if it is farther than this
+                                   // (RMS, bone by bone) from the captured surface; 0: not checked, as in the paper
+    bool scene_changes = true;     // an I-frame if much of the mesh is far from the reference's
+    bool merge_duplicates = true;  // merge vertices that decode to the same values, drop triangles that collapse
     int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
-    ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured better than the paper's, see docs
-    double weight_width = 30;  // mm, 0..1000: borders between bones blend over it; 0: rigid, as in the paper
+    ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured to be better than the paper's, see
+                                                                    // docs/algorithm.md
+    double weight_width = 30;  // mm, 0..1000: width over which bones blend at their borders; 0: rigid, as in the paper
     BoneRegistration registration = BoneRegistration::plane;
 };
 
-// Quality that follows from a rate or an error, instead of from the steps.
+// Derives quality from a rate or an error instead of from the steps.
 struct RateOptions {
-    double bits_per_second = 0;  // > 0: the rate to keep to
-    double buffer_seconds = 1;   // of the receiver, with bits_per_second: what a frame may come late against a constant
-                                 // rate
+    double bits_per_second = 0;  // > 0: the bitrate to keep
+    double buffer_seconds = 1;   // with bits_per_second: the receiver's buffer, i.e. how late a frame may be relative
+                                 // to a constant rate
     std::vector<FrameCost> first_pass;  // with bits_per_second: last_cost() of every frame of a first run over the same
-                                        // capture; the quality then stays as even as the buffer allows
-    double target_error = 0;  // mm (M2), > 0: the error that every frame comes near to; not with bits_per_second
+                                        // capture; quality then varies as little as the buffer allows
+    double target_error = 0;  // mm (M2), > 0: the error that every frame should have; not together with bits_per_second
 };
 
 struct EncoderOptions {
     Profile profile = Profile::tracked;
-    double geometry_step = 2.0;  // mm, > 0: cell of the position quantiser; errors are about half of it
-    double colour_step = 6.0;    // levels of 255, >= 1: cell of the colour quantiser
-    double lambda = 0.12;        // squared error worth one bit, in units of step^2; 0 takes the nearest codeword
-    int key_interval = 30;       // most frames from one I-frame to the next; 1: I-frames only
-    int least_key_interval = 1;  // fewest, unless the frame cannot refer to the I-frame or the scene changes
-    int lattice_bits = 0;        // decoded positions are multiples of 2^-lattice_bits mm; 0: 4, or finer if the step is
-    double subject_size = 0;     // mm: the longest side of the subject, which reaches and thresholds are in proportion
-                                 // to (all are known from adults, 1100 to 2500 mm); 0: told from the first mesh
-    unsigned threads = 0;        // at work at once; 0: one per core; the bytes are the same for any number
-    TaskRunner runner;           // gives the threads; none: a pool of the encoder's own
-    std::uint32_t fps_numerator = 30, fps_denominator = 1;  // frames a second, for players
-    std::uint32_t unit_micrometres = 1000;  // the capture's own unit, kept so that a decoder can give it back
-    Skeleton skeleton;          // no bones: the capture has no skeleton, and one bone that spans the mesh serves
+    double geometry_step = 2.0;  // mm, > 0: cell size of the position quantiser; errors are about half of it
+    double colour_step = 6.0;    // levels of 255, >= 1: cell size of the colour quantiser
+    double lambda = 0.12;        // squared error that is worth one bit, in units of step^2; 0: always the nearest
+                                 // codeword
+    int key_interval = 30;       // largest distance between I-frames, in frames; 1: I-frames only
+    int least_key_interval = 1;  // smallest distance between I-frames, unless the frame cannot refer to the I-frame or
+                                 // the scene changes
+    int lattice_bits = 0;        // decoded positions are multiples of 2^-lattice_bits mm; 0: automatic, 4 or more if
+                                 // the step needs it
+    double subject_size = 0;     // mm: the longest side of the subject, to which reaches and thresholds are scaled
+                                 // (they are tuned for adults, 1100 to 2500 mm); 0: measured on the first mesh
+    unsigned threads = 0;        // that work at the same time; 0: one per core. The bytes are the same for any number
+    TaskRunner runner;           // provides the threads; empty: the encoder has a pool of its own
+    std::uint32_t fps_numerator = 30, fps_denominator = 1;  // frames per second, for players
+    std::uint32_t unit_micrometres = 1000;  // the capture's own unit, kept so that a decoder can restore it
+    Skeleton skeleton;          // without bones: the capture has no skeleton, and one bone that spans the mesh is used
     std::vector<double> radii;  // mm, one per bone, from calibrate(); empty: calibrated on the first frame
     std::optional<ExternalIntraCoder> intra_coder;  // codes I-frames; none: TFAN
     TrackedOptions tracked;
@@ -100,12 +106,12 @@ struct EncoderOptions {
     RateOptions rate;
 };
 
-// The options of a profile: EncoderOptions' own defaults, and for Profile::paper the paper's choices where they differ.
+// The default options of a profile: those of EncoderOptions; for Profile::paper, the paper's choices where they differ.
 EncoderOptions default_options(Profile profile);
 
-// The two steps of a quality knob, 0..100, that means about the same error whatever the capture, with T-frames or
-// without (these and their I-frames take finer positions and coarser colours than said): positions step by
-// 16 mm at 0, 2 mm at 50, 0.25 mm at 100 (halved every 16.7), colours by 32, 5.7 and 1 levels (halved every 20).
+// The two steps for a quality from 0 to 100 that means about the same error for every capture, with T-frames or without
+// (T-frames and their I-frames use finer positions and coarser colours than this to have that error). Position steps
+// are 16 mm at 0, 2 mm at 50, 0.25 mm at 100 (halved every 16.7); colour steps 32, 5.7 and 1 levels (halved every 20).
 struct QualitySteps {
     double geometry_step, colour_step;
 };

@@ -1,4 +1,4 @@
-// What encoder and decoder say of a frame: its kind and where its bytes went.
+// What encoder and decoder report about a frame: its type, and how its bytes are distributed.
 #pragma once
 
 #include <array>
@@ -9,18 +9,18 @@
 
 namespace htvm {
 
-// The kinds of frames; their order is that of frame_kinds.
+// The kinds of frames, in the order of frame_kinds.
 enum class FrameType : std::uint8_t {
-    intra,      // by itself
+    intra,      // a complete mesh by itself
     enhanced,   // against the last I-frame, with connectivity of its own
-    predicted,  // the last I-frame's mesh moved, nothing else
+    predicted,  // the last I-frame's mesh, moved and nothing else
     tracked,    // the last I-frame's mesh laid on the captured surface
 };
 
-// What people call them. What the codec must know of each besides is in src/codec/frame_kinds.cpp.
+// How a kind is called. Everything else the codec must know about it is in src/codec/frame_kinds.cpp.
 struct FrameKind {
     FrameType type;
-    const char* letter;  // as in tables and on the command line
+    const char* letter;  // as used in tables and on the command line
     const char* name;
 };
 inline constexpr std::array frame_kinds = {
@@ -32,15 +32,15 @@ inline constexpr std::array frame_kinds = {
 inline constexpr std::size_t frame_type_count = frame_kinds.size();
 
 constexpr const FrameKind& kind_of(FrameType type) { return frame_kinds[static_cast<std::size_t>(type)]; }
-// The kind of this letter, or null.
+// The kind with this letter, or null.
 constexpr const FrameKind* kind_of_letter(std::string_view letter) {
     for (const auto& kind : frame_kinds)
         if (kind.letter == letter) return &kind;
     return nullptr;
 }
 
-// The parts of a frame's payload, each of which can be decoded by itself; the numbers are those of the stream
-// (docs/bitstream.md, section 4, which also says what is in them in which kind of frame).
+// The parts of a frame's payload, each of which can be decoded by itself. The numbers are those of the stream;
+// docs/bitstream.md, section 4, describes the contents for each kind of frame.
 enum class Layer : std::uint8_t {
     pose = 1,
     transforms = 2,
@@ -51,7 +51,7 @@ enum class Layer : std::uint8_t {
     mapping = 7,
     fans = 8,  // the paper's connectivity: fans and distance orders
     distance_orders = 9,
-    external_intra = 10,  // all of a mesh that another coder packed
+    external_intra = 10,  // a whole mesh, coded by another coder
     coded_bones = 11,
 };
 
@@ -72,10 +72,10 @@ inline constexpr std::array frame_layers = {
     LayerName{Layer::external_intra, "external intra"},
     LayerName{Layer::coded_bones, "coded bones"},
 };
-inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // one more than the largest number; 0 is none
+inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the largest number plus one; 0 is not a layer
 
-// Bytes of one frame by layer: bytes[Layer::geometry]. Geometry and colour have those of their codebook too, in the
-// frame that it came with.
+// The bytes of a frame by layer: bytes[Layer::geometry]. Geometry and colour include their codebook, in the frame that
+// it came with.
 struct LayerBytes {
     std::array<std::size_t, layer_count> of_layer{};
     std::size_t overhead = 0;  // packet headers, counts, checksums
@@ -92,17 +92,17 @@ struct LayerBytes {
 struct FrameInfo {
     FrameType type = FrameType::intra;
     std::uint32_t frame = 0;
-    std::uint32_t reference = 0;    // number of the frame it refers to: the I-frame, of a T-frame also the frame before
+    std::uint32_t reference = 0;    // number of the frame it refers to; for a T-frame the I-frame or the previous frame
     std::int64_t timestamp_us = 0;  // microseconds
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
     std::uint32_t vertices = 0, triangles = 0;                // of the decoded mesh
     LayerBytes bytes;
 };
 
-// What a frame took in a first pass: what a second one spreads its bits by.
+// The size of a frame in a first pass, by which a second pass distributes its bits.
 struct FrameCost {
     FrameType type = FrameType::intra;
-    double quality = 50;  // of the quality knob
+    double quality = 50;  // the quality setting used
     double bits = 0;
 };
 

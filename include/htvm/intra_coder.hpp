@@ -1,4 +1,4 @@
-// The place where another static mesh coder plugs in for I-frames (paper, section III-C).
+// Lets another static mesh coder code I-frames (paper, section III-C).
 #pragma once
 
 #include <cstdint>
@@ -11,21 +11,21 @@
 
 namespace htvm {
 
-// How large a mesh packed bytes claim to hold.
+// The numbers of vertices and triangles that a coded mesh claims to have.
 struct ClaimedCounts {
     std::uint64_t vertices = 0, triangles = 0;
 };
 
-// A static coder that packs a mesh of integers without loss. It may change the order of vertices and triangles, and
-// what else its own design changes (see docs/bitstream.md); decode(encode(x)) must be the same on every machine.
-// encode is needed by an encoder only, decode by both.
+// A static coder that codes a mesh of integers losslessly. It may reorder vertices and triangles, and make the other
+// changes that its design implies (see docs/bitstream.md); decode(encode(x)) must be the same on every machine. encode
+// is needed by encoders only, decode by both sides.
 struct ExternalIntraCoder {
     std::uint8_t number = 0;  // its number in the stream
     const char* name = "";
     std::function<Result<std::vector<std::uint8_t>>(const LatticeMesh&)> encode;
     std::function<Result<LatticeMesh>(std::span<const std::uint8_t>)> decode;
-    // What decode would take memory for, read without decoding. A decoder refuses more than the frame's header says;
-    // without this function it trusts decode to stop by itself.
+    // Reads, without decoding, the counts for which decode would allocate memory. A decoder refuses more than the
+    // frame's header says. Without this function it relies on decode to limit itself.
     std::function<Result<ClaimedCounts>(std::span<const std::uint8_t>)> claims = nullptr;
 };
 

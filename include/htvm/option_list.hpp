@@ -27,7 +27,7 @@ enum class OptionKind : std::uint8_t {
     number,
     whole_number,
     on_or_off,  // 1 or 0
-    word,       // one of Option::words: its place among them
+    word,       // one of Option::words, given by its index
 };
 
 struct Option {
@@ -35,45 +35,46 @@ struct Option {
     OptionGroup group;
     OptionKind kind;
     const char* unit = "";       // "mm", "frames"; "": none
-    double least = 0, most = 1;  // of numbers; both are allowed
-    const char* zero = "";       // what 0 stands for where that is not what a small number would; it is then allowed
-    const char* meaning;         // in a line
+    double least = 0, most = 1;  // range of numbers; both ends are allowed
+    const char* zero = "";       // what 0 means if it has a special meaning; it is then allowed besides the range
+    const char* meaning;         // in one line
     std::span<const char* const> words = {};
     double (*get)(const EncoderOptions&);
-    void (*set)(EncoderOptions&, double);  // the value must be in range and, but for numbers, whole: see set_option()
+    void (*set)(EncoderOptions&, double);  // the value must be in range and, except for numbers, whole: see
+                                           // set_option()
 
-    const char* flag = "";       // of the command line; "": it has none
-    const char* flag_unit = "";  // "": as above
-    double flag_factor = 1;      // from the command line's unit to ours
-    bool flag_off = false;       // of a switch: the flag turns it off
+    const char* flag = "";       // on the command line; "": it has none
+    const char* flag_unit = "";  // "": as `unit`
+    double flag_factor = 1;      // factor from the command line's unit to `unit`
+    bool flag_off = false;       // for a switch: the flag turns it off
 };
 
 std::span<const Option> option_list();
 
-// nullptr where no option has that name.
+// nullptr if no option has that name.
 const Option* find_option(std::string_view name);
-// The one whose name, last part of the name or flag is most like it.
+// The option whose name, last part of the name or flag is most similar.
 const Option& nearest_option(std::string_view name);
-// bad_input that says so and names the nearest.
+// bad_input with a message that names the most similar option.
 Error no_such_option(std::string_view name);
 
-// bad_input where there is no such option, where the text is no value of it, or where
-// the value is out of its range. Whether options go together is checked by Encoder::create().
+// bad_input if there is no such option, if the text is not a value for it, or if the value is out of range.
+// Encoder::create() checks whether options fit together.
 Result<void> set_option(EncoderOptions& options, std::string_view name, double value);
-// The text is a number with a point, "on" or "off", or one of the words.
+// text: a number with a decimal point, "on" or "off", or one of the words.
 Result<void> set_option(EncoderOptions& options, std::string_view name, std::string_view text);
 Result<double> parse_value(const Option& option, std::string_view text);
-// bad_input where the value is out of range or, but for numbers, not whole.
+// bad_input if the value is out of range or, except for numbers, not whole.
 Result<void> check_value(const Option& option, double value);
 
-// As set_option() reads it: "0.12", "off", "motion".
+// In the form that set_option() reads: "0.12", "off", "motion".
 std::string value_text(const Option& option, double value);
 // "0.01 to 3600 s", "0, or 1 to 1024", "on or off", "bone or any".
 std::string range_text(const Option& option);
-// What it means, with what 0 stands for.
+// The meaning of the option, including that of 0.
 std::string meaning_text(const Option& option);
 
-// Whether options of the group mean anything to the profile. Those of other groups must stay at their defaults.
+// Whether options of the group have an effect in the profile. Those of other groups must stay at their defaults.
 bool serves(OptionGroup group, Profile profile);
 const char* group_name(OptionGroup group);  // "common", "rate", "tracked", "topology"
 const char* profile_name(Profile profile);  // "tracked", "topology", "paper"

@@ -1,4 +1,4 @@
-// The stream: self-delimiting packets, one a frame, behind a sequence header. docs/bitstream.md is normative.
+// The stream: a sequence header, then self-delimiting packets, one per frame. docs/bitstream.md is normative.
 #pragma once
 
 #include <cstddef>
@@ -16,40 +16,41 @@ enum class PacketKind : std::uint8_t {
     sequence = 1,   // sequence header: needed before any frame; may be repeated
     intra = 2,      // I-frame
     enhanced = 3,   // EP-frame: refers to an I-frame
-    codebook = 4,   // a codebook that later EP-frames name
-    index = 5,      // where the I-frames are, at the end of a file; optional
+    codebook = 4,   // a codebook that later EP-frames refer to
+    index = 5,      // positions of the I-frames, at the end of a file; optional
     predicted = 6,  // P-frame: the I-frame's mesh moved
     tracked = 7,    // T-frame: the I-frame's mesh laid on the captured surface
 };
 
 struct Packet {
     PacketKind kind = PacketKind::sequence;
-    std::uint32_t frame = 0;        // number of the frame that it is, or came with
-    std::uint32_t reference = 0;    // number of the I-frame that it refers to; its own for an I-frame
+    std::uint32_t frame = 0;        // number of the frame that it holds, or came with
+    std::uint32_t reference = 0;    // number of the I-frame that it refers to; for an I-frame, its own
     std::int64_t timestamp_us = 0;  // of the frame, microseconds
     std::vector<std::uint8_t> payload;
 };
 
 inline constexpr std::size_t packet_overhead = 36;  // bytes around the payload: a header of 32 and a CRC of 4
 
-// The packet's bytes, ready to store or send.
+// The bytes of the packet, ready to be stored or sent.
 std::vector<std::uint8_t> write_packet(const Packet& packet);
 
-// Cuts a stream of bytes into packets. Push bytes as they come, in pieces of any size, and pull packets until there is
-// none. Damage costs the packets it touches: the reader goes on at the next packet that is whole. Memory is taken for
-// what was pushed, not for what a header claims; where it runs out, std::bad_alloc leaves the reader as it was.
+// Cuts a stream of bytes into packets. Push bytes as they arrive, in pieces of any size, and pull packets until there
+// is none. Damage costs only the packets it touches: the reader continues at the next whole packet. Memory is allocated
+// for what was pushed, not for what a header claims; if it runs out, std::bad_alloc leaves the reader unchanged.
 class PacketReader {
 public:
-    // Packets whose payload is larger count as damage.
+    // Packets with a larger payload are treated as damage.
     explicit PacketReader(std::size_t max_payload = std::size_t{1} << 28) : max_payload_(max_payload) {}
     void push(std::span<const std::uint8_t> bytes);
-    // The next whole packet, or nothing until more bytes are pushed.
+    // The next whole packet; nothing if more bytes must be pushed first.
     std::optional<Packet> pull();
-    // Bytes that had to be skipped so far because they are no packet, or one with a wrong CRC.
+    // The number of bytes skipped so far, because they are not a packet or belong to one with a wrong CRC.
     std::uint64_t damaged_bytes() const { return damaged_; }
-    // Packets passed over because their payload is larger than allowed, though their header is sound; damage too.
+    // The number of packets skipped because their payload is larger than allowed although their header is intact;
+    // damage too.
     std::uint64_t oversized_packets() const { return oversized_; }
-    // Bytes pushed that are not part of a packet yet. At the end of a stream they are a packet cut short.
+    // The number of pushed bytes that do not form a packet yet. At the end of a stream they are a truncated packet.
     std::size_t pending_bytes() const { return buffer_.size() - position_; }
 
 private:
@@ -60,7 +61,7 @@ private:
     std::size_t position_ = 0;
     std::uint64_t damaged_ = 0;
     std::uint64_t oversized_ = 0;
-    std::uint64_t checked_in_vain_ = 0;  // payload bytes whose CRC was wrong
+    std::uint64_t checked_in_vain_ = 0;  // payload bytes of packets whose CRC was wrong
 };
 
 }  // namespace htvm

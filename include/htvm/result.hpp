@@ -8,13 +8,13 @@
 namespace htvm {
 
 enum class ErrorKind {
-    bad_input,       // what the caller gave is wrong: a mesh, a pose, an option, a file that is not what it should be
-    corrupt_stream,  // the stream's bytes contradict themselves or end too early
-    unsupported,     // valid, but this build or version cannot do it
+    bad_input,       // the caller's input is wrong: a mesh, a pose, an option, a file of the wrong kind
+    corrupt_stream,  // the stream is inconsistent or ends too early
+    unsupported,     // valid, but not supported by this build or version
     limit,           // larger than a configured limit
 };
 
-// One clear sentence for a person: what, where, what to do.
+// One clear sentence for the user: what is wrong, where, and what to do.
 struct Error {
     ErrorKind kind = ErrorKind::bad_input;
     std::string message;

@@ -1,4 +1,4 @@
-// The skeleton tracked with a mesh sequence: its bones once, its pose every frame.
+// The skeleton tracked with a mesh sequence: its bones, given once, and its pose in every frame.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct Bone {
     std::uint16_t second = 0;  // index of j^(i,1)
 };
 
-// What stays the same over a sequence.
+// What is constant over a sequence.
 struct Skeleton {
     std::vector<std::string> joint_names;
     std::vector<Bone> bones;
@@ -26,8 +26,8 @@ struct Skeleton {
 // S_t: the skeleton in one frame.
 struct Pose {
     std::vector<Vector3d> joints;  // mm, one per joint of the skeleton
-    // One per joint, false where the tracker lost it and its position is a guess (coded as given all the same);
-    // empty: all tracked.
+    // One per joint; false if the tracker lost it and its position is a guess (which is coded all the same); empty: all
+    // tracked.
     std::vector<bool> tracked;
     std::vector<Rotation> orientations;  // T^i, one per bone; empty: derived from the joints
 };

@@ -1,4 +1,4 @@
-// The decoder's part of the C interface, over htvm::Decoder.
+// The decoder part of the C interface, on top of htvm::Decoder.
 #include <algorithm>
 #include <limits>
 #include <optional>
@@ -18,11 +18,11 @@ struct htvm_decoder {
     htvm_allocator allocator;
     std::size_t max_packet_bytes;
     htvm::Decoder decoder;
-    htvm::PacketReader reader;               // of what is sent as bytes
-    std::optional<htvm::Packet> packet;      // sent as such, not yet received
-    std::optional<htvm::FrameView> current;  // lent by the decoder
+    htvm::PacketReader reader;               // for what is sent as bytes
+    std::optional<htvm::Packet> packet;      // sent as a packet, not yet received
+    std::optional<htvm::FrameView> current;  // on loan from the decoder
     LastError error;
-    std::uint64_t damaged_before = 0;  // bytes, by readers that were discarded
+    std::uint64_t damaged_before = 0;  // by readers that were discarded, in bytes
     Sent sent = Sent::nothing;
 
     htvm_decoder(const htvm_allocator& memory, const htvm::DecoderOptions& options)
@@ -90,13 +90,13 @@ std::optional<htvm::Packet> next_packet(htvm_decoder& decoder) {
     return std::exchange(decoder.packet, std::nullopt);
 }
 
-// The numbers of an array of points or the like, which lie side by side; null where there is none.
+// The numbers of an array of points or similar, which are contiguous; null for an empty array.
 template <class Element>
 const typename Element::value_type* numbers(std::span<const Element> elements) {
     return elements.empty() ? nullptr : elements.front().data();
 }
 
-// Copies elements, each N numbers, to the caller's array.
+// Copies elements of N numbers each to the caller's array.
 template <class Element>
 htvm_status copy(LastError& error, std::span<const Element> elements, const std::string& name,
                  typename Element::value_type* out, std::size_t capacity) {
@@ -111,7 +111,7 @@ htvm_status copy(LastError& error, std::span<const Element> elements, const std:
     return HTVM_OK;
 }
 
-// The same for an attribute of the current frame's vertices, which it may not have.
+// The same for an attribute of the current frame's vertices, which the frame may not have.
 template <class Element>
 htvm_status copy_attribute(htvm_decoder* decoder, std::span<const Element> htvm::MeshView::*attribute, const char* name,
                            typename Element::value_type* out, std::size_t capacity) {
@@ -136,7 +136,7 @@ htvm_status copy_pose(htvm_decoder* decoder, std::vector<Element> htvm::Pose::*p
     });
 }
 
-// Only one way of sending suits a decoder.
+// Refuses to mix the two ways of sending.
 htvm_status check_sent(htvm_decoder& decoder, htvm_decoder::Sent way) {
     if (decoder.sent != htvm_decoder::Sent::nothing && decoder.sent != way)
         return decoder.error.set(HTVM_BAD_INPUT, "this decoder is sent packets and bytes: use one or the other");
@@ -153,7 +153,7 @@ htvm_status htvm_decoder_options_init(htvm_decoder_options* options, size_t stru
 htvm_status htvm_decoder_create(const htvm_decoder_options* options, htvm_decoder** decoder) {
     if (!decoder) return HTVM_BAD_INPUT;
     *decoder = nullptr;
-    LastError error;  // there is no handle yet to keep it in
+    LastError error;  // there is no handle yet that could keep the message
     return guarded(error, [&] {
         auto all = default_options();
         if (options) {
@@ -213,7 +213,8 @@ htvm_status htvm_decoder_receive_frame(htvm_decoder* decoder, htvm_frame_info* i
         }
         return htvm_status{HTVM_AGAIN};
     });
-    // Else the same bytes would be read again and again, and a caller who goes on until HTVM_AGAIN never come to it.
+    // Without this the same bytes would be read again and again, and a caller who loops until HTVM_AGAIN would never
+    // get there.
     if (status == HTVM_OUT_OF_MEMORY) discard(*decoder);
     return status;
 }

@@ -1,4 +1,4 @@
-// The encoder's part of the C interface, over htvm::Encoder.
+// The encoder part of the C interface, on top of htvm::Encoder.
 #include <algorithm>
 #include <string>
 #include <string_view>
@@ -18,7 +18,7 @@ struct htvm_encoder {
     htvm_allocator allocator;
     std::size_t joints, bones;  // of the skeleton
     htvm::Encoder encoder;
-    std::vector<std::uint8_t> packet;  // pulled, not yet received; empty: none
+    std::vector<std::uint8_t> packet;  // pulled but not yet received; empty: none
     std::uint32_t attributes = 0;      // of the last frame
     bool any_frame = false, finished = false;
     LastError error;
@@ -61,7 +61,7 @@ htvm_status set_option(htvm_encoder_options* options, const char* name, Value va
     });
 }
 
-// Calls take(), which gives a status, with the option and its value.
+// Calls take() with the option and its value, and returns its status.
 template <class Take>
 htvm_status get_option(htvm_encoder_options* options, const char* name, const Take& take) {
     if (!options) return HTVM_BAD_INPUT;
@@ -93,7 +93,7 @@ htvm_status read_skeleton(LastError& error, const htvm_skeleton& given, htvm::En
     return HTVM_OK;
 }
 
-// `count` elements of N numbers each; none where the array is NULL.
+// `count` elements of N numbers each; none if the array is NULL.
 template <class Element>
 std::vector<Element> elements(const typename Element::value_type* numbers, std::size_t count) {
     std::vector<Element> out;
@@ -151,7 +151,7 @@ htvm_status htvm_encoder_options_create(uint32_t profile, const htvm_allocator* 
     *options = nullptr;
     htvm_allocator memory = allocator ? *allocator : htvm_allocator{};
     if (profile >= number_of_profiles || !htvm::c_api::complete(memory)) return HTVM_BAD_INPUT;
-    LastError unused;  // there is no handle yet to keep it in
+    LastError unused;  // there is no handle yet that could keep the message
     return guarded(unused, [&] {
         *options = htvm::c_api::make_handle<htvm_encoder_options>(memory, memory, static_cast<htvm::Profile>(profile));
         return htvm_status{*options ? HTVM_OK : HTVM_OUT_OF_MEMORY};
@@ -264,7 +264,7 @@ htvm_status htvm_encoder_create(const htvm_encoder_options* options, htvm_encode
                                 size_t text_capacity) {
     if (!encoder) return HTVM_BAD_INPUT;
     *encoder = nullptr;
-    LastError error;  // there is no handle yet to keep it in
+    LastError error;  // there is no handle yet that could keep the message
     const auto status = guarded(
         error, [&] { return options ? create(error, *options, encoder) : create_with_defaults(error, encoder); });
     if (text && text_capacity > 0) {

@@ -1,5 +1,5 @@
-// What both handles of the C interface (htvm/htvm.h) are made of: statuses, the last error, the caller's allocator, and
-// the border that no exception crosses.
+// What both handles of the C interface (htvm/htvm.h) share: statuses, the last error, the caller's allocator, and the
+// boundary that no exception crosses.
 #pragma once
 
 #include <array>
@@ -20,15 +20,15 @@ namespace htvm::c_api {
 
 htvm_status status_of(ErrorKind kind);
 
-// A sentence, kept where no allocation is needed; longer ones are cut.
+// A message in a fixed buffer, so that no allocation is needed; longer ones are truncated.
 struct LastError {
     std::array<char, 512> text{};
-    // Keeps the message and gives the status back.
+    // Keeps the message and returns the status.
     htvm_status set(htvm_status status, const char* message);
     htvm_status set(const Error& error) { return set(status_of(error.kind), error.message.c_str()); }
 };
 
-// Calls work(), which gives a status. Exceptions become one.
+// Calls work() and returns its status; exceptions are turned into one.
 template <class Work>
 htvm_status guarded(LastError& error, const Work& work) noexcept {
     try {
@@ -42,13 +42,14 @@ htvm_status guarded(LastError& error, const Work& work) noexcept {
     }
 }
 
-// The allocator with malloc and free in place of what is not given. False where one function is and the other is not.
+// Replaces functions that are not given by malloc and free. False if only one of the two is given.
 bool complete(htvm_allocator& allocator);
 
-// The caller's function as a runner; none where it is NULL.
+// The caller's function as a runner; empty if it is NULL.
 TaskRunner task_runner(htvm_run_tasks run, void* user);
 
-// A T made from the arguments in the caller's memory, or null where there is none. Exceptions of T's constructor pass.
+// A T made from the arguments in memory from the caller's allocator; null if there is no memory. Exceptions of T's
+// constructor are passed on.
 template <class T, class... Arguments>
 T* make_handle(const htvm_allocator& allocator, Arguments&&... arguments) {
     void* memory = allocator.allocate(allocator.user, sizeof(T));
@@ -61,16 +62,16 @@ T* make_handle(const htvm_allocator& allocator, Arguments&&... arguments) {
     }
 }
 
-// allocator: a copy, since the handle may hold the original.
+// allocator: by value, since the handle may hold the original.
 template <class T>
 void destroy_handle(T* handle, htvm_allocator allocator) {
     handle->~T();
     allocator.release(allocator.user, handle);
 }
 
-// Versioned structs. Those of the caller, of another version perhaps, are as long as their struct_size says: what this
-// version has more is left at its default, and what it does not know must be 0. The size of a struct is a multiple of
-// its alignment in every version, so that no pointer is cut in half.
+// Versioned structs. A struct from the caller may be of another version, and is as long as its struct_size says.
+// Members that only this version has keep their defaults; members that it does not know must be 0. In every version the
+// size of a struct is a multiple of its alignment, so that no pointer is cut in half.
 enum class StructSize { good, never_set, from_a_later_version };
 
 template <class Struct>
@@ -86,10 +87,10 @@ StructSize read_struct(const Struct* given, Struct& out) {
     return StructSize::good;
 }
 
-// read_struct() with a status and a message; `name` is the struct's.
+// read_struct() with a status and a message; `name`: of the struct.
 htvm_status check_struct(LastError& error, StructSize size, const char* name);
 
-// Writes what the caller has room for, and how much that is.
+// Writes as much as the caller has room for, and the size written.
 template <class Struct>
 htvm_status write_struct(Struct value, void* out, std::size_t size) {
     static_assert(std::is_trivially_copyable_v<Struct>);
@@ -100,7 +101,8 @@ htvm_status write_struct(Struct value, void* out, std::size_t size) {
     return HTVM_OK;
 }
 
-// The same for a struct that the caller is to fill: what this version does not know is 0, and struct_size the caller's.
+// The same for a struct that the caller is to fill: members that this version does not know are set to 0, struct_size
+// to the caller's.
 template <class Struct>
 htvm_status init_struct(Struct value, void* out, std::size_t size) {
     static_assert(std::is_trivially_copyable_v<Struct>);
@@ -112,10 +114,10 @@ htvm_status init_struct(Struct value, void* out, std::size_t size) {
     return HTVM_OK;
 }
 
-// What both sides say of a frame; joints and bones are left 0.
+// The frame information that encoder and decoder share; joints and bones are left 0.
 htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes);
 
-// Those that the mesh has: HTVM_COLOURS | ...
+// The attributes that the mesh has: HTVM_COLOURS | ...
 std::uint32_t attributes_of(const MeshView& mesh);
 
 }  // namespace htvm::c_api

@@ -1,4 +1,4 @@
-// Part of WebAssembly builds alone: these have no exceptions, so where C++ would throw (memory has run out), they trap.
+// Used in WebAssembly builds only. These have no exceptions, so where C++ would throw (memory has run out), they trap.
 #include <cstddef>
 
 extern "C" {

@@ -1,4 +1,4 @@
-// Times the stages of a frame.
+// Measures how long the stages of a frame take.
 #pragma once
 
 #include <chrono>
@@ -11,7 +11,7 @@ namespace htvm::internal {
 class StageClock {
 public:
     explicit StageClock(std::vector<StageTime>& stages) : stages_(stages) {}
-    // The time since the last call, or since construction, belongs to this stage.
+    // Assigns the time since the last call, or since construction, to this stage.
     void done(const char* stage) {
         const auto now = std::chrono::steady_clock::now();
         stages_.push_back({stage, std::chrono::duration<double, std::milli>(now - last_).count()});

@@ -26,11 +26,11 @@ tl::unexpected<Error> not_readable(const std::string& why) {
 
 struct DracoCounts {
     std::uint64_t faces = 0;
-    std::uint64_t points = 0;  // of a mesh at least; attribute seams add more
+    std::uint64_t points = 0;  // at least, for a mesh; attribute seams add more
 };
 
-// The counts that libdraco is going to allocate for, from the beginning of the file: "DRACO", version, what it holds
-// and how, flags; metadata if the flags say so; counts.
+// The counts that libdraco is going to allocate for, read from the beginning of the file: "DRACO", version, type and
+// method, flags; metadata if the flags say so; counts.
 Result<DracoCounts> claimed_counts(std::span<const std::uint8_t> bytes) {
     constexpr std::size_t header_bytes = 11;
     if (bytes.size() < header_bytes || !std::equal(bytes.begin(), bytes.begin() + 5, "DRACO")) {
@@ -58,7 +58,7 @@ Result<DracoCounts> claimed_counts(std::span<const std::uint8_t> bytes) {
     if (!is_mesh) {
         counts.points = in.u32();
     } else if (edgebreaker) {
-        in.u8();  // how the mesh is traversed
+        in.u8();  // the method of traversal
         counts.points = in.varint();
         counts.faces = in.varint();
     } else {
@@ -72,7 +72,7 @@ Result<DracoCounts> claimed_counts(std::span<const std::uint8_t> bytes) {
 Result<void> check_counts(const DracoCounts& counts, std::size_t file_bytes, const MeshLimits& limits) {
     if (auto ok = check_count(counts.points, limits.most_vertices, "vertices"); !ok) return ok;
     if (auto ok = check_count(counts.faces, limits.most_triangles, "triangles"); !ok) return ok;
-    // The best that Draco does is far above a hundredth of a bit a vertex; small meshes may be one repeated value.
+    // Draco never gets below a hundredth of a bit per vertex, except in small meshes, which may be one repeated value.
     const std::uint64_t believable = 65536 + std::uint64_t{1000} * file_bytes;
     if (counts.points > believable || counts.faces > believable) {
         return not_readable("it claims " + std::to_string(counts.points) + " vertices and " +
@@ -81,7 +81,7 @@ Result<void> check_counts(const DracoCounts& counts, std::size_t file_bytes, con
     return {};
 }
 
-// Calls take(point, components) for each point; false where the attribute's data do not reach so far.
+// Calls take(point, components) for each point; false if the attribute does not have data for all points.
 template <std::size_t N, class Take>
 bool for_each_point(const draco::PointCloud& cloud, const draco::PointAttribute& attribute, Take take) {
     const std::uint32_t points = cloud.num_points();
@@ -142,7 +142,7 @@ Result<void> take_colours(const draco::PointCloud& cloud, Mesh& mesh) {
     if (attribute->num_components() < 3 || attribute->num_components() > 4) {
         return fail(ErrorKind::unsupported, "the Draco file's colours do not have three or four components");
     }
-    // libdraco converts normalised integers to 0..1 by itself.
+    // libdraco scales normalised integers to 0..1.
     if (attribute->normalized()) scale = 255;
     const bool complete = for_each_point<3>(cloud, *attribute, [&](std::uint32_t, const std::array<double, 3>& value) {
         Colour colour{};

@@ -73,7 +73,7 @@ Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, s
     std::vector<std::uint8_t> bytes;
     const std::uintmax_t expected = std::filesystem::file_size(path, error);
     if (!error && expected <= most_bytes) bytes.reserve(static_cast<std::size_t>(expected));
-    std::array<char, 1 << 16> piece;  // a file's size is a hint only: a pipe has none
+    std::array<char, 1 << 16> piece;  // the file's size is only a hint: a pipe has none
     while (file.read(piece.data(), piece.size()) || file.gcount() > 0) {
         bytes.insert(bytes.end(), piece.begin(), piece.begin() + file.gcount());
         if (bytes.size() > most_bytes) {

@@ -1,4 +1,4 @@
-// Meshes in files: the format goes by the extension (.ply, .obj, .drc, in either case).
+// Mesh files: the extension (.ply, .obj, .drc, in either case) decides the format.
 #pragma once
 
 #include <cstdint>
@@ -12,36 +12,35 @@
 namespace htvm {
 
 struct MeshFileOptions {
-    double millimetres_per_unit = 1;  // of the file's coordinates: 1000 for a file in metres; finite, above 0
-    MeshLimits limits;                // the largest mesh accepted on reading
+    double millimetres_per_unit = 1;  // for the file's coordinates: 1000 for a file in metres; finite, above 0
+    MeshLimits limits;                // the largest mesh to accept
 };
 
-// Reads a mesh, its positions scaled to millimetres. Every error's message begins with the file's name.
+// Reads a mesh and scales its positions to millimetres. Every error message begins with the file's name.
 Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options = {});
 
-// Writes a mesh, its positions in millimetres scaled to the file's unit, over any file of that name. The folder must
-// exist. Writing .drc is unsupported. Every error's message begins with the file's name.
+// Writes a mesh, with positions scaled from millimetres to the file's unit, replacing any file of that name. The folder
+// must exist. Writing .drc is unsupported. Every error message begins with the file's name.
 Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, const MeshFileOptions& options = {});
 
 // True for the extensions that read_mesh reads.
 bool is_mesh_file_name(const std::filesystem::path& path);
 
-// A file's bytes; for files that are no meshes too. Fails (bad_input) where it cannot be read, (limit) above
-// most_bytes.
+// The bytes of any file. Fails (bad_input) if it cannot be read, (limit) above most_bytes.
 Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path,
                                             std::uint64_t most_bytes = std::uint64_t{1} << 32);
 
-// Multiplies the positions by `factor`. Fails (bad_input, naming the vertex) where one leaves the range of a float, and
-// where the factor is not finite and above 0.
+// Multiplies the positions by `factor`. Fails (bad_input, naming the vertex) if one leaves the range of a float, and if
+// the factor is not finite and above 0.
 Result<void> scale_positions(Mesh& mesh, double factor);
 
 enum class LengthUnit { millimetre, centimetre, metre };
 
 double millimetres_per(LengthUnit unit);  // 1, 10, 1000
 
-// The unit that a person's mesh is likely to be in, from the diagonal of its bounding box: metres below 10,
-// centimetres below 600, millimetres from there on. A person's diagonal is 0.5 m (an infant) to 3 m (arms and legs
-// spread), so the bounds are wide of every case but scenes above 6 m in cm. A mesh without extent says nothing: mm.
+// The unit that a mesh of a person is probably in, by the diagonal of its bounding box: metres below 10, centimetres
+// below 600, otherwise millimetres. A person's diagonal is 0.5 m (an infant) to 3 m (arms and legs spread), so the
+// bounds are safe except for scenes above 6 m in cm. For a mesh without extent: mm.
 LengthUnit guess_unit(const Mesh& mesh);
 
 }  // namespace htvm

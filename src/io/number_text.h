@@ -1,4 +1,4 @@
-// Numbers in text files, the same in every locale.
+// Numbers in text files, independent of the locale.
 #pragma once
 
 #include <optional>
@@ -7,11 +7,11 @@
 
 namespace htvm {
 
-// The number that the whole of `text` is: decimal, with optional sign, point and exponent; "nan" and "inf" give
-// themselves, too large a magnitude gives an infinity. Nothing where the text is anything else.
+// The number that `text`, as a whole, represents: decimal, with optional sign, point and exponent; "nan" and "inf" are
+// accepted, and too large a magnitude gives infinity. Nothing if the text is anything else.
 std::optional<double> parse_number(std::string_view text);
 
-// Appends the shortest text that parse_number and a conversion to float bring back exactly.
+// Appends the shortest text that parse_number and a conversion to float turn back into exactly this value.
 void append_number(std::string& text, float value);
 
 }  // namespace htvm

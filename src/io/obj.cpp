@@ -31,18 +31,18 @@ struct Polygon {
     std::size_t line = 0;
 };
 
-// The file's statements, before corners become vertices.
+// The statements of the file, before corners become vertices.
 struct ObjText {
     std::vector<Vector3f> positions;
-    std::vector<Vector3f> colours;  // as long as positions, or empty; not-a-number where the line has none
+    std::vector<Vector3f> colours;  // as long as positions, or empty; NaN if the line has none
     std::vector<Vector2f> texcoords;
     std::vector<Vector3f> normals;
     std::vector<Corner> corners;
     std::vector<Polygon> polygons;
-    std::size_t foreign_line = 0;  // the first whose statement is none of OBJ's; 0: none
+    std::size_t foreign_line = 0;  // the first line that is not an OBJ statement; 0: none
 };
 
-// Statements that hold no mesh and are passed over.
+// Statements that do not describe a mesh and are skipped.
 bool is_other_statement(std::string_view keyword) {
     constexpr std::array<std::string_view, 28> others = {
         "",       "g",      "o",      "s",   "mg",   "l",    "p",     "vp",      "usemtl", "mtllib",
@@ -55,7 +55,7 @@ tl::unexpected<Error> bad_line(std::size_t line, const std::string& why) {
     return fail(ErrorKind::bad_input, "line " + std::to_string(line) + " of the OBJ: " + why);
 }
 
-// The next word of the line, taken off it; empty at its end.
+// Removes the next word from the line and returns it; empty at its end.
 std::string_view take_word(std::string_view& line) {
     const std::size_t begin = line.find_first_not_of(" \t\r\v\f");
     if (begin == line.npos) return line = {};
@@ -65,7 +65,7 @@ std::string_view take_word(std::string_view& line) {
     return word;
 }
 
-// The line's numbers, at most eight, into `values`; how many, or nothing where one is no number.
+// Parses the line's numbers, at most eight, into `values`. Returns how many, or nothing if one is not a number.
 std::optional<std::size_t> take_numbers(std::string_view line, std::array<double, 8>& values) {
     std::size_t count = 0;
     for (std::string_view word = take_word(line); !word.empty() && count < values.size(); word = take_word(line)) {
@@ -88,7 +88,7 @@ Result<void> read_position(ObjText& obj, std::string_view line, std::size_t line
     obj.positions.push_back(
         {static_cast<float>(values[0]), static_cast<float>(values[1]), static_cast<float>(values[2])});
     constexpr float missing = std::numeric_limits<float>::quiet_NaN();
-    // Four numbers are x y z w, five mean nothing known, seven are x y z r g b a.
+    // Four numbers are x y z w, five have no known meaning, seven are x y z r g b a.
     if (*count >= 6) {
         obj.colours.resize(obj.positions.size() - 1, {missing, missing, missing});
         obj.colours.push_back({finite_or_zero(values[3]), finite_or_zero(values[4]), finite_or_zero(values[5])});
@@ -98,8 +98,8 @@ Result<void> read_position(ObjText& obj, std::string_view line, std::size_t line
     return {};
 }
 
-// A corner's index as written, 1 the first and -1 the last so far, as an index from 0. Nothing where it is no such
-// number or points before the first. Whether it points past the last shows at the end of the file.
+// A corner's index, counted from 0. In the file, 1 is the first and -1 the last so far. Nothing if it is not such a
+// number or points before the first. Whether it points past the last is known only at the end of the file.
 std::optional<std::uint32_t> parse_index(std::string_view text, std::size_t count) {
     std::int64_t index = 0;
     const char* end = text.data() + text.size();
@@ -172,7 +172,7 @@ Result<void> read_statement(ObjText& obj, std::string_view line, std::size_t lin
     return check_count(obj.normals.size(), 3 * limits.most_triangles, "normals or more");
 }
 
-// The next line, taken off the text, with lines that a backslash continues joined in `joined`.
+// Removes the next line from the text and returns it; lines continued with a backslash are put together in `joined`.
 std::string_view take_line(std::string_view& text, std::size_t& line_number, std::string& joined) {
     joined.clear();
     for (;;) {
@@ -209,8 +209,8 @@ Result<void> check_corners(const ObjText& obj) {
     return {};
 }
 
-// For each of the values the index of the first that equals it, so that equal values under several indices (as many
-// exporters write them, one a corner) do not split vertices.
+// For each value, the index of the first that equals it. With these, equal values under several indices (many exporters
+// write one per corner) do not split vertices.
 template <std::size_t N>
 std::vector<std::uint32_t> first_equal(const std::vector<std::array<float, N>>& values) {
     struct Hash {
@@ -230,14 +230,14 @@ std::vector<std::uint32_t> first_equal(const std::vector<std::array<float, N>>& 
     return out;
 }
 
-// True where every corner uses the attribute of the position's own index, and the counts agree: the attribute is then
-// one a position, for positions that no corner uses as well.
+// True if every corner uses the attribute with the same index as its position, and the counts agree: then the attribute
+// is one per position, also for positions that no corner uses.
 bool in_step(const ObjText& obj, std::size_t count, std::uint32_t Corner::*attribute) {
     return count == obj.positions.size() && std::all_of(obj.corners.begin(), obj.corners.end(),
                                                         [&](const Corner& c) { return c.*attribute == c.position; });
 }
 
-// Gives every corner a vertex; `vertices` says which combination each vertex is.
+// Assigns a vertex to every corner; `vertices` tells which combination each vertex is.
 std::vector<std::uint32_t> vertices_of_corners(const ObjText& obj, std::vector<Corner>& vertices) {
     const auto texcoord_of = first_equal(obj.texcoords);
     const auto normal_of = first_equal(obj.normals);
@@ -355,7 +355,7 @@ Result<std::string> write_obj(const Mesh& mesh) {
         if (!mesh.colours.empty()) {
             for (const std::uint8_t c : mesh.colours[v]) {
                 text += ' ';
-                // Six digits tell 256 levels apart and stay legible.
+                // Six digits distinguish 256 levels and stay legible.
                 append_number(text, static_cast<float>(std::round(c / 255.0 * 1e6) / 1e6));
             }
         }

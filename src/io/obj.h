@@ -1,16 +1,17 @@
-// OBJ, Wavefront's text format. Read and written here rather than by tinyobjloader, which keeps a polygon's corner
-// count in 8 bits (300 corners become 44), only warns of indices out of range, and cuts polygons by ear clipping, which
-// loses degenerate ones.
+// OBJ, Wavefront's text format. tinyobjloader is not used because it keeps a polygon's corner count in 8 bits (300
+// corners become 44), only warns about indices out of range, and cuts polygons by ear clipping, which loses degenerate
+// ones.
 //
-// Read: v x y z, v x y z r g b (0..1, or 0..255 where any component in the file is above 1), vn, vt, f with v, v/vt,
-// v//vn and v/vt/vn, negative (relative) indices, comments, lines continued with a backslash. Every other statement
-// (groups, objects, materials, lines, points) is skipped. Polygons are cut into fans round their first corner, their
-// orientation kept; faces with fewer than three corners are left out; isolated vertices and degenerate triangles stay.
+// Read: v x y z, v x y z r g b (0..1, or 0..255 if any component in the file is above 1), vn, vt, f with v, v/vt, v//vn
+// and v/vt/vn, negative (relative) indices, comments, lines continued with a backslash. Every other statement (groups,
+// objects, materials, lines, points) is skipped. Polygons are cut into fans around their first corner, keeping their
+// orientation; faces with fewer than three corners are left out; isolated vertices and degenerate triangles are kept.
 //
-// Vertices keep their number and order. A position whose corners carry several values of vt or vn becomes several
-// vertices: the first combination keeps the position's index, the others are appended at the end, as they are met.
-// Where no corner refers to a vertex, it takes the vt (vn) of its own index if the file's faces use vt (vn) in step
-// with v throughout and there are as many; else zeros. Vertices without a colour in a file with colours are white.
+// Vertices keep their number and order. A position whose corners have several values of vt or vn becomes several
+// vertices: the first combination keeps the position's index, the others are appended at the end, in the order in which
+// they are met. A vertex that no corner refers to gets the vt (vn) with its own index if the file's faces use vt (vn)
+// with the same index as v throughout and there are as many; otherwise zeros. Vertices without a colour in a file with
+// colours are white.
 //
 // Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
 #pragma once
@@ -26,12 +27,12 @@
 
 namespace htvm {
 
-// Errors: bad_input naming the line where a number cannot be read, a position is not finite or an index refers to
+// Errors: bad_input, naming the line, if a number cannot be read, a position is not finite or an index refers to
 // nothing; limit.
 Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits = {});
 
-// Lines v x y z or v x y z r g b, vt, vn, f; positions, normals and texture coordinates read back exactly, colours to
-// the same 8 bits. Fails (bad_input) where check_mesh does.
+// Writes lines v x y z or v x y z r g b, vt, vn, f. Positions, normals and texture coordinates are read back exactly,
+// colours to the same 8 bits. Fails (bad_input) if check_mesh does.
 Result<std::string> write_obj(const Mesh& mesh);
 
 }  // namespace htvm

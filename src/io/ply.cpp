@@ -17,7 +17,7 @@ namespace htvm {
 
 namespace {
 
-// What a vertex property means to us, and the place of its value in VertexValues.
+// The meaning of a vertex property, and the index of its value in VertexValues.
 enum Field { x, y, z, nx, ny, nz, s, t, red, green, blue, field_count, ignored };
 using VertexValues = std::array<double, field_count>;
 
@@ -25,8 +25,8 @@ struct Body {
     PlySource& source;
     PlyFormat format;
     MeshLimits limits;
-    std::uint64_t vertex_count = 0;  // as the header claims
-    bool took_words = false;         // the text body has begun, so the line its last word stands on is to be finished
+    std::uint64_t vertex_count = 0;  // as claimed by the header
+    bool took_words = false;         // words of the text body were taken, so the rest of the last line must be skipped
 };
 
 template <std::size_t size>
@@ -62,7 +62,7 @@ double decode_value(const std::uint8_t* bytes, PlyType type, bool big_endian) {
     return std::bit_cast<double>(load<8>(bytes, big_endian));
 }
 
-// The next value; nothing where the bytes end or, in text, where the next word is no number.
+// The next value; nothing if the bytes end or, in text, if the next word is not a number.
 std::optional<double> take_value(Body& body, PlyType type) {
     if (body.format == PlyFormat::ascii) {
         std::array<char, 256> word;
@@ -76,7 +76,7 @@ std::optional<double> take_value(Body& body, PlyType type) {
     return value;
 }
 
-// The length of a list; nothing where it is missing, negative or broken.
+// The length of a list; nothing if it is missing, negative or malformed.
 std::optional<std::uint64_t> take_list_length(Body& body, const PlyProperty& list) {
     const auto length = take_value(body, list.count_type);
     if (!length || !(*length >= 0) || *length > 4294967295.0) return std::nullopt;
@@ -99,11 +99,12 @@ bool skip_property(Body& body, const PlyProperty& property) {
     return true;
 }
 
-// Has a stream fetched in pieces rather than value by value: of the elements still to come, what they take at least.
+// Makes a stream fetch data in pieces rather than value by value, but never more than the least that the remaining
+// elements take.
 void fetch_ahead(Body& body, std::uint64_t element_bytes, std::uint64_t elements_left) {
     constexpr std::uint64_t piece = 1 << 16;
     if (body.source.buffered() >= element_bytes) return;
-    // In text the last value of all may lack the separator that is counted in.
+    // In text, the last value of all may lack the separator that the count includes.
     const std::uint64_t wanted = element_bytes * std::min(elements_left, piece / (element_bytes + 1) + 1);
     (void)body.source.ensure(static_cast<std::size_t>(std::min(wanted - (wanted > 0 ? 1 : 0), piece)));
 }
@@ -117,7 +118,7 @@ tl::unexpected<Error> ends_within(const std::string& where) {
                 "the PLY ends or cannot be read at " + where + "; the file is cut off or damaged");
 }
 
-// Fails where the element claims more than the bytes at hand can hold.
+// Fails if the element claims more than the available bytes can hold.
 Result<void> check_element_count(const Body& body, const PlyElement& element) {
     const std::uint64_t fewest = fewest_element_bytes(element, body.format);
     const auto left = body.source.remaining();
@@ -129,13 +130,13 @@ Result<void> check_element_count(const Body& body, const PlyElement& element) {
                                           " bytes that follow can hold; the file is cut off or damaged");
 }
 
-// What to reserve for a count that was checked against the bytes at hand, or (a stream) was not.
+// How much to reserve for a count that was checked against the available bytes, or (for a stream) was not.
 std::size_t reservation(const Body& body, std::uint64_t count, std::uint64_t bytes_each) {
     const std::uint64_t most = body.source.remaining().value_or(1 << 18) / bytes_each;
     return static_cast<std::size_t>(std::min(count, most));
 }
 
-// How a vertex element's properties make a vertex.
+// How the properties of a vertex element form a vertex.
 struct VertexLayout {
     std::vector<Field> fields;  // of each property
     std::array<PlyType, field_count> type{};
@@ -183,7 +184,7 @@ Result<VertexLayout> layout_of(const PlyElement& vertex) {
             if (field <= z) {
                 return fail(ErrorKind::bad_input, "the PLY header declares the vertex's " + property.name + " twice");
             }
-            field = ignored;  // such as s t and u v both: the first counts
+            field = ignored;  // of properties with the same meaning, such as s t and u v, the first counts
         }
         if (field != ignored) {
             seen[field] = true;
@@ -200,15 +201,15 @@ Result<VertexLayout> layout_of(const PlyElement& vertex) {
     return layout;
 }
 
-// A colour component, as the property's type has it, to 0..255.
+// Converts a colour component of the property's type to 0..255.
 std::uint8_t colour_component(double value, PlyType type) {
     if (type == PlyType::f32 || type == PlyType::f64) value *= 255;
     if (type == PlyType::u16) value /= 257;
-    if (!(value > 0)) return 0;  // NaN too
+    if (!(value > 0)) return 0;  // includes NaN
     return static_cast<std::uint8_t>(std::lround(std::min(value, 255.0)));
 }
 
-// False where the bytes end or cannot be read.
+// False if the bytes end or cannot be read.
 bool take_vertex(Body& body, const PlyElement& element, const VertexLayout& layout, VertexValues& value) {
     for (std::size_t p = 0; p < element.properties.size(); ++p) {
         const PlyProperty& property = element.properties[p];
@@ -263,7 +264,7 @@ tl::unexpected<Error> bad_index(std::uint64_t face, std::uint64_t vertex_count) 
                                           std::to_string(vertex_count) + " - 1");
 }
 
-// A vertex index as a whole number below vertex_count; nothing where it is not.
+// A vertex index as a whole number below vertex_count; nothing if it is not one.
 std::optional<std::uint32_t> as_index(double value, std::uint64_t vertex_count) {
     if (!(value >= 0 && value < static_cast<double>(vertex_count))) return std::nullopt;
     const auto index = static_cast<std::uint32_t>(value);
@@ -291,8 +292,8 @@ Result<void> read_polygon(Body& body, const PlyProperty& list, std::uint64_t fac
     return {};
 }
 
-// The usual face, nothing but a triangle with 32-bit indices, at a fraction of the time. False where the next face is
-// another kind, and then nothing is taken: read_polygon knows all.
+// Reads the usual face, only a triangle with 32-bit indices, in a fraction of the time. False, with nothing taken, if
+// the next face is of another kind, which read_polygon handles.
 bool take_plain_triangle(Body& body, const PlyElement& element, Mesh& mesh) {
     constexpr std::size_t bytes = 1 + 3 * 4;
     const PlyProperty& list = element.properties[0];
@@ -301,7 +302,7 @@ bool take_plain_triangle(Body& body, const PlyElement& element, Mesh& mesh) {
     if (!plain || mesh.triangles.size() >= body.limits.most_triangles) return false;
     if (!body.source.ensure(1) || *body.source.cursor() != 3 || !body.source.ensure(bytes)) return false;
     const std::uint8_t* face = body.source.cursor();
-    const std::uint64_t most = std::min(body.vertex_count, std::uint64_t{1} << 31);  // above, int32 would be negative
+    const std::uint64_t most = std::min(body.vertex_count, std::uint64_t{1} << 31);  // an int32 above would be negative
     Triangle triangle{};
     for (std::size_t c = 0; c < 3; ++c) {
         triangle[c] = static_cast<std::uint32_t>(load<4>(face + 1 + 4 * c, false));
@@ -405,7 +406,7 @@ Result<Mesh> read_one(PlySource& source, const MeshLimits& limits) {
         }
         if (!read) return tl::unexpected(read.error());
     }
-    if (body.took_words) {  // the rest of the last line, so that what follows begins on its own
+    if (body.took_words) {  // skip the rest of the last line, so that what follows begins on its own line
         while (source.ensure(1)) {
             const std::uint8_t c = *source.cursor();
             source.advance(1);

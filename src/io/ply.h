@@ -1,15 +1,15 @@
-// PLY, the polygon file format: text and binary of either byte order in, binary little-endian out.
+// PLY, the polygon file format: reads text and binary files of either byte order, writes binary little-endian.
 //
 // Read: the element "vertex" (x y z; nx ny nz; s t, u v or texture_u texture_v; red green blue or diffuse_red ...) and
 // the list "vertex_indices" or "vertex_index" of the element "face". Everything else is skipped. Polygons are cut into
-// fans round their first corner, their orientation kept; faces with fewer than three corners are left out. Colours of
-// a floating-point type are 0..1, 16-bit ones 0..65535, others 0..255. Normals, colours and texture coordinates
-// that are not finite become 0; normals are not made unit length. Triangle strips are refused (unsupported).
+// fans around their first corner, keeping their orientation; faces with fewer than three corners are left out. Colours
+// of a floating-point type are 0..1, 16-bit ones 0..65535, others 0..255. Normals, colours and texture coordinates that
+// are not finite become 0; normals are not normalised. Triangle strips are refused (unsupported).
 //
 // Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
 //
-// Errors: bad_input with the vertex or face (counted from 0) where the file is truncated, a position is not finite or
-// an index is out of range; limit; unsupported. Nothing is allocated for a count that the bytes at hand cannot hold.
+// Errors: bad_input, with the vertex or face (counted from 0), if the file is truncated, a position is not finite or an
+// index is out of range; limit; unsupported. Nothing is allocated for a count that the available bytes cannot hold.
 #pragma once
 
 #include <cstddef>
@@ -27,27 +27,28 @@ namespace htvm {
 
 struct PlyAtStart {
     Mesh mesh;
-    std::size_t bytes_consumed = 0;  // where the next PLY may begin
+    std::size_t bytes_consumed = 0;  // the position at which the next PLY may begin
 };
 
-// Reads the one PLY that the bytes begin with (white space before it is taken too); others may follow.
+// Reads the one PLY at the beginning of the bytes (leading white space is skipped); others may follow.
 Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
 
-// Reads a file's bytes. Trailing bytes are ignored, but a second PLY is an error: nothing is dropped in silence.
+// Reads the bytes of a file. Trailing bytes are ignored, but a second PLY is an error, so that no mesh is dropped
+// silently.
 Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
 
-// Binary little-endian: float x y z, then where the mesh has them float nx ny nz, float s t, uchar red green blue;
-// faces as uchar, uint vertex_indices. Fails (bad_input) where check_mesh does.
+// Binary little-endian: float x y z, then, if the mesh has them, float nx ny nz, float s t, uchar red green blue; faces
+// as uchar, uint vertex_indices. Fails (bad_input) if check_mesh does.
 Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh);
 
 // Reads PLYs that follow one another in a stream. One mesh is held at a time, and the stream is not read past the end
-// of the mesh it gives, so that a live stream's meshes come out as soon as they are complete.
+// of the mesh returned, so the meshes of a live stream are available as soon as they are complete.
 class PlyStreamReader {
 public:
     // The stream must outlive the reader.
     explicit PlyStreamReader(std::istream& stream, const MeshLimits& limits = {});
-    // The next mesh; nothing at the end of the stream. After an error the place of the next mesh is unknown: the error
-    // (which names the mesh, counted from 0) comes again.
+    // The next mesh; nothing at the end of the stream. After an error it is unknown where the next mesh begins, so the
+    // same error (which names the mesh, counted from 0) is returned again.
     Result<std::optional<Mesh>> next();
 
 private:

@@ -24,7 +24,7 @@ struct PlyProperty {
 
 struct PlyElement {
     std::string name;
-    std::uint64_t count = 0;  // as the header claims: not to be trusted
+    std::uint64_t count = 0;  // as claimed by the header, not to be trusted
     std::vector<PlyProperty> properties;
 };
 
@@ -33,21 +33,21 @@ struct PlyHeader {
     std::vector<PlyElement> elements;
 };
 
-// Bytes of a header, from "ply" to "end_header", that a reader accepts.
+// The longest header, from "ply" to "end_header", that a reader accepts, in bytes.
 inline constexpr std::size_t most_ply_header_bytes = std::size_t{1} << 20;
 
-// Elements that a header may declare.
+// The most elements that a header may declare.
 inline constexpr std::size_t most_ply_elements = 256;
 
-// Bytes of one value in a binary file: 1, 2, 4 or 8.
+// The bytes of one value in a binary file: 1, 2, 4 or 8.
 std::size_t ply_type_size(PlyType type);
 
-// The fewest bytes one element of this kind takes in the file; 0 for an element without properties. A list may be
-// empty; in text a value takes a digit and a separator (which the file's last value may lack).
+// The fewest bytes that one element of this kind takes in the file; 0 for an element without properties. A list may be
+// empty; in text a value takes a digit and a separator (which the last value in the file may lack).
 std::uint64_t fewest_element_bytes(const PlyElement& element, PlyFormat format);
 
-// Reads one line of the header, without its end of line, into the header read so far. True when it was "end_header".
-// Fails (bad_input, unsupported) with a sentence that quotes the line. The first line, "ply", is not to be given.
+// Parses one line of the header, without its line ending, into the header read so far. Returns true for "end_header".
+// Fails (bad_input, unsupported) with a sentence that quotes the line. The first line, "ply", must not be passed.
 Result<bool> read_ply_header_line(PlyHeader& header, std::string_view line);
 
 }  // namespace htvm

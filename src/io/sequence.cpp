@@ -19,13 +19,13 @@ namespace fs = std::filesystem;
 struct NumberedName {
     std::string prefix;
     std::string suffix;
-    std::size_t digits = 1;  // at least; padded by zeros
+    std::size_t digits = 1;  // at least this many, padded with zeros
 };
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-// Of "frame_%05d.ply" its parts; %% stands for a percent sign. Nothing where the name has no %, an error where what
-// follows the % is anything but d or 0Nd, or where there are two.
+// Splits "frame_%05d.ply" into its parts; %% stands for a percent sign. Nothing if the name has no %; an error if a %
+// is followed by anything except d or 0Nd, or if there are two.
 Result<std::optional<NumberedName>> parse_pattern(std::string_view name) {
     NumberedName pattern;
     bool has_number = false;
@@ -59,7 +59,7 @@ Result<std::optional<NumberedName>> parse_pattern(std::string_view name) {
     return std::optional(std::move(pattern));
 }
 
-// The number in a name that the pattern could have made.
+// The number in a name that the pattern could have produced.
 std::optional<std::uint64_t> number_in(const NumberedName& pattern, std::string_view name) {
     if (name.size() < pattern.prefix.size() + pattern.digits + pattern.suffix.size()) return std::nullopt;
     if (!name.starts_with(pattern.prefix) || !name.ends_with(pattern.suffix)) return std::nullopt;
@@ -193,7 +193,7 @@ Result<SequenceFiles> find_sequence(std::string_view what) {
 bool natural_less(std::string_view a, std::string_view b) {
     std::size_t i = 0;
     std::size_t j = 0;
-    int zeros = 0;  // of equal numbers, decides last
+    int zeros = 0;  // leading zeros, decides last
     while (i < a.size() && j < b.size()) {
         if (!is_digit(a[i]) || !is_digit(b[j])) {
             if (a[i] != b[j]) return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
@@ -224,7 +224,7 @@ bool natural_less(std::string_view a, std::string_view b) {
 bool glob_matches(std::string_view glob, std::string_view text) {
     std::size_t g = 0;
     std::size_t t = 0;
-    std::optional<std::size_t> star;  // the last * met, and how much of the text it was tried with
+    std::optional<std::size_t> star;  // the last * seen, and how much of the text it was tried with
     std::size_t tried = 0;
     while (t < text.size()) {
         if (g < glob.size() && glob[g] == '*') {

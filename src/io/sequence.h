@@ -1,4 +1,5 @@
-// Sequences of mesh files, one a frame: which files a name given by a person means, and what decoded frames are called.
+// Sequences of mesh files, one per frame: which files a name given by the user refers to, and how decoded frames are
+// named.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +13,8 @@
 namespace htvm {
 
 struct SequenceFiles {
-    std::vector<std::filesystem::path> paths;  // one a frame, in order; never empty
-    std::vector<std::uint64_t> numbers;  // each name's number, where given by a %d pattern; else empty. Gaps show here
+    std::vector<std::filesystem::path> paths;  // one per frame, in order; never empty
+    std::vector<std::uint64_t> numbers;  // the number in each name if a %d pattern was given, else empty; shows gaps
 };
 
 // The files that `what` means, which is, tried in this order:
@@ -26,11 +27,12 @@ struct SequenceFiles {
 // a glob means files of different formats (each frame twice, most likely).
 Result<SequenceFiles> find_sequence(std::string_view what);
 
-// True where a comes before b: letters by code, runs of digits by their number (2 before 10), equal numbers by fewer
+// True if a sorts before b: letters by code, runs of digits by their number (2 before 10), equal numbers by fewer
 // leading zeros.
 bool natural_less(std::string_view a, std::string_view b);
 
-// True where `text` as a whole matches `glob`: * for any characters or none, ? for one, all else for itself.
+// True if the whole of `text` matches `glob`: * stands for any characters or none, ? for one, everything else for
+// itself.
 bool glob_matches(std::string_view glob, std::string_view text);
 
 // How frames written to files are named.
@@ -38,13 +40,13 @@ struct OutputNames {
     std::filesystem::path folder;
     std::string prefix;     // before the number
     std::string suffix;     // after it, with the extension
-    int digits = 5;         // of the number, padded by zeros
-    bool one_file = false;  // no number: a name for one frame alone
+    int digits = 5;         // of the number, padded with zeros
+    bool one_file = false;  // no number: the name of a single file for a single frame
 };
 
 // From a pattern (`out/frame_%05d.obj`), a folder (`out/`, or a name without extension: `out/00000.ply` and so on with
-// `extension`), or the name of one file (`frame.ply`: one_file). Fails (bad_input, unsupported) where the pattern is
-// not a single %d or %0Nd in the last part, or the extension is not one that is written (.ply, .obj).
+// `extension`), or the name of one file (`frame.ply`: one_file). Fails (bad_input, unsupported) if the pattern is not a
+// single %d or %0Nd in the last part, or if the extension is not one that can be written (.ply, .obj).
 Result<OutputNames> output_names(std::string_view what, std::string_view extension = ".ply");
 
 // The file for frame n.

@@ -11,7 +11,7 @@ namespace htvm {
 using namespace internal;
 namespace {
 
-constexpr double same_time = 0.0002;  // s: a hand at 5 m/s moves 1 mm
+constexpr double same_time = 0.0002;  // s: in this time a hand at 5 m/s moves 1 mm
 
 std::string number(double value) {
     char text[40];
@@ -70,12 +70,12 @@ Result<void> check_mesh(const MeshClock& mesh) {
     return {};
 }
 
-// Whether pose i simply is mesh frame i: no mesh clock, or one that runs with the poses.
+// Whether pose i belongs to mesh frame i: there is no mesh clock, or it agrees with that of the poses.
 bool frame_by_frame(const SkeletonTrack& track, const MeshClock& mesh) {
     if (mesh.fps == 0) return true;
     if (track.poses.size() == mesh.frames && std::abs(track.fps / mesh.fps - 1) <= 0.005) {
         const double span = track.timestamps.empty() ? 0 : track.timestamps.back() - track.timestamps.front();
-        // Otherwise the tracker dropped frames and went on after the meshes' end.
+        // Otherwise the tracker dropped frames and went on after the meshes had ended.
         if (std::abs(span * mesh.fps - static_cast<double>(mesh.frames) + 1) <=
             0.5 + 0.005 * static_cast<double>(mesh.frames))
             return true;
@@ -87,7 +87,7 @@ bool frame_by_frame(const SkeletonTrack& track, const MeshClock& mesh) {
     return true;
 }
 
-// The mesh frames' times on the track's clock.
+// The times of the mesh frames on the track's clock.
 std::vector<double> mesh_times(const SkeletonTrack& track, const MeshClock& mesh, double offset,
                                std::vector<std::string>& notes) {
     std::vector<double> times;
@@ -122,8 +122,8 @@ std::vector<double> mesh_times(const SkeletonTrack& track, const MeshClock& mesh
     return times;
 }
 
-// Where a time falls among the samples of one joint or bone: between samples `before` and `after` (equal where one
-// is taken as it is, or held), at `fraction` of the way.
+// Where a time lies among the samples of one joint or bone: at `fraction` of the way from sample `before` to sample
+// `after` (equal if one is taken as it is, or held).
 struct Place {
     std::size_t before = 0, after = 0;
     double fraction = 0;
@@ -135,7 +135,7 @@ Place find_place(const std::vector<std::size_t>& samples, const std::vector<doub
     const auto earlier = [&](std::size_t sample, double bound) { return timestamps[sample] < bound; };
     const auto next = std::lower_bound(samples.begin(), samples.end(), time - same_time, earlier);
     if (next == samples.end()) return {samples.back(), samples.back(), 0, true};
-    // The nearer of two samples that are both at this time.
+    // Two samples are within the tolerance of this time: take the nearer.
     if (next + 1 != samples.end() && std::abs(timestamps[next[1]] - time) < std::abs(timestamps[*next] - time))
         if (std::abs(timestamps[next[1]] - time) <= same_time) return {next[1], next[1], 0, false};
     if (timestamps[*next] - time <= same_time) return {*next, *next, 0, false};
@@ -145,14 +145,14 @@ Place find_place(const std::vector<std::size_t>& samples, const std::vector<doub
 }
 
 struct FillCount {
-    std::size_t joints = 0;  // joints filled in, over all frames
-    std::size_t frames = 0;  // frames with some
-    std::size_t whole = 0;   // frames with all
-    std::size_t beyond = 0;  // of these, frames before the first or after the last pose
+    std::size_t joints = 0;  // number of joints filled in, over all frames
+    std::size_t frames = 0;  // number of frames with some
+    std::size_t whole = 0;   // number of frames with all
+    std::size_t beyond = 0;  // number of those before the first or after the last pose
     std::vector<std::string> never;
 };
 
-// Fills joint j of all poses from the poses that track it.
+// Fills in joint j of all poses from the poses that track it.
 void fill_joint(const SkeletonTrack& track, const std::vector<double>& times, std::size_t j,
                 const std::vector<std::size_t>& samples, std::vector<Pose>& poses) {
     for (std::size_t t = 0; t < times.size(); ++t) {
@@ -166,7 +166,7 @@ void fill_joint(const SkeletonTrack& track, const std::vector<double>& times, st
     }
 }
 
-// Puts joints that no pose has where the nearest joint along the bones is, else at the first joint that is known.
+// Puts a joint that no pose has where the nearest joint along the bones is, or else at the first joint that is known.
 void place_lost_joints(const Skeleton& skeleton, std::vector<bool> known, std::vector<Pose>& poses) {
     const auto copy = [&](std::size_t from, std::size_t to) {
         for (Pose& pose : poses) pose.joints[to] = pose.joints[from];
@@ -174,7 +174,7 @@ void place_lost_joints(const Skeleton& skeleton, std::vector<bool> known, std::v
     };
     for (bool changed = true; changed;) {
         changed = false;
-        const std::vector<bool> before = known;  // one bone further a round: the nearest wins
+        const std::vector<bool> before = known;  // one bone further per round, so the nearest wins
         for (const Bone& bone : skeleton.bones)
             for (const auto& [from, to] : {std::pair(bone.first, bone.second), std::pair(bone.second, bone.first)})
                 if (before[from] && !known[to]) copy(from, to), changed = true;
@@ -236,16 +236,18 @@ void say_filled(const FillCount& count, std::size_t frames, std::vector<std::str
 
 Rotation blend(const Rotation& a, const Rotation& b, double fraction) {
     if (fraction == 0 || a == b) return a;
-    // The mean of matrices turns evenly enough between poses that are near; far apart there is no good answer.
+    // For similar poses, the mean of the matrices interpolates turns evenly enough; for very different ones there is no
+    // good answer.
     double trace = 0;
     for (std::size_t i = 0; i < 9; ++i) trace += a[i] * b[i];
-    if (trace < 0) return fraction < 0.5 ? a : b;  // more than 120 degrees
+    if (trace < 0) return fraction < 0.5 ? a : b;  // more than 120 degrees apart
     Rotation mean;
     for (std::size_t i = 0; i < 9; ++i) mean[i] = a[i] + (b[i] - a[i]) * fraction;
     return orthonormalised(mean);
 }
 
-// Orientations that the track gives; bones with none in any frame stay unknown. Returns how many bones have some.
+// Takes the orientations that the track has; bones without any in all frames stay unknown. Returns how many bones have
+// some.
 std::size_t take_orientations(const SkeletonTrack& track, const std::vector<double>& times, std::vector<Pose>& poses) {
     const std::size_t bones = track.skeleton.bones.size();
     std::size_t given = 0;

@@ -1,4 +1,4 @@
-// Brings a skeleton's motion to the mesh frames: one complete pose per mesh frame.
+// Aligns a skeleton's motion with the mesh frames: one complete pose per mesh frame.
 #pragma once
 
 #include <cstddef>
@@ -13,21 +13,21 @@ namespace htvm {
 // When the mesh frames were captured.
 struct MeshClock {
     std::size_t frames = 0;
-    double fps = 0;  // frames per second; 0: unknown, then one pose is one mesh frame
+    double fps = 0;  // frames per second; 0: unknown, then each pose belongs to one mesh frame
     std::vector<double>
         timestamps;  // seconds, one per frame, not decreasing; empty: frame / fps from the track's start
 };
 
 struct AlignOptions {
-    double offset = 0;                // seconds added to the skeleton's timestamps, where its clock is known to be off
-    bool derive_orientations = true;  // false: bones whose orientation no frame gives are left unknown_orientation
+    double offset = 0;                // seconds to add to the skeleton's timestamps if its clock is known to be off
+    bool derive_orientations = true;  // false: bones whose orientation is in no frame are left unknown_orientation
 };
 
 struct AlignedPoses {
     // One per mesh frame, every joint finite. tracked is false for joints that had to be filled in. orientations are
-    // one per bone (empty where the track has none and none are to be derived).
+    // one per bone (empty if the track has none and none are to be derived).
     std::vector<Pose> poses;
-    std::vector<std::string> notes;  // what was filled, resampled or assumed, one sentence each, for the user
+    std::vector<std::string> notes;  // what was filled in, resampled or assumed, one sentence each, for the user
 };
 
 // Poses at the mesh frames' times. A pose within 0.2 ms of a mesh frame is taken as it is; else joints are

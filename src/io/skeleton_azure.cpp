@@ -13,10 +13,10 @@ using nlohmann::json;
 
 struct SensorJoint {
     const char* name;
-    std::uint16_t parent;  // the pelvis is its own
+    std::uint16_t parent;  // the pelvis is its own parent
 };
 
-// The sensor's joints in its order, each with the joint it hangs from.
+// The sensor's joints in its order, each with its parent.
 constexpr SensorJoint sensor_joints[] = {
     {"PELVIS", 0},        {"SPINE_NAVEL", 0},    {"SPINE_CHEST", 1},     {"NECK", 2},         {"CLAVICLE_LEFT", 2},
     {"SHOULDER_LEFT", 4}, {"ELBOW_LEFT", 5},     {"WRIST_LEFT", 6},      {"HAND_LEFT", 7},    {"HANDTIP_LEFT", 8},
@@ -29,7 +29,7 @@ constexpr SensorJoint sensor_joints[] = {
 
 std::string frame_place(std::size_t frame) { return "frame " + std::to_string(frame) + " (the first is 0)"; }
 
-// The name of the joint that the sensor's joint of that name hangs from; nullptr for names that it does not have.
+// The name of the parent of a sensor joint; nullptr for names that the sensor does not have.
 const char* sensor_parent(const std::string& name) {
     for (const auto& joint : sensor_joints)
         if (name == joint.name) return sensor_joints[joint.parent].name;
@@ -50,7 +50,7 @@ Result<Skeleton> read_hierarchy(const json& document, std::vector<std::string>& 
         auto read = bone_pairs(*bones, skeleton.joint_names);
         if (!read) return fail_at("bone_list", read.error());
         skeleton.bones = std::move(*read);
-        // A bone turns about its first joint, so it must start at the end nearer to the pelvis.
+        // A bone turns about its first joint, so that must be the end nearer to the pelvis.
         for (Bone& bone : skeleton.bones) {
             const char* parent = sensor_parent(skeleton.joint_names[bone.first]);
             if (parent && skeleton.joint_names[bone.second] == parent) std::swap(bone.first, bone.second);
@@ -71,7 +71,7 @@ Result<Skeleton> read_hierarchy(const json& document, std::vector<std::string>& 
     return skeleton;
 }
 
-// Bodies without an id are told apart by their place in the frame.
+// Bodies without an id are identified by their index in the frame.
 std::int64_t body_id(const json& body, std::size_t place) {
     const json* id = find_member(body, "body_id");
     return id && id->is_number_integer() ? id->get<std::int64_t>() : -1 - static_cast<std::int64_t>(place);
@@ -84,7 +84,7 @@ Result<const json*> bodies_of(const json& frame, std::size_t t) {
     return bodies;
 }
 
-// The id of the body seen in most frames; the first seen among equals; 0 where there is none.
+// The id of the body seen in most frames; of equals, the one seen first; 0 if there is no body.
 Result<std::int64_t> choose_body(const json& frames, std::vector<std::string>& notes) {
     struct Seen {
         std::size_t frames = 0, order = 0, last_frame = 0;
@@ -113,7 +113,7 @@ Result<std::int64_t> choose_body(const json& frames, std::vector<std::string>& n
     return best->first;
 }
 
-// A unit quaternion's rotation; null and the zero quaternion are unknown.
+// The rotation of a unit quaternion; null and the zero quaternion mean unknown.
 Result<Rotation> rotation_from_quaternion(const json& value) {
     if (value.is_null()) return unknown_orientation;
     if (!value.is_array() || value.size() != 4) return fail(ErrorKind::bad_input, "must be [w, x, y, z]");

@@ -25,7 +25,7 @@ Result<SkeletonTrack> parse_skeleton_azure(std::string_view text);
 // The same from parsed JSON.
 Result<SkeletonTrack> skeleton_from_azure(const nlohmann::json& document);
 
-// Whether parsed JSON looks like the above: frames of bodies.
+// Whether parsed JSON looks like the above: frames with bodies.
 bool looks_like_azure(const nlohmann::json& document);
 
 }  // namespace htvm

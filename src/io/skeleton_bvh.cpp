@@ -54,7 +54,7 @@ struct WordReader {
         if (position == begin && position < text.size()) ++position;
         return text.substr(begin, position - begin);
     }
-    // The rest of the line up to a brace, without the spaces around it: names may hold spaces.
+    // The rest of the line up to a brace, without surrounding spaces: names may contain spaces.
     std::string_view name() {
         while (position < text.size() && (text[position] == ' ' || text[position] == '\t')) ++position;
         const std::size_t begin = position;
@@ -205,7 +205,7 @@ Result<MotionHeader> read_motion_header(WordReader& words, const Hierarchy& hier
     if (!parse_number(words.word(), header.seconds_per_frame) || header.seconds_per_frame < 1e-6 ||
         header.seconds_per_frame > 1000)
         return fail_on_line(words, "Frame Time: must be a number of seconds from 0.000001 to 1000");
-    // Frames cost memory by joints, and a hierarchy can have many joints that take no channel.
+    // Frames take memory in proportion to the joints, of which a hierarchy can have many without any channel.
     const std::size_t joints = hierarchy.joints.size();
     if (header.frames > 0 && (hierarchy.channel_count == 0 || header.frames > words.text.size() ||
                               header.frames * joints > std::max<std::size_t>(words.text.size(), 1 << 16)))
@@ -239,7 +239,7 @@ Rotation axis_rotation(std::size_t axis, double degrees) {
 
 double distance(const Vector3d& a, const Vector3d& b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
 
-// The translations that a joint's position channels give, zero on the axes they lack.
+// The translation given by a joint's position channels; zero on axes without a channel.
 Vector3d channel_position(const BvhJoint& joint, const double* values) {
     Vector3d position{};
     for (std::size_t c = 0; c < joint.channels.size(); ++c)
@@ -247,7 +247,7 @@ Vector3d channel_position(const BvhJoint& joint, const double* values) {
     return position;
 }
 
-// Exporters disagree on whether position channels stand in place of OFFSET or on top of it; the first frame tells.
+// Exporters disagree on whether position channels replace OFFSET or are added to it; the first frame tells which.
 void settle_position_channels(Hierarchy& hierarchy, const std::vector<double>& frame, std::vector<std::string>& notes) {
     std::size_t next = 0;
     for (auto& joint : hierarchy.joints) {

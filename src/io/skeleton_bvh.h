@@ -9,16 +9,16 @@
 namespace htvm {
 
 struct BvhOptions {
-    double mm_per_unit = 0;  // mm for one unit of the file; 0: guessed from the skeleton's height, and said in a note
+    double mm_per_unit = 0;  // mm per unit of the file; 0: guessed from the skeleton's height, with a note
 };
 
 // Reads a BVH text: joint positions by forward kinematics (rotations in the order of the channels, degrees), in mm;
-// bones from each joint to its children, end sites included (named "PARENT end"), oriented as their first joint.
-// BVH has no units: a skeleton lower than 10 is taken as metres, lower than 600 as centimetres, else as mm.
-// Position channels count from the parent: in place of the joint's OFFSET where the first frame's lie nearer to the
-// OFFSET than to zero (they repeat it), else on top of it; said in a note where the two differ.
-// Errors: bad_input with the line, or the frame; unsupported for several roots or scale channels; limit for too many
-// joints, or motion that would take far more memory than the file.
+// bones from each joint to its children, including end sites (named "PARENT end"), oriented like their first joint. BVH
+// has no units: a skeleton lower than 10 is taken as metres, lower than 600 as centimetres, otherwise as mm. Position
+// channels are relative to the parent. They replace the joint's OFFSET if those of the first frame are nearer to OFFSET
+// than to zero (they repeat it); otherwise they are added to it. A note says which if it makes a difference. Errors:
+// bad_input with the line, or the frame; unsupported for several roots or scale channels; limit for too many joints, or
+// motion that would take far more memory than the file.
 Result<SkeletonTrack> parse_skeleton_bvh(std::string_view text, const BvhOptions& options = {});
 
 }  // namespace htvm

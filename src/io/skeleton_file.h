@@ -1,4 +1,4 @@
-// Skeleton files on disk, of any format that the library reads.
+// Skeleton files of any format that the library reads.
 #pragma once
 
 #include <cstddef>
@@ -12,11 +12,11 @@
 namespace htvm {
 
 struct SkeletonReadOptions {
-    BvhOptions bvh;                                 // how to read BVH, which does not say its unit
+    BvhOptions bvh;                                 // for BVH, which does not state its unit
     std::size_t max_bytes = std::size_t{1} << 30U;  // larger files are refused
 };
 
-// Reads a skeleton from text, telling the format by what it holds: BVH starts with HIERARCHY; JSON with bodies is
+// Reads a skeleton from text, and recognises the format by its contents: BVH starts with HIERARCHY; JSON with bodies is
 // Azure Kinect's, other JSON is ours. Errors: bad_input, unsupported, limit.
 Result<SkeletonTrack> parse_skeleton(std::string_view text, const SkeletonReadOptions& options = {});
 

@@ -52,8 +52,8 @@ Result<Pose> pose_from_json(const json& frame, std::size_t t, const Skeleton& sk
     return pose;
 }
 
-// Nine numbers, or three rows of three; null is unknown. Off by more than rounding: made exact; by more than 1e-3:
-// an error.
+// Nine numbers, or three rows of three; null means unknown. Deviations beyond rounding are corrected; above 1e-3 they
+// are an error.
 Result<Rotation> rotation_from_json(const json& value) {
     if (value.is_null()) return unknown_orientation;
     const char* shape = "must be null or a 3x3 rotation matrix: three rows of three numbers";
@@ -101,7 +101,7 @@ Result<void> read_orientations(const json& list, SkeletonTrack& track) {
     return {};
 }
 
-// Fills timestamps and fps; each may be told by the other.
+// Fills in timestamps and fps; either can be derived from the other.
 Result<void> read_clock(const json& document, SkeletonTrack& track) {
     const json* fps = find_member(document, "fps");
     const json* timestamps = find_member(document, "timestamps");
@@ -152,7 +152,7 @@ Result<void> read_radii(const json& list, SkeletonTrack& track) {
 
 void append_number(std::string& out, double value) {
     char text[32];
-    const auto end = std::to_chars(text, text + sizeof text, value);  // the shortest that reads back the same
+    const auto end = std::to_chars(text, text + sizeof text, value);  // the shortest text that reads back the same
     out.append(text, end.ptr);
 }
 
@@ -295,7 +295,7 @@ Result<SkeletonTrack> parse_skeleton_json(std::string_view text) {
 Result<std::string> format_skeleton_json(const SkeletonTrack& track) {
     if (const auto checked = check_writable(track); !checked) return tl::unexpected(checked.error());
     const auto quoted = [](const std::string& name) {
-        return json(name).dump(-1, ' ', false, json::error_handler_t::replace);  // bytes that are not UTF-8
+        return json(name).dump(-1, ' ', false, json::error_handler_t::replace);  // tolerates bytes that are not UTF-8
     };
     std::string out = "{\n\"units\": \"mm\",\n\"fps\": ";
     append_number(out, track.fps);

@@ -29,16 +29,17 @@
 
 namespace htvm {
 
-// Reads the format above; positions become mm. Every count, index and number is checked; an error (bad_input; limit
-// for too many joints or bones) names the frame and the joint. Rotations that are a little off (1e-3) are made exact.
+// Reads the format above; positions are converted to mm. Every count, index and number is checked; errors (bad_input;
+// limit for too many joints or bones) name the frame and the joint. Rotations that are slightly off (1e-3) are
+// corrected.
 Result<SkeletonTrack> parse_skeleton_json(std::string_view text);
 
 // The same from parsed JSON.
 Result<SkeletonTrack> skeleton_from_json(const nlohmann::json& document);
 
-// Writes the format above, in mm, so that reading it gives the same track back bit for bit, save that joints that
-// are not tracked lose their position. Timestamps are left out where they are frame / fps. Notes are not written.
-// Error (bad_input): arrays whose lengths disagree, or numbers that are not finite.
+// Writes the format above, in mm. Reading it gives the same track bit for bit, except that joints that are not tracked
+// lose their position. Timestamps are omitted if they equal frame / fps. Notes are not written. Error (bad_input):
+// arrays whose lengths disagree, or numbers that are not finite.
 Result<std::string> format_skeleton_json(const SkeletonTrack& track);
 
 }  // namespace htvm

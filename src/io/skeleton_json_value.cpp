@@ -18,7 +18,7 @@ Result<std::uint16_t> joint_index(const json& value, const std::vector<std::stri
         return static_cast<std::uint16_t>(found - names.begin());
     }
     if (!value.is_number_integer()) return fail(ErrorKind::bad_input, "a joint must be an index or a name");
-    // Negative numbers become huge and are refused with the rest.
+    // Negative numbers become huge, and are refused as too large.
     const auto index =
         value.is_number_unsigned() ? value.get<std::uint64_t>() : static_cast<std::uint64_t>(value.get<std::int64_t>());
     if (index >= names.size())
@@ -34,7 +34,7 @@ tl::unexpected<Error> fail_at(const std::string& place, const Error& error) {
 }
 
 Result<json> parse_json(std::string_view text) {
-    // The parser reports by exceptions, the library by values.
+    // The parser reports errors by exceptions, this library by values.
     try {
         return json::parse(text.begin(), text.end());
     } catch (const json::parse_error& error) {

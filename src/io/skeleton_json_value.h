@@ -1,5 +1,5 @@
 // Checked access to parsed JSON, shared by the skeleton readers. Error messages say what is wrong, not where: the
-// caller knows the frame and the joint and puts them in front.
+// caller knows the frame and the joint and prepends them.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,10 +13,11 @@
 
 namespace htvm {
 
-// Parses a JSON text (UTF-8, a byte order mark is skipped); error: bad_input with the byte where it stops being JSON.
+// Parses a JSON text (UTF-8; a byte order mark is skipped). Error: bad_input with the byte at which it stops being
+// JSON.
 Result<nlohmann::json> parse_json(std::string_view text);
 
-// The member of an object, or nullptr where the value is no object, has no such member, or has null there.
+// The member of an object; nullptr if the value is not an object, has no such member, or the member is null.
 const nlohmann::json* find_member(const nlohmann::json& value, const char* name);
 
 // A finite number.
@@ -32,7 +33,7 @@ Result<std::vector<std::string>> joint_names(const nlohmann::json& value);
 // at most max_skeleton_bones.
 Result<std::vector<Bone>> bone_pairs(const nlohmann::json& value, const std::vector<std::string>& names);
 
-// Puts a place in front of an error's message: "PLACE: MESSAGE".
+// Prepends a place to an error's message: "PLACE: MESSAGE".
 tl::unexpected<Error> fail_at(const std::string& place, const Error& error);
 
 }  // namespace htvm

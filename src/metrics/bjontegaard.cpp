@@ -6,12 +6,12 @@
 namespace htvm {
 namespace {
 
-// y over x, x strictly rising, with the slope at each knot.
+// y as a function of x, x strictly increasing, with the slope at each knot.
 struct Pchip {
     std::vector<double> x, y, slope;
 };
 
-// The slope at an end from the two pieces next to it (three-point formula), kept from overshooting.
+// The slope at an end from the two pieces next to it (three-point formula), limited so that it does not overshoot.
 double end_slope(double h0, double h1, double d0, double d1) {
     const double slope = ((2 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
     if (slope * d0 <= 0) return 0;
@@ -63,7 +63,8 @@ struct Knot {
     double x, y;
 };
 
-// Through the knots by rising x; of equal x the first in `before`'s order stays. Nothing for fewer than two.
+// Through the knots by increasing x; of knots with equal x, the first in the order of `before` is kept. Nothing for
+// fewer than two.
 template <class Before>
 std::optional<Pchip> through(std::vector<Knot> knots, const Before& before) {
     std::sort(knots.begin(), knots.end(),

@@ -2,9 +2,9 @@
 // (Bjontegaard: Calculation of average PSNR differences between RD-curves, VCEG-M33, 2001), and where two
 // rate-distortion curves cross.
 //
-// Both curves are drawn through their points as log(rate) over quality by monotone piecewise cubics (Fritsch and
-// Carlson; "pchip"), which do not swing between points as the paper's single cubic does. The difference is averaged
-// over the qualities that both curves reach.
+// Both curves are log(rate) over quality, interpolated by monotone piecewise cubics (Fritsch and Carlson; "pchip"),
+// which do not oscillate between points like the single cubic of Bjontegaard's paper. The difference is averaged over
+// the qualities that both curves reach.
 #pragma once
 
 #include <optional>
@@ -13,32 +13,33 @@
 
 namespace htvm {
 
-// One point of a curve. rate: > 0, any unit (bits per vertex, Mbit/s). quality: the larger the better: a PSNR in dB,
-// or quality_of_error() of an error.
+// One point of a curve. rate: > 0, in any unit (bits per vertex, Mbit/s). quality: larger is better: a PSNR in dB, or
+// quality_of_error() of an error.
 struct RatePoint {
     double rate = 0;
     double quality = 0;
 };
 
-// An error's place on the quality axis: -ln(error), so that halving the error counts the same everywhere. An error of 0
-// gives infinity, and such a point is left out of every curve.
+// Puts an error on the quality axis: -ln(error), so that halving the error always counts the same. An error of 0 gives
+// infinity, and such a point is left out of every curve.
 double quality_of_error(double error);
 
-// Mean rate of `tested` over that of `reference` at equal quality, less 1: 0 for the same curve, 1 for twice the bits,
-// -0.5 for half. Points that are not finite, or of a rate <= 0, are left out; of points with the same quality the
-// cheapest counts. Nothing where a curve has fewer than two points left, or the curves share no range of qualities.
+// The mean ratio of the rate of `tested` to that of `reference` at equal quality, minus 1: 0 for the same curve, 1 for
+// twice the bits, -0.5 for half. Points that are not finite, or whose rate is <= 0, are left out; of points with the
+// same quality, the cheapest counts. Nothing if fewer than two points of a curve remain, or if the curves have no
+// common range of qualities.
 std::optional<double> bjontegaard_rate_difference(std::span<const RatePoint> reference,
                                                   std::span<const RatePoint> tested);
 
-// The quality of a curve at a rate (pchip over log(rate)); nothing outside its points' rates.
+// The quality of a curve at a rate (pchip over log(rate)); nothing outside the range of its rates.
 std::optional<double> quality_at_rate(std::span<const RatePoint> curve, double rate);
 
 struct CurveCrossing {
     double rate = 0, quality = 0;
-    bool first_ahead_below = false;  // the first curve has the better quality at lower rates, the second at higher ones
+    bool first_ahead_below = false;  // the first curve has the better quality at rates below, the second above
 };
 
-// Where the curves cross over the rates that both cover, by rising rate. Curves that only touch do not cross.
+// Where the curves cross, within the rates that both cover, by increasing rate. Curves that only touch do not cross.
 std::vector<CurveCrossing> curve_crossings(std::span<const RatePoint> first, std::span<const RatePoint> second);
 
 }  // namespace htvm

@@ -30,7 +30,7 @@ Axes axes_for(UpAxis up) {
     return {{{1, 0, 0}}, {{0, 1, 0}}};
 }
 
-// The box as seen while turning about the vertical: a cylinder that encloses it.
+// The volume that the box sweeps as it turns about the vertical axis: a cylinder that encloses it.
 struct Cylinder {
     double radius, half_height;
 };
@@ -43,7 +43,7 @@ Cylinder enclosing_cylinder(const Box& box, const Point3& up) {
     return {radius, half_height};
 }
 
-// Half extents in the picture plane and in depth of a cylinder seen from `elevation` above.
+// The half extents in the picture plane and in depth of a cylinder that is seen from `elevation` above.
 struct Extents {
     double across, upright, deep;
 };
@@ -86,7 +86,8 @@ Result<std::vector<Camera>> cameras_round(const Box& box, const ViewOptions& opt
         camera.scale =
             std::min(half_width / std::max(extents.across, 1e-9), half_height / std::max(extents.upright, 1e-9));
     } else {
-        // The corner nearest to the camera decides: its offset at depth (distance - deep) must stay in the picture.
+        // The corner nearest to the camera limits the scale: its offset at depth (distance - deep) must stay in the
+        // picture.
         camera.scale = options.height / 2.0 / std::tan(options.field_of_view * degree / 2);
         distance = extents.deep + camera.scale * std::max(extents.across / half_width, extents.upright / half_height);
     }

@@ -1,13 +1,14 @@
-// D1 and D2: point-to-point and point-to-plane PSNR of the vertices, in the manner of MPEG's point cloud metric
-// (pc_error; Tian, Ochimizu, Feng, Cohen, Vetro: Geometric distortion metrics for point cloud compression, 2017).
+// D1 and D2: point-to-point and point-to-plane PSNR of the vertices, as in MPEG's point cloud metric (pc_error; Tian,
+// Ochimizu, Feng, Cohen, Vetro: Geometric distortion metrics for point cloud compression, 2017).
 //
-// Each vertex v of one mesh is compared with the nearest vertex h of the other: D1 takes |v - h|^2, D2 the square of
-// (v - h) . n with n the unit normal at h. The mean over the vertices is the direction's error, the larger of both
-// directions counts (pc_error's symmetric value), and
+// Each vertex v of one mesh is compared with the nearest vertex h of the other: D1 takes |v - h|^2, D2 the square of (v
+// - h) . n, where n is the unit normal at h. The mean over the vertices is the error of one direction; the larger of
+// the two directions counts (pc_error's symmetric value), and
 //     PSNR = 10 log10(peak^2 / error).
+//
 // The peak is the diagonal of the original sequence's bounding box unless given. pc_error puts 3 p^2 in the numerator
-// for a cube of side p: give peak = p * sqrt(3) for the same numbers. Of vertices at the same distance the lowest index
-// is taken, where pc_error averages them.
+// for a cube of side p: use peak = p * sqrt(3) to get the same numbers. Of vertices at the same distance the lowest
+// index is taken, whereas pc_error averages them.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@
 
 namespace htvm {
 
-// Sums of one direction; the sums of several frames add up.
+// Sums over one direction; those of several frames can be added up.
 struct CloudErrorSums {
     std::uint64_t vertices = 0;
     double squared_point = 0;  // mm^2, D1

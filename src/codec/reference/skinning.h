@@ -62,34 +62,35 @@ std::vector<BoneCylinder> cylinders(const std::vector<Bone>& bones, std::span<co
 HandleWeights smooth_weights(std::span<const std::uint16_t> handle_of_vertex, std::span<const LatticePoint> positions,
                              std::span<const Triangle> triangles, std::int32_t width, Threads threads);
 
-// What every EP-frame refers to: the decoded mesh of the last I-frame, skinned, with what both sides derive from it.
+// What every EP-frame refers to: the decoded, skinned mesh of the last I-frame, with what both sides derive from it.
 struct ReferenceMesh {
     LatticeMesh mesh;
     std::vector<BoneIndex> bone_of_vertex;
     SubMeshes sub_meshes;
-    HandleWeights weights;             // of the bones, one per vertex; empty: each vertex moves with its bone
-    std::vector<LatticePoint> pivots;  // one per bone: the mean of its sub-mesh's vertices, or its first joint
+    HandleWeights weights;             // of bones, one per vertex; empty: each vertex moves with its bone alone
+    std::vector<LatticePoint> pivots;  // one per bone: the mean of its sub-mesh's vertices, or its first joint if there
+                                       // are none
     std::vector<LatticePoint> joints;  // of the I-frame's pose
     std::vector<QuantisedRotation> orientations;  // T_I^i of each bone
     MappingPrior mapping_prior;
     std::uint32_t frame = 0;
 };
 
-// Skins a reference that has its mesh, joints and orientations, and derives the pivots and the rest. bones must not be
-// empty; radii: one per bone. weight_width, lattice units, is that of smooth_weights(); 0: rigid.
+// Skins a reference whose mesh, joints and orientations are set, and derives the pivots and everything else. bones must
+// not be empty; radii: one per bone. weight_width: that of smooth_weights(), in lattice units; 0: rigid.
 void skin_reference(ReferenceMesh& reference, const std::vector<Bone>& bones, std::span<const std::int32_t> radii,
                     std::int32_t weight_width, Threads threads);
-// All at once.
+// Sets the members and skins in one call.
 ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, std::vector<LatticePoint> joints,
                              std::vector<QuantisedRotation> orientations, std::span<const std::int32_t> radii,
                              std::int32_t weight_width, std::uint32_t frame, Threads threads);
 
-// M_P: the reference vertices moved by their bones' transforms, one transform a bone. A vertex of several bones goes to
-// the weighted mean of where they move it, rounded once and kept within the lattice.
+// M_P: the reference vertices moved by the transforms of their bones, one transform per bone. A vertex of several bones
+// goes to the weighted mean of the places where they move it, rounded once and clamped to the lattice.
 std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
                                             std::span<const QuantisedTransform> transforms, Threads threads);
 
-// The reference's normals turned by their bones' transforms, blended likewise.
+// The reference's normals turned by the transforms of their bones, blended in the same way.
 std::vector<QuantisedNormal> predict_normals(const ReferenceMesh& reference,
                                              std::span<const QuantisedTransform> transforms);
 

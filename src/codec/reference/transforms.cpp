@@ -42,8 +42,8 @@ QuantisedRotation quantise_rotation(const std::array<double, 4>& quaternion) {
 
 namespace {
 
-// A sum of weighted vectors, in 2^-(matrix_bits + weight_bits) lattice units. The weights sum to 2^12, so that sums of
-// turned vectors stay below sqrt(3) * 2^25 * 2^36 and those of points that are moved below 2^63.
+// A sum of weighted vectors, in 2^-(matrix_bits + weight_bits) lattice units. The weights sum to 2^12, so sums of
+// turned vectors stay below sqrt(3) * 2^25 * 2^36, and those of moved points below 2^63.
 using WeightedSum = std::array<std::int64_t, 3>;
 
 void add_turned(WeightedSum& sum, std::int64_t weight, const RotationMatrix& m, LatticePoint v) {
@@ -96,15 +96,15 @@ LatticePoint blended_turn(LatticePoint vector, const VertexWeights& weights, std
 
 namespace {
 
-// Written once for both directions (entropy/models.h): what is handed in is written, or becomes what is read.
+// Written once for both directions (entropy/models.h): the value passed in is written, or is set to what is read.
 
-// Kept within twice the lattice, so that sums of a few of them cannot overflow.
+// Clamped to twice the lattice, so that sums of a few of them cannot overflow.
 template <class Coder>
 void code_point(Coder& coder, SignedModel& model, LatticePoint& p) {
     for (std::int32_t* c : {&p.x, &p.y, &p.z}) *c = coder.signed_number(model, *c) % (2 * lattice_limit + 1);
 }
 
-// False where a component is out of range: in a corrupt stream.
+// False if a component is out of range, which happens only in a corrupt stream.
 template <class Coder>
 bool code_rotation(Coder& coder, SignedModel& model, QuantisedRotation& rotation) {
     rotation.largest = static_cast<std::uint8_t>(coder.raw(rotation.largest, 2));

@@ -1,8 +1,8 @@
-// Quantised rigid transforms: how one moves lattice points, how several are blended by the weights of a vertex, and the
-// layers that carry them (paper, section IV-B). Integers only, the same everywhere.
+// Quantised rigid transforms: how one moves lattice points, how several are blended by a vertex's weights, and the
+// layers that carry them (paper, section IV-B). Integers only, so every machine gets the same result.
 //
-// Transforms layer: for each transform whether it does nothing, else the largest quaternion component (2 bits), the
-// other three and the shift as adaptive signed numbers, one model for each of rotation and shift.
+// Transforms layer: for each transform whether it is the identity; if not, which quaternion component is the largest (2
+// bits), the other three and the shift as adaptive signed numbers, with one model for rotations and one for shifts.
 #pragma once
 
 #include <array>
@@ -16,8 +16,9 @@
 
 namespace htvm::internal {
 
-// A rotation as a quaternion whose largest component is 2^rotation_bits and positive; the others follow in order
-// (w, x, y, z without it), each within +-2^rotation_bits. Of angle quanta about 2^-13 rad: 0.06 mm half a metre away.
+// A rotation as a quaternion whose largest component is 2^rotation_bits and positive. The others follow in the order
+// (w, x, y, z without it), each within +-2^rotation_bits. A quantum is an angle of about 2^-13 rad: 0.06 mm at a
+// distance of half a metre.
 inline constexpr int rotation_bits = 13;
 struct QuantisedRotation {
     std::uint8_t largest = 0;  // 0 w, 1 x, 2 y, 3 z
@@ -32,7 +33,7 @@ struct QuantisedTransform {
     bool operator==(const QuantisedTransform&) const = default;
 };
 
-// R as integers over 2^matrix_bits.
+// R as integers in units of 2^-matrix_bits.
 inline constexpr int matrix_bits = 24;
 using RotationMatrix = std::array<std::int64_t, 9>;
 RotationMatrix rotation_matrix(const QuantisedRotation& rotation);
@@ -40,20 +41,20 @@ RotationMatrix rotation_matrix(const QuantisedRotation& rotation);
 // R v, each component rounded to the nearest integer (halves towards +infinity).
 LatticePoint rotate(const RotationMatrix& matrix, LatticePoint v);
 
-// The quantised rotation nearest to a quaternion w, x, y, z of any length but zero.
+// The quantised rotation nearest to a quaternion w, x, y, z of any length except zero.
 QuantisedRotation quantise_rotation(const std::array<double, 4>& quaternion);
 
 std::vector<RotationMatrix> rotation_matrices(std::span<const QuantisedTransform> transforms);
 
-// One point moved by one transform; the result is kept within the lattice.
+// One point moved by one transform; the result is clamped to the lattice.
 LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift);
 
-// The weighted mean of where its handles move the point, rounded once and kept within the lattice. rotation, pivots and
-// transforms: one per handle.
+// The weighted mean of the places where a point's handles move it, rounded once and clamped to the lattice. rotations,
+// pivots and transforms: one per handle.
 LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, std::span<const RotationMatrix> rotation,
                           std::span<const LatticePoint> pivots, std::span<const QuantisedTransform> transforms);
 
-// A vector turned by its handles, blended likewise.
+// A vector turned by its handles, blended in the same way.
 LatticePoint blended_turn(LatticePoint vector, const VertexWeights& weights, std::span<const RotationMatrix> rotation);
 
 std::vector<std::uint8_t> encode_transforms(std::span<const QuantisedTransform> transforms);

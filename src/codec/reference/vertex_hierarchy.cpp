@@ -14,10 +14,10 @@ namespace {
 
 constexpr std::size_t most_elements = std::size_t{1} << 28;
 
-// What the next coarser level is built from.
+// The nodes of one level, from which the next coarser level is built.
 struct Layer {
-    std::vector<std::uint32_t> vertices;  // below each node
-    std::vector<Vector3d> centre;         // of them
+    std::vector<std::uint32_t> vertices;  // number of vertices below each node
+    std::vector<Vector3d> centre;         // mean of these vertices
     std::vector<std::uint32_t> first_neighbour, neighbours;
 
     std::size_t size() const { return vertices.size(); }
@@ -50,7 +50,7 @@ Layer layer_of_vertices(std::span<const LatticePoint> positions, std::span<const
     return layer;
 }
 
-// Interleaves the bits of the cell of a point, for an order in which near points are mostly near.
+// Interleaves the bits of a point's cell, which gives an order in which near points are mostly close together.
 std::uint64_t morton_code(const Vector3d& p) {
     std::uint64_t code = 0;
     std::array<std::uint32_t, 3> cell{};
@@ -87,7 +87,7 @@ std::vector<std::uint32_t> match(const Layer& layer) {
         alone -= 2;
     }
     if (alone <= n / 2) return partner;
-    // Too few pairs: the nodes left over pair up with who is near in space.
+    // If there are too few pairs, the remaining nodes are paired with nodes near them in space.
     std::vector<std::pair<std::uint64_t, std::uint32_t>> left;
     left.reserve(alone);
     for (std::uint32_t v = 0; v < n; ++v)
@@ -100,7 +100,7 @@ std::vector<std::uint32_t> match(const Layer& layer) {
     return partner;
 }
 
-// Joins partners. `level` gets everything but the slopes; returns the layer that it makes.
+// Joins partners. Sets everything in `level` except the slopes; returns the layer of the joined nodes.
 Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, HierarchyLevel& level) {
     Layer coarse;
     std::vector<std::uint32_t> parent(fine.size());
@@ -152,9 +152,9 @@ Vector3d solve(const std::array<Vector3d, 3>& m, const Vector3d& b) {
             (c0[2] * b[0] + c1[2] * b[1] + c2[2] * b[2]) / determinant};
 }
 
-// The gradient of a field round node p by least squares, weighted by vertices over squared distance, applied to the
-// way from second to first: a fixed weight for every neighbour's mean. Held back a little so that the direction across
-// the surface, of which the neighbours say nothing, stays at rest.
+// The gradient of a field around node p by least squares (neighbours weighted by vertices over squared distance),
+// multiplied by the vector from second to first: this gives a fixed weight for each neighbour's mean. Slightly
+// regularised, so that the direction across the surface, about which the neighbours tell nothing, has no effect.
 void find_slopes(const Layer& fine, const Layer& coarse, std::uint32_t p, HierarchyLevel& level) {
     constexpr double hold = 0.01;
     const auto around = coarse.around(p);

@@ -1,13 +1,14 @@
 // A multi-resolution order of a mesh's vertices, for coding smooth fields on a mesh that both sides know.
 //
-// Vertices are joined in pairs, the pairs again in pairs, and so on until one node is left: along the mesh's edges,
-// near ones first, few vertices first; where the mesh offers too few pairs (pieces, isolated vertices, hubs), by
-// nearness in space. Each node stands for the mean of a field over the vertices below it, and knows what the means
-// round it say about the difference between the two nodes that it joins. So a field is one mean and a difference for
-// each pair: Haar's transform on a tree (as RAHT: de Queiroz, Chou 2016), whose coefficients are predicted from the
-// coarser level.
+// Vertices are joined into pairs, pairs into pairs of pairs, and so on until one node is left. Pairs are formed along
+// the mesh's edges, preferring short ones and nodes with few vertices; where the mesh does not offer enough pairs
+// (pieces, isolated vertices, hubs), by nearness in space. Each node stands for the mean of a field over the vertices
+// below it. The means of the nodes around it predict the difference between the two nodes that it joins. A field is
+// thus coded as one mean, and a difference for each pair: Haar's transform on a tree (like RAHT: de Queiroz, Chou
+// 2016), with coefficients predicted from the coarser level.
 //
-// Both sides derive it from the decoded reference: doubles made of + - x / sqrt, and integers, the same everywhere.
+// Both sides derive the hierarchy from the decoded reference, with integers and doubles computed by + - x / sqrt, so
+// every machine gets the same.
 #pragma once
 
 #include <cstddef>
@@ -25,21 +26,23 @@ namespace htvm::internal {
 inline constexpr std::uint32_t no_node = std::numeric_limits<std::uint32_t>::max();
 inline constexpr int slope_bits = 12;
 inline constexpr int share_bits = 30;
-inline constexpr std::size_t hierarchy_row_limit = 32;  // neighbours kept per node
+inline constexpr std::size_t hierarchy_row_limit = 32;  // most neighbours kept per node
 inline constexpr int split_scale_bits = 14;
 
-// Nodes that join one or two nodes of the next finer level. Arrays by node, but for `neighbours` and `slopes`.
+// A level of nodes, each joining one or two nodes of the next finer level. All arrays are indexed by node, except
+// `neighbours` and `slopes`.
 struct HierarchyLevel {
-    std::vector<std::uint32_t> first, second;  // the nodes joined; second = no_node where there is only one
-    std::vector<std::uint32_t> vertices;       // how many there are below, at least 1
-    // Of a pair with a and b vertices: first = mean + difference * second_share, second = first - difference.
+    std::vector<std::uint32_t> first, second;  // the nodes joined; second = no_node if there is only one
+    std::vector<std::uint32_t> vertices;       // number of vertices below, at least 1
+    // For a pair with a and b vertices: first = mean + difference * second_share, second = first - difference.
     std::vector<std::uint32_t> second_share;     // b / (a + b) in 1/2^share_bits
-    std::vector<std::uint16_t> split_scale;      // sqrt(1/a + 1/b) in 1/2^split_scale_bits: the difference that has the
-                                                 // squared error of one vertex that is off by 1; 0 without a second
+    std::vector<std::uint16_t> split_scale;      // sqrt(1/a + 1/b) in 1/2^split_scale_bits: the difference with the
+                                                 // same squared error as one vertex that is off by 1; 0 without a
+                                                 // second
     std::vector<std::uint32_t> first_neighbour;  // row p of the next two: first_neighbour[p] .. first_neighbour[p + 1]
     std::vector<std::uint32_t> neighbours;       // distinct nodes of this level joined to p by an edge of the mesh
-    // The predicted difference is the sum of slope * (mean of the neighbour - own mean), in 1/2^slope_bits, |.| <=
-    // 2^15: the gradient that fits best, by least squares. Zero without a second.
+    // The predicted difference is the sum of slope * (mean of the neighbour - own mean), by the gradient that fits best
+    // in the least-squares sense. In 1/2^slope_bits, |.| <= 2^15. Zero without a second.
     std::vector<std::int32_t> slopes;
 
     std::size_t size() const { return first.size(); }
@@ -47,19 +50,19 @@ struct HierarchyLevel {
 
 struct VertexHierarchy {
     std::size_t vertex_count = 0;
-    std::vector<HierarchyLevel> levels;  // the first joins vertices, the last has one node; none for < 2 vertices
+    std::vector<HierarchyLevel> levels;  // the first level joins vertices, the last has a single node; empty for < 2
+                                         // vertices
 
-    std::size_t node_count() const {  // of all levels together
+    std::size_t node_count() const {  // in all levels together
         std::size_t count = 0;
         for (const auto& level : levels) count += level.size();
         return count;
     }
 };
 
-// Any triangles will do: non-manifold, duplicate, degenerate, none. Every level has at most three quarters of the nodes
-// of the one below, plus one. Time is proportional to vertices plus triangles, but for sorting.
-// Errors: bad_input where a triangle names a vertex that is not there or a position is off the lattice; limit above
-// 2^28 vertices or triangles.
+// Accepts any triangles: non-manifold, duplicate, degenerate, none. Every level has at most three quarters of the nodes
+// of the one below, plus one. Apart from sorting, time is linear in vertices plus triangles. Errors: bad_input if a
+// triangle names a vertex that does not exist or a position is off the lattice; limit above 2^28 vertices or triangles.
 Result<VertexHierarchy> build_vertex_hierarchy(std::span<const LatticePoint> positions,
                                                std::span<const Triangle> triangles);
 

@@ -16,7 +16,8 @@ namespace htvm::internal {
 
 namespace {
 
-// Values where nothing is known: the mean of the neighbours', from the rim inwards; in the end nothing.
+// Fills in values where nothing is known with the mean of the neighbours, from the rim inwards; zero if no neighbour is
+// ever known.
 void fill_gaps(std::vector<double>& values, std::vector<bool> known, std::span<const Triangle> triangles) {
     constexpr int rounds = 24;
     if (std::find(known.begin(), known.end(), false) == known.end()) return;
@@ -48,7 +49,7 @@ void fill_gaps(std::vector<double>& values, std::vector<bool> known, std::span<c
     }
 }
 
-// Where one surface looks for the other.
+// The points at which one surface looks for the other.
 struct SurfaceSamples {
     std::vector<Point3f> points, normals;  // unit length
 };
@@ -64,19 +65,20 @@ void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::s
     samples.normals.push_back(to_floats(normalised(normal)));
 }
 
-// Where the captured surface is looked at: at the moved reference's vertices, then at its triangles' middles.
+// The samples at which the captured surface is examined: the moved reference's vertices, then the centres of its
+// triangles.
 SurfaceSamples samples_of(const MovedReference& moved) {
     SurfaceSamples out{points_of(moved.positions), points_of(moved.normals)};
     for (const auto& t : moved.triangles) add_middle(out, out.points, out.normals, t);
     return out;
 }
 
-// The function on the mesh, linear within each triangle, that is nearest to what was seen at the samples: least squares
-// with the weights that integrate squares exactly (a twelfth of a triangle's area at each corner, three quarters at its
-// middle), by conjugate gradients.
+// Finds the function on the mesh, linear within each triangle, that is nearest to the values at the samples: least
+// squares by conjugate gradients, with the weights that integrate squares exactly (a twelfth of a triangle's area at
+// each corner, three quarters at its centre).
 struct SurfaceFit {
     std::span<const Triangle> triangles;
-    std::vector<double> corner_weight, middle_weight;  // zero where nothing was seen
+    std::vector<double> corner_weight, middle_weight;  // zero if the sample has no value
     std::vector<double> diagonal;
 
     std::vector<double> times(const std::vector<double>& x) const;
@@ -156,7 +158,7 @@ std::vector<double> SurfaceFit::fitted(const std::vector<double>& seen) const {
     return x;
 }
 
-// How far along its normal each sample is from the surface, lattice units.
+// The distance of each sample from the surface along its normal, in lattice units.
 std::vector<double> distances(const SurfaceSamples& samples, const std::vector<SurfacePoint>& targets) {
     std::vector<double> out(targets.size(), 0);
     for (std::size_t i = 0; i < targets.size(); ++i) {
@@ -168,7 +170,7 @@ std::vector<double> distances(const SurfaceSamples& samples, const std::vector<S
     return out;
 }
 
-// What the surface shows at each sample less what the reference shows there: a list of levels per component.
+// The colour of the surface at each sample minus that of the reference there: a list of levels per component.
 std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const LatticeMesh& captured,
                                                   const std::vector<SurfacePoint>& targets, Threads threads) {
     std::array<std::vector<double>, 3> out;
@@ -199,8 +201,8 @@ std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, c
 }  // namespace
 
 SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
-    // Cells no finer than the search can go through: of captures with tiny triangles, or none. Every eighth triangle
-    // tells the edges well enough for that.
+    // The cells must not be too fine for the search to go through, as for captures with tiny triangles, or none. Every
+    // eighth triangle gives a good enough estimate of the edges.
     const double edge =
         std::max({mean_edge(mesh.positions, mesh.triangles, 8), options.far_reach * options.millimetre / 48, 1.0});
     return {points_of(mesh.positions),
@@ -224,7 +226,7 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
     TrackedTargets out;
     const std::size_t vertices = moved.positions.size();
     out.displacement.resize(vertices);
-    // A field codes no more than that: on the finest lattice 16 mm. The surface then lags behind by the rest.
+    // A field cannot code more than this: 16 mm on the finest lattice. The surface then lags behind by the rest.
     constexpr double most = field_limit;
     for (std::size_t v = 0; v < vertices; ++v)
         out.displacement[v] = static_cast<std::int32_t>(std::lround(std::clamp(seen[0][v], -most, most)));
@@ -238,13 +240,14 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
 
 namespace {
 
-// A sample's cube of space, and the squared distance from it to the other surface.
+// The cube of space that a sample lies in, and its squared distance from the other surface.
 struct SampledDistance {
     std::array<std::int32_t, 3> cube{};
     double squared = 0;
 };
 
-// The two farthest of each cube are left out: one sample that found the wrong sheet is no region lost.
+// The two farthest samples of each cube are left out: one sample that found the wrong sheet does not mean that a region
+// is lost.
 double worst_of(std::vector<SampledDistance> samples) {
     constexpr std::ptrdiff_t fewest = 10, left_out = 2;
     std::sort(samples.begin(), samples.end(),
@@ -260,7 +263,7 @@ double worst_of(std::vector<SampledDistance> samples) {
     return std::sqrt(worst);
 }
 
-// Every so many-th vertex and triangle's middle.
+// Every n-th vertex, and the centre of every n-th triangle.
 SurfaceSamples sparse_samples_of(std::span<const Point3f> points, std::span<const Point3f> normals,
                                  std::span<const Triangle> triangles) {
     constexpr std::size_t wanted = 2000;  // of each
@@ -291,8 +294,8 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
     return {std::sqrt(squares / count), static_cast<double>(strays) / count, worst_of(std::move(samples)), {}};
 }
 
-// The captured surface is so fine that the triangles round the nearest vertex suffice, and a side is told from the
-// other, as of a sleeve, by its normals.
+// The captured surface is so fine that searching the triangles around the nearest vertex suffices; its normals tell the
+// two sides of, say, a sleeve apart.
 std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, const SurfaceIndex& captured,
                                          const TrackedFitOptions& options) {
     const auto found = closest_facing(captured, decoded.points, decoded.normals,
@@ -334,8 +337,8 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
 
 namespace {
 
-// One vertex for all in the same place, with the first one's colour: else the two sides of a seam, as of a texture's
-// chart, would be simplified apart, and gape.
+// Merges all vertices at the same place into one, with the colour of the first. Otherwise the two sides of a seam, as
+// of a texture chart, would be simplified separately, and gaps would open.
 LatticeMesh welded(const LatticeMesh& captured) {
     LatticeMesh places;
     places.positions = captured.positions;
@@ -363,8 +366,8 @@ LatticeMesh with_fewer_vertices(const LatticeMesh& captured, const SimplifiedRef
     return out;
 }
 
-// Vertices and colours where the triangles between them come nearest to the captured surface: after the collapses each
-// vertex was placed for itself alone.
+// Moves the vertices, and sets their colours, so that the triangles between them come as near as possible to the
+// captured surface: the collapses placed each vertex for itself alone.
 void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const SurfaceIndex& surface,
                     const SimplifiedReferenceOptions& options) {
     const auto normals = vertex_normals(mesh.positions, mesh.triangles);

@@ -1,5 +1,5 @@
-// What the encoder asks a captured surface for a tracked frame: the few vertices that stand for it as a reference, what
-// it wants of a reference that was moved to it, and whether the decoded frame still stands for it.
+// What the encoder derives from a captured surface for a tracked frame: a simplified mesh to serve as the reference,
+// the targets for a reference that was moved to the surface, and whether the decoded frame still fits the surface.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace htvm::internal {
 
-// The captured mesh, ready to be registered to.
+// The captured mesh, prepared for registration to it.
 SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options);
 
 // A reference mesh moved by its nodes.
@@ -26,34 +26,34 @@ struct MovedReference {
 };
 
 struct TrackedTargets {
-    std::vector<std::int32_t> displacement;  // one per vertex, lattice units along its normal
-    std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty where the reference has none
+    std::vector<std::int32_t> displacement;  // one per vertex, in lattice units along its normal
+    std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty if the reference has no colours
 };
 
-// captured: the mesh that `surface` was made of. reach: lattice units; what has no surface within it takes after its
-// neighbours. Least squares over the whole surface, not at the vertices alone: a coarse reference's vertices lie
-// outside a round limb, so that its triangles lie half outside and half inside.
+// captured: the mesh that `surface` was made from. reach: lattice units; vertices without a surface within it take the
+// values of their neighbours. The fit is least squares over the whole surface, not only at the vertices: on a round
+// limb, the vertices of a coarse reference must lie outside, so that its triangles lie half outside and half inside.
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
                                     const SurfaceIndex& surface, double reach, Threads threads);
 
-// From a few thousand samples each way, the worse direction of the two; lattice units.
+// Measured with a few thousand samples in each direction; the worse of the two directions. Lattice units.
 struct TrackedFit {
-    double rms = 0;               // distance from surface to surface; none counts as more than `reach`
-    double stray_share = 0;       // of the samples that are farther than `stray`
-    double worst_region = 0;      // the root mean square in the worst cube of space
-    std::vector<double> squared;  // distances of the decoded mesh's samples from the captured surface
+    double rms = 0;               // RMS distance from surface to surface; no distance counts as more than `reach`
+    double stray_share = 0;       // share of the samples that are farther than `stray`
+    double worst_region = 0;      // the RMS distance in the worst cube of space
+    std::vector<double> squared;  // squared distances of the decoded mesh's samples from the captured surface
 };
 
 struct TrackedFitOptions {
     double stray = 200;    // lattice units, > 0
-    double reach = 400;    // likewise: on the captured surface nothing is looked for farther away
-    double region = 1600;  // side of the cubes, likewise; those with few samples are left out
+    double reach = 400;    // likewise: beyond it the captured surface is not searched
+    double region = 1600;  // side length of the cubes, likewise; cubes with few samples are left out
     Threads threads = {};
 };
 
-// captured: of the captured mesh. intra_squared: `squared` of the I-frame, whose connectivity `decoded` has; what its
-// samples were off there is not held against the frame, since the search does not find every long triangle of a sole,
-// nor are those of the I-frame itself, for which it is empty.
+// captured: index of the captured mesh. intra_squared: `squared` of the I-frame whose connectivity `decoded` has, or
+// empty for the I-frame itself. Errors that the I-frame had at a sample do not count against the frame, since the
+// search misses some long triangles, as those of a sole.
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const double> intra_squared, const TrackedFitOptions& options);
 
@@ -61,13 +61,12 @@ struct SimplifiedReferenceOptions {
     double surface_error = 16;  // lattice units, > 0: see SimplificationOptions
     double colour_error = 16;   // levels, > 0
     double longest_edge = 640;  // lattice units, > 0
-    double reach = 480;         // lattice units: how far the captured surface is looked for
+    double reach = 480;         // lattice units: how far to search for the captured surface
     Threads threads = {};
 };
 
-// Normals are made anew where the capture has them. Texture coordinates cannot be simplified: a mesh that has some, or
-// has no triangles, comes back as it is.
-// surface: of `captured`.
+// Normals are recomputed if the capture has them. Texture coordinates cannot be simplified: a mesh with texture
+// coordinates, or without triangles, is returned unchanged. surface: index of `captured`.
 LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options);
 

@@ -22,7 +22,7 @@ LatticePoint sum_of(LatticePoint a, LatticePoint b, LatticePoint minus) {
             within(std::int64_t{a.z} + b.z - minus.z, shift_limit)};
 }
 
-// Rounded towards zero a little: a step that hardly helps is not worth its bits.
+// Rounded slightly towards zero: a step that hardly helps is not worth its bits.
 std::int32_t steps(std::int64_t difference, int exponent) {
     constexpr double dead_zone = 0.6;
     const double size = static_cast<double>(std::int64_t{1} << exponent);
@@ -45,7 +45,7 @@ QuantisedTransform predict_node_transform(std::size_t node, std::uint32_t parent
             move(pivots[node], rotation_matrix(of_parent.rotation), pivots[parent], of_parent.shift) - pivots[node];
         return out;
     }
-    // As the node was, and the step that its parent has made since.
+    // As the node was, moved by the step that its parent has made since.
     QuantisedTransform out = before[node];
     const auto& parent_before = before[parent];
     out.shift = sum_of(out.shift, of_parent.shift, parent_before.shift);

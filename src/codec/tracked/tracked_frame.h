@@ -1,9 +1,10 @@
-// Tracked frames (design, section 4): the reference mesh's connectivity, moved by the nodes of a deformation graph and
-// displaced along its normals; neither connectivity nor mapping nor positions along the surface are sent.
+// Tracked frames: the reference mesh with its connectivity, moved by the nodes of a deformation graph and displaced
+// along its normals. Neither connectivity, nor mapping, nor positions along the surface are sent.
 //
-// Everything is relative to the group's I-frame: its mesh moved by the nodes' transforms, plus a displacement of each
-// vertex along the moved mesh's normal, and its colours plus a change of each. Transforms and fields are predicted from
-// the frame before's, or not, as the frame says: one that refers to the I-frame alone may be lost without harm.
+// Everything is relative to the group's I-frame: its mesh is moved by the nodes' transforms, then each vertex is
+// displaced along the moved mesh's normal, and its colour is changed. Transforms and fields may be predicted from those
+// of the previous frame; each frame says whether they are. A frame that refers to the I-frame alone may be lost without
+// harm to others.
 #pragma once
 
 #include <optional>
@@ -20,56 +21,55 @@
 
 namespace htvm::internal {
 
-// What both sides derive from the decoded I-frame, once.
+// What both sides derive once from the decoded I-frame.
 struct TrackedReference {
-    LatticeMesh mesh;  // as decoded, its positions smoothed within their cells
+    LatticeMesh mesh;  // as decoded, with positions smoothed within their quantiser cells
     DeformationNodes nodes;
-    std::vector<LatticePoint> pivots;    // where the nodes sit
-    std::vector<std::uint32_t> parents;  // of each node: its lowest neighbour, where that is lower than itself
+    std::vector<LatticePoint> pivots;    // the positions of the nodes
+    std::vector<std::uint32_t> parents;  // the lowest neighbour of each node, if lower than the node itself
     VertexHierarchy hierarchy;
 };
-// node_spacing: lattice units, > 0. quantiser_step: of the I-frame's positions, lattice units.
-// threads: two at most serve.
+// node_spacing: lattice units, > 0. quantiser_step: that of the I-frame's positions, in lattice units. threads: uses
+// two at most.
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
                                                 std::int32_t quantiser_step, Threads threads = {});
 
-// Vertices halfway to the mean of their neighbours, but no farther than half a quantiser step from where they were in
-// each coordinate: takes the steps out of a coarsely quantised surface without sending anything.
+// Moves each vertex halfway to the mean of its neighbours, but in each coordinate no farther than half a quantiser
+// step. This removes the steps of a coarsely quantised surface at no cost in bits.
 std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> positions,
                                                 std::span<const Triangle> triangles, std::int32_t quantiser_step);
 
-// What a frame leaves for the next.
+// What a frame leaves for the next one.
 struct TrackedState {
     std::vector<QuantisedTransform> transforms;  // one per node
     FieldHistory displacement, colour;
 };
 
-// What is not the reference's own: triangles and texture coordinates are.
+// What differs from the reference: everything except triangles and texture coordinates.
 struct DecodedTrackedFrame {
     std::vector<LatticePoint> positions;
-    std::vector<Colour> colours;           // where the reference has them
+    std::vector<Colour> colours;           // if the reference has them
     std::vector<QuantisedNormal> normals;  // likewise
     TrackedState state;
 };
 
-// before: of the frame that the payload refers to; null where that is the I-frame. out: an earlier frame's, whose
-// arrays serve again, but not that of `before`; of no use after an error.
+// before: state of the frame that the payload refers to; null if that is the I-frame. out: may hold an earlier frame,
+// whose arrays are reused, but not the one of `before`; its contents are undefined after an error.
 Result<void> decode_tracked_frame(const FramePayloadView& payload, const TrackedReference& reference,
                                   const TrackedState* before, Threads threads, DecodedTrackedFrame& out);
 
-// The pieces, which the encoder shares.
-// The reference moved by its nodes, one transform per node.
+// The steps, which the encoder shares. First: the reference moved by its nodes, one transform per node.
 std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
                                          std::span<const QuantisedTransform> transforms, Threads threads);
 
-// Each point moved along its normal by so many lattice units, kept on the lattice.
+// Each point moved along its normal by the given number of lattice units, clamped to the lattice.
 std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                                     std::span<const std::int32_t> displacement);
 
-// Each colour changed by its residual, three components per vertex, kept within 0..255.
+// Each colour plus its residual, three components per vertex, clamped to 0..255.
 std::vector<Colour> recoloured(std::span<const Colour> colours, std::span<const std::int32_t> residuals);
 
-// The normals that a displaced mesh shows, as the codec holds normals.
+// The normals of a displaced mesh, in the codec's representation.
 std::vector<QuantisedNormal> quantised_normals(std::span<const Vector3d> normals);
 
 }  // namespace htvm::internal

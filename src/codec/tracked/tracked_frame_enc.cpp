@@ -29,7 +29,7 @@ std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, s
     return out;
 }
 
-// Half the displacement's step for shifts; turns so coarse that most stay as predicted: measured, see
+// For shifts, half the step of the displacement; for turns, steps so coarse that most stay as predicted: measured, see
 // docs/algorithm.md.
 NodeMotionOptions motion_options(double geometry_step) {
     NodeMotionOptions out;
@@ -90,7 +90,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     }
     clock.done("targets");
 
-    // A step so large that whatever differs from the prediction counts as nothing.
+    // A step so large that every difference from the prediction becomes zero.
     const double displacement_step = options.motion_alone ? field_limit : options.geometry_step;
     const double colour_step = options.motion_alone ? field_limit : options.colour_step;
     FieldOptions geometry;
