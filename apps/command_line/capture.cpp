@@ -76,7 +76,7 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
         track = std::move(*read);
         if (options.fps <= 0 && track->fps > 0) capture.fps_ = track->fps;
     }
-    // Where file names are numbered, a gap in the numbers is a gap in time.
+    // If file names are numbered, a gap in the numbers is a gap in time.
     const auto& numbers = capture.files_.numbers;
     for (std::size_t k = 0; k < numbers.size(); ++k)
         capture.timestamps_.push_back(static_cast<double>(numbers[k] - numbers[0]) / capture.fps_);
@@ -101,7 +101,7 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
     return capture;
 }
 
-// Reads the first mesh, and with it the unit of all.
+// Reads the first mesh, which determines the unit of all.
 Result<void> Capture::peek() {
     auto mesh = read_next();
     if (!mesh) return tl::unexpected(mesh.error());
@@ -116,7 +116,7 @@ Result<void> Capture::peek() {
     return {};
 }
 
-// In the files' own unit as long as that is not known, then in mm.
+// In the unit of the files until that is known, then in mm.
 Result<std::optional<Mesh>> Capture::read_next() {
     if (stream_) {
         for (; read_ < options_.first; ++read_)

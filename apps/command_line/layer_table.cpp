@@ -11,7 +11,7 @@
 namespace htvm::app {
 namespace {
 
-// What a frame's bytes are told as: its layers, and the rest.
+// The parts by which a frame's bytes are listed: its layers, and the rest.
 template <class Visit>
 void for_each_part(const LayerBytes& bytes, const Visit& visit) {
     for (const auto& [layer, name] : frame_layers) visit(name, bytes[layer]);
@@ -49,7 +49,7 @@ double bits_per_vertex(std::size_t bytes, std::uint64_t vertices) {
 
 std::string layer_table(const TotalsByType& totals) {
     const LayerTotals all = totals.all();
-    std::vector<std::string> columns;  // of what any frame has
+    std::vector<std::string> columns;  // for everything that any frame has
     for_each_part(all.bytes, [&](const char* name, std::size_t bytes) {
         if (bytes > 0) columns.emplace_back(name);
     });

@@ -1,4 +1,4 @@
-// Where a sequence's bytes went, added up over frames, as text and as JSON.
+// How the bytes of a sequence are distributed over layers, summed over frames, as text and as JSON.
 #pragma once
 
 #include <array>
@@ -12,13 +12,13 @@ namespace htvm::app {
 
 struct LayerTotals {
     std::size_t frames = 0;
-    std::uint64_t source_vertices = 0;  // the "v" of bits per vertex: the captured meshes' vertices
+    std::uint64_t source_vertices = 0;  // the "v" of bits per vertex: vertices of the captured meshes
     LayerBytes bytes;
 };
 
 void add(LayerTotals& totals, const FrameInfo& info);
 
-// The same by kind of frame.
+// The same for each kind of frame.
 struct TotalsByType {
     std::array<LayerTotals, frame_type_count> totals;
     LayerTotals& of(FrameType type) { return totals[static_cast<std::size_t>(type)]; }
@@ -27,14 +27,14 @@ struct TotalsByType {
 };
 void add(TotalsByType& totals, const FrameInfo& info);
 
-// Bits per captured vertex; 0 where there is no vertex.
+// Bits per captured vertex; 0 if there is no vertex.
 double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);
 
 // A table of bits per vertex by layer, one line per kind of frame and one for all.
 std::string layer_table(const TotalsByType& totals);
 
 nlohmann::json layers_json(const LayerBytes& bytes);
-// The reverse; throws as nlohmann-json does where a layer is missing or no number.
+// The inverse; throws as nlohmann-json does if a layer is missing or not a number.
 LayerBytes layers_from_json(const nlohmann::json& json);
 nlohmann::json frame_json(const FrameInfo& info);
 

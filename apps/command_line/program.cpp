@@ -29,17 +29,17 @@ int exit_code(ErrorKind kind) {
     return 1;
 }
 
-// What was wrong with the command line, and where to read on.
+// What is wrong with the command line, and where to find help.
 std::string usage_message(const CLI::App* app, const CLI::Error& error) {
     std::string command = app->get_name();
     for (const auto* named : app->get_subcommands()) command += " " + named->get_name();
     return fmt::format("{}: error: {}; '{} --help' tells more\n", app->get_name(), error.what(), command);
 }
 
-// Output that is still buffered may fail to arrive: a full disk must not look like success.
+// Writing buffered output can still fail: a full disk must not look like success.
 bool output_arrived() { return std::fflush(stdout) == 0 && std::ferror(stdout) == 0; }
 
-// CLI11 takes "nan" for a number within any range, and "-1" for a very large one.
+// CLI11 accepts "nan" as a number within any range, and "-1" as a very large one.
 void refuse_odd_numbers(const CLI::App& command) {
     for (const auto* option : command.get_options())
         for (const auto& text : option->results()) {
@@ -51,7 +51,7 @@ void refuse_odd_numbers(const CLI::App& command) {
         }
 }
 
-// CLI11 says of an unknown command only that one is missing.
+// For an unknown command, CLI11 only says that one is missing.
 bool names_no_command(const CLI::App& app, const std::string& word) {
     const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
     return !word.starts_with('-') && std::none_of(commands.begin(), commands.end(),

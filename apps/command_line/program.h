@@ -1,4 +1,4 @@
-// A program of subcommands: what `htvm` and `htvm-lab` have in common from main() on.
+// A program with subcommands: what `htvm` and `htvm-lab` share from main() on.
 #pragma once
 
 #include <functional>
@@ -21,15 +21,15 @@ using Run = std::function<Result<void>()>;
 using AddCommand = void (*)(CLI::App& app, Run& run);
 
 struct Program {
-    std::string name;         // as people type it
+    std::string name;         // as typed by the user
     std::string description;  // one sentence, at the top of --help
-    std::string footer;       // at the end of --help, behind the exit codes; may be empty
+    std::string footer;       // at the end of --help, after the exit codes; may be empty
     std::vector<AddCommand> commands;
-    std::map<std::string, std::string> elsewhere;  // commands of another program, by what to type for them
+    std::map<std::string, std::string> elsewhere;  // commands of another program, and what to type for them
 };
 
-// Parses, runs the chosen subcommand and says on stderr what went wrong. The exit code: 0 done, 1 bad input, 2 usage,
-// 3 corrupt stream, 4 unsupported, 5 limit exceeded.
+// Parses the command line, runs the chosen subcommand, and reports errors on stderr. The exit code: 0 done, 1 bad
+// input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit exceeded.
 int run_program(const Program& program, int argc, char** argv);
 
 }  // namespace htvm::app

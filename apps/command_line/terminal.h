@@ -1,4 +1,4 @@
-// What the programs say to a person: notes, warnings and progress, all on stderr, so that stdout stays for data.
+// What the programs tell the user: notes, warnings and progress, all on stderr, so that stdout is left for data.
 #pragma once
 
 #include <cstddef>
@@ -6,15 +6,15 @@
 
 namespace htvm::app {
 
-// The program's name, in front of every note and warning; "htvm" before the first call.
+// Sets the program's name, which precedes every note and warning; "htvm" before the first call.
 void speak_as(const std::string& program);
 void note(const std::string& line);
 void warn(const std::string& line);
 
-// One line that is rewritten in place, at most ten times a second, on a terminal; silent elsewhere.
+// A line that is rewritten in place, at most ten times per second; only on a terminal.
 class Progress {
 public:
-    Progress(std::string what, std::size_t total);  // total 0: not known
+    Progress(std::string what, std::size_t total);  // total 0: unknown
     ~Progress();
     Progress(const Progress&) = delete;
     Progress& operator=(const Progress&) = delete;

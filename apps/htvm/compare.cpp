@@ -24,7 +24,8 @@
 namespace htvm::app {
 namespace {
 
-// ---- What a comparison says: a table for people, JSON and lines of CSV for programs ---------------------------------
+// ---- The output of a comparison: a table for people, JSON and CSV for programs
+// ---------------------------------------
 
 const char* shading_name(Shading shading) {
     return shading == Shading::flat ? "flat" : shading == Shading::smooth ? "smooth" : "unlit";
@@ -117,7 +118,7 @@ nlohmann::json distances_json(const SurfaceDistances& d) {
     return {{"rms_mm", d.rms}, {"mean_mm", d.mean}, {"largest_mm", d.largest}, {"samples", d.samples}};
 }
 
-// A table of all that `options` asked for.
+// A table of everything that `options` asked for.
 std::string comparison_table(const SequenceComparison& sums, const CompareOptions& options, double peak_mm) {
     const ComparisonSummary s = summarise(sums, peak_mm);
     const double frames = static_cast<double>(sums.frames);
@@ -169,7 +170,7 @@ nlohmann::json topology_json(const Topology& t) {
             {"flap_area_mm2", t.flap_area}};
 }
 
-// Only what `options` asked for. A PSNR without any difference, an infinite one, is null.
+// Only what `options` asked for. An infinite PSNR, without any difference, becomes null.
 nlohmann::json summary_json(const ComparisonSummary& s, const CompareOptions& options) {
     nlohmann::json out;
     if (options.points) {
@@ -200,7 +201,7 @@ nlohmann::json summary_json(const ComparisonSummary& s, const CompareOptions& op
     return out;
 }
 
-// One line per frame, the columns that `options` asked for; infinity is inf.
+// One line per frame, with the columns that `options` asked for; infinity is written as inf.
 std::string csv_header(const CompareOptions& options) {
     std::string out = "frame";
     for (const auto& column : columns({}, options, 1)) out += fmt::format(",{}", column.name);
@@ -222,7 +223,7 @@ struct Options {
     std::vector<std::string> only;
     CompareOptions compare;
     unsigned threads = 0;
-    DecoderOptions limits;  // of streams
+    DecoderOptions limits;  // for streams
     bool grey = false, follow_sequence = false, json = false;
     double peak_mm = 0;
     std::string csv, pictures;
@@ -250,8 +251,8 @@ void choose_metrics(Options& options) {
     c.topology = only.contains("topology");
 }
 
-// The places of the frames to compare, by the numbers in the files' names; empty where a side has none (a stream, files
-// without numbers): frames are then compared in their order.
+// The positions of the frames to compare, matched by the numbers in the files' names. Empty if a side has no numbers (a
+// stream, files without numbers): frames are then compared in order.
 Result<std::vector<FramePair>> pairs_of(const Options& options) {
     if (options.decoded.ends_with(".htvm") || options.original.ends_with(".htvm")) return std::vector<FramePair>{};
     const auto originals = find_sequence(options.original), decoded = find_sequence(options.decoded);
@@ -262,7 +263,7 @@ Result<std::vector<FramePair>> pairs_of(const Options& options) {
     auto pairs = pair_by_number(a, b);
     if (options.frames > 0 && pairs.size() > options.frames) {
         pairs.resize(options.frames);
-        return pairs;  // what comes behind was not asked for
+        return pairs;  // the rest was not asked for
     }
     std::vector<std::size_t> of_original, of_decoded;
     for (const auto& pair : pairs) {
@@ -277,7 +278,7 @@ Result<std::vector<FramePair>> pairs_of(const Options& options) {
     return pairs;
 }
 
-// The box round all originals, for cameras that stand still.
+// The box around all originals, for cameras that stand still.
 Result<Box> sequence_box(const Options& options) {
     auto source = open_meshes(options.original, options.unit, options.limits);
     if (!source) return tl::unexpected(source.error());
@@ -318,7 +319,7 @@ Result<void> write_pictures(const Options& options, const Mesh& original, const 
 struct Measured {
     SequenceComparison sums;
     std::vector<FrameComparison> frames;
-    std::vector<std::size_t> places;  // of each among the originals
+    std::vector<std::size_t> places;  // the position of each among the originals
 };
 
 void warn_of_length(const MeshSource& original, const MeshSource& decoded, const Options& options) {
@@ -328,7 +329,7 @@ void warn_of_length(const MeshSource& original, const MeshSource& decoded, const
                      decoded.name, decoded.frames, std::min(wanted(original.frames), wanted(decoded.frames))));
 }
 
-// A stream's length is known when it has ended only.
+// The length of a stream is known only once it has ended.
 void warn_of_ends(const MeshSource& original, const MeshSource& decoded, bool original_ended, bool decoded_ended,
                   std::size_t compared) {
     if (decoded.frames > 0 && original.frames > 0) return;
@@ -339,7 +340,7 @@ void warn_of_ends(const MeshSource& original, const MeshSource& decoded, bool or
                      longer.name, compared));
 }
 
-// The mesh at a place of the sequence; `at` is the place that comes next.
+// The mesh at a position of the sequence; `at` is the position that comes next.
 Result<std::optional<Mesh>> mesh_at(MeshSource& source, std::size_t place, std::size_t& at) {
     for (;;) {
         auto mesh = source.next(source);
@@ -439,7 +440,7 @@ Result<void> compare(Options options) {
     options.compare.threads = pool.threads();
     const auto measured = measure(options);
     if (!measured) return tl::unexpected(measured.error());
-    // The frames' PSNR takes the sequence's peak, so that they can be compared with each other.
+    // The PSNR of each frame uses the peak of the sequence, so that frames can be compared with each other.
     const double peak_mm = summarise(measured->sums, options.peak_mm).peak_mm;
     if (!options.csv.empty())
         if (auto ok = write_csv(options, *measured, peak_mm); !ok) return ok;

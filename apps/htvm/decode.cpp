@@ -36,14 +36,14 @@ struct Options {
 
 struct Summary {
     std::size_t decoded = 0, concealed = 0;
-    std::size_t undecodable = 0;      // frames that came, but could not be decoded
-    std::size_t missing = 0;          // frames that did not come, between others
+    std::size_t undecodable = 0;      // frames that arrived but could not be decoded
+    std::size_t missing = 0;          // frames that are missing between others
     std::size_t damaged_packets = 0;  // codebooks and headers that could not be read
     std::size_t concealed_in_a_row = 0;
-    std::uint32_t due = 0;                     // the number of the frame that should come next
-    std::optional<std::int64_t> timestamp_us;  // of the frame before
+    std::uint32_t due = 0;                     // the number of the frame expected next
+    std::optional<std::int64_t> timestamp_us;  // of the previous frame
     double decode_seconds = 0;
-    std::optional<Error> refused;  // of the first frame that a limit, or this version, kept from being decoded
+    std::optional<Error> refused;  // the error of the first frame that was refused because of a limit or this version
     nlohmann::json list = nlohmann::json::array();
     std::size_t written() const { return decoded + concealed; }
     double frames_per_second() const { return static_cast<double>(decoded) / std::max(decode_seconds, 1e-9); }
@@ -65,7 +65,7 @@ public:
             return fail(ErrorKind::bad_input, out.names_.folder.string() + " cannot be made: " + error.message());
         return out;
     }
-    // Gives the name of what was written.
+    // Returns the name of the file written.
     Result<std::string> write(Mesh& mesh, std::uint32_t frame, double millimetres_per_unit) {
         if (!standard_) {
             const auto path = output_path(names_, frame);
@@ -84,9 +84,9 @@ public:
         return std::string("-");
     }
     bool one_file() const { return !standard_ && names_.one_file; }
-    // Meshes in the folder that this run did not write: they would be read as one sequence with its own.
+    // Meshes in the folder that this run did not write: they would be read as part of the same sequence.
     std::size_t other_meshes() const {
-        if (!folder_alone_) return 0;  // a pattern tells its own files from others
+        if (!folder_alone_) return 0;  // with a pattern, its files are distinct from others
         std::size_t others = 0;
         std::error_code error;
         const auto folder = names_.folder.empty() ? std::filesystem::path(".") : names_.folder;
@@ -106,7 +106,7 @@ Result<double> output_unit(const Options& options, const SequenceInfo& info) {
     return millimetres_of_unit(options.unit);
 }
 
-// What the steps of decoding work on.
+// The data that the steps of decoding work on.
 struct Decoding {
     const Options& options;
     StreamInput& input;
@@ -132,10 +132,10 @@ Result<void> write(Decoding& d, DecodedFrame& frame) {
     return {};
 }
 
-// More frames than that in a row would be a still picture, and a false frame number a disk full of them.
+// More in a row would be just a still picture, and a false frame number could fill the disk with them.
 constexpr std::size_t most_concealed_in_a_row = 300;
 
-// Writes a stand-in for a frame. False where there is none.
+// Writes a stand-in for a frame. False if there is none.
 Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_us) {
     if (d.options.conceal != "animate" || d.summary.concealed_in_a_row >= most_concealed_in_a_row) return false;
     auto frame = d.decoder.conceal(number, timestamp_us);
@@ -146,7 +146,7 @@ Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_u
     return true;
 }
 
-// Frames that were lost on the way leave no damage behind, only a gap in the numbers.
+// Frames that were lost in transmission leave no damage behind, only a gap in the numbers.
 Result<void> fill_gap(Decoding& d, const Packet& next) {
     auto& summary = d.summary;
     const std::uint32_t first = summary.due;
@@ -175,7 +175,7 @@ Result<void> fill_gap(Decoding& d, const Packet& next) {
     return {};
 }
 
-// A packet that is sound, but cannot be decoded.
+// Handles a packet that is undamaged but cannot be decoded.
 Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error) {
     const bool is_refused = error.kind == ErrorKind::unsupported || error.kind == ErrorKind::limit;
     if (!frame_type(packet.kind)) {
@@ -193,14 +193,14 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
     return {};
 }
 
-// True while there is more to decode.
+// Decodes the next packet; true while there is more.
 Result<bool> decode_next(Decoding& d) {
     if (is_enough(d)) return false;
     const auto packet = d.input.next();
     if (!packet) return false;
     const bool is_frame = frame_type(packet->kind).has_value();
-    if (is_frame || packet->kind == PacketKind::index) {  // the index has the number of frames
-        // Before the packet is decoded: it may be the I-frame that the lost ones did not refer to.
+    if (is_frame || packet->kind == PacketKind::index) {  // the index gives the number of frames
+        // Before decoding the packet, because it may be an I-frame, which the lost frames did not refer to.
         if (auto ok = fill_gap(d, *packet); !ok) return tl::unexpected(ok.error());
         if (is_enough(d)) return false;
     }
@@ -243,7 +243,7 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
                         others));
 }
 
-// An error where the stream is not all there.
+// An error if the stream is incomplete.
 Result<void> judge(const Options& options, const MeshOutput& output, const StreamInput& input, const Summary& summary) {
     const auto lost = summary.undecodable + summary.missing;
     if (input.oversized_packets() > 0)

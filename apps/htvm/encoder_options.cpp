@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::array profiles = {Profile::tracked, Profile::topology, Profile::paper};
 
-// Over the options of each group in the help.
+// The heading above the options of each group in the help.
 const char* heading(OptionGroup group) {
     constexpr std::array<const char*, 4> headings = {"Encoding", "Rate control, instead of a quality",
                                                      "Profile tracked (the default)", "Profiles topology and paper"};
@@ -48,7 +48,7 @@ Profile profile_by(const std::string& name) {
                          [&](Profile profile) { return name == profile_name(profile); });
 }
 
-// The option as the command line has it: under its flag's name, in its flag's unit.
+// The option as it is on the command line: with the name and the unit of its flag.
 Option as_flag(const Option& option) {
     Option out = option;
     out.name = option.flag;
@@ -58,7 +58,7 @@ Option as_flag(const Option& option) {
     return out;
 }
 
-// Broken into lines that leave room for the column of flags within a hundred characters.
+// Wrapped so that a line fits within a hundred characters beside the column of flags.
 std::string wrapped(std::string_view text) {
     constexpr std::size_t longest = 70;
     std::string out;
@@ -84,7 +84,7 @@ std::string capitalised(std::string text) {
     return text;
 }
 
-// In the first of its group's profiles, and in the paper's where that is another.
+// The default in the first of the group's profiles, and in the paper's if different.
 std::string default_text(const Option& option) {
     const auto text = [&](Profile profile) {
         return value_text(option, option.get(default_options(profile)) / option.flag_factor);
@@ -120,7 +120,7 @@ void add_option(CLI::App& command, EncodingOptions& options, const Option& optio
         ->group(heading(option.group));
 }
 
-// What is no option of the library, or sets several.
+// Options that are not in the library's list, or set several.
 void add_quality(CLI::App& command, EncodingOptions& options) {
     command
         .add_option(
@@ -168,7 +168,7 @@ void add_what_is_beside_the_list(CLI::App& command, EncodingOptions& options) {
         ->needs(command.get_option("--bitrate"));
 }
 
-// What the options are but for the capture's part.
+// All options except those that depend on the capture.
 EncoderOptions without_capture(const EncodingOptions& options) {
     auto out = default_options(profile_by(options.profile));
     const auto steps = quality_steps(options.quality);
@@ -178,7 +178,7 @@ EncoderOptions without_capture(const EncodingOptions& options) {
     return out;
 }
 
-// The library's sentence with flags in place of its names.
+// The library's sentence, with flags instead of its names.
 std::string in_flags(std::string_view sentence) {
     std::string out;
     while (!sentence.empty()) {
@@ -199,7 +199,7 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
         if (*option.flag) add_option(command, options, option);
     add_what_is_beside_the_list(command, options);
     command.get_option("--buffer")->needs(command.get_option("--bitrate"));
-    // Quality follows from a bitrate or an error; what sets the steps by hand contradicts it.
+    // With a bitrate or a target error, quality follows from it, so options that set the steps directly contradict it.
     command.get_option("--bitrate")->excludes(command.get_option("--target-error"));
     for (const char* control : {"--bitrate", "--target-error"})
         for (const char* by_hand : {"--quality", "--geometry-step", "--colour-step"})

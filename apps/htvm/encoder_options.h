@@ -15,7 +15,7 @@ class App;
 
 namespace htvm::app {
 
-// About 0.6 mm off the surface (M2).
+// Gives about 0.6 mm of surface error (M2).
 constexpr double default_quality = 42;
 
 struct EncodingOptions {
@@ -23,19 +23,21 @@ struct EncodingOptions {
     std::string profile = "tracked";
     std::string intra = "tfan";
     std::string radii_file;
-    int passes = 1;                                       // of rate control: the caller runs the first of two
-    std::vector<std::pair<const Option*, double>> given;  // of the library's list, in its units
+    int passes = 1;                                       // for rate control: 2 means that the caller runs a first pass
+                                                          // before
+    std::vector<std::pair<const Option*, double>> given;  // options of the library's list that were given, in the
+                                                          // library's units
 };
 
 void add_encoding_options(CLI::App& command, EncodingOptions& options);
 
-// Ends with a usage error (CLI::ValidationError) where options contradict each other or do nothing in the profile.
+// Ends with a usage error (CLI::ValidationError) if options contradict each other or have no effect in the profile.
 void check_together(const EncodingOptions& options);
 
-// The library's options for a capture; reads the radii's file where one is named.
+// The library's options for a capture; reads the file of radii if one is given.
 Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture);
 
-// All options of the library as docs/options.md has them.
+// All options of the library, as in docs/options.md.
 std::string options_in_markdown();
 
 }  // namespace htvm::app

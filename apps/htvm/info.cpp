@@ -19,7 +19,7 @@ struct Options {
     std::string input;
     bool json = false, summary = false;
     DecoderOptions limits;
-    double megabits = 0, buffer_seconds = 1;  // of the line and the receiver's buffer to check against; 0: none
+    double megabits = 0, buffer_seconds = 1;  // of the line and the receiver's buffer to check against; 0: no check
 };
 
 // A frame's bytes, with those of the codebooks that came with it.

@@ -32,18 +32,18 @@ struct CloudError {
 };
 CloudError& operator+=(CloudError& sums, const CloudError& frame);
 
-// One direction, where nearest = nearest_vertices(from.positions, to.positions). The normals are to.normals, or where
-// the mesh has none those of its triangles, weighted by area. A vertex without a normal (no triangle with an area, a
-// zero vector) counts the whole distance. Nothing to compare with: infinite.
+// One direction, where nearest = nearest_vertices(from.positions, to.positions). The normals are to.normals or, if the
+// mesh has none, those of its triangles, weighted by area. A vertex without a normal (no triangle with an area, a zero
+// vector) counts with its whole distance. Infinite if there is nothing to compare with.
 CloudErrorSums sum_cloud_errors(const Mesh& from, const Mesh& to, std::span<const std::uint32_t> nearest);
 
 // One frame, both directions.
 CloudError cloud_error(const Mesh& original, const Mesh& decoded, internal::Threads threads = {});
 
-// 10 log10(peak^2 / error) in dB. Infinity where the error is 0, minus infinity where it is infinite or the peak 0.
+// 10 log10(peak^2 / error) in dB. Infinity if the error is 0; minus infinity if it is infinite or the peak is 0.
 double psnr(double peak, double mean_squared_error);
 
-// The larger mean squared error of both directions, mm^2; 0 where nothing was compared.
+// The larger mean squared error of the two directions, mm^2; 0 if nothing was compared.
 double d1_error(const CloudError& sums);
 double d2_error(const CloudError& sums);
 

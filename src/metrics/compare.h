@@ -1,5 +1,5 @@
-// All metrics of a pair of meshes at once, and of a sequence frame by frame with bounded memory: what the commands that
-// measure share.
+// All metrics of a pair of meshes in one call, and of a sequence, frame by frame with bounded memory: shared by the
+// commands that measure.
 #pragma once
 
 #include <cstdint>
@@ -26,12 +26,13 @@ struct CompareOptions {
     SurfaceErrorOptions surface_options;
     TopologyMeasureOptions topology_options;
     ViewOptions views;
-    RenderOptions render;            // colours are drawn only where both meshes have some
-    std::optional<Box> view_box;     // what the cameras look at in every frame; empty: each original's own bounding box
-    internal::Threads threads = {};  // any number gives the same numbers (overrides surface_options')
+    RenderOptions render;            // colours are drawn only if both meshes have some
+    std::optional<Box> view_box;     // what the cameras look at in every frame; empty: the bounding box of each
+                                     // original
+    internal::Threads threads = {};  // the number of threads does not change the results (overrides surface_options')
 };
 
-// One frame. What was not asked for is left zero.
+// One frame. Metrics that were not asked for are left zero.
 struct FrameComparison {
     std::uint64_t original_vertices = 0, decoded_vertices = 0;
     std::uint64_t original_triangles = 0, decoded_triangles = 0;
@@ -43,16 +44,16 @@ struct FrameComparison {
     Topology original_topology, decoded_topology;
 };
 
-// Fails (bad_input) where a mesh cannot be measured (check_measurable) or an option is out of range, (limit) where
-// memory runs out.
+// Fails (bad_input) if a mesh cannot be measured (check_measurable) or an option is out of range, (limit) if memory
+// runs out.
 Result<FrameComparison> compare_frame(const Mesh& original, const Mesh& decoded, const CompareOptions& options = {});
 
-// Frames added up so far.
+// The sums over the frames so far.
 struct SequenceComparison {
     std::uint64_t frames = 0;
     std::uint64_t original_vertices = 0, decoded_vertices = 0;
     std::uint64_t original_triangles = 0, decoded_triangles = 0;
-    Box original_box;  // round all frames
+    Box original_box;  // around all frames
     PointError points;
     SurfaceErrorSums surface;
     CloudError cloud;
@@ -60,23 +61,24 @@ struct SequenceComparison {
     Topology original_topology, decoded_topology;  // sums over the frames
 };
 SequenceComparison& operator+=(SequenceComparison& sums, const FrameComparison& frame);
-SequenceComparison as_sequence(const FrameComparison& frame);  // of one frame
+SequenceComparison as_sequence(const FrameComparison& frame);  // from one frame
 
-// The numbers that stand in tables and curves. PSNR is infinite where there is no difference.
+// The numbers shown in tables and curves. PSNR is infinite if there is no difference.
 struct ComparisonSummary {
     double m1_mm = 0, m1_forward_mm = 0, m1_backward_mm = 0, m1_largest_mm = 0;
-    bool has_colour = false;                                              // both sequences have colours somewhere
+    bool has_colour = false;                                              // whether both sequences have colours in some
+                                                                          // frame
     double m1_colour = 0, m1_colour_forward = 0, m1_colour_backward = 0;  // levels
     double m2_mm = 0, m2_worst_frame_mm = 0;
     SurfaceDistances m2_forward, m2_backward;
-    double hausdorff_mm = 0;  // largest distance of both directions and all frames
-    double peak_mm = 0;       // of D1 and D2
+    double hausdorff_mm = 0;  // the largest distance in both directions and all frames
+    double peak_mm = 0;       // for D1 and D2
     double d1_db = 0, d2_db = 0;
     double m3_foreground_db = 0, m3_full_db = 0;
     double foreground_share = 0;  // of the pixels
 };
 
-// peak_mm: of D1 and D2; 0: the diagonal of the box round all originals so far.
+// peak_mm: for D1 and D2; 0: the diagonal of the box around all originals so far.
 ComparisonSummary summarise(const SequenceComparison& sums, double peak_mm = 0);
 
 }  // namespace htvm

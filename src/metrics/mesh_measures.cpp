@@ -17,7 +17,7 @@ Result<void> check_measurable(const Mesh& mesh, const std::string& name) {
                     "The " + name + " has an attribute array that is not as long as its vertices.");
     for (std::size_t v = 0; v < vertices; ++v)
         for (float c : mesh.positions[v])
-            if (!(std::abs(c) <= largest_coordinate))  // also true for NaN
+            if (!(std::abs(c) <= largest_coordinate))  // true for NaN as well
                 return fail(ErrorKind::bad_input, "Vertex " + std::to_string(v) + " of the " + name +
                                                       " has a coordinate that is not a number within 1e9 mm.");
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)

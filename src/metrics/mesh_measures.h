@@ -1,4 +1,5 @@
-// What every metric needs of a mesh: is it usable, how large is it, where do its vertices face, which of them coincide.
+// What every metric needs to know about a mesh: whether it is usable, how large it is, where its vertices face, and
+// which of them coincide.
 #pragma once
 
 #include <array>
@@ -21,12 +22,12 @@ inline Point3 to_point(const Vector3f& v) { return internal::to_vector(v); }
 // Coordinates beyond this are refused: squared distances would leave the float range of the search structures.
 inline constexpr float largest_coordinate = 1e9f;  // mm
 
-// bad_input unless the mesh is one that the metrics can measure: finite coordinates within +-largest_coordinate,
-// triangle indices < vertex count, at most 2^31 vertices and triangles, attribute arrays empty or one entry a vertex.
-// `name` says in the message which mesh it is. Every other function of src/metrics expects a mesh that passed.
+// bad_input unless the metrics can measure the mesh: finite coordinates within +-largest_coordinate, triangle indices <
+// vertex count, at most 2^31 vertices and triangles, attribute arrays empty or with one entry per vertex. `name`
+// identifies the mesh in the message. Every other function of src/metrics expects a mesh that passed this check.
 Result<void> check_measurable(const Mesh& mesh, const std::string& name);
 
-// Axis-aligned box in mm; empty until something was put in.
+// Axis-aligned box in mm; empty until something is put in.
 struct Box {
     Point3 low{}, high{};
     bool empty = true;
@@ -35,12 +36,12 @@ void extend(Box& box, const Box& other);
 Box bounding_box(const Mesh& mesh);
 double diagonal(const Box& box);  // mm; 0 for an empty box
 
-// Per vertex, the lowest index of a vertex at exactly the same position (itself where it is the first).
+// For each vertex, the lowest index of a vertex at exactly the same position (its own if it is the first).
 std::vector<std::uint32_t> first_coincident_vertex(const Mesh& mesh);
 
-// Unit normals, one per vertex: the sum of the area-weighted normals of the triangles round it. Vertices at the same
-// position share one normal, so that a surface cut along texture seams stays smooth. Zero where no triangle with an
-// area touches the position. The mesh's own normals are not looked at.
+// Unit normals, one per vertex: the sum of the area-weighted normals of the triangles around it. Vertices at the same
+// position share one normal, so that a surface cut along texture seams stays smooth. Zero if no triangle with an area
+// touches the position. The mesh's own normals are ignored.
 std::vector<Vector3f> welded_normals(const Mesh& mesh);
 
 }  // namespace htvm

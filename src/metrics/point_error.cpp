@@ -26,8 +26,8 @@ struct Cloud {
 using Tree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Cloud, double>, Cloud, 3, std::uint32_t>;
 
-// Keeps the nearest point seen and, of equal ones, the lowest index. The radius it lets the tree search is a little
-// wider than the best distance, so that branches which hold an equally near point are not cut off.
+// Keeps the nearest point seen and, of equally near ones, the lowest index. The radius that it gives the tree search is
+// slightly wider than the best distance, so that branches with an equally near point are not pruned.
 struct NearestWithLowestIndex {
     using DistanceType = double;
     double squared_distance = std::numeric_limits<double>::infinity();
@@ -96,7 +96,7 @@ PointErrorSums sum_point_errors(const Mesh& from, const Mesh& to, std::span<cons
     sums.largest_distance = std::sqrt(largest);
     if (from.colours.empty() || to.colours.empty()) return sums;
     sums.colour_vertices = from.positions.size();
-    std::uint64_t squared_colour = 0;  // exact: 3 * 255^2 a vertex
+    std::uint64_t squared_colour = 0;  // exact: at most 3 * 255^2 per vertex
     for (std::size_t v = 0; v < from.colours.size(); ++v)
         for (std::size_t c = 0; c < 3; ++c) {
             const int d = int{from.colours[v][c]} - int{to.colours[nearest[v]][c]};

@@ -36,13 +36,13 @@ ProjectedVertex project(const Vector3f& position, const Camera& camera) {
     return out;
 }
 
-// Where a point lies against the directed edge a -> b: positive inside a triangle whose area is positive.
+// On which side of the directed edge a -> b a point lies: positive inside a triangle whose area is positive.
 struct EdgeFunction {
     std::int64_t step_x, step_y, at_origin, bias;
     EdgeFunction(const ProjectedVertex& a, const ProjectedVertex& b)
         : step_x(std::int64_t{a.y} - b.y), step_y(std::int64_t{b.x} - a.x) {
         at_origin = -(step_x * a.x + step_y * a.y);
-        // A pixel exactly on an edge belongs to the triangle whose top or left edge it is (y runs downwards).
+        // A pixel exactly on an edge belongs to the triangle of which this is a top or left edge (y runs downwards).
         const bool top_left = step_x > 0 || (step_x == 0 && step_y > 0);
         bias = top_left ? 0 : -1;
     }
@@ -51,7 +51,7 @@ struct EdgeFunction {
 
 using Shade = std::array<float, 3>;
 
-// Light from above the camera's left shoulder, never black: the shading tells every direction from every other.
+// Light from above the camera's left shoulder. Never black, so that the shading distinguishes all directions.
 struct Light {
     Point3 direction;
     explicit Light(const Camera& camera)
@@ -62,10 +62,10 @@ struct Light {
     }
 };
 
-// One triangle ready to be coloured: corner shades are lit already unless normals are interpolated.
+// A triangle prepared for drawing: shades of the corners are already lit, unless normals are interpolated.
 struct TrianglePaint {
     std::array<Shade, 3> shades;
-    std::array<Point3, 3> normals;  // used where smooth
+    std::array<Point3, 3> normals;  // used for smooth shading
     bool smooth = false;
 };
 
@@ -108,7 +108,7 @@ void paint_pixel(const TrianglePaint& paint, const std::array<double, 3>& weight
     }
 }
 
-// First and one past the last pixel whose centre can lie in [low, high], within [begin, end).
+// The first pixel, and one past the last, whose centre can lie in [low, high], within [begin, end).
 struct PixelRange {
     int begin, end;
 };
@@ -208,7 +208,7 @@ void draw(const DrawableMesh& drawable, const Camera& camera, Canvas& canvas, Th
         for (std::size_t v = begin; v < end; ++v) canvas.vertices[v] = project(mesh.positions[v], camera);
     });
     const Light light(camera);
-    // Every thread draws all triangles into rows of its own, in the same order.
+    // Every thread draws all triangles, in the same order, into rows of its own.
     parallel_for(static_cast<std::size_t>(camera.height), threads, 64, [&](std::size_t begin, std::size_t end) {
         const Rows rows{static_cast<int>(begin), static_cast<int>(end)};
         for (const auto& t : mesh.triangles) draw_triangle(drawable, t, camera, light, rows, canvas);

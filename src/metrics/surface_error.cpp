@@ -40,7 +40,8 @@ SurfaceDistances summarise(const DistanceSums& sums) {
     return {sums.samples, std::sqrt(sums.squared / n), sums.distance / n, std::sqrt(sums.largest_squared)};
 }
 
-// splitmix64 (Steele, Lea, Flood 2014) as a function of the sample's number: samples do not depend on each other.
+// splitmix64 (Steele, Lea, Flood 2014) as a function of the sample's number, so that samples do not depend on each
+// other.
 double uniform(std::uint64_t seed, std::uint64_t number) {
     std::uint64_t z = seed * 0xD1342543DE82EF95ull + (number + 1) * 0x9E3779B97F4A7C15ull;
     z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
@@ -48,10 +49,10 @@ double uniform(std::uint64_t seed, std::uint64_t number) {
     return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
-// Items (edges or faces) that share out `samples` in proportion to their measure: the samples of item i are those
-// whose number lies in [first(i), first(i + 1)).
+// Distributes samples over items (edges or faces) in proportion to their measure: the samples of item i are those whose
+// number lies in [first(i), first(i + 1)).
 struct Shares {
-    std::vector<double> until;  // running sum of the measures, one entry more than items
+    std::vector<double> until;  // running sum of the measures, items + 1 entries
     double samples = 0;
     std::uint64_t first(std::size_t i) const {
         return until.back() > 0 ? static_cast<std::uint64_t>(until[i] / until.back() * samples + 0.5) : 0;
@@ -60,7 +61,7 @@ struct Shares {
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
-// What is sampled of one mesh.
+// What to sample on one mesh.
 struct SamplingPlan {
     std::vector<std::uint32_t> vertices;
     std::vector<Edge> edges;
@@ -89,7 +90,7 @@ std::vector<std::uint32_t> used_vertices(const Mesh& mesh) {
     return vertices;
 }
 
-// METRO's shares, see the header. `target` is the number of samples asked for.
+// METRO's distribution of samples, see the header. `target` is the number of samples asked for.
 SamplingPlan plan_samples(const Mesh& mesh, double target, const SurfaceErrorOptions& options) {
     SamplingPlan plan;
     if (options.vertices || mesh.triangles.empty()) plan.vertices = used_vertices(mesh);
@@ -116,7 +117,7 @@ SamplingPlan plan_samples(const Mesh& mesh, double target, const SurfaceErrorOpt
     return plan;
 }
 
-// Distance to the surface of `mesh`, remembering the triangle found last as the next search's start.
+// Distance to the surface of `mesh`; remembers the last triangle found as the start of the next search.
 struct DistanceToSurface {
     const SurfaceIndex* index;
     std::uint32_t hint = 0;
@@ -127,8 +128,8 @@ struct DistanceToSurface {
     }
 };
 
-// Runs measure(item, distance, sums) over [0, count) in blocks that do not depend on the number of threads, and adds
-// the blocks' sums up in their order.
+// Runs measure(item, distance, sums) over [0, count) in blocks that do not depend on the number of threads, and adds up
+// the sums of the blocks in order.
 template <class Measure>
 void measure_blocks(std::size_t count, const SurfaceIndex& index, Threads threads, DistanceSums& total,
                     const Measure& measure) {
@@ -170,7 +171,7 @@ DistanceSums measure_plan(const Mesh& from, const SamplingPlan& plan, const Surf
     return total;
 }
 
-// Where `to` has no triangles: the samples are the vertices of `from`, the surface the vertices of `to`.
+// For `to` without triangles: the samples are the vertices of `from`, the surface the vertices of `to`.
 SurfaceDistances distances_to_vertices(const Mesh& from, const Mesh& to, Threads threads) {
     DistanceSums sums;
     const auto nearest = nearest_vertices(from.positions, to.positions, threads);

@@ -18,7 +18,7 @@ struct SurfaceIndex::Impl {
     const Mesh* mesh = nullptr;
     RTCDevice device = nullptr;
     RTCScene scene = nullptr;
-    double largest = 0;  // absolute coordinate
+    double largest = 0;  // largest absolute coordinate
     Impl() = default;
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
@@ -37,7 +37,7 @@ double squared_distance_to(const Mesh& mesh, std::uint32_t triangle, const Point
         .squared_distance;
 }
 
-// How far the hierarchy must be searched to be sure of everything within `distance`: float coordinates, boxes and
+// How far to search the hierarchy to be sure to find everything within `distance`: float coordinates, boxes and
 // distances are each off by a few units in the last place.
 float search_radius(double distance, double largest) {
     return static_cast<float>(distance * (1 + 4e-6) + largest * 1e-6);

@@ -1,6 +1,6 @@
-// Closest points on a mesh's surface: a bounding volume hierarchy (Embree's) finds the candidates, the distances are
-// computed in double. The hierarchy works in float and is searched a little wider than needed for its rounding, so that
-// the answer is exactly the smallest double distance, whatever the hierarchy looks like.
+// Closest points on a mesh's surface. A bounding volume hierarchy (Embree's) finds the candidates; distances are
+// computed in double. The hierarchy works in float, so it is searched slightly wider than needed to allow for its
+// rounding. The result is thus exactly the smallest double distance, whatever the hierarchy looks like.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace htvm {
 
-// The nearest point of triangle abc to p; a triangle without area counts as its three sides.
+// The nearest point of triangle abc to p; a triangle without area is treated as its three sides.
 inline Point3 closest_point_of(const Point3& p, const Point3& a, const Point3& b, const Point3& c) {
     return internal::point_at(internal::closest_on_triangle(p, a, b, c).shares, a, b, c);
 }
@@ -26,17 +26,16 @@ struct ClosestTriangle {
 
 class SurfaceIndex {
 public:
-    // Indexes the triangles of `mesh`, which must have at least one and must outlive the index. A limit error if
-    // Embree cannot start or runs out of memory.
+    // Indexes the triangles of `mesh`, which must have at least one and must outlive the index. A limit error if Embree
+    // cannot start or runs out of memory.
     static Result<SurfaceIndex> build(const Mesh& mesh, internal::Threads threads = {});
 
-    // The triangle nearest to p, which lies within +-2 * largest_coordinate. `hint` is any triangle, best one that is
-    // expected near: the search starts with its distance; the answer does not depend on it. Threads may call it at
-    // once.
+    // The triangle nearest to p, which must lie within +-2 * largest_coordinate. `hint` is any triangle, ideally a near
+    // one: the search starts with its distance. The result does not depend on it. Thread-safe.
     ClosestTriangle closest(const Point3& p, std::uint32_t hint = 0) const;
 
-    // Calls visit(triangle) for every triangle that may come nearer to p than `radius` mm (a superset of those that
-    // do), in no particular order, until visit returns false.
+    // Calls visit(triangle) for every triangle that may be nearer to p than `radius` mm (a superset of those that are),
+    // in no particular order, until visit returns false.
     void visit_near(const Point3& p, double radius, const std::function<bool(std::uint32_t)>& visit) const;
 
 private:

@@ -32,9 +32,9 @@ struct Sets {
     }
 };
 
-// Side of a triangle with three different vertices; `from` -> `to` as the triangle runs.
+// A side of a triangle with three different vertices, directed from `from` to `to` as in the triangle.
 struct Side {
-    std::uint32_t low, high;  // sorted, so that equal edges stand together
+    std::uint32_t low, high;  // the ends in order, so that equal edges are adjacent after sorting
     std::uint32_t from, triangle;
 };
 
@@ -57,7 +57,7 @@ std::vector<Side> sorted_sides(const Mesh& mesh) {
     return sides;
 }
 
-// Calls visit(first, count) for every edge: the run of sides that are this edge.
+// Calls visit(first, count) for every edge, with the run of sides that belong to it.
 template <class Visit>
 void for_each_edge(const std::vector<Side>& sides, const Visit& visit) {
     for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
@@ -113,7 +113,7 @@ void count_parts(const Mesh& mesh, Topology& out) {
         static_cast<std::int64_t>(out.vertices - out.isolated_vertices) - static_cast<std::int64_t>(out.edges) + whole;
 }
 
-// The mesh with coincident vertices made one, without triangles that have a vertex twice then.
+// The mesh with coincident vertices merged, without the triangles that then have a vertex twice.
 Mesh welded(const Mesh& mesh) {
     const auto first = first_coincident_vertex(mesh);
     Mesh out;
@@ -125,12 +125,13 @@ Mesh welded(const Mesh& mesh) {
     return out;
 }
 
-// What is looked at around one triangle or edge, at most: a heap of coincident surfaces must not take squared time.
+// The most candidates to examine around one triangle or edge, so that a heap of coincident surfaces does not take
+// quadratic time.
 constexpr int most_candidates = 200;
 
 struct OpenEdge {
     std::uint32_t from, to;
-    Point3 outward;  // in the triangle's plane, away from it
+    Point3 outward;  // in the plane of the triangle, pointing away from it
 };
 
 std::vector<OpenEdge> open_edges(const Mesh& mesh) {
@@ -144,10 +145,10 @@ std::vector<OpenEdge> open_edges(const Mesh& mesh) {
     return edges;
 }
 
-// One item's counterpart across a crack or a flap.
+// For an item without a counterpart across a crack or a flap.
 constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
-// The nearest counterpart found so far; of equally near ones the lowest index.
+// The nearest counterpart so far; of equally near ones, the lowest index.
 struct Counterpart {
     std::uint32_t index = none;
     double distance = 0;
@@ -158,8 +159,8 @@ struct Counterpart {
     }
 };
 
-// How many groups the items with a counterpart make, where items that share a vertex and counterparts are in one.
-// vertices_of(i) is an array of item i's vertices.
+// The number of groups formed by the items that have a counterpart: items that share a vertex, or are counterparts,
+// belong to the same group. vertices_of(i) is an array of the vertices of item i.
 template <class VerticesOf>
 std::uint64_t count_groups(std::size_t vertices, const std::vector<std::uint32_t>& counterparts,
                            const VerticesOf& vertices_of) {
@@ -199,7 +200,7 @@ Result<void> find_cracks(const Mesh& mesh, double width, Threads threads, Topolo
     const auto edges = open_edges(mesh);
     out.open_edges = edges.size();
     if (edges.empty()) return {};
-    Mesh lines;  // the open edges as triangles without area, in the same order
+    Mesh lines;  // the open edges, as triangles without area in the same order
     lines.positions = mesh.positions;
     for (const auto& e : edges) lines.triangles.push_back({e.from, e.to, e.to});
     const auto index = SurfaceIndex::build(lines, threads);

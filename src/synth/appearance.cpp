@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Where one material ends and the next begins, rest mm.
+// Where one material ends and the next begins, in mm of rest coordinates.
 constexpr double collar_height = 1472, hem_height = 925, cuff_height = 112, sleeve_end = 368, arm_begin = 215;
 
 double smooth_step(double u) {
@@ -48,7 +48,7 @@ double smooth_noise(double x, double y, double z) {
     return std::clamp(1.9 * (a + w * (b - a)), -1.2, 1.2);
 }
 
-// Rounded ridges where the noise crosses zero, as cloth folds: in [-1, 1].
+// Rounded ridges where the noise crosses zero, like folds of cloth: in [-1, 1].
 double ridges(double x, double y, double z) {
     const double n = 1.8 * smooth_noise(x, y, z);
     const double crest = std::max(0.0, 1.0 - n * n);
@@ -63,10 +63,10 @@ double spot(const Vector3d& q, double x, double y, double radius_x, double radiu
 
 bool on_arm(const Vector3d& q) { return std::abs(q.x()) > arm_begin && q.y() > 1200; }
 
-// Positive where hair grows, mm from the hairline: high on the brow, low at the nape.
+// Positive where hair grows, in mm from the hairline: high on the brow, low at the nape.
 double hair_depth(const Vector3d& q) { return q.y() - 1592 - 100 * smooth_step((q.z() + 40) / 110); }
 
-// 1 on the ears, which hair leaves free.
+// 1 on the ears, which have no hair.
 double ear_cover(const Vector3d& q) {
     const double u = (q.z() + 2) / 40, v = (q.y() - 1634) / 48;
     return smooth_step(1.6 * (1.0 - std::sqrt(u * u + v * v))) * smooth_step((std::abs(q.x()) - 40) / 20);
@@ -104,7 +104,7 @@ double arm_relief(const Vector3d& q) {
 double torso_relief(const Vector3d& q) {
     const double collar = 3.5 * smooth_step((q.y() - 1446) / 12) * smooth_step((collar_height - q.y()) / 6);
     const double lower = smooth_step((1250 - q.y()) / 250);
-    // Drawn from the shoulders to the waist, on each side its own way.
+    // Folds from the shoulders to the waist, different on each side.
     const double slant = 0.5 * std::abs(q.x());
     const double folds = ridges((q.y() + slant) / 75, q.x() / 150, q.z() / 140);
     const double hang = ridges(q.x() / 55, q.y() / 260, q.z() / 55 + 3);
@@ -134,7 +134,7 @@ double shoe_relief(const Vector3d& q) {
     return sole + tongue + laces;
 }
 
-// Colours are worked out in 0..255 and rounded once.
+// Colours are computed in 0..255 and rounded once.
 Vector3d mix(const Vector3d& a, const Vector3d& b, double weight) { return a + std::clamp(weight, 0.0, 1.0) * (b - a); }
 
 Vector3d skin_colour(const Vector3d& q) {
@@ -161,7 +161,7 @@ Vector3d head_colour(const Vector3d& q) {
     return mix(colour, hair, smooth_step(edge / 6));
 }
 
-// A shirt of blue and white bands that a thin red line crosses, with a round badge on the chest.
+// A shirt with blue and white bands, crossed by a thin red line, with a round badge on the chest.
 Vector3d shirt_colour(const Vector3d& q) {
     const bool arm = on_arm(q);
     const double along = arm ? std::abs(q.x()) : q.y();
@@ -205,7 +205,7 @@ std::uint8_t to_byte(double value) { return static_cast<std::uint8_t>(std::clamp
 
 double surface_relief(const Vector3d& q) {
     if (on_arm(q)) return arm_relief(q);
-    // The regions' reliefs fade into each other over a few millimetres, steep as a hem is but without a jump.
+    // The reliefs of the regions fade into each other over a few millimetres: steep, like a hem, but without a jump.
     if (q.y() > collar_height) return mix({head_relief(q), 0, 0}, {2, 0, 0}, (collar_height + 4 - q.y()) / 4).x();
     if (q.y() > hem_height) return torso_relief(q);
     if (q.y() > hem_height - 6) {
@@ -228,7 +228,7 @@ Colour surface_colour(const Vector3d& q) {
     } else {
         colour = q.y() > cuff_height - 3 ? trouser_colour(q) : shoe_colour(q);
     }
-    // Hollows are darker, as in a capture's texture.
+    // Hollows are darker, as in the texture of a capture.
     const bool cloth = on_arm(q) ? std::abs(q.x()) < sleeve_end : q.y() < collar_height && q.y() > cuff_height;
     if (cloth) colour *= std::clamp(0.94 + 0.025 * (surface_relief(q) - 3.0), 0.82, 1.06);
     return {to_byte(colour.x()), to_byte(colour.y()), to_byte(colour.z())};

@@ -13,8 +13,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-// A segment from `start` with a radius that changes linearly along it, in space scaled by `scale` about its start,
-// which makes elliptic cross-sections.
+// A segment from `start` whose radius changes linearly along it, in space scaled by `scale` about its start, which
+// gives elliptic cross-sections.
 struct Primitive {
     Vector3d start, axis, inverse_scale;  // axis: to the end, in scaled space
     double inverse_length2 = 0, radius = 0, radius_change = 0;
@@ -22,8 +22,8 @@ struct Primitive {
 
 struct Shape {
     std::vector<Primitive> primitives;
-    double blend = 10;       // mm over which the primitives melt into one another
-    bool flat_sole = false;  // cut off below the ground of the T-pose
+    double blend = 10;       // mm over which the primitives blend
+    bool flat_sole = false;  // cut off at the ground of the T-pose
 };
 
 using Body = std::array<Shape, part_count>;
@@ -125,8 +125,8 @@ const Body& rest_body() {
     return body;
 }
 
-// A weight that falls from 1 at 0 to exactly 0 at reach * blend, with the slope of exp(-difference / blend) at 0: what
-// lies further changes nothing at all, so that leaving it out gives the same bits.
+// A weight that falls from 1 at 0 to exactly 0 at reach * blend, with the slope of exp(-difference / blend) at 0. What
+// is further away has no effect at all, so leaving it out gives the same bits.
 constexpr double reach = 4.0;
 double fading_weight(double difference, double blend) {
     const double u = 1.0 - difference / (reach * blend);
@@ -138,7 +138,8 @@ double primitive_distance(const Primitive& p, const Vector3d& rest) {
     const double along = std::clamp(q.dot(p.axis) * p.inverse_length2, 0.0, 1.0);
     const Vector3d away = q - along * p.axis;
     const double length = away.norm() + 1e-9;
-    // The distance in scaled space over the length of its gradient in real space: right to first order at the surface.
+    // The distance in scaled space divided by the length of its gradient in real space: correct to first order at the
+    // surface.
     const double slope = away.cwiseProduct(p.inverse_scale).norm() / length + 1e-9;
     return (length - (p.radius + p.radius_change * along)) / std::max(slope, 1e-3);
 }
@@ -167,7 +168,7 @@ constexpr double part_blend = 9.0;
 
 PartSet bit(std::size_t part) { return PartSet{1} << part; }
 
-// The parts whose rest coordinates may be mixed with a part's: itself and those it hangs on. Where a hand touches a
+// The parts whose rest coordinates may be mixed with those of a part: itself and its ancestors. Where a hand touches a
 // leg, each keeps its own.
 PartSet joined_parts(std::size_t part) {
     static const std::array<PartSet, part_count> joined = [] {
@@ -198,7 +199,7 @@ struct PartDistances {
     std::array<double, part_count> distance;
     std::array<Vector3d, part_count> rest;
     std::size_t nearest = 0;
-    double blended = 0;  // of all parts, without relief
+    double blended = 0;  // over all parts, without relief
 };
 
 PartDistances part_distances(const PosedBody& body, PartSet candidates, const Vector3d& world) {
@@ -238,7 +239,7 @@ SurfacePoint evaluate_body(const PosedBody& body, PartSet candidates, const Vect
     }
     point.rest /= sum;
     point.distance = parts.blended;
-    // Far from the surface the relief cannot change the sign, and is not worth its time.
+    // Far from the surface the relief cannot change the sign, so it is not computed there.
     if (std::abs(parts.blended) < 2 * relief_bound) point.distance -= surface_relief(point.rest);
     return point;
 }

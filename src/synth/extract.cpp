@@ -18,7 +18,7 @@ using Eigen::Vector3i;
 constexpr int brick_cells = 4;               // along each side
 constexpr int brick_side = brick_cells + 1;  // corners along each side
 constexpr int brick_corners = brick_side * brick_side * brick_side;
-constexpr int edges_per_corner = 7;  // from a corner to those at +{0,1}^3, numbered by that offset's bits, less one
+constexpr int edges_per_corner = 7;  // to the corners at +{0,1}^3, numbered by the bits of that offset minus one
 constexpr int owned_edges = brick_cells * brick_cells * brick_cells * edges_per_corner;
 constexpr std::uint32_t no_vertex = std::numeric_limits<std::uint32_t>::max();
 
@@ -26,14 +26,14 @@ struct Brick {
     Vector3i first;  // grid index of its lowest corner
     PartSet candidates = 0;
     std::array<float, brick_corners> values;
-    std::array<std::uint32_t, owned_edges> vertex;  // of each owned edge, local until the bricks are numbered
-    std::array<std::int32_t, 8> neighbour;          // brick at +{0,1}^3 by the offset's bits, -1 where none
+    std::array<std::uint32_t, owned_edges> vertex;  // on each owned edge; local until the bricks are numbered
+    std::array<std::int32_t, 8> neighbour;          // brick at +{0,1}^3 by the bits of the offset, -1 if there is none
     std::vector<Vector3d> positions;
     std::vector<EdgePlace> places;
     std::vector<Triangle> triangles;
 };
 
-// 21 bits of brick index for each axis.
+// 21 bits of brick index per axis.
 std::uint64_t brick_key(const Vector3i& brick) {
     const auto part = [](int c) { return static_cast<std::uint64_t>(c + (1 << 20)) & 0x1fffffu; };
     return part(brick.x()) << 42 | part(brick.y()) << 21 | part(brick.z());
@@ -48,14 +48,14 @@ int edge_index(int x, int y, int z, int direction) {
     return ((z * brick_cells + y) * brick_cells + x) * edges_per_corner + direction - 1;
 }
 
-// Descends an octree whose node of level n has 2^n bricks along a side, and collects the bricks that the surface
+// Descends an octree whose nodes of level n have 2^n bricks along a side, and collects the bricks that the surface
 // enters.
 void find_bricks(const PosedBody& body, const Grid& grid, const Vector3i& first, int level, PartSet candidates,
                  std::vector<Brick>& bricks) {
     const int cells = brick_cells << level;
     const Vector3d centre =
         grid.origin + grid.rotation * (grid.cell * (first.cast<double>().array() + 0.5 * cells).matrix());
-    // A quarter more than the node, so that vertices which move along the surface still find their parts.
+    // A quarter more than the node, so that vertices that later move along the surface still find their parts.
     const BallBounds bounds = bound_body(body, candidates, centre, 1.25 * grid.cell * cells * std::sqrt(0.75));
     if (!bounds.crosses) return;
     if (level == 0) {
@@ -77,10 +77,10 @@ std::vector<Brick> find_all_bricks(const PosedBody& body, const Grid& grid) {
         low = low.cwiseMin(local);
         high = high.cwiseMax(local);
     }
-    const double margin = 260.0 / grid.cell;  // no part reaches further from the joints, mm
+    const double margin = 260.0 / grid.cell;  // mm, no part reaches further from the joints
     const Vector3i first = (low.array() - margin).floor().cast<int>().matrix();
     const double extent = (high - low).maxCoeff() + 2 * margin + 2;
-    // Bricks start at multiples of their size, so that a position names its brick.
+    // Bricks start at multiples of their size, so that the brick follows from the position.
     const auto align = [](int c) { return (c >= 0 ? c : c - brick_cells + 1) / brick_cells * brick_cells; };
     int level = 0;
     while ((brick_cells << level) < extent + brick_cells) ++level;
@@ -98,7 +98,7 @@ void evaluate_brick(const PosedBody& body, const Grid& grid, Brick& brick) {
                         .distance);
 }
 
-// Puts a vertex where the function, linear along the edge, is zero.
+// Puts a vertex where the function, linearly interpolated along the edge, is zero.
 void place_vertices(const Grid& grid, Brick& brick) {
     brick.vertex.fill(no_vertex);
     for (int z = 0; z < brick_cells; ++z)
@@ -119,7 +119,7 @@ void place_vertices(const Grid& grid, Brick& brick) {
             }
 }
 
-// The six tetrahedra of a cell round its main diagonal, as corner bits, each of positive orientation.
+// The six tetrahedra of a cell around its main diagonal, as corner bits, each positively oriented.
 constexpr std::array<std::array<int, 4>, 6> cell_tetrahedra = {
     {{0, 1, 3, 7}, {0, 2, 6, 7}, {0, 4, 5, 7}, {0, 3, 2, 7}, {0, 6, 4, 7}, {0, 5, 1, 7}}};
 
@@ -128,7 +128,7 @@ constexpr std::array<std::array<int, 4>, 4> one_first = {{{0, 1, 2, 3}, {1, 0, 3
 constexpr std::array<std::array<int, 4>, 6> two_first = {
     {{0, 1, 2, 3}, {0, 2, 3, 1}, {0, 3, 1, 2}, {1, 2, 0, 3}, {1, 3, 2, 0}, {2, 3, 0, 1}}};
 
-// Emits a tetrahedron's triangles as pairs of its corners, whose joining edge holds the vertex.
+// Emits the triangles of a tetrahedron; each vertex is given as the two corners whose edge it lies on.
 template <class Emit>
 void polygonise_tetrahedron(unsigned inside, const Emit& emit) {
     using Edge = std::array<int, 2>;
@@ -153,7 +153,7 @@ void polygonise_tetrahedron(unsigned inside, const Emit& emit) {
     }
 }
 
-// The global index of the vertex on the edge between two corners of a cell, given as offset bits.
+// The global index of the vertex on the edge between two corners of a cell, which are given as offset bits.
 std::uint32_t vertex_on_edge(const std::vector<Brick>& bricks, const Brick& brick, const Vector3i& cell, int a, int b) {
     const int low = a & b, direction = a ^ b;
     Vector3i corner = cell + Vector3i(low & 1, low >> 1 & 1, low >> 2);

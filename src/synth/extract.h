@@ -1,5 +1,5 @@
-// From the body's function to a triangle mesh: marching tetrahedra over a regular grid, of which only the bricks that
-// the surface enters are visited.
+// Turns the body's function into a triangle mesh: marching tetrahedra over a regular grid, visiting only the bricks
+// that the surface enters.
 #pragma once
 
 #include <Eigen/Core>
@@ -20,22 +20,22 @@ struct Grid {
     double cell = 10;  // mm
 };
 
-// Which parts of the body matter in each brick of the grid that the surface enters.
+// For each brick of the grid that the surface enters, the parts of the body that have an effect there.
 struct BrickMap {
     Grid grid;
-    std::unordered_map<std::uint64_t, PartSet> candidates;  // by brick_key
+    std::unordered_map<std::uint64_t, PartSet> candidates;  // indexed by brick_key
 
-    PartSet at(const Eigen::Vector3d& world) const;  // all parts where no brick is
+    PartSet at(const Eigen::Vector3d& world) const;  // all parts if there is no brick
 };
 
-// Where on a grid edge a vertex lies: at share * edge from the edge's lower corner.
+// The position of a vertex on a grid edge: at share * edge from the lower corner of the edge.
 struct EdgePlace {
     Eigen::Vector3d edge;  // the whole edge, world mm
     double share = 0;      // in (0, 1)
 };
 
 struct Extraction {
-    std::vector<Eigen::Vector3d> positions;  // on the grid's edges and diagonals
+    std::vector<Eigen::Vector3d> positions;  // on the edges and diagonals of the grid
     std::vector<EdgePlace> places;           // one per position
     std::vector<Triangle> triangles;         // counter-clockwise seen from outside; closed and manifold
     BrickMap bricks;

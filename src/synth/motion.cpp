@@ -13,14 +13,14 @@ using Eigen::Vector3d;
 constexpr double degree = std::numbers::pi / 180.0;
 constexpr double full_turn = 2.0 * std::numbers::pi;
 
-// Angles in degrees, one of each pair for the left and the right side. Zero everywhere is the T-pose.
+// Angles in degrees; of each pair, the first is for the left side. All zero is the T-pose.
 struct Angles {
     double pelvis_yaw = 0, pelvis_roll = 0, pelvis_pitch = 0;
     double spine_pitch = 0, spine_yaw = 0, spine_roll = 0;
     double head_pitch = 0, head_yaw = 0, head_roll = 0;
     double arm_lower[2] = {}, arm_swing[2] = {}, arm_twist[2] = {}, elbow[2] = {}, wrist[2] = {};
     double hip_flex[2] = {}, hip_spread[2] = {}, knee[2] = {}, ankle[2] = {};
-    double lift = 0;  // mm, of the whole body above its stance
+    double lift = 0;  // mm, height of the whole body above its stance
 };
 constexpr std::size_t angle_count = sizeof(Angles) / sizeof(double);
 
@@ -42,13 +42,13 @@ double smooth_step_integral(double u) {
     return u < 1 ? u * u * u * (1.0 - 0.5 * u) : u - 0.5;
 }
 
-// Rises from 0 to 1 and falls again, smooth, within [begin, end].
+// Rises smoothly from 0 to 1 and falls again within [begin, end].
 double bump(double t, double begin, double end) {
     const double u = std::clamp((t - begin) / (end - begin), 0.0, 1.0);
     return 0.5 - 0.5 * std::cos(full_turn * u);
 }
 
-// The schedule of one cycle, s.
+// The schedule of one cycle, in seconds.
 constexpr double ready_time = 0.45, fade = 0.4;
 constexpr double walk_end = 2.2, wave_end = 4.2, turn_end = 6.2, cycle = 8.0;
 constexpr double walk_speed = 1200.0, stride = 1300.0, walk_radius = 1000.0;  // mm/s, mm, mm
@@ -103,7 +103,7 @@ Angles wave(double t, double local) {
     a.elbow[1] = 72 + 27 * beat;
     a.wrist[1] = -8 * std::sin(full_turn * 1.5 * local - 0.9);
     a.arm_lower[0] = 62;
-    a.elbow[0] = 62 + 4 * beat;  // the other hand near the hip
+    a.elbow[0] = 62 + 4 * beat;  // keeps the other hand near the hip
     a.arm_twist[0] = 22;
     a.spine_roll = 4 + 1.5 * beat;
     a.head_roll = 5;
@@ -128,7 +128,7 @@ Angles turn(double t, double local) {
     return a;
 }
 
-// Crouch, push off, 0.46 s of flight with 260 mm of height, landing, recovery.
+// Crouch, push off, 0.46 s of flight with a height of 260 mm, landing, recovery.
 Angles jump(double t, double local) {
     Angles a = stand(t);
     constexpr double take_off = 0.72, landing = take_off + 0.46;
@@ -150,11 +150,11 @@ Angles jump(double t, double local) {
     return a;
 }
 
-// How far the person has walked by a time since ready_time: the integral of the speed, which fades in and out.
+// How far the person has walked since ready_time: the integral of the speed, which fades in and out.
 double walked_distance(double time) {
     const double cycles = std::floor(time / cycle), local = time - cycles * cycle;
     const auto ramp = [](double t) { return fade * smooth_step_integral((t + fade / 2) / fade); };
-    // Over a cycle the walk lasts walk_end: its fade in is cut in half by the cycle's start and completed at its end.
+    // Over a cycle the walk lasts walk_end: the start of the cycle cuts its fade-in in half, and the end completes it.
     const double within = ramp(local) - ramp(0) - ramp(local - walk_end) + ramp(local - cycle);
     return walk_speed * (cycles * walk_end + within);
 }
@@ -173,14 +173,15 @@ Stance stance_at(double seconds) {
     const double jumping = 1.0 - walking - waving - turning;
     Stance stance;
     stance.walked = walked_distance(time);
-    // At a cycle's start the jump that fades out is the one that began at the end of the cycle before.
+    // At the start of a cycle, the jump that fades out began at the end of the previous cycle.
     const double jump_time = local < fade ? local + cycle - turn_end : local - turn_end;
     Angles moving;
     add_weighted(moving, walking, walk(seconds, stance.walked));
     add_weighted(moving, waving, wave(seconds, local - walk_end));
     add_weighted(moving, turning, turn(seconds, local - wave_end));
     add_weighted(moving, jumping, jump(seconds, jump_time));
-    const double out = smooth_step((seconds - 0.07) / 0.55);  // the T-pose, all zeros, has the rest of the weight
+    const double out = smooth_step((seconds - 0.07) / 0.55);  // the rest of the weight is on the T-pose, which is all
+                                                              // zeros
     add_weighted(stance.angles, out, moving);
     const double u = smooth_step((local - wave_end - 0.1) / (turn_end - wave_end - 0.2));
     stance.turned = full_turn * u;
@@ -197,7 +198,7 @@ Vector3d carry(const PartFrame& frame, const Vector3d& rest) {
     return frame.rotation * (rest - frame.rest_pivot) + frame.pivot;
 }
 
-// Hangs a part on its parent, turning about a rest point of the parent.
+// Attaches a part to its parent, turning about a rest point of the parent.
 PartFrame attach(const PartFrame& parent, const Vector3d& rest_pivot, const Matrix3d& local_rotation) {
     return {parent.rotation * local_rotation, rest_pivot, carry(parent, rest_pivot)};
 }
@@ -232,7 +233,7 @@ void place_joints(PosedBody& body) {
     for (std::size_t j = 0; j < joint_count; ++j) body.joints[j] = carry(body.parts[index_of(carrier[j])], rest[j]);
 }
 
-// The height of the lowest point of the shoes: a soft minimum, so that a change of foot makes no jolt.
+// The height of the lowest point of the shoes: a soft minimum, so that a change of foot causes no jolt.
 double lowest_sole(const PosedBody& body) {
     constexpr double softness = 6.0;
     std::array<double, 4> heights;

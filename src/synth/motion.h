@@ -31,8 +31,8 @@ enum class Part : std::uint8_t {
 inline constexpr std::size_t part_count = 16;
 inline constexpr std::size_t joint_count = 15;
 
-// Where a part is: rest coordinates q (mm, T-pose, y up, facing +z, the person's left at +x) lie at
-// rotation * (q - rest_pivot) + pivot in the world.
+// The position of a part: rest coordinates q (mm, T-pose, y up, facing +z, the person's left at +x) lie at rotation *
+// (q - rest_pivot) + pivot in the world.
 struct PartFrame {
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d rest_pivot = Eigen::Vector3d::Zero();
@@ -47,8 +47,8 @@ struct PosedBody {
 // The rest positions of the joints (mm), in the order of synth_skeleton().
 const std::array<Eigen::Vector3d, joint_count>& rest_joints();
 
-// The body at a time (s, >= 0): a T-pose that eases out during the first half second, then a cycle of 8 s of walking
-// (1.2 m/s round a circle of 1 m), waving, turning and jumping. Depends on nothing else.
+// The body at a time (s, >= 0): a T-pose that fades out during the first half second, then a cycle of 8 s of walking
+// (1.2 m/s along a circle with a radius of 1 m), waving, turning and jumping. Depends on the time alone.
 PosedBody pose_body(double seconds);
 
 }  // namespace htvm::synth

@@ -1,5 +1,5 @@
-// Random numbers that depend on nothing but their key, so that any frame can be made on its own, in any order and on
-// any number of threads.
+// Random numbers that depend on their key alone, so that any frame can be generated on its own, in any order and on any
+// number of threads.
 #pragma once
 
 #include <cmath>

@@ -40,7 +40,7 @@ bool adjacent(const HalfEdgeMesh& mesh, std::uint32_t a, std::uint32_t b) {
 
 Vector3d area_vector(const Vector3d& a, const Vector3d& b, const Vector3d& c) { return (b - a).cross(c - a); }
 
-// Keeps the triangles of components with at least `fewest` triangles.
+// Keeps the triangles of components that have at least `fewest` triangles.
 std::vector<Triangle> large_components(std::size_t vertices, const std::vector<Triangle>& triangles,
                                        std::size_t fewest) {
     std::vector<std::uint32_t> parent(vertices);
@@ -62,7 +62,7 @@ std::vector<Triangle> large_components(std::size_t vertices, const std::vector<T
     return kept;
 }
 
-// Pairs half-edges by sorting those of each vertex into buckets; false where one has no or several partners.
+// Pairs half-edges by sorting those of each vertex into buckets; false if one has no partner or several.
 bool pair_half_edges(HalfEdgeMesh& mesh) {
     const std::size_t vertices = mesh.positions.size(), count = mesh.origin.size();
     std::vector<std::uint32_t> start(vertices + 1, 0), bucket(count);
@@ -93,7 +93,7 @@ bool pair_half_edges(HalfEdgeMesh& mesh) {
     return true;
 }
 
-// would_fold, with the triangles that hold `other` left out.
+// Like would_fold, without the triangles that contain `other`.
 bool would_fold_without(const HalfEdgeMesh& mesh, std::uint32_t vertex, std::uint32_t other, const Vector3d& place) {
     bool folds = false;
     for_each_outgoing(mesh, vertex, [&](std::uint32_t e) {
@@ -106,7 +106,7 @@ bool would_fold_without(const HalfEdgeMesh& mesh, std::uint32_t vertex, std::uin
     return folds;
 }
 
-// The two ends may have no common neighbours but the two that face the edge.
+// The two ends may have no common neighbours except the two opposite to the edge.
 bool link_is_clean(const HalfEdgeMesh& mesh, std::uint32_t u, std::uint32_t v) {
     int common = 0;
     for_each_outgoing(mesh, u, [&](std::uint32_t e) { common += adjacent(mesh, v, target(mesh, e)) ? 1 : 0; });
@@ -151,7 +151,7 @@ bool collapse_edge(HalfEdgeMesh& mesh, std::uint32_t e) {
     return true;
 }
 
-// The cotangent of the angle that faces a half-edge in its triangle.
+// The cotangent of the angle opposite to a half-edge in its triangle.
 double facing_cotangent(const HalfEdgeMesh& mesh, std::uint32_t e) {
     const Vector3d apex = mesh.positions[mesh.origin[previous(e)]];
     const Vector3d a = mesh.positions[mesh.origin[e]] - apex, b = mesh.positions[target(mesh, e)] - apex;
@@ -171,7 +171,7 @@ bool flip_edge(HalfEdgeMesh& mesh, std::uint32_t e) {
     };
     if (!aligned(old_one, old_two, 0.6) || !aligned(new_one, mean, 0.5) || !aligned(new_two, mean, 0.5)) return false;
 
-    // e: w -> x with v facing; t: x -> w with u facing. The four outer half-edges move between the triangles.
+    // e: w -> x, opposite to v; t: x -> w, opposite to u. The four outer half-edges move between the triangles.
     const std::uint32_t outer_vw = mesh.twin[en], outer_wu = mesh.twin[ep], outer_ux = mesh.twin[tn],
                         outer_xv = mesh.twin[tp];
     const auto link = [&](std::uint32_t h, std::uint32_t from, std::uint32_t outer) {
@@ -221,7 +221,7 @@ void collapse_to(HalfEdgeMesh& mesh, std::size_t vertices) {
         for (std::uint32_t e = 0; e < mesh.origin.size(); ++e)
             if (mesh.origin[e] != dead_half_edge && e < mesh.twin[e])
                 edges.emplace_back((mesh.positions[mesh.origin[e]] - mesh.positions[target(mesh, e)]).squaredNorm(), e);
-        // Only the shortest third in a round: a round's collapses lengthen the edges around them.
+        // Only the shortest third per round, since collapses lengthen the edges around them.
         const auto end = edges.begin() + static_cast<std::ptrdiff_t>(edges.size() / 3);
         std::nth_element(edges.begin(), end, edges.end());
         std::sort(edges.begin(), end);

@@ -32,11 +32,12 @@ RandomKey frame_key(const SynthOptions& options, int frame) {
     return derive_key(RandomKey{mix_bits(options.seed)}, static_cast<std::uint64_t>(static_cast<std::uint32_t>(frame)));
 }
 
-// An extraction has about this many vertices times squared cell size, mm^2: 4.5 a cell times the body's surface.
+// An extraction has about this many vertices times the squared cell size, in mm^2: 4.5 per squared cell times the
+// body's surface.
 constexpr double vertices_times_cell2 = 8.6e6;
 
-// The cells are small enough for half as many vertices again as are kept: the shortest edges are then collapsed, which
-// leaves no trace of the grid. Coarser cells than 26 mm would lose the limbs.
+// The cells are small enough for one and a half times as many vertices as are kept. Then the shortest edges are
+// collapsed, which leaves no trace of the grid. Cells coarser than 26 mm would lose the limbs.
 Grid free_grid(RandomKey key, double vertices) {
     Grid grid;
     grid.cell = std::min(26.0, std::sqrt(vertices_times_cell2 / (1.6 * vertices)));
@@ -47,7 +48,7 @@ Grid free_grid(RandomKey key, double vertices) {
     return grid;
 }
 
-// Moves a point towards the surface by its distance, in the direction in which the distance falls fastest.
+// Moves a point towards the surface by its distance, in the direction of steepest descent of the distance.
 void descend(Vector3d& position, const PosedBody& body, const BrickMap& bricks, double longest_step) {
     const PartSet candidates = bricks.at(position);
     const double distance = evaluate_body(body, candidates, position).distance, width = 0.5;
@@ -60,8 +61,8 @@ void descend(Vector3d& position, const PosedBody& body, const BrickMap& bricks, 
     position -= step * gradient / std::sqrt(steepness2);
 }
 
-// Moves every vertex onto the surface: along its normal, and where a crumpled neighbourhood's normal does not lead
-// there, by the distance's own slope.
+// Moves every vertex onto the surface: along its normal, or, if the normal of a crumpled neighbourhood does not lead
+// there, along the gradient of the distance.
 void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, int rounds, Threads threads) {
     const auto normals = vertex_normals(mesh, threads);
     const double longest_step = 0.5 * bricks.grid.cell;
@@ -99,8 +100,8 @@ double mean_edge_length(const HalfEdgeMesh& mesh) {
     return count > 0 ? sum / static_cast<double>(count) : 0.0;
 }
 
-// Moves every vertex along the surface at random, by about `share` of the spacing in each direction, unless
-// that would fold the surface.
+// Moves every vertex along the surface at random, by about `share` of the spacing in each direction, unless this would
+// fold the surface.
 void jitter(HalfEdgeMesh& mesh, double share, RandomKey key) {
     const auto normals = vertex_normals(mesh, {});
     const double size = share * mean_edge_length(mesh);
@@ -115,10 +116,11 @@ void jitter(HalfEdgeMesh& mesh, double share, RandomKey key) {
     }
 }
 
-// As many vertices as wanted, evenly but randomly spread over the surface.
+// The wanted number of vertices, spread evenly but randomly over the surface.
 void remesh(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, std::size_t vertices, RandomKey key,
             Threads threads) {
-    // What is collapsed depends on the lengths of the edges: once the vertices have moved, no longer on the grid.
+    // Which edges are collapsed depends on their lengths. Once the vertices have moved, these no longer depend on the
+    // grid.
     jitter(mesh, 0.3, derive_key(key, 0));
     collapse_to(mesh, vertices);
     compact(mesh);
@@ -142,7 +144,7 @@ void scale_to_power(std::vector<double>& values, double power) {
     for (double& value : values) value *= factor;
 }
 
-// Every value half-way towards the mean of its neighbours.
+// Moves every value halfway towards the mean of its neighbours.
 std::vector<double> smoothed(const HalfEdgeMesh& mesh, const std::vector<double>& values) {
     std::vector<double> sums(values.size(), 0.0);
     for (std::size_t e = 0; e < mesh.origin.size(); ++e) sums[mesh.origin[e]] += values[mesh.origin[mesh.twin[e]]];
@@ -151,7 +153,7 @@ std::vector<double> smoothed(const HalfEdgeMesh& mesh, const std::vector<double>
     return sums;
 }
 
-// Noise of a mean square of `power` with the spectrum of a reconstruction's: two thirds is correlated with the next
+// Noise with a mean square of `power` and the spectrum of a reconstruction: two thirds is correlated with the next
 // vertex, a third over several. One value per vertex, mm.
 std::vector<double> reconstruction_noise(const HalfEdgeMesh& mesh, double power, RandomKey key) {
     std::vector<double> fine(mesh.positions.size()), coarse(mesh.positions.size());
@@ -173,13 +175,13 @@ void add_noise_along_normals(HalfEdgeMesh& mesh, const std::vector<double>& nois
     for (std::size_t v = 0; v < normals.size(); ++v) mesh.positions[v] += noise[v] * normals[v];
 }
 
-// Moves lattice vertices along their edges by as much as changes their distance to the surface by the noise, and never
-// past the edge's ends.
+// Moves lattice vertices along their edges so that their distance to the surface changes by the noise, but never past
+// the ends of the edge.
 void add_noise_along_edges(HalfEdgeMesh& mesh, const std::vector<EdgePlace>& places, const std::vector<double>& noise,
                            Threads threads) {
     const auto normals = vertex_normals(mesh, threads);
     for (std::size_t v = 0; v < normals.size(); ++v) {
-        const double rise = places[v].edge.dot(normals[v]);  // of the distance, over the whole edge
+        const double rise = places[v].edge.dot(normals[v]);  // change of the distance over the whole edge
         const double steep = std::max(std::abs(rise), 0.2 * places[v].edge.norm());
         const double share = places[v].share + std::copysign(noise[v] / steep, noise[v] * rise);
         mesh.positions[v] += (std::clamp(share, 0.02, 0.98) - places[v].share) * places[v].edge;
@@ -211,7 +213,7 @@ Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey ke
     else
         grid = free_grid(derive_key(key, grid_stream), wanted);
     const Extraction extraction = extract_surface(body, grid, threads);
-    // A reconstruction drops specks; on the lattice every vertex stays where its edge is.
+    // A reconstruction drops specks; in lattice mode every vertex stays on its edge.
     const std::size_t fewest = options.lattice ? 0 : extraction.triangles.size() / 100;
     HalfEdgeMesh surface = build_half_edges(extraction.positions, extraction.triangles, fewest);
     if (!options.lattice)

@@ -1,5 +1,6 @@
 // The synthetic capture: a dressed person who moves, re-meshed in every frame as a reconstruction would be, with the
-// skeleton that a tracker would give. Any frame can be made on its own, and is the same for any number of threads.
+// skeleton that a tracker would report. Any frame can be generated on its own, and is the same for any number of
+// threads.
 #pragma once
 
 #include <cstdint>
@@ -12,36 +13,36 @@
 namespace htvm {
 
 struct SynthOptions {
-    std::uint64_t seed = 1;  // of everything random: sampling and noise; the motion does not depend on it
-    int vertices = 35000;    // about how many a frame has, 150 to 2,000,000; each frame's own within 3 %
-    double fps = 30;         // frames a second, > 0
-    double surface_noise_power =
-        2.25;                       // mm^2, mean square of the reconstruction noise along the normal; new every frame
-    double joint_noise_power = 25;  // mm^2, variance of each joint coordinate's Gaussian noise (paper, Fig. 20)
-    bool lattice = false;           // leave the vertices on the edges and diagonals of one fixed, axis-aligned grid;
-                                    // then the number of vertices varies with the pose, and is at least about 1,000
-    bool colours = true;            // give vertices colours
-    bool normals = false;           // give vertices normals
+    std::uint64_t seed = 1;  // for everything random: sampling and noise; the motion does not depend on it
+    int vertices = 35000;    // approximate number per frame, 150 to 2,000,000; each frame is within 3 % of it
+    double fps = 30;         // frames per second, > 0
+    double surface_noise_power = 2.25;  // mm^2, mean square of the reconstruction noise along the normal; different in
+                                        // every frame
+    double joint_noise_power = 25;      // mm^2, variance of each joint coordinate's Gaussian noise (paper, Fig. 20)
+    bool lattice = false;  // keep the vertices on the edges and diagonals of one fixed, axis-aligned grid; the
+                           // number of vertices then varies with the pose, and is at least about 1,000
+    bool colours = true;   // give vertices colours
+    bool normals = false;  // give vertices normals
 };
 
 struct SynthFrame {
     Mesh mesh;       // closed and manifold; mm, y up, the ground at y = 0
-    Pose pose;       // what a tracker would say: true_pose with noise
+    Pose pose;       // the pose that a tracker would report: true_pose with noise
     Pose true_pose;  // without noise
 };
 
 // 15 joints and 14 bones, as in the paper's Fig. 3; bones in the same order as the joints' chains.
 Skeleton synth_skeleton();
 
-// The side of the lattice's cells, mm: a lattice vertex is at cell * (i, j, k) + share * cell * d, with integers i, j,
-// k, d one of the seven offsets {0, 1}^3 other than zero and share in (0, 1).
+// The side length of the lattice's cells, mm: a lattice vertex is at cell * (i, j, k) + share * cell * d, with integers
+// i, j, k, d one of the seven offsets {0, 1}^3 other than zero, and share in (0, 1).
 double synth_lattice_cell(const SynthOptions& options);
 
-// Says what is wrong with options (bad_input), if anything.
+// Fails (bad_input) with what is wrong with the options, if anything.
 Result<void> check_synth_options(const SynthOptions& options);
 
-// The frame at frame / fps seconds. Frame 0 is a T-pose that faces +z; negative frames are frame 0's pose. Options out
-// of their ranges are clamped to them.
+// The frame at frame / fps seconds. Frame 0 is a T-pose that faces +z; negative frames have the pose of frame 0.
+// Options out of range are clamped.
 SynthFrame synth_frame(const SynthOptions& options, int frame, internal::Threads threads = {});
 
 }  // namespace htvm
