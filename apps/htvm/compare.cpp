@@ -24,8 +24,7 @@
 namespace htvm::app {
 namespace {
 
-// ---- The output of a comparison: a table for people, JSON and CSV for programs
-// ---------------------------------------
+// ---- The output of a comparison: a table for people, JSON and CSV for programs --------------------------------------
 
 const char* shading_name(Shading shading) {
     return shading == Shading::flat ? "flat" : shading == Shading::smooth ? "smooth" : "unlit";

@@ -22,7 +22,7 @@ struct Options {
     double megabits = 0, buffer_seconds = 1;  // of the line and the receiver's buffer to check against; 0: no check
 };
 
-// A frame's bytes, with those of the codebooks that came with it.
+// Adds a codebook's bytes to those of the frame that it came with.
 void add_codebook(LayerBytes& bytes, const Packet& packet) {
     bytes.overhead += packet_overhead;
     if (!packet.payload.empty())
@@ -67,7 +67,7 @@ nlohmann::json sequence_json(const SequenceInfo& s) {
             {"nearest_vertices", s.nearest_vertices}};
 }
 
-// What the stream would do on such a line; an error where its receiver would have to wait.
+// Reports what the stream would do on such a line; an error if its receiver would have to wait.
 Result<void> check_buffer(const Options& options, const BufferModel& buffer) {
     if (!options.json)
         fmt::print("over {:g} Mbit/s, a buffer of {:g} s is at most {:.1f} % full (frame {})\n", options.megabits,
@@ -88,7 +88,7 @@ nlohmann::json buffer_json(const Options& options, const BufferModel& buffer) {
 Result<void> info(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
-    Decoder headers(options.limits);  // for the sequence header alone: frames are inspected, not decoded
+    Decoder headers(options.limits);  // only for the sequence header: frames are inspected, not decoded
     TotalsByType totals;
     std::size_t count = 0;
     LayerBytes codebooks;

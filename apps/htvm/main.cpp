@@ -1,4 +1,4 @@
-// htvm: the command line for those who compress and play captures. Experiments have their own: htvm-lab.
+// htvm: the command line for compressing and playing captures. Experiments have their own program: htvm-lab.
 #include "commands.h"
 
 int main(int argc, char** argv) {

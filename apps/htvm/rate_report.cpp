@@ -21,11 +21,11 @@ void BufferModel::add(const Packet& packet) {
     if (!last_us_ || packet.timestamp_us > *last_us_) last_us_ = packet.timestamp_us;
     held_ += 8.0 * static_cast<double>(packet.payload.size() + packet_overhead);
     if (held_ > peak_) peak_ = held_, peak_frame_ = packet.frame;
-    // Timestamps are whole microseconds: two of them may be lost since the buffer was last empty.
+    // Timestamps are whole microseconds: rounding may have lost two since the buffer was last empty.
     if (!overflows_ && held_ > capacity_ + 2e-6 * bits_per_second_) overflows_ = true, first_overflow_ = packet.frame;
 }
 
-// ---- What became of a bitrate or a target error ---------------------------------------------------------------------
+// ---- The outcome of a bitrate or a target error ---------------------------------------------------------------------
 
 namespace {
 
@@ -37,7 +37,7 @@ double error_percent(const RateReport& report, std::uint64_t bytes, double secon
     return 100 * (rate_of(bytes, seconds) / report.bits_per_second - 1);
 }
 
-// Of frames that a target error leaves at an end of the range of qualities, where they are off it.
+// About the frames that miss a target error because quality is at an end of its range.
 std::string beyond_reach(const RateReport& report) {
     const auto coded = [&](auto test) {
         return std::count_if(report.costs.begin(), report.costs.end(), [&](const FrameCost& cost) {

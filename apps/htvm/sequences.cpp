@@ -16,7 +16,7 @@
 
 namespace htvm::app {
 
-// ---- Where meshes come from -----------------------------------------------------------------------------------------
+// ---- Sources of meshes ----------------------------------------------------------------------------------------------
 
 namespace {
 
@@ -42,7 +42,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (decoder->sequence()) self.millimetres_per_unit = decoder->sequence()->unit_micrometres / 1000.0;
             if (!*frame) continue;
-            // Without this, every frame after a lost one would be taken for its neighbour.
+            // Without this, every frame after a lost one would be compared with its neighbour.
             if (packet->frame != expected)
                 return fail(ErrorKind::corrupt_stream,
                             fmt::format("{} has frame {} where frame {} is due: frames were lost; decode it, and give "
@@ -89,7 +89,7 @@ Result<MeshSource> open_meshes(const std::string& name, const std::string& unit,
     return source;
 }
 
-// ---- Which belong together ------------------------------------------------------------------------------------------
+// ---- Which frames belong together -----------------------------------------------------------------------------------
 
 namespace {
 
@@ -110,7 +110,7 @@ std::optional<NameParts> parts_of(const std::filesystem::path& path) {
     return out;
 }
 
-// The place of a number, if it is there.
+// The position of a number, if it exists.
 std::optional<std::size_t> place_of(std::span<const std::uint64_t> ascending, std::uint64_t number) {
     const auto at = std::lower_bound(ascending.begin(), ascending.end(), number);
     if (at == ascending.end() || *at != number) return std::nullopt;

@@ -35,7 +35,7 @@ std::optional<Packet> StreamInput::next() {
     for (;;) {
         if (auto packet = reader_.pull()) return packet;
         if (at_end_) return std::nullopt;
-        // What a live stream has is taken as it comes, not only when the buffer is full.
+        // Data of a live stream is taken as it arrives, not only once the buffer is full.
         in.read(buffer.data(), 1);
         std::streamsize got = in.gcount();
         if (got > 0) got += in.readsome(buffer.data() + 1, static_cast<std::streamsize>(buffer.size()) - 1);
@@ -55,7 +55,7 @@ Result<StreamOutput> StreamOutput::open(const std::string& path) {
     if (is_mesh_file_name(path))
         return fail(ErrorKind::bad_input,
                     path + " is the name of a mesh, but a stream would be written there; give one that ends in .htvm");
-    // What is there stays until there is something to put in its place.
+    // An existing file is kept until there is something to replace it.
     output.file_.open(path, std::ios::binary | std::ios::app);
     if (!output.file_) {
         const std::string reason = std::strerror(errno);
@@ -85,11 +85,11 @@ Result<void> StreamOutput::write(const Packet& packet) {
     return {};
 }
 
-// ---- What the commands accept of a stream ---------------------------------------------------------------------------
+// ---- What the commands accept as a stream ---------------------------------------------------------------------------
 
 namespace {
 
-// What a number with a sign, or beyond 64 bits, would be taken for is far above it.
+// Numbers with a sign, or beyond 64 bits, are parsed as values far above this.
 constexpr std::uint64_t most_bytes = std::uint64_t{1} << 60;
 
 const char* const group = "Limits, for streams that may be hostile";

@@ -1,5 +1,5 @@
-// Streams as the commands read and write them: packets in a file, or on standard input and output; and the options that
-// say what the commands accept of a stream.
+// Streams as the commands read and write them: packets in a file, or on standard input and output. Also the options
+// that limit what the commands accept as a stream.
 #pragma once
 
 #include <cstdint>
@@ -19,13 +19,13 @@ namespace htvm::app {
 
 class StreamInput {
 public:
-    // - is standard input. Larger packets are passed over.
+    // "-" is standard input. Larger packets are skipped.
     static Result<StreamInput> open(const std::string& path, std::uint64_t max_packet_bytes);
-    // The next packet, or nothing at the end.
+    // The next packet; nothing at the end.
     std::optional<Packet> next();
     std::uint64_t damaged_bytes() const { return reader_.damaged_bytes(); }
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
-    std::size_t cut_short_bytes() const { return reader_.pending_bytes(); }  // at the end: of a packet without its end
+    std::size_t cut_short_bytes() const { return reader_.pending_bytes(); }  // at the end: bytes of a truncated packet
 
 private:
     std::ifstream file_;
@@ -35,7 +35,7 @@ private:
 
 class StreamOutput {
 public:
-    static Result<StreamOutput> open(const std::string& path);  // - is standard output
+    static Result<StreamOutput> open(const std::string& path);  // "-" is standard output
     Result<void> write(const Packet& packet);
     std::uint64_t bytes() const { return bytes_; }
 
@@ -46,11 +46,12 @@ private:
     std::uint64_t bytes_ = 0;
 };
 
-// ---- What the commands accept of a stream ---------------------------------------------------------------------------
+// ---- What the commands accept as a stream ---------------------------------------------------------------------------
 
-// -M/--max-memory, --max-vertices, --max-triangles, --max-bones, --max-packet; into the options' limits.
+// Adds -M/--max-memory, --max-vertices, --max-triangles, --max-bones, --max-packet, which set the limits in the
+// options.
 void add_decoder_limits(CLI::App& command, DecoderOptions& limits);
-// Where frames are not decoded: --max-bones and --max-packet alone.
+// For commands that do not decode frames: --max-bones and --max-packet only.
 void add_packet_limits(CLI::App& command, DecoderOptions& limits);
 
 }  // namespace htvm::app

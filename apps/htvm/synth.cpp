@@ -56,7 +56,7 @@ void add_pose(SkeletonTrack& track, Pose pose) {
     track.poses.push_back(std::move(pose));
 }
 
-// Makes as many frames at once as there are threads, so that memory does not grow with the number of frames.
+// Generates as many frames at once as there are threads, so that memory does not grow with the number of frames.
 Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, SkeletonTrack& exact) {
     const ThreadPool pool(std::min(thread_count(options.threads), 64u));
     const Threads threads = pool.threads();
@@ -84,7 +84,7 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
     return written;
 }
 
-// Frames of an earlier run beside the new ones would be read as one sequence with them.
+// Frames of an earlier run in the same folder would be read as part of the same sequence.
 void warn_of_other_meshes(const Options& options, const std::set<std::string>& written) {
     std::size_t others = 0;
     std::error_code error;

@@ -19,8 +19,8 @@ using namespace app;
 
 namespace {
 
-// How a coder's curve looks. Colours told apart by people who are colour-blind too (after Okabe and Ito), and marks,
-// for curves that lie on each other: disc, square, triangle, diamond, triangle upside down.
+// How a coder's curve looks. The colours can be distinguished by colour-blind people too (after Okabe and Ito); the
+// marks distinguish curves that lie on each other: disc, square, triangle, diamond, inverted triangle.
 struct Look {
     const char* rgb;
     int mark;
@@ -52,7 +52,7 @@ Look look_of(const std::vector<std::string>& coders, const std::string& name) {
     return other_looks[0];
 }
 
-// A step of 1, 2 or 5 times a power of ten that cuts `span` into at most `most` parts.
+// A step of 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts.
 double round_step(double span, int most) {
     const double rough = span / most, power = std::pow(10, std::floor(std::log10(rough)));
     for (const double factor : {1.0, 2.0, 5.0})
@@ -99,7 +99,7 @@ std::vector<Coordinate> curve_of(std::span<const RdPoint> points, const std::str
     for (const auto& point : points) {
         const auto value = point.values.find(measure.key);
         if (point.coder != coder || value == point.values.end()) continue;
-        if (measure.is_error && !(value->second > 0)) continue;  // no place on a logarithmic axis
+        if (measure.is_error && !(value->second > 0)) continue;  // cannot be shown on a logarithmic axis
         out.push_back({by_bits_per_vertex ? bits_per_vertex(point) : megabits_per_second(point), value->second});
     }
     std::sort(out.begin(), out.end(), [](const Coordinate& a, const Coordinate& b) { return a.x < b.x; });
@@ -117,7 +117,7 @@ std::string file_name(const Measure& measure, bool by_bits_per_vertex) {
     return fmt::format("{}_{}", measure.key, by_bits_per_vertex ? "bpvf" : "mbits");
 }
 
-// The curves of one picture in gnuplot's language, and the values that its axes must hold.
+// The curves of one picture in gnuplot's language, and the values that its axes must include.
 struct PictureCurves {
     std::string data, plots;
     std::vector<double> xs, ys;

@@ -30,8 +30,8 @@ struct Codec {
     unsigned threads = 1;
 };
 
-// All packets of the frame just pushed. Bytes that are not the frame's own (the sequence header, with the first one)
-// count as overhead.
+// All packets of the frame just pushed. Bytes that do not belong to the frame itself (the sequence header, sent with
+// the first one) count as overhead.
 Result<CodedFrame> decode_pending(Codec& codec) {
     CodedFrame out;
     out.decode_ms = 0;
@@ -74,7 +74,7 @@ Result<FrameCoder> start_codec(EncoderOptions options, const SequenceFacts& fact
     });
 }
 
-// Every option that the profile heeds, but for what the sweep sets.
+// Every option that has an effect in the profile, except those that the sweep sets.
 std::string settings_of(const EncoderOptions& options) {
     constexpr std::array<std::string_view, 6> by_the_sweep = {"geometry_step", "colour_step",     "threads",
                                                               "fps_numerator", "fps_denominator", "unit_micrometres"};
@@ -93,7 +93,7 @@ QualityPoint quality_point(double quality) {
     QualityPoint out;
     out.quality = quality;
     out.geometry_step = steps.geometry_step;
-    out.colour_step = std::round(steps.colour_step);  // as the encoder does
+    out.colour_step = std::round(steps.colour_step);  // like the encoder
     return out;
 }
 
@@ -254,7 +254,7 @@ Result<CodedFrame> code_by_draco(const SourceFrame& frame, const DracoSettings& 
     if (!bytes) return tl::unexpected(bytes.error());
     out.bytes[Layer::external_intra] = bytes->size();
     if (colours) {
-        // Its colours' share: what the same frame takes less without them.
+        // The share of its colours: what the same frame takes less without them.
         double not_counted = 0;
         const auto geometry = encode(frame.mesh, settings, false, not_counted);
         if (!geometry) return tl::unexpected(geometry.error());
@@ -301,7 +301,7 @@ namespace {
 
 using std::filesystem::path;
 
-// The end of what a command printed.
+// The end of a command's output.
 std::string last_words(const path& file) {
     const auto bytes = read_file(file, 1 << 20);
     if (!bytes) return {};

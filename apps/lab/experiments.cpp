@@ -57,7 +57,7 @@ bool contains(const std::vector<double>& list, double value) {
     return std::find(list.begin(), list.end(), value) != list.end();
 }
 
-// The trials that are missing, run; results go to their places in `points`.
+// Runs the missing trials; results go to their places in `points`.
 Result<void> run_missing(const Laboratory& laboratory, const std::string& name, const std::vector<Trial>& trials,
                          const SweepOptions& options, const std::vector<std::string>& names,
                          const std::vector<std::string>& keys, std::vector<std::optional<RdPoint>>& points) {
@@ -204,18 +204,18 @@ std::vector<Trial> noise_trials(const ExperimentPlan& plan, const std::vector<Po
     return out;
 }
 
-// ---- Thresholds on the skeleton's motion, and the coders that choose by them (figures 7 and 17 to 19) ---------------
+// ---- Thresholds on the skeleton's motion, and the coders that use them (figures 7 and 17 to 19) ---------------------
 
 namespace {
 
-// Two digits, so that a threshold can be read and typed.
+// Two digits, so that a threshold is easy to read and type.
 double rounded(double value) {
     if (!(value > 0)) return 0;
     const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
     return std::round(value / unit) * unit;
 }
 
-// At equal parts between `low` and `high` of the values, without repeats.
+// At equal steps between the quantiles `low` and `high` of the values, without repeats.
 std::vector<double> quantiles(const std::vector<double>& values, double low, double high, int count) {
     std::vector<double> out;
     for (int i = 0; i < count; ++i) {
@@ -333,7 +333,7 @@ std::vector<Trial> intra_choice_trials(const ExperimentPlan& plan, const MotionT
     std::vector<Trial> out;
     for (const double quality : plan.interval_qualities) {
         for (const double threshold : thresholds.intra_above) {
-            // The threshold alone decides.
+            // Only the threshold decides.
             auto options = paper_options(1000000);
             options.topology.frame_choice = FrameChoice::motion;
             options.topology.intra_above = threshold;
@@ -417,7 +417,7 @@ Result<double> quality_near_rate(const SourceFrames& source, double rate, int ke
                 add(sums, encoder->last_frame());
         }
         const double found = app::bits_per_vertex(sums.bytes.total(), sums.source_vertices);
-        if (std::abs(found - rate) >= smallest) break;  // rates rise with the quality
+        if (std::abs(found - rate) >= smallest) break;  // rates rise with quality
         smallest = std::abs(found - rate);
         best = quality;
     }
@@ -483,7 +483,7 @@ double mean_of(const std::vector<double>& values) {
 
 namespace {
 
-// What a decoder keeps between frames, laid open.
+// The state that a decoder keeps between frames, accessible.
 struct OpenDecoder {
     std::optional<SequenceHeader> header;
     std::optional<ReferenceMesh> reference;
@@ -517,7 +517,7 @@ Result<void> take_codebook(OpenDecoder& decoder, const Packet& packet) {
     return {};
 }
 
-// The coded part, then the animated triangles that are wanted, one flag each.
+// The coded part, then the animated triangles that are wanted (one flag each).
 Mesh joined(const LatticeMesh& coded, const LatticeMesh& animated, const std::vector<std::uint8_t>& wanted,
             const Lattice& lattice) {
     Mesh out = to_mesh(coded, lattice);
@@ -534,7 +534,7 @@ Mesh joined(const LatticeMesh& coded, const LatticeMesh& animated, const std::ve
     return out;
 }
 
-// The first part of a zippered mesh is what was coded.
+// The coded part of a zippered mesh, which comes first in it.
 LatticeMesh coded_part(const LatticeMesh& zippered, const FrameHeader& header) {
     LatticeMesh out;
     out.positions.assign(zippered.positions.begin(), zippered.positions.begin() + header.vertices);
@@ -544,7 +544,7 @@ LatticeMesh coded_part(const LatticeMesh& zippered, const FrameHeader& header) {
     return out;
 }
 
-// Nothing where the frame is coded as a whole.
+// Nothing if the frame is coded as a whole.
 Result<std::optional<SeamStages>> take_apart(const OpenDecoder& decoder, const Packet& packet) {
     const auto payload = read_frame_payload(packet.payload);
     if (!payload) return tl::unexpected(payload.error());

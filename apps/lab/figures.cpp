@@ -23,7 +23,7 @@ Histogram histogram(std::span<const double> values, int most_bars, double least_
     if (finite.empty()) return out;
     const auto [low, high] = std::minmax_element(finite.begin(), finite.end());
     const double largest = std::max(std::abs(*low), std::abs(*high));
-    // Values that differ by less than a thousandth of their size are one bar of a hundredth of it.
+    // Values that differ by less than a thousandth of their size form one bar, a hundredth of it wide.
     double rough = (*high - *low) / std::max(most_bars, 1);
     if (rough <= 1e-3 * largest / std::max(most_bars, 1)) rough = largest > 0 ? 1e-2 * largest : 1;
     rough = std::max(rough, least_width);
@@ -101,7 +101,7 @@ std::string range_words(std::span<const RdPoint> points, const std::string& meas
     return fmt::format("{:.{}f} to {:.{}f} {}", low, m.digits, high, m.digits, m.unit);
 }
 
-// Plane sections: each coder's curve once for every value held fixed.
+// Plane sections: each coder's curve, once for every value held fixed.
 Figure section(std::span<const RdPoint> points, const std::vector<double>& fixed, bool colour_fixed, Figure figure,
                const std::string& name, Easel& easel) {
     const std::string measure = colour_fixed ? "m1_mm" : "m1_colour", other = colour_fixed ? "m1_colour" : "m1_mm";
@@ -410,8 +410,8 @@ struct PaperMean {
     const char* title = "the paper's mean";
 };
 
-// Bars with the mean as a line. With the paper's mean, a dashed line, the axis starts from 0; without, it spans the
-// bars.
+// Bars with the mean as a line. If the paper's mean is given, as a dashed line, the axis starts at 0; otherwise it
+// spans the bars.
 Chart distribution(const std::vector<double>& values, const std::string& title, const std::string& unit,
                    std::optional<PaperMean> paper, int digits) {
     double largest = paper ? paper->value : 0;

@@ -1,4 +1,4 @@
-// The paper's figures from what was measured: charts, and captions whose words the numbers choose.
+// The paper's figures with what was measured: charts, and captions whose wording depends on the numbers.
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,12 @@
 
 namespace htvm::lab {
 
-// Where charts go. Their scripts gather until gnuplot is run on all.
+// Where charts are written. Their scripts are collected, and gnuplot is run once on all.
 struct Easel {
     std::filesystem::path folder;
     std::string script;
 };
-// The file that the chart will be in; the script grows by it.
+// Adds the chart to the script, and returns the file that it will be in.
 std::filesystem::path draw(Easel& easel, const std::string& name, const Chart& chart);
 std::filesystem::path draw(Easel& easel, const std::string& name, const SpaceChart& chart);
 
@@ -45,8 +45,8 @@ Figure figure_23(const InternalRun& run, Easel& easel);
 Figure figure_24(const InternalRun& run, Easel& easel);
 Figure figure_25(const InternalRun& run, Easel& easel);
 
-// Skeleton noise against none: how many more bits the noisiest skeleton takes at equal error, and by how much M1 at
-// the same steps differs at most (0.02: 2 %).
+// Skeleton noise compared with none: how many more bits the noisiest skeleton takes at equal error, and the largest
+// change of M1 at the same steps (0.02: 2 %).
 struct NoiseEffect {
     double highest_power = 0;
     std::optional<double> rate_difference;
@@ -54,10 +54,11 @@ struct NoiseEffect {
 };
 std::optional<NoiseEffect> noise_effect(const Findings& findings);
 
-// Where bits go at the rate where the paper's coder and TFAN cross (or in the middle of their rates): why it is there.
+// Where the bits go at the rate at which the paper's coder and TFAN cross (or in the middle of their rates), as an
+// explanation.
 std::string crossing_reason(std::span<const RdPoint> points);
 
-// Motion-based coding at each threshold, and at the middle one beside the paper's finding; nothing without figure 17.
+// Motion-based coding at each threshold, and the paper's finding next to the middle one; nothing without figure 17.
 std::optional<Table> motion_table(const Findings& findings);
 std::optional<Claim> motion_claim(const Findings& findings);
 
@@ -71,8 +72,8 @@ struct Histogram {
     double mean = 0;                    // of the values themselves
 };
 
-// Bars whose width is 1, 2 or 5 times a power of ten and which start at a multiple of it, at most `most_bars` + 1 of
-// them, none narrower than `least_width`; values that are not finite are left out. Equal values make one bar.
+// Bars whose width is 1, 2 or 5 times a power of ten and which begin at a multiple of it: at most `most_bars` + 1, none
+// narrower than `least_width`. Values that are not finite are left out. Equal values form one bar.
 Histogram histogram(std::span<const double> values, int most_bars = 12, double least_width = 0);
 
 }  // namespace htvm::lab

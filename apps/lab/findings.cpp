@@ -143,7 +143,7 @@ std::optional<double> geometry_step_at_rate(std::span<const RdPoint> points, con
 std::vector<double> matched_rates(std::span<const RdPoint> points, const std::string& first, const std::string& second,
                                   int count, double highest) {
     const auto a = rates_of(points, first), b = rates_of(points, second);
-    // A little inside, so that both can be interpolated.
+    // Slightly inside, so that both can be interpolated.
     const double low = 1.02 * std::max(a.low, b.low);
     double high = 0.98 * std::min(a.high, b.high);
     if (!(low < high)) return {};
@@ -154,7 +154,7 @@ std::vector<double> matched_rates(std::span<const RdPoint> points, const std::st
     return out;
 }
 
-// ---- The report's words and tables, and its JSON --------------------------------------------------------------------
+// ---- The report's text and tables, and its JSON ---------------------------------------------------------------------
 
 namespace {
 

@@ -20,7 +20,7 @@ namespace htvm::lab {
 using namespace app;
 using namespace internal;
 
-// ---- Decoded frames beside each other -------------------------------------------------------------------------------
+// ---- Decoded frames side by side ------------------------------------------------------------------------------------
 
 namespace {
 
@@ -37,7 +37,7 @@ std::optional<std::size_t> joint_like(const Skeleton& skeleton, bool left, const
     return std::nullopt;
 }
 
-// From the right to the left of the body, on the floor (x, z).
+// From the right side of the body to the left, on the floor (x, z).
 std::optional<std::array<double, 2>> leftwards(const Skeleton& skeleton, const std::optional<Pose>& pose) {
     if (!pose) return std::nullopt;
     for (const char* part : {"hip", "shoulder", "arm"}) {
@@ -50,7 +50,7 @@ std::optional<std::array<double, 2>> leftwards(const Skeleton& skeleton, const s
     return std::nullopt;
 }
 
-// Where the vertices between two heights are, on the floor; heights as parts of the body's.
+// The centre on the floor of the vertices between two heights, given as fractions of the body's height.
 std::optional<std::array<double, 2>> centre_between(const Mesh& mesh, const Box& box, double low, double high) {
     const double bottom = box.low[1], height = box.high[1] - box.low[1];
     std::array<double, 2> sum{0, 0};
@@ -95,7 +95,7 @@ Result<std::vector<Mesh>> decode_frames(const SourceFrames& source, const Pictur
 }
 
 double front_azimuth(const Mesh& mesh, const Skeleton& skeleton, const std::optional<Pose>& pose) {
-    // With y up, who has the left hand towards +x looks towards +z.
+    // With y up, a person whose left hand points towards +x looks towards +z.
     if (const auto left = leftwards(skeleton, pose)) return degrees(-(*left)[1], (*left)[0]);
     const Box box = bounding_box(mesh);
     if (box.empty || !(box.high[1] > box.low[1])) return 0;
@@ -174,7 +174,7 @@ Result<std::vector<Picture>> draw_tiles(const std::vector<const Mesh*>& meshes, 
     views.height = 2 * view.height;
     views.width = 3 * view.height;
     if (view.close_up && !box.empty) {
-        // The upper two fifths, and as wide as that is high, round the middle of the head.
+        // The upper two fifths, equally wide, around the middle of the head.
         const double height = box.high[1] - box.low[1], half = 0.2 * height;
         const auto head = centre_between(*meshes.front(), box, 0.9, 1).value_or(std::array<double, 2>{0, 0});
         const double aside = 0.9 * half / std::numbers::sqrt2;
@@ -213,7 +213,7 @@ namespace {
 
 constexpr const char* no_rates = "the coders share no range of rates in this run, so that none can be matched.";
 
-// One rate: the two coders' decoded frames, [coder][frame], and their surface errors.
+// One rate: the decoded frames of the two coders, [coder][frame], and their surface errors.
 struct Match {
     double rate = 0;
     std::array<std::vector<Mesh>, 2> decoded;
@@ -221,7 +221,7 @@ struct Match {
 };
 
 struct Shot {
-    std::vector<std::size_t> frames;  // two: near and far from the I-frame that starts the run
+    std::vector<std::size_t> frames;  // two: one near the I-frame at the start of the run, one far from it
     std::size_t first = 0;
 };
 
@@ -229,7 +229,7 @@ Shot choose_frames(std::size_t count, int key_interval) {
     Shot shot;
     std::size_t far = count * 2 / 3;
     const auto interval = static_cast<std::size_t>(std::max(key_interval, 1));
-    if (interval > 1 && far % interval == 0 && far + 1 < count) ++far;  // not an I-frame
+    if (interval > 1 && far % interval == 0 && far + 1 < count) ++far;  // so that it is not an I-frame
     far = std::min(far, count - 1);
     shot.first = far / interval * interval;
     shot.frames = {shot.first + (far - shot.first + 1) / 2, far};
@@ -296,7 +296,7 @@ Result<std::vector<Match>> match_rates(const SourceFrames& source, const std::ve
     return matches;
 }
 
-// A row: the original, then the coder's meshes at rising rates.
+// A row: the original, then the coder's meshes by rising rate.
 Result<std::vector<Tile>> coder_row(const Mesh& original, const std::vector<const Match*>& matches, std::size_t coder,
                                     std::size_t frame, const TileView& view, const RenderOptions& render_options,
                                     const GalleryOptions& options, const std::string& name) {
@@ -326,7 +326,7 @@ std::string surface_words(const std::vector<const Match*>& matches, std::size_t 
     return out + fmt::format(" The paper's coder is nearer to the original at {} of {} rates.", better, matches.size());
 }
 
-// One figure with two rows, ours on top; the frame is that of shot.frames[frame].
+// One figure with two rows, ours on top, of the frame shot.frames[frame].
 Result<Figure> two_rows(Figure figure, const SourceFrames& source, const std::vector<const Match*>& matches,
                         const Shot& shot, std::size_t frame, const TileView& view, const RenderOptions& render_options,
                         const GalleryOptions& options) {

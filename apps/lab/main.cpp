@@ -1,4 +1,4 @@
-// htvm-lab: experiments with the coders, ours and others. What compresses and plays captures is htvm.
+// htvm-lab: experiments with the coders, ours and others. Captures are compressed and played with htvm.
 #include "commands.h"
 
 int main(int argc, char** argv) {

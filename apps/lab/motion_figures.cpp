@@ -1,4 +1,4 @@
-// Frames and bones chosen by the skeleton's motion: the charts of figures 7, 17 and 18, the pictures of figure 19.
+// Choices by the motion of the skeleton: the charts of figures 7, 17 and 18, the pictures of figure 19.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -50,12 +50,12 @@ std::string threshold_list(const ThresholdPoints& points) {
     return out + " mm";
 }
 
-// The rate's, as bits_phrase() has it.
+// The change of the rate, in the form of bits_phrase().
 std::string rate_change(const RdPoint& from, const RdPoint& to) {
     return bits_phrase(bits_per_vertex(to) / std::max(bits_per_vertex(from), 1e-9) - 1);
 }
 
-// How the second value stands to the first: "38 % less", "12 % more", "as much".
+// The second value relative to the first: "38 % less", "12 % more", "as much".
 std::string change_words(double from, double to) {
     if (!(from > 0)) return "not known";
     const double percent = 100 * (to / from - 1);
@@ -63,7 +63,7 @@ std::string change_words(double from, double to) {
     return fmt::format("{:.0f} % {}", std::abs(percent), percent < 0 ? "less" : "more");
 }
 
-// The axes of all of a chart's lines from 0.
+// Makes the chart's axes, for all its lines, start at 0.
 void start_at_zero(Chart& chart) {
     std::vector<double> xs, ys;
     for (const auto& line : chart.lines) {
@@ -332,8 +332,8 @@ constexpr Colour coded_tint{230, 125, 45}, animated_tint{90, 150, 215}, stitch_t
 constexpr std::size_t most_seams = 10;  // frames whose seams are counted
 
 struct MotionShot {
-    std::size_t first = 0, frame = 0;       // the I-frame, and the frame shown
-    std::vector<std::size_t> partly_coded;  // rising: where some bones move and some are still
+    std::size_t first = 0, frame = 0;       // the I-frame, and the frame to show
+    std::vector<std::size_t> partly_coded;  // ascending: frames in which some bones move and some are still
 };
 
 std::vector<std::size_t> every_frame(std::size_t first, std::size_t last) {
@@ -342,7 +342,8 @@ std::vector<std::size_t> every_frame(std::size_t first, std::size_t last) {
     return out;
 }
 
-// In the group two thirds into the sequence, the frame in which nearest to half of the bones move by the threshold.
+// In the group two thirds into the sequence, the frame in which the share of bones that move by the threshold is
+// nearest to half.
 Result<MotionShot> choose_shot(const SourceFrames& source, int key_interval, double threshold) {
     const auto interval = static_cast<std::size_t>(key_interval);
     MotionShot out;
@@ -368,7 +369,7 @@ Result<MotionShot> choose_shot(const SourceFrames& source, int key_interval, dou
     return out;
 }
 
-// At most `most`, evenly spread, the frame shown among them.
+// At most `most`, evenly spread, including the frame shown.
 std::vector<std::size_t> spread(const std::vector<std::size_t>& frames, std::size_t most, std::size_t shown) {
     std::vector<std::size_t> out;
     for (std::size_t i = 0; i < std::min(most, frames.size()); ++i)
@@ -395,7 +396,7 @@ Result<double> surface_error(const Mesh& original, const Mesh& decoded, unsigned
     return m2(compared->surface);
 }
 
-// Three of the thresholds that code less than all: low, middle, high.
+// Three of the thresholds at which not everything is coded: low, middle, high.
 std::vector<std::pair<double, const RdPoint*>> shown_points(const Findings& findings) {
     auto all = by_threshold(findings.motion, still_below_words, findings.thresholds->still_below);
     std::erase_if(all, [](const auto& entry) { return !(entry.first > 0); });
@@ -449,7 +450,7 @@ Result<Figure> figure_19(const SourceFrames& source, const ExperimentPlan& plan,
     return figure;
 }
 
-// The triangles near the spot, without what stands before it.
+// The triangles near the spot, without those in front of it.
 Mesh around(const Mesh& mesh, const SeamSpot& spot, double radius) {
     Mesh out = mesh;
     out.triangles.clear();
@@ -631,7 +632,7 @@ std::optional<SeamSpot> busiest_seam(const SeamStages& stages, double radius) {
             normal = normal + other.normal;
             ++near;
         }
-        // Many stitches, that face the same way: they lie side by side in a picture from there.
+        // Many stitches that face the same way: from there they are side by side in a picture.
         const double together = length(normal), score = together * together / near;
         if (!(score > most)) continue;
         most = score;

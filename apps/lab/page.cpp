@@ -20,7 +20,7 @@
 
 namespace htvm::lab {
 
-// ---- The report: one HTML file that holds all it shows --------------------------------------------------------------
+// ---- The report: one HTML file that contains everything it shows ----------------------------------------------------
 
 namespace {
 
@@ -248,7 +248,7 @@ Result<std::string> report_page(const Report& report) {
     return out + "</pre>\n</main>\n</body>\n</html>\n";
 }
 
-// ---- What a measurement was made with -------------------------------------------------------------------------------
+// ---- The circumstances of a measurement -----------------------------------------------------------------------------
 
 namespace {
 

@@ -28,7 +28,7 @@ namespace {
 
 using std::filesystem::path;
 
-// What all coders' rates are compared with.
+// The coders that all others are compared with.
 constexpr std::array<const char*, 3> rate_references = {"draco10", "tfan", "tfan-mpeg"};
 
 struct Options {
@@ -90,7 +90,7 @@ CompareOptions compare_options(const Options& options) {
     return out;
 }
 
-// All that a result depends on besides its coder and quality.
+// Everything that a result depends on besides its coder and quality.
 Result<std::string> common_key(const Options& options) {
     const auto files = find_sequence(options.capture.input);
     if (!files) return tl::unexpected(files.error());
@@ -113,7 +113,7 @@ struct Task {
     std::optional<RdPoint> result;
 };
 
-// Decoded frames that an earlier run left count where all are there.
+// Decoded frames from an earlier run are used if they are complete.
 bool has_files(const path& folder, std::size_t count) {
     if (folder.empty()) return true;
     std::error_code error;
@@ -144,7 +144,7 @@ std::vector<Task> make_tasks(const Options& options, const std::vector<CoderUnde
     return tasks;
 }
 
-// Codes and measures what no earlier run has kept.
+// Codes and measures whatever no earlier run has stored.
 Result<void> run_tasks(const Options& options, const ResultCache& cache, Capture& capture, std::vector<Task*> missing) {
     const WorkFolder work(path(options.output) / "work");
     if (auto made = make_folder(work.where); !made) return made;

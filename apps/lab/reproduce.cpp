@@ -72,7 +72,7 @@ std::string capture_name(const Options& options) {
     return name;
 }
 
-// The true skeleton: the one named, or the one that htvm synth writes beside the noisy one.
+// The true skeleton: the one given, or the one that htvm synth writes next to the noisy one.
 std::string true_skeleton_file(const Options& options) {
     if (!options.true_skeleton.empty()) return options.true_skeleton;
     const path given(options.capture.skeleton);
@@ -82,7 +82,7 @@ std::string true_skeleton_file(const Options& options) {
     return std::filesystem::exists(beside, error) ? beside.string() : std::string();
 }
 
-// One a frame; none without a skeleton.
+// One per frame; none without a skeleton.
 Result<std::vector<Pose>> tracked_poses(const SourceFrames& source) {
     std::vector<Pose> out;
     for (std::size_t i = 0; i < source.size(); ++i) {
@@ -94,7 +94,7 @@ Result<std::vector<Pose>> tracked_poses(const SourceFrames& source) {
     return out;
 }
 
-// Poses for the noise to be added to, one per frame; none without a skeleton.
+// The poses that noise is added to, one per frame; none without a skeleton.
 Result<std::vector<Pose>> poses_for_noise(const Options& options, const SourceFrames& source) {
     const auto truth = true_skeleton_file(options);
     if (truth.empty()) return tracked_poses(source);
@@ -156,7 +156,7 @@ SweepOptions sweep_options(const Laboratory& laboratory, const ExperimentPlan& p
     return out;
 }
 
-// Figures 7, 17 and 18: what the thresholds on the skeleton's motion do; without a skeleton, intervals.
+// Figures 7, 17 and 18: the effect of the thresholds on the skeleton's motion; without a skeleton, that of intervals.
 Result<void> measure_choices(const Options& options, const Laboratory& laboratory, const ExperimentPlan& plan,
                              const std::set<int>& wanted, Findings& findings) {
     if (!any_of(wanted, {7, 17, 18, 19})) return {};
@@ -233,7 +233,7 @@ Result<void> measure_curves(const Options& options, const Laboratory& laboratory
 Result<void> measure_internals(const Options& options, const Laboratory& laboratory, const std::set<int>& wanted,
                                Findings& findings) {
     if (!any_of(wanted, {21, 22, 23, 24, 25})) return {};
-    // The paper's 13.2 bpvf have colours in them; without, the middle of its figure 6.
+    // The paper's 13.2 bpvf include colours; without colours, the middle of its figure 6.
     const double rate = findings.has_colour ? 13.2 : 10;
     const auto quality = quality_near_rate(*laboratory.source, rate, options.key_interval, options.threads);
     if (!quality) return tl::unexpected(quality.error());

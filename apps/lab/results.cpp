@@ -171,11 +171,11 @@ std::optional<RdPoint> rd_point_from_json(const nlohmann::json& json) {
     }
 }
 
-// ---- What the sweep says to people and programs: tables, and lines of CSV -------------------------------------------
+// ---- The output of the sweep: tables for people, CSV for programs ---------------------------------------------------
 
 namespace {
 
-// Bytes as the tables group them; what no column names is "other".
+// Bytes grouped as in the tables; whatever is in no column is "other".
 struct LayerColumn {
     const char* title;
     const char* key;
@@ -232,7 +232,7 @@ std::optional<double> value_of(const RdPoint& point, const Measure& measure) {
     return found->second;
 }
 
-// Of the bits.
+// The share of the bits that I-frames take.
 double intra_share(const RdPoint& point) {
     const auto all = totals(point).bytes.total();
     return all == 0 ? 0 : static_cast<double>(totals(point, FrameType::intra).bytes.total()) / static_cast<double>(all);

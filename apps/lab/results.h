@@ -1,4 +1,4 @@
-// What the sweep found for one coder at one quality, and the measures that tables and curves show.
+// The results of the sweep for one coder at one quality, and the measures that tables and curves show.
 #pragma once
 
 #include <map>
@@ -18,13 +18,13 @@ namespace htvm::lab {
 // A measure of the decoded sequence.
 struct Measure {
     const char* key;    // in JSON, CSV and file names
-    const char* title;  // of a curve's axis
-    const char* brief;  // of a table's column
+    const char* title;  // for the axis of a curve
+    const char* brief;  // for the column of a table
     const char* unit;
-    const char* metric;  // of --metrics that it belongs to
+    const char* metric;  // the entry of --metrics that includes it
     bool is_error;       // smaller is better; else a PSNR
-    bool is_curve;       // drawn, and compared by rate differences
-    int digits;          // behind the point, in tables
+    bool is_curve;       // drawn as a curve, and compared by rate differences
+    int digits;          // after the decimal point, in tables
 };
 std::span<const Measure> measures();
 
@@ -34,39 +34,39 @@ struct RdFrame {
     LayerBytes bytes;
     double encode_ms = 0;
     std::optional<double> decode_ms;
-    std::optional<double> m1_mm, m2_mm;  // where the frame was measured
+    std::optional<double> m1_mm, m2_mm;  // set if the frame was measured
 };
 
 struct RdPoint {
     std::string coder;
     double quality = 0, geometry_step = 0, colour_step = 0;
-    std::string setting;  // the quality in the coder's own terms, where it has some
+    std::string setting;  // the quality in the coder's own terms, if it has any
     double fps = 30;
     std::vector<RdFrame> frames;
-    std::map<std::string, double> values;  // by Measure::key; what was not measured is left out
+    std::map<std::string, double> values;  // by Measure::key; measures that were not taken are missing
 };
 
-// Over all frames, or those of one type.
+// Sums over all frames, or over those of one type.
 app::LayerTotals totals(const RdPoint& point);
 app::LayerTotals totals(const RdPoint& point, FrameType type);
 
 double bits_per_vertex(const RdPoint& point);  // bpvf: all bits over all captured vertices
 double megabits_per_second(const RdPoint& point);
-double encode_fps(const RdPoint& point);                 // frames a second
-std::optional<double> decode_fps(const RdPoint& point);  // nothing where decoding was not timed by itself
+double encode_fps(const RdPoint& point);                 // frames per second
+std::optional<double> decode_fps(const RdPoint& point);  // nothing if decoding was not timed separately
 
-// A coder's curve in a measure, the quality larger for better (errors by quality_of_error).
+// A coder's curve for a measure, with larger quality for better (errors by quality_of_error).
 std::vector<RatePoint> rate_curve(std::span<const RdPoint> points, const std::string& coder, const Measure& measure);
 
-// The measures of a summary that `options` asked for, into `values`; infinite ones are left out.
+// Writes the measures of a summary that `options` asked for into `values`; infinite ones are left out.
 void take_measures(const ComparisonSummary& summary, const CompareOptions& options,
                    std::map<std::string, double>& values);
 
 nlohmann::json to_json(const RdPoint& point);
-// Nothing where the JSON is not what to_json wrote.
+// Nothing if the JSON was not written by to_json.
 std::optional<RdPoint> rd_point_from_json(const nlohmann::json& json);
 
-// ---- What the sweep says to people and programs: tables, and lines of CSV -------------------------------------------
+// ---- The output of the sweep: tables for people, CSV for programs ---------------------------------------------------
 
 // Names of the coders in the order of their first points.
 std::vector<std::string> coders_of(std::span<const RdPoint> points);
@@ -74,15 +74,15 @@ std::vector<std::string> coders_of(std::span<const RdPoint> points);
 // One line per coder and quality: rates, bits per vertex by layer, measures, speeds.
 std::string rate_table(std::span<const RdPoint> points);
 
-// EP-frames alone, bits per vertex by layer; empty where there is none.
+// EP-frames only, bits per vertex by layer; empty if there are none.
 std::string enhanced_frame_table(std::span<const RdPoint> points);
 
-// Bjontegaard rate differences of every coder against `reference`, in every measure that was taken; empty where the
+// Bjontegaard rate differences of every coder relative to `reference`, for every measure that was taken; empty if the
 // reference was not measured.
 std::string rate_difference_table(std::span<const RdPoint> points, const std::string& reference);
 nlohmann::json rate_differences_json(std::span<const RdPoint> points, const std::string& reference);
 
-// Where the M1 curve of `first` crosses that of `second`, as a sentence; empty where one of them was not measured.
+// Where the M1 curve of `first` crosses that of `second`, as a sentence; empty if one of them was not measured.
 std::string crossing_sentence(std::span<const RdPoint> points, const std::string& first, const std::string& second);
 
 // One line per coder and quality.

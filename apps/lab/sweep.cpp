@@ -86,7 +86,7 @@ Result<std::shared_ptr<const SourceFrame>> SourceFrames::frame(std::size_t index
     return std::shared_ptr<const SourceFrame>(std::move(whole));
 }
 
-// ---- Results kept between runs --------------------------------------------------------------------------------------
+// ---- Results stored between runs ------------------------------------------------------------------------------------
 
 namespace {
 
@@ -203,7 +203,7 @@ Result<RdPoint> run_job(const SweepJob& job, const SourceFrames& source, const S
     return point;
 }
 
-// No exception leaves a thread.
+// Turns exceptions into errors: no exception may leave a thread.
 Result<RdPoint> run_guarded(const SweepJob& job, const SourceFrames& source, const SweepOptions& options,
                             const std::function<void()>& step) {
     try {
@@ -224,7 +224,7 @@ void sweep(const std::vector<SweepJob>& jobs, const SourceFrames& source, const 
     SweepOptions each = options;
     const ThreadPool pool(std::max(1u, options.threads));
     each.compare.threads =
-        pool.threads().at_most(std::max(1u, options.threads / workers));  // where there are more cores than jobs
+        pool.threads().at_most(std::max(1u, options.threads / workers));  // used if there are more cores than jobs
     std::atomic<std::size_t> next = 0;
     std::mutex mutex;
     auto work = [&](std::size_t, std::size_t) {

@@ -20,18 +20,19 @@ namespace {
 
 constexpr std::uint32_t none = 0xFFFFFFFFu;
 
-// ---- Connectivity: triangles to symbols and back
-// ---------------------------------------------------------------------
+// ---- Connectivity: triangles to symbols and back --------------------------------------------------------------------
 
-// Values below these have a symbol of their own in a stream's model; the others follow an escape.
+// Values below these have a symbol of their own in the model of a stream; all others follow an escape.
 constexpr std::uint32_t fan_symbols = 4, degree_symbols = 16, configuration_symbols = 10, operation_symbols = 2,
                         index_symbols = 8, residual_symbols = 256;
 
 struct FanSymbols {
-    std::vector<std::uint32_t> fans;     // one per vertex: how many fans it is the focus of
-    std::vector<std::uint32_t> degrees;  // one per fan: boundary vertices - 2 + triangles at the focus coded before
+    std::vector<std::uint32_t> fans;     // one per vertex: the number of fans that it is the focus of
+    std::vector<std::uint32_t> degrees;  // one per fan: boundary vertices - 2 + triangles at the focus that were coded
+                                         // before
     std::vector<std::uint32_t> configurations;  // one per fan
-    // Of the boundary vertices that a configuration does not say: 0 a new vertex, 1 a known one, which has an index.
+    // For boundary vertices that the configuration does not determine: 0 for a new vertex, 1 for a known one, which has
+    // an index.
     std::vector<std::uint32_t> operations;
     std::vector<std::uint32_t> indices;  // zig-zag
 };
@@ -61,8 +62,8 @@ public:
         }
     }
 
-    // The list of visited vertices: those of the coded triangles at the focus that come after it, ascending; where
-    // there are more than two, those in one triangle only, where a fan begins or ends, come to the front.
+    // Builds the list of visited vertices: those in coded triangles at the focus that come after it, ascending. If
+    // there are more than two, those in only one triangle, where a fan begins or ends, are moved to the front.
     void look_from(std::uint32_t focus) {
         for (const std::uint32_t v : visited_) seen_[v] = 0;
         visited_.clear();
@@ -76,7 +77,7 @@ public:
             std::stable_partition(visited_.begin(), visited_.end(), [&](std::uint32_t v) { return seen_[v] == 1; });
         for (std::size_t i = 0; i < visited_.size(); ++i) place_[visited_[i]] = static_cast<std::uint32_t>(i);
     }
-    // A new vertex joins the list's end.
+    // Appends a new vertex to the list.
     void meet(std::uint32_t v) {
         seen_[v] = 1;
         place_[v] = static_cast<std::uint32_t>(visited_.size());
@@ -84,11 +85,11 @@ public:
     }
     std::uint32_t coded_triangles() const { return coded_; }
 
-    // -k for the k-th of the list, from 1; else how much later than the focus it was visited.
+    // -k for the k-th of the list, counted from 1; for others, how much later than the focus it was visited.
     std::int32_t index_of(std::uint32_t v) const {
         return seen_[v] ? -1 - static_cast<std::int32_t>(place_[v]) : static_cast<std::int32_t>(v - focus_);
     }
-    // The reverse: none where there is no such place. A vertex beyond the visited ones is for the caller to refuse.
+    // The inverse; none if there is no such place. The caller must refuse a vertex beyond the visited ones.
     std::uint32_t vertex_of(std::int32_t index) const {
         if (index >= 0) return focus_ + static_cast<std::uint32_t>(index);
         const auto place = static_cast<std::size_t>(-1 - index);
@@ -99,15 +100,15 @@ public:
 private:
     std::vector<Triangle> triangles_;
     std::vector<std::uint32_t> first_, next_;  // corners (3 triangle + corner) at each vertex, as lists
-    std::vector<std::uint32_t> seen_;          // triangles of the focus at the vertex; 0: not in the list
-    std::vector<std::uint32_t> place_;         // in the list
+    std::vector<std::uint32_t> seen_;          // number of the focus's triangles at the vertex; 0: not in the list
+    std::vector<std::uint32_t> place_;         // its place in the list
     std::vector<std::uint32_t> visited_;
     std::uint32_t focus_ = 0, coded_ = 0;
 };
 
 // A fan's boundary as operations and indices. A configuration fixes the first and the last of them, and may say that
 // all between are new:
-//   0, 7  known, new ..., known; first and last of the list's first two, or the other way round
+//   0, 7  known, new ..., known; the first and the last are the list's first two, in either order
 //   1, 8  the same with anything between
 //   2, 3  new ..., known: the list's first, or second
 //   4, 5  known: the list's first, or second; new ...
@@ -143,11 +144,11 @@ void write_boundary(const Boundary& b, FanSymbols& out) {
     for (std::size_t i = named; i + named < b.indices.size(); ++i) out.indices.push_back(zigzag(b.indices[i]));
 }
 
-// Takes the next symbols one after the other.
+// Reads symbols one after another.
 struct Cursor {
     const std::vector<std::uint32_t>& values;
     std::size_t next = 0;
-    bool ended = false;  // more were taken than there are: those are 0
+    bool ended = false;  // true once more were read than there are; the surplus ones are 0
     std::uint32_t take() {
         if (next < values.size()) return values[next++];
         ended = true;
@@ -276,8 +277,7 @@ Result<std::vector<Triangle>> triangles_of(const FanSymbols& symbols, std::uint3
     return std::move(view.triangles());
 }
 
-// ---- Attributes: one prediction per vertex
-// ---------------------------------------------------------------------------
+// ---- Attributes: one prediction per vertex --------------------------------------------------------------------------
 
 // Every vertex is predicted from vertices before it: a + b - c of a triangle (a, b, c) that shares its edge a, b with
 // one of the vertex's own; the latest c, as it is the nearest on the way of the traversal. Where there is none, from
@@ -380,8 +380,7 @@ std::vector<Values> values_of(const std::vector<std::uint32_t>& residuals, Predi
     return out;
 }
 
-// ---- Entropy coding: a stream of numbers under one adaptive model
-// ----------------------------------------------------
+// ---- Entropy coding: a stream of numbers under one adaptive model ---------------------------------------------------
 
 struct NumberModel {
     explicit NumberModel(std::uint32_t own_symbols)
@@ -418,8 +417,7 @@ bool read_numbers(ByteReader& in, std::uint32_t own_symbols, std::uint64_t most,
     return values.size() == count;
 }
 
-// ---- A frame
-// ---------------------------------------------------------------------------------------------------------
+// ---- A frame --------------------------------------------------------------------------------------------------------
 
 // Cells over the bounding box: equally large in all directions.
 struct Grid {
