@@ -1,10 +1,9 @@
-// Speed of a frame, by kind and by stage, on the default synthetic person: about 35,000 vertices with colour.
+// Speed per frame, by kind and by stage, on the default synthetic person: about 35,000 vertices with colour.
 //
-// Real time, on all cores; frames per second beside it. HTVM_BENCH_VERTICES changes the size.
+// Real time on all cores, and frames per second. HTVM_BENCH_VERTICES changes the size.
 //
-// The benchmarks `..._two_threads` take each frame on one thread and on two, in turn, so that whatever else the machine
-// does falls on both alike: the counter `one/two` is the ratio of the median times, above 1 where two threads are
-// faster.
+// The benchmarks `..._two_threads` take each frame on one thread and on two, in turn, so that other load on the machine
+// affects both equally. The counter `one/two` is the ratio of the median times, above 1 if two threads are faster.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -40,10 +39,10 @@ htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
     return options;
 }
 
-// What every frame behind the first becomes.
+// The kind of every frame after the first.
 enum class Kind { intra, enhanced, motion, predicted, tracked };
 
-// Motion-based coding leaves some bones of frames so near to the I-frame out; P-frames are animated whatever the
+// Motion-based coding leaves out some bones of frames this near to the I-frame; P-frames are animated whatever the
 // motion.
 void choose(htvm::EncoderOptions& options, Kind kind) {
     if (kind == Kind::tracked) {
@@ -74,7 +73,7 @@ const std::vector<htvm::SynthFrame>& capture() {
     return made;
 }
 
-// An encoder behind its first frame, so that the next ones can refer to it.
+// An encoder that has coded its first frame, so that the next ones can refer to it.
 htvm::Encoder primed(Kind kind, double quality, unsigned threads) {
     auto options = encoder_options(quality, threads);
     choose(options, kind);
@@ -89,7 +88,7 @@ void report(benchmark::State& state, const std::map<std::string, double>& stages
     for (const auto& [stage, milliseconds] : stages) state.counters[stage + ", ms"] = milliseconds / iterations;
 }
 
-// Says so where the encoder chose another kind of frame, as I in place of T.
+// Reports it if the encoder chose another kind of frame, such as I instead of T.
 bool is_kind(benchmark::State& state, htvm::FrameType type, Kind kind) {
     const auto wanted = kind == Kind::intra       ? htvm::FrameType::intra
                         : kind == Kind::predicted ? htvm::FrameType::predicted
@@ -100,7 +99,7 @@ bool is_kind(benchmark::State& state, htvm::FrameType type, Kind kind) {
     return false;
 }
 
-// To and fro, so that the person never jumps.
+// Runs forwards and backwards, so that the person never jumps.
 const htvm::SynthFrame& input_of(std::int64_t frame) {
     const auto step = static_cast<std::size_t>(frame % (2 * (frames - 1)));
     return capture()[step < frames ? step : 2 * (frames - 1) - step];
@@ -126,7 +125,7 @@ void encode(benchmark::State& state, Kind kind) {
     state.counters["bpv"] = bits / static_cast<double>(state.iterations());
 }
 
-// The frames' times on one thread and on two, ms.
+// The times of the frames with one thread and with two, ms.
 using Times = std::array<std::vector<double>, 2>;
 
 double median(std::vector<double> values) {
@@ -135,7 +134,7 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-// Takes the next frame on one thread and on two, each first by turns, with code(threads - 1).
+// Codes the next frame with one thread and with two, alternating which goes first, with code(threads - 1).
 template <class Code>
 void take_both(Times& times, const Code& code) {
     const std::size_t first = times[0].size() % 2;
@@ -178,7 +177,7 @@ void encode_motion(benchmark::State& state) { encode(state, Kind::motion); }
 void encode_predicted(benchmark::State& state) { encode(state, Kind::predicted); }
 void encode_tracked(benchmark::State& state) { encode(state, Kind::tracked); }
 
-// The packets up to a frame of that kind, which is the last of it among them.
+// The packets before the last frame of that kind, and that frame.
 std::pair<std::vector<htvm::Packet>, htvm::Packet> coded(Kind kind, double quality) {
     auto encoder = primed(kind, quality, 0);
     const auto& input = capture()[2];

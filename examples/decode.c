@@ -1,5 +1,6 @@
-/* Decodes a .htvm stream through the C interface: decode FILE.htvm [OBJ_PREFIX]
- * Prints a line a frame; with a prefix, writes PREFIX000000.obj and so on beside it. */
+/* Decodes a .htvm stream through the C interface:
+ *     decode FILE.htvm [OBJ_PREFIX]
+ * Prints one line per frame; with a prefix, also writes PREFIX000000.obj and so on. */
 #include <htvm/htvm.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -22,10 +23,10 @@ static int write_obj(const char* prefix, uint32_t number, const htvm_mesh_view* 
     return fclose(file) == 0;
 }
 
-/* Takes all frames that are whole so far. Gives the number of packets that could not be decoded. */
+/* Receives all frames that are complete so far. Returns the number of packets that could not be decoded. */
 static int receive_frames(htvm_decoder* decoder, const char* prefix, uint32_t* topology) {
     htvm_frame_info info;
-    htvm_mesh_view mesh; /* the decoder's own arrays, until the next frame is received */
+    htvm_mesh_view mesh; /* the decoder's own arrays, valid until the next frame is received */
     htvm_status status;
     int errors = 0;
     while ((status = htvm_decoder_receive_frame(decoder, &info, sizeof info)) != HTVM_AGAIN) {
@@ -35,7 +36,7 @@ static int receive_frames(htvm_decoder* decoder, const char* prefix, uint32_t* t
             continue;
         }
         if (htvm_decoder_view(decoder, &mesh, sizeof mesh) != HTVM_OK) return errors + 1;
-        /* A player would send triangles and texture coordinates to the graphics card only where they are new. */
+        /* A player would send triangles and texture coordinates to the graphics card only when they are new. */
         printf("frame %" PRIu32 ": %s, %" PRIu32 " vertices, %" PRIu32 " triangles%s, %" PRIu64 " bytes\n", info.frame,
                htvm_frame_kind_letter(info.type), mesh.vertices, mesh.triangles,
                mesh.topology == *topology ? " as before" : "", info.bytes);

@@ -1,4 +1,4 @@
-/* Encodes a small mesh that moves, through the C interface: encode FILE.htvm */
+/* Encodes a small moving mesh through the C interface: encode FILE.htvm */
 #include <htvm/htvm.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,5 +1,5 @@
-// Captures as nobody should give them to the encoder: any sizes, any floats, indices that lead nowhere, poses of any
-// kind; and, since nothing else gets far, many that are nearly sound.
+// Invalid and unusual captures for the encoder: any sizes, any floats, indices out of range, poses of any kind. Many
+// are almost valid, since nothing else gets far.
 #pragma once
 
 #include <array>
@@ -40,12 +40,12 @@ inline Vector3f any_place(FuzzInput& input) {
     return {any_coordinate(input), any_coordinate(input), any_coordinate(input)};
 }
 
-// A tube of rings, or nothing: what a limb may look like, and enough vertices for registration to have work.
+// A tube of rings, or nothing: similar to a limb, with enough vertices to give registration work.
 inline Mesh tube(std::uint32_t rings, std::uint32_t around) {
     Mesh out;
     for (std::uint32_t r = 0; r < rings; ++r)
         for (std::uint32_t a = 0; a < around; ++a) {
-            // A diamond: no trigonometry, so that every machine makes the same.
+            // A diamond, since it needs no trigonometry: every machine makes the same.
             const float t = 4.f * static_cast<float>(a) / static_cast<float>(around);
             const float x = t < 2 ? 1 - t : t - 3, y = t < 1 ? t : t < 3 ? 2 - t : t - 4;
             out.positions.push_back({60 * x, 60 * y, 30 * static_cast<float>(r)});
@@ -76,7 +76,7 @@ inline Mesh any_mesh(FuzzInput& input) {
     for (std::uint32_t n = input.below(kind & 2 ? 40 : 4); n > 0 && input.left() > 0; --n)
         out.positions.push_back(any_place(input));
     const auto vertices = static_cast<std::uint32_t>(out.positions.size());
-    // Now and then one that is not there.
+    // Sometimes one that does not exist.
     const auto any_vertex = [&] { return vertices > 0 && (kind & 8) == 0 ? input.below(vertices) : input.u32(); };
     for (std::uint32_t n = input.below(kind & 4 ? 60 : 4); n > 0 && input.left() > 0; --n)
         out.triangles.push_back({any_vertex(), any_vertex(), any_vertex()});
@@ -91,7 +91,7 @@ inline Skeleton any_skeleton(FuzzInput& input) {
     const std::uint32_t joints = input.below(7);
     for (std::uint32_t j = 0; j < joints; ++j) out.joint_names.push_back("joint " + std::to_string(j));
     for (std::uint32_t n = joints > 1 ? input.below(7) : 0; n > 0; --n) {
-        // One too far, now and then.
+        // Sometimes one too far.
         const auto first = static_cast<std::uint16_t>(input.below(joints + (input.u8() == 255)));
         out.bones.push_back({first, static_cast<std::uint16_t>(input.below(joints))});
     }
@@ -120,7 +120,7 @@ inline Pose any_pose(const Skeleton& skeleton, FuzzInput& input) {
     return out;
 }
 
-// One to five frames, some of them the one before a little moved.
+// One to five frames; some are the previous one, moved a little.
 inline AnyCapture any_capture(FuzzInput& input) {
     AnyCapture out;
     out.skeleton = any_skeleton(input);

@@ -1,5 +1,5 @@
-// The bytes of a fuzzing input, taken from the front as numbers and choices. Past the end everything is zero, so that
-// every input means something, and a short one something simple.
+// Takes numbers and choices from the front of a fuzzing input. Past the end everything is zero, so that every input has
+// a meaning, and a short one a simple meaning.
 #pragma once
 
 #include <bit>
@@ -20,7 +20,7 @@ public:
     std::uint32_t u32() { return static_cast<std::uint32_t>(get(4)); }
     std::uint64_t u64() { return get(8); }
     bool flag() { return (u8() & 1) != 0; }
-    // 0 .. n - 1, from one byte where that is enough; n at least 1.
+    // 0 .. n - 1, from one byte if that is enough; n is at least 1.
     std::uint32_t below(std::uint32_t n) { return (n <= 256 ? u8() : n <= 65536 ? u16() : u32()) % n; }
     // low .. high.
     std::int32_t between(std::int32_t low, std::int32_t high) {
@@ -28,9 +28,9 @@ public:
         const std::uint64_t taken = range <= 256 ? u8() : range <= 65536 ? u16() : u32();
         return static_cast<std::int32_t>(low + static_cast<std::int64_t>(taken % range));
     }
-    // Any float: not a number, infinite and denormal ones too.
+    // Any float, including NaN, infinity and denormal ones.
     float any_float() { return std::bit_cast<float>(u32()); }
-    // A whole number of either sign, most often a small one; |.| <= limit.
+    // A signed whole number, most often a small one; |.| <= limit.
     std::int32_t number(std::int32_t limit) {
         const std::uint8_t shape = u8();
         if (shape < 160) return between(-(limit < 100 ? limit : 100), limit < 100 ? limit : 100);
@@ -55,14 +55,14 @@ private:
     std::span<const std::uint8_t> bytes_;
 };
 
-// Ends the program, as a sanitizer does, where what must hold does not.
+// Ends the program, as a sanitizer does, if something that must hold does not.
 inline void require(bool fact, const char* what) {
     if (fact) return;
     std::cerr << "fuzzing: this must hold and does not: " << what << std::endl;
     std::abort();
 }
 
-// A layer's bytes as damage leaves them: flipped, overwritten, cut off or grown, as the input says.
+// A layer's bytes damaged as the input says: flipped, overwritten, truncated or extended.
 inline std::vector<std::uint8_t> damaged(std::vector<std::uint8_t> bytes, FuzzInput& input) {
     for (std::uint32_t n = input.below(8); n > 0; --n) {
         const std::uint8_t kind = input.u8();

@@ -1,4 +1,4 @@
-// What must hold of every mesh that an importer gives.
+// What must hold for every mesh that an importer returns.
 #pragma once
 
 #include <cstring>
@@ -15,7 +15,7 @@ inline void require_importable(const Mesh& mesh) {
     (void)guess_unit(mesh);
 }
 
-// Bit by bit.
+// Compares bit by bit.
 inline bool same(const Mesh& a, const Mesh& b) {
     const auto equal = [](const auto& x, const auto& y) {
         return x.size() == y.size() && (x.empty() || std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])) == 0);

@@ -1,4 +1,4 @@
-// What must hold of every skeleton track that an importer gives.
+// What must hold for every skeleton track that an importer returns.
 #pragma once
 
 #include <algorithm>

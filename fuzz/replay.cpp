@@ -1,5 +1,5 @@
 // Runs inputs through the fuzz targets without a fuzzer, with any compiler: the regression test.
-//   fuzz_replay TARGET FILE_OR_FOLDER...   folders are searched; those that are not there are passed over
+//   fuzz_replay TARGET FILE_OR_FOLDER...   searches folders; skips what does not exist
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
@@ -43,7 +43,8 @@ int main(int count, char** words) {
     for (const auto& path : inputs) {
         std::ifstream file(path, std::ios::binary);
         const std::vector<char> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-        std::cout << path.filename().string() << std::endl;  // flushed: after a crash the last name is the culprit
+        std::cout << path.filename().string() << std::endl;  // flushed, so that after a crash the last name is the
+                                                             // culprit
         target->second(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
     }
     std::cout << target->first << ": " << inputs.size() << " inputs\n";

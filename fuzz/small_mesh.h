@@ -1,4 +1,4 @@
-// Small meshes on the lattice for the targets of the layers: grids with holes and folds, or triangles by chance.
+// Small meshes on the lattice for the targets of the layers: grids with holes and folds, or random triangles.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ inline SmallMesh grid(std::uint32_t width, std::uint32_t height) {
     return out;
 }
 
-// Up to some 300 vertices and 500 triangles; none, where the input is short. Any triangle whose corners are there.
+// Up to about 300 vertices and 500 triangles; none if the input is short. Any triangles whose corners exist.
 inline SmallMesh small_mesh(FuzzInput& input) {
     SmallMesh out;
     const std::uint8_t kind = input.u8();
@@ -46,7 +46,7 @@ inline SmallMesh small_mesh(FuzzInput& input) {
     const auto vertices = static_cast<std::uint32_t>(out.positions.size());
     for (std::uint32_t n = input.below(kind & 4 ? 128 : 6); n > 0 && input.left() > 0; --n)
         out.triangles.push_back({input.below(vertices), input.below(vertices), input.below(vertices)});
-    // Changes here and there: vertices elsewhere, triangles gone, turned over or doubled.
+    // Changes in places: moved vertices; removed, flipped or doubled triangles.
     for (std::uint32_t n = input.below(32); n > 0 && input.left() > 0; --n) {
         const std::uint8_t change = input.u8();
         if (change < 128) {
@@ -66,7 +66,7 @@ inline SmallMesh small_mesh(FuzzInput& input) {
     return out;
 }
 
-// Each triangle turned so that its corners are the lowest row of three, then sorted: what two equal surfaces share.
+// Each triangle rotated so that its corners are the lowest sequence of three, then sorted: equal for equal surfaces.
 inline std::vector<Triangle> as_set(std::vector<Triangle> triangles) {
     for (auto& t : triangles) t = std::min({t, Triangle{t[1], t[2], t[0]}, Triangle{t[2], t[0], t[1]}});
     std::sort(triangles.begin(), triangles.end());

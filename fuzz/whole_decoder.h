@@ -1,4 +1,4 @@
-// Streams of bytes through the reader of packets and the whole decoder, with what must hold of every frame.
+// Sends streams of bytes through the packet reader and the whole decoder, and checks what must hold for every frame.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +31,7 @@ inline std::vector<Packet> read_packets(std::span<const std::uint8_t> bytes, std
     return out;
 }
 
-// A mesh as include/htvm/mesh.hpp promises it.
+// A mesh as promised by include/htvm/mesh.hpp.
 inline void require_sound(const Mesh& mesh, const DecoderOptions& limits) {
     const std::size_t vertices = mesh.positions.size();
     require(vertices <= limits.max_vertices && mesh.triangles.size() <= limits.max_triangles, "no more than allowed");
@@ -75,7 +75,8 @@ inline void decode_all(const std::vector<Packet>& packets, const DecoderOptions&
     }
 }
 
-// Puts right the CRCs of whatever begins like a packet, so that what they would have caught reaches the decoder.
+// Corrects the CRCs of everything that begins like a packet, so that the damage they would have caught reaches the
+// decoder.
 inline void repair_checksums(std::vector<std::uint8_t>& bytes) {
     const std::string sync = "HTVP";
     const auto put = [&](std::size_t at, std::uint32_t value) {
@@ -88,7 +89,7 @@ inline void repair_checksums(std::vector<std::uint8_t>& bytes) {
         if (at + packet_overhead > bytes.size()) return;
         std::uint32_t size = 0;
         for (std::size_t i = 0; i < 4; ++i) size |= std::uint32_t{bytes[at + 24 + i]} << (8 * i);
-        // A size that leads past the end is cut to what there is: most inputs would hold no packet otherwise.
+        // A size beyond the end is reduced to what there is: otherwise most inputs would contain no packet.
         const auto most = static_cast<std::uint32_t>(bytes.size() - at - packet_overhead);
         if (size > most) put(at + 24, size = most);
         put(at + 28, crc32(std::span(bytes).subspan(at + 4, 24)));

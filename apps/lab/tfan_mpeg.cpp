@@ -279,11 +279,12 @@ Result<std::vector<Triangle>> triangles_of(const FanSymbols& symbols, std::uint3
 
 // ---- Attributes: one prediction per vertex --------------------------------------------------------------------------
 
-// Every vertex is predicted from vertices before it: a + b - c of a triangle (a, b, c) that shares its edge a, b with
-// one of the vertex's own; the latest c, as it is the nearest on the way of the traversal. Where there is none, from
-// the latest neighbour; a vertex that has none, from the one before it.
+// Every vertex is predicted from vertices before it. Best is a + b - c of a triangle (a, b, c) that shares its edge a,
+// b with one of the vertex's own triangles; of several, the one with the latest c, which is the nearest along the
+// traversal. Otherwise the latest neighbour is used, and for a vertex without known neighbours the vertex before it.
 struct Prediction {
-    std::uint32_t a = none, b = none, c = none;  // b and c are none for a neighbour; a is none for the first vertex
+    std::uint32_t a = none, b = none, c = none;  // for a neighbour, b and c are none; for the first vertex, a is none
+                                                 // too
 };
 
 class Predictor {
@@ -319,7 +320,7 @@ public:
     }
 
 private:
-    // The triangles looked at, of a vertex: bounds the work at the hub of a large fan, on both sides alike.
+    // The most triangles examined per vertex: bounds the work at the hub of a large fan, in the same way on both sides.
     static constexpr std::size_t most_triangles = 64;
 
     std::span<const std::uint32_t> triangles_at(std::uint32_t v) const {
@@ -346,7 +347,7 @@ private:
 
 using Values = std::array<std::int32_t, 3>;  // a quantised position or colour
 
-// Sums modulo 2^32: a damaged stream may predict from what was predicted until nothing fits.
+// Sums modulo 2^32: in a damaged stream predictions can build on each other until they overflow.
 std::int32_t wrapped(std::int64_t v) { return static_cast<std::int32_t>(static_cast<std::uint32_t>(v)); }
 
 Values predicted_values(const Prediction& p, const std::vector<Values>& values) {
@@ -357,7 +358,7 @@ Values predicted_values(const Prediction& p, const std::vector<Values>& values) 
     return out;
 }
 
-// predict: the Prediction of a vertex. Residuals of all components, zig-zag, in one stream.
+// predict: gives the Prediction of a vertex. The residuals of all components, zig-zag, in one stream.
 template <class Predict>
 std::vector<std::uint32_t> residuals_of(const std::vector<Values>& values, Predict predict) {
     std::vector<std::uint32_t> out;
@@ -419,7 +420,7 @@ bool read_numbers(ByteReader& in, std::uint32_t own_symbols, std::uint64_t most,
 
 // ---- A frame --------------------------------------------------------------------------------------------------------
 
-// Cells over the bounding box: equally large in all directions.
+// Cells over the bounding box, of equal size in all directions.
 struct Grid {
     std::array<float, 3> low{};
     float side = 0;  // the longest
@@ -517,7 +518,7 @@ Result<Mesh> decode_mpeg_tfan(std::span<const std::uint8_t> bytes) {
     for (float& f : grid.low) f = std::bit_cast<float>(in.u32());
     grid.side = std::bit_cast<float>(in.u32());
     const int colour_step = in.u8();
-    // A vertex or triangle takes a thousandth of a bit at least: what claims more of them is damaged.
+    // A vertex or triangle takes at least a thousandth of a bit; data that claims more of them is damaged.
     const std::uint64_t most = std::min<std::uint64_t>(1u << 28, 8192 * std::uint64_t{bytes.size()});
     if (!in.ok() || vertices > most || triangles > most || grid.bits < 1 || grid.bits > 30) return damaged();
 

@@ -1,11 +1,11 @@
-// The published TFAN (Mamou, Zaharia, Preteux 2009), as MPEG-4 took it up: so that a comparison with it can be made in
-// its own terms beside ours, which code the same fans in contexts (codec/intra/tfan.h).
+// The published TFAN (Mamou, Zaharia, Preteux 2009), as adopted by MPEG-4, so that a comparison can be made in its own
+// terms too; our own TFAN codes the same fans with contexts (codec/intra/tfan.h).
 //
-// Every frame by itself. Vertices are visited through a first-in first-out queue; the triangles at the vertex in front
-// that were not coded yet are coded as oriented fans. The numbers of fans, their degrees, their configurations, and the
-// operations and indices of what no configuration names are five streams, each under one adaptive model without
-// contexts. Positions, quantised to so many bits of the bounding box's longest side, are predicted by one
-// parallelogram; colours by one neighbour. Not byte-compatible with ISO/IEC 14496-16, whose rate it comes near:
+// Every frame is coded by itself. Vertices are visited through a first-in first-out queue; the triangles at the vertex
+// in front that are not coded yet are coded as oriented fans. The numbers of fans, their degrees, their configurations,
+// and the operations and indices that no configuration covers are five streams, each under one adaptive model without
+// contexts. Positions, quantised to a number of bits over the longest side of the bounding box, are predicted by one
+// parallelogram; colours by one neighbour. Not byte-compatible with ISO/IEC 14496-16, but near its rate:
 // docs/algorithm.md.
 #pragma once
 
@@ -19,7 +19,7 @@
 namespace htvm::lab {
 
 struct MpegTfanSettings {
-    int position_bits = 10;  // of the bounding box's longest side: 1..30
+    int position_bits = 10;  // over the longest side of the bounding box: 1..30
     int colour_step = 1;     // levels of 255: 1..255
 };
 
@@ -29,15 +29,16 @@ struct MpegTfanFrame {
     std::vector<std::uint32_t> order;  // the input index of each decoded vertex
 };
 
-// The mesh's positions, colours and triangles: all vertices and triangles come back, isolated, duplicate and degenerate
-// ones too, in the order of the traversal, each triangle turned to begin with its first visited corner. bad_input where
-// a triangle names a vertex that is not there, a position is not finite, or a setting is out of its range.
+// Codes positions, colours and triangles. All vertices and triangles come back, including isolated, duplicate and
+// degenerate ones, in the order of the traversal; each triangle is rotated to begin with its first visited corner.
+// bad_input if a triangle names a vertex that does not exist, a position is not finite, or a setting is out of range.
 Result<MpegTfanFrame> encode_mpeg_tfan(const Mesh& mesh, const MpegTfanSettings& settings);
 
-// corrupt_stream where the bytes end early or name what cannot be.
+// corrupt_stream if the bytes end early or contain invalid values.
 Result<Mesh> decode_mpeg_tfan(std::span<const std::uint8_t> bytes);
 
-// Positions in the bits whose cells over the mean frame's longest side are nearest to the sweep's step, as Draco's.
+// Positions use the number of bits whose cells over the average frame's longest side are nearest to the sweep's step,
+// as for Draco.
 CoderUnderTest mpeg_tfan_under_test(const std::string& name);
 
 }  // namespace htvm::lab

@@ -1,6 +1,6 @@
-// Encodes three frames of the synthetic person on one thread, an I-frame and two T-frames, and prints every call that
-// the last one makes within the codec, once: the addresses of who calls and of who is called, in the order of their
-// first time.
+// Encodes three frames of the synthetic person on one thread, an I-frame and two T-frames. Prints every call that the
+// last one makes within the codec, once each: the addresses of the caller and the called function, in the order of
+// first occurrence.
 #include <cstdio>
 #include <cstdlib>
 #include <set>
@@ -16,14 +16,14 @@ using Call = std::pair<void*, void*>;
 
 struct Journey {
     bool recorded = false;
-    std::vector<void*> entered;  // functions, the innermost last
+    std::vector<void*> entered;  // functions entered, the innermost last
     std::set<Call> known;
     std::vector<Call> calls;
 };
 
 Journey journey;
 
-// Trees from before there were profiles have `tracked` as a switch; in later ones it is the default profile.
+// In trees from before profiles existed, `tracked` is a switch; in later ones it is the default profile.
 template <class Options>
 void choose_tracked(Options& options) {
     if constexpr (requires { options.tracked = true; }) options.tracked = true;

@@ -1,4 +1,4 @@
-// The decoder's C interface: any calls in any order on a handle, with arrays of just the capacity that is named. The
+// The decoder's C interface: any calls in any order on a handle, with arrays of exactly the capacity that is given. The
 // input: a number of calls, three bytes each, then a stream, sent in pieces or packets as the calls say.
 #include <cstring>
 #include <memory>
@@ -20,7 +20,7 @@ struct Caller {
     bool any_current = false;
 };
 
-// A status that the header names for the call, with words where it is a failure.
+// The status must be one that the header lists for the call, with a message if it is a failure.
 htvm_status expect(const Caller& caller, htvm_status status) {
     require(status >= HTVM_BUFFER_TOO_SMALL && status <= HTVM_END,
             "a status of the header, and never an internal fault");
@@ -29,7 +29,7 @@ htvm_status expect(const Caller& caller, htvm_status status) {
     return status;
 }
 
-// A copy into an array of `capacity` elements: done where they are enough, refused where not.
+// A copy into an array of `capacity` elements: must succeed if that is enough, and be refused if not.
 template <class Element, class Function>
 void copy(Caller& caller, Function function, std::size_t capacity, std::size_t needed, bool has) {
     const auto array = std::make_unique<Element[]>(capacity);
@@ -68,7 +68,7 @@ void copy_something(Caller& caller, std::uint8_t which, std::uint8_t room) {
     }
 }
 
-// What is lent can be read to its end.
+// Everything on loan can be read to its end.
 void view_everything(Caller& caller) {
     htvm_mesh_view view{};
     const auto status = expect(caller, htvm_decoder_view(caller.decoder, &view, sizeof view));
@@ -90,7 +90,7 @@ void view_everything(Caller& caller) {
     require(sum <= 11 * std::size_t{view.vertices}, "no more numbers than there are");
 }
 
-// A frame was made current, or none was.
+// Notes that a frame became current, or that none did.
 void made_current(Caller& caller, htvm_status status) {
     expect(caller, status);
     caller.any_current = status == HTVM_OK;
@@ -101,7 +101,7 @@ void send(Caller& caller, bool as_bytes, std::uint8_t size) {
     if (as_bytes) {
         const std::size_t piece =
             std::min<std::size_t>(std::size_t{size} * 8, caller.stream.size() - caller.sent_bytes);
-        // A copy of its own, so that reading past its end is found out.
+        // A separate copy, so that reading past its end is detected.
         const std::vector<std::uint8_t> bytes(
             caller.stream.begin() + static_cast<std::ptrdiff_t>(caller.sent_bytes),
             caller.stream.begin() + static_cast<std::ptrdiff_t>(caller.sent_bytes + piece));
@@ -154,7 +154,7 @@ void call(Caller& caller, std::uint8_t kind, std::uint8_t a, std::uint8_t b) {
     }
 }
 
-// Whatever was called before, what is left can be received, and it ends.
+// Whatever was called before, the rest can be received, and it ends.
 void drain(Caller& caller) {
     const std::size_t packets = caller.stream.size() / packet_overhead + caller.sent_packets + 1;
     std::size_t received = 0;

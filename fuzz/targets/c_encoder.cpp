@@ -1,5 +1,5 @@
-// The encoder's C interface on any meshes, poses and options, by any names, structs of earlier versions among them: a
-// status and a sentence, or packets that the C decoder takes, frame by frame.
+// The encoder's C interface with any meshes, poses and options, by any names, including structs of earlier versions.
+// The result must be a status with a message, or packets that the C decoder accepts, frame by frame.
 #include <array>
 #include <cstring>
 #include <limits>
@@ -27,7 +27,7 @@ constexpr std::array numbers = {0.0,
                                 std::numeric_limits<double>::infinity(),
                                 std::numeric_limits<double>::quiet_NaN()};
 
-// A few options changed, each to a value that may be far out of its range, by a name that may be wrong.
+// Changes a few options, each to a value that may be far out of range, by a name that may be wrong.
 void set_any_options(fuzz::FuzzInput& input, htvm_encoder_options* options, std::uint32_t profile) {
     require(htvm_encoder_options_set_number(options, "geometry_step", 8) == HTVM_OK, "8 mm is a step");
     for (std::uint32_t n = input.below(6); n > 0; --n) {
@@ -55,7 +55,7 @@ void set_any_options(fuzz::FuzzInput& input, htvm_encoder_options* options, std:
     require(htvm_encoder_options_set_number(options, "threads", 1) == HTVM_OK, "one thread");
 }
 
-// The mesh's arrays as C has them. Attributes that do not fit its vertices are left out: C cannot say such a thing.
+// The mesh's arrays for C. Attributes that do not fit its vertices are left out, since C cannot express them.
 htvm_mesh mesh_of(const Mesh& mesh, std::uint8_t age) {
     htvm_mesh out;
     require(htvm_mesh_init(&out, sizeof out) == HTVM_OK, "a mesh is given its defaults");
@@ -73,7 +73,7 @@ htvm_mesh mesh_of(const Mesh& mesh, std::uint8_t age) {
     return out;
 }
 
-// All packets that there are; each is decoded at once.
+// Receives all packets there are; each is decoded at once.
 void receive(htvm_encoder* encoder, htvm_decoder* decoder, std::size_t frames_due) {
     std::size_t frames = 0;
     for (;;) {

@@ -1,4 +1,4 @@
-// Codebooks and the packets they come in, and residual layers coded with them.
+// Codebooks and their packets, and residual layers coded with them.
 #include "codec/paper/codebook.h"
 
 #include "core/lattice.h"

@@ -1,4 +1,4 @@
-// The whole decoder on a file of any bytes: as they are, and with their CRCs put right.
+// The whole decoder on a file of any bytes: unchanged, and with corrected CRCs.
 #include "whole_decoder.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

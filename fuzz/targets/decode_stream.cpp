@@ -1,5 +1,5 @@
-// The whole decoder on a stream whose packets are lost, doubled, in another order, damaged or mixed up, every CRC
-// right. The input: a number of changes, four bytes each, then a stream.
+// The whole decoder on a stream whose packets are lost, doubled, reordered, damaged or mixed up, all with correct CRCs.
+// The input: a number of changes, four bytes each, then a stream.
 #include "codec/stream/frame_payload.h"
 #include "whole_decoder.h"
 
@@ -8,7 +8,7 @@ namespace {
 using namespace htvm;
 using namespace htvm::internal;
 
-// Damages one layer of a frame, or a number of its header, and leaves the rest as it is.
+// Damages one layer of a frame, or a number in its header, and leaves the rest unchanged.
 void change_layer(Packet& packet, std::uint8_t choice, std::uint8_t where, std::uint8_t value) {
     const auto read = read_frame_payload(packet.payload);
     if (!read) return;

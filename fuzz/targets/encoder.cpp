@@ -1,4 +1,5 @@
-// The encoder on any meshes, poses and options: an error, or packets that decode to just what it promised.
+// The encoder with any meshes, poses and options: must give an error, or packets that decode to exactly what it
+// promised.
 #include "htvm/encoder.hpp"
 
 #include <array>

@@ -1,4 +1,4 @@
-// The range decoder and its symbol models: what any bytes decode to, encoded again, decodes to the same.
+// The range decoder and its symbol models: what any bytes decode to must, when encoded again, decode to the same.
 #include "codec/intra/attribute_residual.h"
 #include "entropy/range_coder.h"
 #include "fuzz_input.h"
@@ -12,7 +12,7 @@ enum class Kind : std::uint8_t { bit, raw, symbol, number, signed_number, residu
 
 struct Step {
     Kind kind = Kind::bit;
-    std::uint8_t size = 1;  // of raw numbers, bits
+    std::uint8_t size = 1;  // for raw numbers, bits
 };
 
 struct Models {
@@ -77,7 +77,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::vector<std::int64_t> values;
     for (const auto step : steps) {
         values.push_back(decode(first, models, step));
-        // The one number that bytes can say and the encoder cannot.
+        // The one number that bytes can represent and the encoder cannot.
         if (step.kind == Kind::number && values.back() == 0xFFFFFFFF) values.back() = 0;
     }
     RangeEncoder encoder;

@@ -1,4 +1,5 @@
-// The sequence header, the index and the payload of frames: what can be read comes back when written.
+// The sequence header, the index and the payload of frames: what can be read is the same after writing and reading
+// again.
 #include "codec/stream/frame_payload.h"
 #include "codec/stream/sequence.h"
 #include "fuzz_input.h"

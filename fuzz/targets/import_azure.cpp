@@ -1,4 +1,4 @@
-// Azure Kinect's skeleton files, and any skeleton file told by what it holds: a sound track or an error.
+// Azure Kinect's skeleton files, and any skeleton file recognised by its contents: must give a valid track or an error.
 #include "import_skeleton.h"
 #include "io/skeleton_azure.h"
 #include "io/skeleton_file.h"

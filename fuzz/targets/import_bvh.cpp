@@ -1,4 +1,4 @@
-// BVH files, and what any skeleton file is told to be: a sound track or an error.
+// BVH files, and what any skeleton file is recognised as: must give a valid track or an error.
 #include "import_skeleton.h"
 #include "io/skeleton_bvh.h"
 

@@ -1,4 +1,4 @@
-// DRC files through libdraco, which is not ours and not instrumented: a sound mesh or an error.
+// DRC files through libdraco, which is not ours and not instrumented: must give a valid mesh or an error.
 #include "import_mesh.h"
 #include "io/drc.h"
 

@@ -1,4 +1,4 @@
-// The project's own skeleton files: a sound track or an error; what was read can be written and reads back.
+// The project's own skeleton files: must give a valid track or an error; what was read can be written and reads back.
 #include "import_skeleton.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

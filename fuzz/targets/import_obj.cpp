@@ -1,4 +1,4 @@
-// OBJ files: a sound mesh or an error; what was read can be written and reads back.
+// OBJ files: must give a valid mesh or an error; what was read can be written and reads back.
 #include "import_mesh.h"
 #include "io/obj.h"
 

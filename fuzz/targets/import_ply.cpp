@@ -1,4 +1,4 @@
-// PLY files, from memory and from a stream: the same mesh, sound, and the same again after writing.
+// PLY files, from memory and from a stream: must give the same valid mesh, and the same again after writing.
 #include <sstream>
 
 #include "import_mesh.h"

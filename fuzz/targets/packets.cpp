@@ -1,4 +1,4 @@
-// The container: packets come back however the bytes are cut up, and between any noise.
+// The container: packets come back however the bytes are cut up, and with any noise between them.
 #include "whole_decoder.h"
 
 namespace {
@@ -15,7 +15,7 @@ bool same(const std::vector<Packet>& a, const std::vector<Packet>& b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) { return same(x, y); });
 }
 
-// Packets by the input's choice with its noise between, some of it cut off packets.
+// Packets chosen by the input with noise between them, some of it truncated packets.
 std::vector<std::uint8_t> any_stream(fuzz::FuzzInput& input, std::vector<Packet>& packets) {
     std::vector<std::uint8_t> bytes;
     for (std::uint32_t n = input.below(12); n > 0 && input.left() > 0; --n) {

@@ -1,4 +1,4 @@
-// Connectivity of I-frames: any triangles come back; any bytes give triangles of vertices that are there, or an error.
+// Connectivity of I-frames: any triangles come back; any bytes give triangles of existing vertices, or an error.
 #include "codec/intra/tfan.h"
 
 #include "small_mesh.h"

@@ -1,4 +1,5 @@
-// Transforms of bones, the pose of an I-frame, and the motion of nodes: layers come back; damage stays in range.
+// Transforms of bones, the pose of an I-frame, and the motion of nodes: layers come back; damaged ones give values in
+// range.
 #include "codec/reference/transforms.h"
 
 #include "codec/tracked/node_motion.h"

@@ -1,4 +1,4 @@
-// Zippering of any two meshes: the result names vertices that are there, and begins with what was coded.
+// Zippering of any two meshes: the result indexes existing vertices, and begins with what was coded.
 #include "codec/paper/zipper.h"
 
 #include "codec/paper/enhanced_frame.h"

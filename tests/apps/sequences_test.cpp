@@ -1,4 +1,4 @@
-// Decoded frames are measured against their own originals, whatever frames are missing on either side.
+// Decoded frames are compared with their own originals, whatever frames are missing on either side.
 #include "sequences.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// The C interface's decoder gives what the C++ one gives, and survives callers who do as they should not.
+// The C interface's decoder gives the same as the C++ one, and survives callers who misuse it.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -45,7 +45,7 @@ void expect_same_frame(htvm_decoder* decoder, const htvm_frame_info& info, const
     EXPECT_EQ(pose.orientations, expected.pose.orientations);
 }
 
-// Every frame that is whole so far, against those expected from `next` on.
+// Receives every complete frame, and compares it with those expected from `next` on.
 void receive_all(htvm_decoder* decoder, const std::vector<DecodedFrame>& expected, std::size_t& next) {
     htvm_frame_info info;
     htvm_status status;
@@ -305,14 +305,14 @@ TEST(CDecoder, SurvivesMisuse) {
 }
 
 TEST(CDecoder, StructsOfOtherVersionsAreRead) {
-    // As an older program: a struct of the first 16 bytes only.
+    // Like an older program: a struct of the first 16 bytes only.
     unsigned char older[16 + 8];
     std::memset(older, 0xAB, sizeof older);
     ASSERT_EQ(htvm_decoder_options_init(reinterpret_cast<htvm_decoder_options*>(older), 16), HTVM_OK);
     for (std::size_t i = 16; i < sizeof older; ++i) EXPECT_EQ(older[i], 0xAB) << "beyond the caller's struct";
     EXPECT_NE(make_decoder(reinterpret_cast<htvm_decoder_options*>(older)), nullptr);
 
-    // As a newer program: longer, and 0 where this version knows nothing.
+    // Like a newer program: longer, and 0 in what this version does not know.
     struct Newer {
         htvm_decoder_options options;
         std::uint64_t more[3];
@@ -330,7 +330,7 @@ TEST(CDecoder, StructsOfOtherVersionsAreRead) {
     EXPECT_EQ(htvm_decoder_options_init(nullptr, 100), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_decoder_options_init(&unset, 4), HTVM_BAD_INPUT);
 
-    // What the library fills, too: the first 12 bytes, and no more.
+    // The same for structs that the library fills: the first 12 bytes, and no more.
     const auto receiver = make_decoder();
     ASSERT_EQ(htvm_decoder_send_bytes(receiver.get(), coded_grid().bytes.data(), coded_grid().bytes.size()), HTVM_OK);
     unsigned char info[20];

@@ -1,4 +1,4 @@
-// The C interface's encoder gives the bytes of the C++ one, and survives callers who do as they should not.
+// The C interface's encoder gives the same bytes as the C++ one, and survives callers who misuse it.
 #include <gtest/gtest.h>
 
 #include <cstddef>
@@ -32,7 +32,7 @@ Handle make_encoder(const htvm_encoder_options* options = nullptr) {
     return {encoder, htvm_encoder_destroy};
 }
 
-// The mesh as the C interface takes it; it refers to the mesh's arrays.
+// The mesh in the form of the C interface; it refers to the mesh's arrays.
 htvm_mesh c_mesh(const Mesh& mesh) {
     htvm_mesh out;
     EXPECT_EQ(htvm_mesh_init(&out, sizeof out), HTVM_OK);
@@ -54,9 +54,9 @@ htvm_pose c_pose(const Pose& pose) {
     return out;
 }
 
-// A skeleton as the C interface takes it, with the arrays that it refers to.
+// A skeleton in the form of the C interface, with the arrays that it refers to.
 struct CSkeleton {
-    Skeleton cpp;  // whose names the C struct points at
+    Skeleton cpp;  // owns the names that the C struct points to
     std::vector<std::uint16_t> bones;
     std::vector<const char*> names;
     htvm_skeleton skeleton;
@@ -75,7 +75,7 @@ struct CSkeleton {
     }
 };
 
-// Appends the packets that are ready; gives the status that ended it.
+// Appends the packets that are ready; returns the status at which it stopped.
 htvm_status receive_all(htvm_encoder* encoder, std::vector<std::uint8_t>& out) {
     for (;;) {
         std::size_t size = 0;
@@ -139,7 +139,7 @@ TEST(CEncoder, OptionsGiveTheBytesOfTheCppEncoder) {
     }
 }
 
-// The list of options as C has it is the C++ one, and each can be set and read by text and by number.
+// The list of options in C equals the C++ one, and each can be set and read by text and by number.
 TEST(CEncoder, EveryOptionOfTheListCanBeAskedForSetAndRead) {
     ASSERT_EQ(htvm_encoder_option_count(), option_list().size());
     for (const auto profile : {Profile::tracked, Profile::topology, Profile::paper}) {
@@ -314,7 +314,7 @@ TEST(CEncoder, WrongMeshesAndPosesAreErrorsAndTheNextFrameIsFine) {
     bad.positions = nullptr;
     EXPECT_EQ(htvm_encoder_send_mesh(encoder.get(), &bad, &pose, 0, 0), HTVM_BAD_INPUT);
     bad = good;
-    bad.vertices /= 2;  // triangles name vertices that are not there
+    bad.vertices /= 2;  // triangles name vertices that no longer exist
     EXPECT_EQ(htvm_encoder_send_mesh(encoder.get(), &bad, &pose, 0, 0), HTVM_BAD_INPUT);
     EXPECT_GT(std::strlen(htvm_encoder_last_error(encoder.get())), 10u);
     auto no_joints = pose;

@@ -1,4 +1,4 @@
-// Streams for the tests of the C interface, and what the C++ interface makes of them.
+// Streams for the tests of the C interface, and what the C++ interface decodes from them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace htvm::test {
 
 using namespace internal;
 
-// A person of some 300 vertices with skeleton, colours and normals; an I-frame, EP-frames, P-frames, T-frames.
+// A person of about 300 vertices with skeleton, colours and normals; an I-frame, EP-frames, P-frames, T-frames.
 inline const CodedSequence& coded_person() {
     static const auto coded = [] {
         EncoderOptions options = enhanced_options();
@@ -36,7 +36,7 @@ inline const CodedSequence& coded_grid() {
     return coded;
 }
 
-// The current frame of a decoder by the C interface's copies.
+// The current frame of a decoder, through the copying functions of the C interface.
 inline Mesh copied_mesh(htvm_decoder* decoder, const htvm_frame_info& info) {
     Mesh out;
     const auto take = [&](auto& array, std::size_t count, auto copy) {
@@ -53,7 +53,7 @@ inline Mesh copied_mesh(htvm_decoder* decoder, const htvm_frame_info& info) {
     return out;
 }
 
-// The same as it is lent.
+// The same through the view.
 inline Mesh lent_mesh(htvm_decoder* decoder, const htvm_frame_info& info) {
     htvm_mesh_view view;
     EXPECT_EQ(htvm_decoder_view(decoder, &view, sizeof view), HTVM_OK);
@@ -87,7 +87,7 @@ inline Pose copied_pose(htvm_decoder* decoder, const htvm_frame_info& info) {
     return out;
 }
 
-// Memory of the caller that counts, and gives none from its `fails_from`-th allocation on.
+// An allocator of the caller that counts, and fails from its `fails_from`-th allocation on.
 struct CountingMemory {
     int made = 0, released = 0, fails_from = 1 << 30;
 

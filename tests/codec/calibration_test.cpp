@@ -26,7 +26,7 @@ Mesh cylinder(double radius) {
     return mesh;
 }
 
-const CalibrationOptions maximum = {.percentile = 100};  // the paper's
+const CalibrationOptions maximum = {.percentile = 100};  // as in the paper
 const Pose standing = {{{0, 0, 0}, {0, 1000, 0}}, {}, {}};
 
 TEST(Calibration, OfACylinderIsItsRadius) {

@@ -1,4 +1,4 @@
-// What tracked frames aim at: targets of a moved reference, the simplified reference, and the fit of what came out.
+// The targets of tracked frames: those of a moved reference, the simplified reference, and the fit of the result.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace htvm::internal {
 namespace {
 
-// A square height field of cells x cells, `cell` lattice units a side, its middle at the origin, facing +z.
+// A square height field of cells x cells, each `cell` lattice units wide, with its middle at the origin, facing +z.
 template <class Height>
 LatticeMesh height_field(std::int32_t cells, std::int32_t cell, const Height& height) {
     LatticeMesh out;
@@ -128,7 +128,7 @@ TEST(SimplifiedReference, has_fewer_vertices_within_the_error) {
 
 TEST(SimplifiedReference, does_not_gape_where_a_seam_has_two_vertices_in_the_same_place) {
     const auto whole = height_field(32, 25, bowl);
-    auto cut = whole;  // the right half's triangles get vertices of their own along the middle
+    auto cut = whole;  // the triangles of the right half get vertices of their own along the middle
     for (auto& t : cut.triangles) {
         const bool right = std::all_of(t.begin(), t.end(), [&](std::uint32_t v) { return whole.positions[v].x >= 0; });
         if (!right) continue;
@@ -188,7 +188,7 @@ TEST(TrackedFit, counts_what_one_surface_lacks_as_strays_both_ways) {
 }
 
 TEST(TrackedFit, does_not_hold_against_a_frame_what_its_intra_frame_was_off_already) {
-    // The decoded mesh goes on where the captured one has ended, as far as in the I-frame or farther.
+    // The decoded mesh continues beyond the end of the captured one, as far as in the I-frame or farther.
     const auto ending_at = [](std::int32_t end) {
         auto mesh = height_field(64, 25, flat);
         std::erase_if(mesh.triangles, [&](const Triangle& t) {
@@ -202,7 +202,7 @@ TEST(TrackedFit, does_not_hold_against_a_frame_what_its_intra_frame_was_off_alre
     const auto same = measure_tracked_fit(ending_at(600), decoded, intra.squared, {});
     EXPECT_EQ(same.rms, 0);
     EXPECT_EQ(same.worst_region, 0);
-    EXPECT_EQ(same.squared, intra.squared);  // what is told on is what was measured
+    EXPECT_EQ(same.squared, intra.squared);  // what is reported is what was measured
     const std::vector<double> perfect(intra.squared.size(), 0);
     EXPECT_GT(measure_tracked_fit(ending_at(600), decoded, perfect, {}).rms, 10);
     EXPECT_GT(measure_tracked_fit(ending_at(300), decoded, intra.squared, {}).rms, 10);

@@ -1,4 +1,4 @@
-// What the encoder says it sent is what the decoder shows, to the bit, for any mesh and any number of threads.
+// What the encoder says that it sent is, to the bit, what the decoder shows, for any mesh and any number of threads.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 
 using namespace test;
 
-// Every frame's reconstruction, its info and its bytes, whatever the threads and the pieces that arrive.
+// Checks every frame's reconstruction, its info and its bytes, for several numbers of threads and sizes of pieces.
 void expect_closed_loop(const TestSequence& sequence, EncoderOptions options) {
     SCOPED_TRACE(sequence.name);
     options.threads = 1;
@@ -59,7 +59,7 @@ EncoderOptions key_every_third() {
     return options;
 }
 
-// Nothing merges, nothing is traded for rate, and colours are exact: every vertex can be known again by its colour.
+// Nothing merges, nothing is traded for rate, and colours are exact: every vertex can be recognised by its colour.
 EncoderOptions traceable() {
     auto options = key_every_third();
     options.topology.merge_duplicates = false;
@@ -115,7 +115,7 @@ TEST(ClosedLoop, DracoIntraFrames) {
     for (const auto& sequence : awkward_sequences()) expect_closed_loop(sequence, options);
 }
 
-// The farthest that vertices, predictions and codewords can part: a pose that leaps while the mesh leaps the other way.
+// Predictions, vertices and codewords as far apart as possible: the pose leaps one way while the mesh leaps the other.
 TEST(ClosedLoop, VerticesAndPoseAtOppositeEndsOfTheLattice) {
     TestSequence sequence{"opposite ends", {}, {}};
     sequence.skeleton.joint_names = {"a", "b"};
@@ -141,8 +141,8 @@ TEST(ClosedLoop, VerticesAndPoseAtOppositeEndsOfTheLattice) {
         }
 }
 
-// Where a bit is worth more than any error, all residuals get the commonest codeword: here one that leads from one end
-// of the lattice to the other, and for the vertex that is there already, beyond.
+// If a bit is worth more than any error, all residuals get the most common codeword: here one that leads from one end
+// of the lattice to the other, and, for the vertex that is there already, beyond it.
 TEST(ClosedLoop, NoChoiceOfCodewordLeavesTheLattice) {
     constexpr float end = 127.9f;  // mm; the lattice of 2^-16 mm is small
     TestSequence sequence{"codewords far off", {}, {}};
@@ -209,7 +209,7 @@ TEST(ClosedLoop, MotionBasedFramesOfEveryAwkwardSequence) {
 }
 
 TEST(ClosedLoop, EveryChoiceOfFrames) {
-    std::map<double, std::set<std::vector<std::uint8_t>>> streams;  // by still_below
+    std::map<double, std::set<std::vector<std::uint8_t>>> streams;  // keyed by still_below
     for (const auto choice : {FrameChoice::fixed, FrameChoice::motion, FrameChoice::rate_distortion})
         for (const double still_below : {0.0, 60.0}) {
             auto options = motion_based(still_below, 6);
@@ -221,7 +221,7 @@ TEST(ClosedLoop, EveryChoiceOfFrames) {
             options.topology.animation_error = 20;
             streams[still_below].insert(encode(walking(7, 500), options).bytes);
             expect_closed_loop(walking(7, 500), options);
-            // Slow, and half of the ways are other tests' already.
+            // Slow, and half of the combinations are covered by other tests.
             if ((choice == FrameChoice::motion) != (still_below > 0) || choice == FrameChoice::fixed) continue;
             for (const auto& sequence : awkward_sequences()) expect_closed_loop(with_spokes(sequence), options);
         }
@@ -276,9 +276,9 @@ TEST(ClosedLoop, WithoutMergingEveryVertexAndOrientedTriangleIsThere) {
 }
 
 TEST(ClosedLoop, WithoutMergingAndAtLambdaZeroErrorsAreBoundedByTheStep) {
-    // I-frames round each coordinate to the step's grid: half a step at most. EP-frames take the nearest codeword or
-    // the step's grid, whichever is nearer: half the diagonal of a cell at most. Rounding to the lattice before, and to
-    // floats behind, comes on top.
+    // I-frames round each coordinate to the grid of the step: the error is at most half a step. EP-frames take the
+    // nearest codeword or the step's grid, whichever is nearer: at most half the diagonal of a cell. Rounding to the
+    // lattice before, and to floats afterwards, comes on top.
     for (const double step : {0.25, 2.0, 7.0})
         for (const auto& sequence : coloured_sequences()) {
             SCOPED_TRACE(sequence.name + ", step " + std::to_string(step));
@@ -324,8 +324,8 @@ TEST(ClosedLoop, NormalsAndTextureCoordinatesAreThoseOfTheSource) {
     }
 }
 
-// An EP-frame's residuals are quantised after its vertices have merged, and where they are coarse two may meet after
-// all; as an adult, the sequence that this happens to has scene changes instead.
+// An EP-frame's residuals are quantised after its vertices have merged, and if they are coarse two vertices may
+// coincide after all. The sequence for which this happens has scene changes instead if it is of adult size.
 TEST(ClosedLoop, MergingLeavesNoTwoEqualVerticesAndNoCollapsedTriangle) {
     auto options = key_every_third();
     options.subject_size = 1750;

@@ -56,7 +56,7 @@ TEST(Codebook, OfZeroCodewordsComesBack) {
 }
 
 TEST(Codebook, TheLargestResidualsComeBack) {
-    // A vertex at one end of what may be captured, predicted at the other end of the lattice, and beyond.
+    // A vertex at one end of the range of captures, predicted at the other end of the lattice, and beyond.
     for (const std::int32_t extreme : {(1 << 24) + (1 << 23), 1 << 25, 1 << 26}) {
         Codebook codebook;
         codebook.codewords = {{extreme, 0, 0}, {0, -extreme, extreme}};

@@ -1,6 +1,6 @@
-// Streams that every version must decode to the same integers, with a digest of each frame beside them: *.htvm and
-// *.digests in tests/data/conformance. HTVM_WRITE_CONFORMANCE=1 in the environment writes them anew, or one of them
-// where that is its name.
+// Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
+// tests/data/conformance. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of them; with the name of a stream,
+// that one.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -35,8 +35,8 @@ void add_floats(ByteWriter& out, const auto& values) {
         for (const float c : value) out.u32(std::bit_cast<std::uint32_t>(c));
 }
 
-// CRC-32 of what was decoded, little-endian: positions (32-bit floats, mm), triangles (32-bit indices), colours
-// (bytes), normals and texture coordinates (32-bit floats), one array behind the other.
+// CRC-32 of the decoded arrays, little-endian: positions (32-bit floats, mm), triangles (32-bit indices), colours
+// (bytes), normals and texture coordinates (32-bit floats), one array after another.
 std::uint32_t digest(const Mesh& mesh) {
     ByteWriter out;
     add_floats(out, mesh.positions);
@@ -56,7 +56,7 @@ std::string line_of(const DecodedFrame& frame) {
     return line;
 }
 
-// One line a frame: its number, its kind, its vertices, its triangles, its digest.
+// One line per frame: its number, its kind, its vertices, its triangles, its digest.
 std::vector<std::string> digests(const std::vector<std::uint8_t>& bytes) {
     const auto decoded = decode_packets(read_packets(bytes, 1000));
     for (const auto& error : decoded.errors) ADD_FAILURE() << error.message;
@@ -103,8 +103,8 @@ void write_stream(const std::string& name, const TestSequence& sequence, const E
     write_packets(name, coded.packets);
 }
 
-// P-frames, and EP-frames of which some bones are coded; at the end one of no bone, one of bones without any vertex,
-// and one of vertices without any triangle.
+// P-frames, and EP-frames in which some bones are coded; at the end one with no bone, one with bones without any
+// vertex, and one with vertices without any triangle.
 void write_moving() {
     auto options = motion_based(40, 5);
     options.topology.frame_choice = FrameChoice::motion;
@@ -145,8 +145,8 @@ void write_tracked() {
     write_stream("tracked", walking(6, 300, 20), options);
 }
 
-// T-frames on every awkward connectivity and on a person, moved by chance; in the second sequence by nodes that are as
-// near to each other as may be, in the third by few and with fields of every kind.
+// T-frames on every awkward connectivity and on a person, moved at random: in the second sequence by nodes that are as
+// close together as possible, in the third by few nodes and with fields of every kind.
 void write_tracked_by_chance() {
     TestSequence awkward{"awkward", {}, {}};
     unsigned attributes = 0;
@@ -176,7 +176,7 @@ void write_tracked_by_chance() {
     write_packets("tracked_by_chance", packets);
 }
 
-// What is rare: meshes without vertices or triangles among others, attributes that come and go, all vertices in one
+// Rare cases: meshes without vertices or triangles among others, attributes that come and go, all vertices at one
 // point, the ends of the lattice, sizes that jump, many components.
 void write_corner_cases() {
     TestSequence corners{"corner cases", {}, {}};
@@ -197,7 +197,7 @@ void write_corner_cases() {
     write_stream("corner_cases_intra", corners, options);
 }
 
-// Encoder's choices that reach the decoder: the paper's, a fine lattice, steps that change from frame to frame.
+// Choices of the encoder that affect the decoder: the paper's, a fine lattice, steps that change from frame to frame.
 void write_choices() {
     auto person = synthetic(true, 4, 500);
     for (auto& frame : person.frames) frame.mesh.normals.clear();
@@ -216,7 +216,7 @@ void write_choices() {
     fine.topology.weight_width = 1000;
     write_stream("fine_lattice", synthetic(true, 2, 300), fine);
 
-    // EP-frames, whole and in part, whose steps change: the skeleton walks, and jumps.
+    // EP-frames, whole and in part, with changing steps: the skeleton walks, and jumps.
     auto all = walking(6, 300, 20);
     for (const int later : {60, 61, 200}) all.frames.push_back(walking(1, 300, later).frames[0]);
     EncoderOptions rate = test::enhanced_options();
@@ -262,7 +262,7 @@ void write_all() {
     }
     write_stream("no_skeleton_all_attributes", attributes, options);
 
-    // Every awkward connectivity, one after the other, each coded twice: an I-frame and an EP-frame.
+    // Every awkward connectivity, one after another, each coded twice: an I-frame and an EP-frame.
     TestSequence awkward{"awkward", {}, {}};
     for (const auto& shape : tfan_test::special_meshes()) {
         if (shape.vertex_count > 200) continue;

@@ -1,4 +1,4 @@
-// Damage on the way: CRCs tell every flipped bit, and what gets past them does no harm and does not last.
+// Damage in transmission: CRCs detect every flipped bit, and damage that gets past them does no harm and does not last.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,14 +16,14 @@ namespace {
 
 using namespace test;
 
-// Header, two groups of an I-frame, codebooks, EP-frames whole and in part, and P-frames, index.
+// A header, two groups of an I-frame, codebooks, EP-frames whole and in part, and P-frames, and an index.
 const std::vector<Packet>& animated() {
     static const std::vector<Packet> packets = [] {
         auto options = motion_based(40, 4);
         options.topology.frame_choice = FrameChoice::motion;
         options.topology.predicted_below = 800;
         auto out = encode(walking(8, 100), options).packets;
-        // The first EP-frames are in part: here is one of the whole mesh.
+        // The first EP-frames are in part: this adds one of the whole mesh.
         auto whole = encode(walking(8, 100), motion_based(0, 4)).packets;
         EXPECT_TRUE(std::any_of(out.begin(), out.end(), is_in_part));
         EXPECT_TRUE(std::any_of(whole.begin(), whole.end(),
@@ -35,7 +35,7 @@ const std::vector<Packet>& animated() {
     return packets;
 }
 
-// Header, I-frame and four T-frames, twice.
+// A header, then twice an I-frame and four T-frames.
 const std::vector<Packet>& tracked() {
     static const std::vector<Packet> packets = [] {
         EncoderOptions options = test::enhanced_options();
@@ -114,7 +114,7 @@ void expect_sound(const Mesh& mesh) {
         for (const auto c : p) ASSERT_TRUE(std::isfinite(c));
 }
 
-// A decoder that was given the packets before `at`, as far as they matter to that one.
+// A decoder that was given those packets before `at` that the packet there depends on.
 Decoder decoder_before(const std::vector<Packet>& packets, std::size_t at) {
     DecoderOptions options;
     options.max_vertices = 20000;
@@ -127,8 +127,8 @@ Decoder decoder_before(const std::vector<Packet>& packets, std::size_t at) {
     return decoder;
 }
 
-// Flips bits of each packet's payload, mends the CRC, and gives it to a decoder that knows what came before, to which
-// the sound packet is as welcome afterwards as ever.
+// Flips bits of each packet's payload, corrects the CRC, and passes it to a decoder that knows the packets before.
+// Afterwards the undamaged packet must still be accepted.
 void expect_harmless(const std::vector<Packet>& packets, int flips) {
     const auto whole = decode_packets(packets);
     ASSERT_TRUE(whole.errors.empty());
@@ -142,7 +142,7 @@ void expect_harmless(const std::vector<Packet>& packets, int flips) {
             const auto frame = decoder.push(packet);
             if (frame && *frame) expect_sound((**frame).mesh);
         }
-        // What follows a T-frame may be lost with it, and a header may begin another sequence.
+        // Frames after a damaged T-frame may be lost with it, and a damaged header may begin another sequence.
         if (packets[at].kind == PacketKind::tracked || packets[at].kind == PacketKind::sequence)
             decoder = decoder_before(packets, at);
         const auto again = decoder.push(packets[at]);

@@ -1,4 +1,4 @@
-// Frames depend on their I-frame and codebooks alone, and nothing that a stream holds does harm.
+// Frames depend on their I-frame and codebooks alone, and no stream does harm, whatever it contains.
 #include "htvm/decoder.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 using namespace test;
 
-// Nine frames, an I-frame every third, with attributes of every kind.
+// Nine frames, with an I-frame every third, and attributes of every kind.
 const CodedSequence& nine_frames() {
     static const CodedSequence coded = [] {
         auto sequence = synthetic(true, 9, 500);
@@ -38,7 +38,7 @@ std::map<std::uint32_t, Mesh> by_number(const DecodedSequence& decoded) {
     return out;
 }
 
-// The frames that came are as encoded; these are their numbers.
+// Checks that the frames that arrived are as encoded; returns their numbers.
 std::vector<std::uint32_t> checked_numbers(const DecodedSequence& decoded) {
     std::vector<std::uint32_t> out;
     for (const auto& [number, mesh] : by_number(decoded)) {
@@ -95,7 +95,7 @@ TEST(Independence, AMissingCodebookCostsTheFramesThatNameIt) {
         if (packets[missing].kind != PacketKind::codebook) continue;
         auto rest = packets;
         rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(missing));
-        // Until the next codebook for the same purpose, or I-frame.
+        // Until the next codebook for the same purpose, or the next I-frame.
         std::vector<std::uint32_t> expected;
         for (std::uint32_t t = 0; t < 9; ++t) expected.push_back(t);
         for (std::size_t i = missing + 1; i < packets.size(); ++i) {
@@ -132,7 +132,7 @@ TEST(Independence, ARepeatedHeaderChangesNothing) {
 TEST(Independence, AnotherHeaderBeginsAnotherSequence) {
     const auto other = encode(synthetic(false, 1, 200), {});
     auto packets = kept([](const Packet& packet) { return packet.frame < 3 && packet.kind != PacketKind::index; });
-    packets.insert(packets.begin() + 2, other.packets[0]);  // behind the first I-frame
+    packets.insert(packets.begin() + 2, other.packets[0]);  // after the first I-frame
     const auto decoded = decode_packets(packets);
     EXPECT_EQ(checked_numbers(decoded), std::vector<std::uint32_t>{0});
     ASSERT_EQ(decoded.errors.size(), 2u);
@@ -214,8 +214,8 @@ TEST(Decoder, ThePoseComesBack) {
     for (const auto& frame : decoded.frames) EXPECT_EQ(frame.pose.orientations.size(), 14u);
 }
 
-// The stream as it is up to packet `at`, then that packet with each of its layers damaged, then the rest. CRCs do not
-// protect here: this is what a hostile writer can make.
+// The stream up to packet `at`, then that packet with each of its layers damaged, then the rest. CRCs are no protection
+// here: a hostile writer can make such streams.
 void expect_harmless(const std::vector<Packet>& packets, std::size_t at, const DecoderOptions& options, int flips) {
     hostile::try_everything(
         packets[at].payload,
@@ -227,7 +227,7 @@ void expect_harmless(const std::vector<Packet>& packets, std::size_t at, const D
                 const auto frame = decoder.push(packet);
                 if (!frame || !*frame) continue;
                 const auto& mesh = (**frame).mesh;
-                // Zippering joins what the packet holds with the I-frame's mesh.
+                // Zippering joins the contents of the packet with the I-frame's mesh.
                 ASSERT_LE(mesh.positions.size(), is_in_part(packet) ? 2 * options.max_vertices : options.max_vertices);
                 for (const auto& t : mesh.triangles)
                     for (const auto v : t) ASSERT_LT(v, mesh.positions.size());

@@ -1,4 +1,4 @@
-// What the decoder lends: the copies' arrays, and a topology number that says what need not be sent again.
+// What the decoder lends equals the copies, and the topology number tells what need not be sent again.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -40,7 +40,7 @@ DeformationNodes nodes_of(const Strip& mesh, std::int32_t spacing, std::int32_t 
     return choose_deformation_nodes(mesh.positions, mesh.triangles, {spacing, reach, most});
 }
 
-// What every result must hold, whatever the mesh.
+// What must hold for every result, whatever the mesh.
 void expect_sound(const Strip& mesh, const DeformationNodes& nodes) {
     const std::size_t count = nodes.vertex.size();
     ASSERT_EQ(nodes.handle_of_vertex.size(), mesh.positions.size());
@@ -63,14 +63,14 @@ void expect_sound(const Strip& mesh, const DeformationNodes& nodes) {
         EXPECT_EQ(sum, 1 << weight_bits);
     }
     for (std::size_t v = 0; v < nodes.weights.size(); ++v) {
-        const auto& w = nodes.weights[v];  // the nearest node weighs most, or as much as the first
+        const auto& w = nodes.weights[v];  // the nearest node has the largest weight, or the same as the first
         const auto k = static_cast<std::size_t>(std::find(w.handle.begin(), w.handle.end(), nodes.handle_of_vertex[v]) -
                                                 w.handle.begin());
         ASSERT_LT(k, handles_per_vertex);
         EXPECT_EQ(w.weight[k], w.weight[0]);
     }
     for (std::size_t n = 0; n < count; ++n) EXPECT_EQ(nodes.handle_of_vertex[nodes.vertex[n]], n);
-    // All nodes hang together.
+    // All nodes are connected.
     std::vector<std::size_t> group(count);
     for (std::size_t n = 0; n < count; ++n) group[n] = n;
     for (std::size_t round = 0; round < count; ++round)
@@ -104,13 +104,14 @@ TEST(DeformationNodes, EachIsTheFirstVertexThatTheOthersDoNotReach) {
     // Columns 0, 10, 20, ...: a node at column 0 reaches 2 columns along its row.
     const auto mesh = strip(8, 10);
     const auto nodes = nodes_of(mesh, 25);
-    // From vertex 0 the other row's column 2 is 10 + 20 or sqrt(200) + 10 = 24 away: reached, rounded down.
+    // From vertex 0, column 2 of the other row is 10 + 20 or sqrt(200) + 10 = 24 away: reached, since it is rounded
+    // down.
     EXPECT_EQ(nodes.vertex, (std::vector<std::uint32_t>{0, 5, 10, 15}));
     expect_sound(mesh, nodes);
 }
 
 TEST(DeformationNodes, ATieGoesToTheLowerNode) {
-    // Three in a row, 10 apart: the middle one is as far from both ends.
+    // Three in a row, 10 apart: the middle one is equally far from both ends.
     const Strip mesh{{{0, 0, 0}, {20, 0, 0}, {10, 0, 0}}, {{0, 2, 0}, {2, 1, 1}}};
     const auto nodes = nodes_of(mesh, 10);
     EXPECT_EQ(nodes.vertex, (std::vector<std::uint32_t>{0, 1}));
@@ -134,7 +135,7 @@ TEST(DeformationNodes, DistancesRunAcrossACutWhereVerticesCoincide) {
     append(mesh, strip(3, 10, {20, 0, 0}));  // begins where the first one ends
     const auto nodes = nodes_of(mesh, 100, 0);
     EXPECT_EQ(nodes.vertex.size(), 1u);
-    // Both copies of the vertices at the cut weigh the same, so that it stays closed.
+    // Both copies of the vertices at the cut have the same weights, so that it stays closed.
     const auto finer = nodes_of(mesh, 15, 0);
     EXPECT_EQ(finer.weights[4], finer.weights[6]);
     EXPECT_EQ(finer.weights[5], finer.weights[7]);
@@ -145,7 +146,7 @@ TEST(DeformationNodes, PiecesWithinReachOfEachOtherShareNodes) {
     auto mesh = strip(3, 10);
     append(mesh, strip(3, 10, {25, 0, 3}));
     EXPECT_EQ(nodes_of(mesh, 100, 4).vertex.size(), 2u);
-    EXPECT_EQ(nodes_of(mesh, 100, 6).vertex.size(), 1u);  // the root of 5 * 5 + 3 * 3 is below 6
+    EXPECT_EQ(nodes_of(mesh, 100, 6).vertex.size(), 1u);  // sqrt(5 * 5 + 3 * 3) is below 6
 }
 
 TEST(DeformationNodes, TooManyTakeAWiderSpacing) {
@@ -164,7 +165,7 @@ TEST(DeformationNodes, ThousandsOfPiecesShareAsManyAsThereMayBe) {
     const auto nodes = nodes_of(mesh, 100, 50);
     EXPECT_EQ(nodes.vertex.size(), most_deformation_nodes);
     ASSERT_EQ(nodes.handle_of_vertex.size(), mesh.positions.size());
-    // A vertex that no node reaches goes with the nearest in space.
+    // A vertex that no node reaches follows the one nearest in space.
     const std::size_t v = mesh.positions.size() - 1;
     std::int64_t best = std::numeric_limits<std::int64_t>::max();
     for (const auto n : nodes.vertex) best = std::min(best, squared_distance(mesh.positions[v], mesh.positions[n]));

@@ -11,7 +11,7 @@ namespace {
 
 using test::below;
 
-// Few places and few values, so that many vertices are the same.
+// Few places and few values, so that many vertices are equal.
 LatticeMesh crowded(std::size_t count, bool colours, bool normals, bool texcoords, unsigned seed) {
     std::mt19937 random(seed);
     LatticeMesh out;
@@ -49,7 +49,7 @@ TEST(Duplicates, AreWhatBruteForceFinds) {
 
 TEST(Duplicates, ManyDifferentVerticesAtOnePointAreFoundInLinearTime) {
     LatticeMesh mesh;
-    constexpr std::uint32_t count = 300000;  // squared, this would take minutes
+    constexpr std::uint32_t count = 300000;  // with quadratic time, this would take minutes
     mesh.positions.assign(count, {1, 2, 3});
     for (std::uint32_t k = 0; k < count; ++k)
         mesh.colours.push_back(

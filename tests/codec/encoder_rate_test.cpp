@@ -15,7 +15,7 @@ using test::TestSequence;
 
 constexpr double frames_per_second = 30;
 
-// The synthetic person walks ten frames forth and back, as often as need be.
+// The synthetic person walks ten frames forwards and backwards, as often as needed.
 TestSequence walking(int frames) {
     constexpr int there = 10;
     TestSequence out{"walking", synth_skeleton(), {}};
@@ -34,12 +34,12 @@ TestSequence walking(int frames) {
 }
 
 struct Run {
-    std::vector<FrameCost> costs;  // of 0 bits where the frame was dropped
+    std::vector<FrameCost> costs;  // 0 bits if the frame was dropped
     std::vector<Packet> packets;
     std::vector<Mesh> shown;
     std::vector<std::string> errors;
     double bits = 0;     // of all packets
-    double fullest = 0;  // the buffer's highest level over its capacity, from the packets
+    double fullest = 0;  // the buffer's highest level relative to its capacity, from the packets
     std::size_t frames_of(FrameType type) const {
         return static_cast<std::size_t>(std::count_if(
             costs.begin(), costs.end(), [&](const FrameCost& c) { return c.type == type && c.bits > 0; }));
@@ -138,7 +138,7 @@ TEST(EncoderRate, TheBytesAreTheSameForAnyNumberOfThreads) {
 }
 
 TEST(EncoderRate, FramesBecomePredictedOnesWhereTheBufferIsNearlyFull) {
-    // The I-frames fit, but the line does not carry the EP-frames even at the lowest quality.
+    // The I-frames fit, but the line cannot carry the EP-frames even at the lowest quality.
     const auto sequence = walking(30);
     const auto options = at_rate(80e3, 0.4);
     const auto run = coded_by(sequence, options);
@@ -166,7 +166,7 @@ TEST(EncoderRate, ADroppedFrameLeavesTheStreamSound) {
     SynthOptions large;
     large.vertices = 5000;
     auto other = synth_frame(large, 43);
-    other.mesh.colours.clear();  // which cannot refer to the I-frame
+    other.mesh.colours.clear();  // so it cannot refer to the I-frame
     sequence.frames[3] = {std::move(other.mesh), std::move(other.pose)};
     const auto run = coded_by(sequence, at_rate(150e3, 0.3));
     EXPECT_EQ(run.errors.size(), 1u);
@@ -183,7 +183,7 @@ TEST(EncoderRate, ADroppedFrameLeavesTheStreamSound) {
 }
 
 TEST(EncoderRate, ASceneChangeInTheMiddleIsAbsorbed) {
-    // From the middle on, everything is twice as large, which the skeleton does not say.
+    // From the middle on, everything is twice as large, which the skeleton does not show.
     auto sequence = walking(90);
     const std::size_t middle = sequence.frames.size() / 2;
     for (std::size_t f = middle; f < sequence.frames.size(); ++f)
@@ -256,7 +256,7 @@ double error_of(const Mesh& captured, const Mesh& shown) {
 
 TEST(TrackedRate, AFrameThatFitsNoBufferIsTheMotionAlone) {
     auto sequence = walking(15);
-    sequence.skeleton = {};  // without which a P-frame would be one rigid body
+    sequence.skeleton = {};  // without a skeleton a P-frame would be one rigid body
     for (auto& frame : sequence.frames) frame.pose.reset();
     const auto run = coded_by(sequence, at_rate(60e3, 0.5, Profile::tracked));
     EXPECT_TRUE(run.errors.empty());

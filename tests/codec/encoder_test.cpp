@@ -24,7 +24,7 @@ void expect_refused(const EncoderOptions& options, const char* what) {
 
 TEST(EncoderOptions, DefaultsAreLegal) { EXPECT_TRUE(Encoder::create({}).has_value()); }
 
-// Numbers of the list: OptionList.RangesEndWhereTheySay.
+// Numbers in the list are covered by OptionList.RangesEndWhereTheySay.
 TEST(EncoderOptions, OutOfRangeIsRefusedAndNamed) {
     const auto with = [](const std::function<void(EncoderOptions&)>& change) {
         EncoderOptions options = test::enhanced_options();
@@ -78,7 +78,7 @@ TEST(QualitySteps, HalveAsPromised) {
     EXPECT_EQ(quality_steps(500).geometry_step, 0.25);
 }
 
-// A frame that cannot be coded, among good ones.
+// A frame that cannot be coded, among valid ones.
 struct Fault {
     const char* message;
     std::function<void(SequenceFrame&)> make;
@@ -142,7 +142,7 @@ TEST(Encoder, AFrameThatCannotBeCodedIsNamedAndTheStreamGoesOnAsIfItHadNotBeen) 
                     const auto pushed = encoder->push(broken.mesh, &*broken.pose, 1000 * (t + 1));
                     ASSERT_FALSE(pushed.has_value());
                     EXPECT_EQ(pushed.error().kind, ErrorKind::bad_input);
-                    // Of the first frame the joint, or the mesh as a whole, may be what is found first.
+                    // In the first frame, either the joint or the mesh as a whole may be reported first.
                     EXPECT_TRUE(at == 0 || pushed.error().message.find(fault.message) != std::string::npos)
                         << pushed.error().message;
                 }

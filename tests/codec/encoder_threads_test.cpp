@@ -1,5 +1,5 @@
 // The same input and options give the same bytes for any number of threads: every kind of frame, every way to choose
-// them, rate control in one pass and two, with and without skeleton.
+// them, rate control in one pass and two, with and without a skeleton.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -79,7 +79,7 @@ TEST(EncoderThreads, FramesChosenByRateAndDistortion) {
     EXPECT_NE(frames_of(coded, FrameType::enhanced), frames_of(unchosen, FrameType::enhanced));
 }
 
-// Tasks one after the other, the last first.
+// Runs the tasks one after another, the last first.
 void in_reverse(std::size_t tasks, const std::function<void(std::size_t)>& task) {
     for (std::size_t t = tasks; t-- > 0;) task(t);
 }

@@ -14,7 +14,7 @@ LatticePoint random_point(std::mt19937& random, std::int32_t reach) {
     return {between(random, -reach, reach), between(random, -reach, reach), between(random, -reach, reach)};
 }
 
-// Three bones, the last far away from every vertex: it is bare.
+// Three bones; the last is far away from every vertex, so it has none.
 ReferenceMesh random_reference(std::size_t vertices, std::mt19937& random) {
     LatticeMesh mesh;
     for (std::size_t i = 0; i < vertices; ++i) mesh.positions.push_back(random_point(random, 3000));
@@ -78,7 +78,7 @@ TEST(ReferenceVertices, OfTheBoneAreTheNearestOfItsSubMeshOrOfAllWhereItIsBare) 
                 if (bare || c.reference.bone_of_vertex[r] == bone)
                     best = std::min(best, distance(c.predicted[r], c.frame[k]));
             EXPECT_TRUE(bare || c.reference.bone_of_vertex[found[k]] == bone);
-            // The search runs in the reference's own space: predicted vertices are rounded there, by a unit at most.
+            // The search runs in the reference's own space: predicted vertices are rounded there, by at most one unit.
             ASSERT_NEAR(distance(c.predicted[found[k]], c.frame[k]), best, 2.0);
         }
     }

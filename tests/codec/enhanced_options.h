@@ -1,5 +1,5 @@
-// Options of the topology profile that code an EP-frame wherever there is a reference, also where an I-frame would take
-// fewer bits: for tests that are about EP-frames.
+// Options of the topology profile that code an EP-frame whenever there is a reference, even if an I-frame would take
+// fewer bits: for tests about EP-frames.
 #pragma once
 
 #include "htvm/encoder_options.hpp"

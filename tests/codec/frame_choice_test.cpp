@@ -1,4 +1,4 @@
-// Which kind of frame a frame becomes (paper, section III-B, and past it).
+// Which kind of frame a frame becomes (paper, section III-B, and beyond it).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 using namespace test;
 using enum FrameType;
 
-// One captured person, carried along x by so many millimetres in each frame, skeleton and all.
+// One captured person, moved along x by the given millimetres in each frame, including the skeleton.
 TestSequence carried(const std::vector<double>& places) {
     SynthOptions options;
     options.vertices = 1200;
@@ -69,7 +69,7 @@ TEST(ChoiceByMotion, CodesAfterAllWhatDoesNotFitTheCapture) {
     EXPECT_EQ(types_of(encode(sequence, unchecked)), (std::vector{intra, predicted, predicted}));
 }
 
-// A person who walks, as the synthetic capture has it.
+// A walking person, from the synthetic capture.
 TestSequence on_foot(int frames, double size = 1) {
     SynthOptions options;
     options.vertices = 1500;
@@ -99,7 +99,7 @@ TEST(ChoiceOfTheCheaper, IsIntraFramesAsTheyAreAloneWhereNoSkeletonHelps) {
 
 TEST(ChoiceOfTheCheaper, TakesNoMoreBitsThanIntraFrames) {
     const auto person = on_foot(12);
-    auto strangers = person;  // nothing of one frame helps with the next
+    auto strangers = person;  // no frame helps to predict the next
     for (std::size_t f = 0; f < strangers.frames.size(); ++f)
         for (auto& p : strangers.frames[f].mesh.positions)
             p[0] += 30 * std::sin(p[1] * (0.05F + 0.013F * static_cast<float>(f)));
@@ -109,7 +109,7 @@ TEST(ChoiceOfTheCheaper, TakesNoMoreBitsThanIntraFrames) {
         auto alone = options;
         alone.key_interval = 1;
         const auto chosen = encode(sequence, options);
-        // Where EP-frames do not pay, what is left to lose is the finer I-frame that one is tried against.
+        // If EP-frames do not pay off, the only remaining loss is the finer I-frame against which one is tried.
         EXPECT_LE(static_cast<double>(chosen.bytes.size()),
                   1.01 * static_cast<double>(encode(sequence, alone).bytes.size()));
         return types_of(chosen);
@@ -171,7 +171,7 @@ TEST(SceneChanges, AreMoreThanATenthOfEitherSurfaceFarFromTheOther) {
 TEST(ChoiceByCost, TakesAPredictedFrameWhereNothingButThePlaceChanged) {
     EncoderOptions options = test::enhanced_options();
     options.topology.frame_choice = FrameChoice::rate_distortion;
-    options.geometry_step = 8;  // beside which the registration's own error is small
+    options.geometry_step = 8;  // the registration's own error is small compared to this
     auto sequence = carried({0, 30, 60});
     for (auto& frame : sequence.frames) frame.mesh.colours.clear();
     EXPECT_EQ(types_of(encode(sequence, options)), (std::vector{intra, predicted, predicted}));
@@ -193,7 +193,7 @@ TEST(ChoiceByCost, IsNeverWorseThanIntraFramesAtTheSameQuality) {
         const auto plain = encode(sequence, options);
         ASSERT_EQ(chosen.reconstructions.size(), plain.reconstructions.size());
         for (std::size_t t = 0; t < sequence.frames.size(); ++t) {
-            // 5 % is allowed, and the encoder looks at samples.
+            // 5 % is allowed, and the encoder estimates from samples.
             EXPECT_LT(errors_of(chosen, t).geometry_rms, 1.12 * errors_of(plain, t).geometry_rms) << "frame " << t;
             EXPECT_LT(errors_of(chosen, t).colour_rms, 1.12 * errors_of(plain, t).colour_rms) << "frame " << t;
         }

@@ -1,4 +1,4 @@
-// The table of frame kinds holds what the streams do.
+// The table of frame kinds agrees with what the streams do.
 #include "codec/frame_kinds.h"
 
 #include <gtest/gtest.h>

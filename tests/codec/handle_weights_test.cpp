@@ -84,18 +84,18 @@ TEST(SmoothWeights, FallInAStraightLineFromTheMiddleOfTheEdgesAcrossTheBorder) {
     const auto patch = grid(8, 1, 10);  // no triangles: a strip needs two rows
     EXPECT_EQ(weights_on(patch, {0, 0, 0, 0, 1, 1, 1, 1}, 80),
               (HandleWeights{alone(0), alone(0), alone(0), alone(0), alone(1), alone(1), alone(1), alone(1)}));
-    // Columns 0..3 belong to handle 0, 4..7 to handle 1: the border is half way, at 35.
+    // Columns 0..3 belong to handle 0, 4..7 to handle 1: the border is halfway, at 35.
     const auto strip = grid(8, 2, 10);
     Handles own;
     for (int row = 0; row < 2; ++row) own.insert(own.end(), {0, 0, 0, 0, 1, 1, 1, 1});
     const auto weights = weights_on(strip, own, 80);
-    // 1/2 - distance / width, in 4096ths: at 5, 15, 25, 35 from the border.
+    // 1/2 - distance / width, in 1/4096: at 5, 15, 25, 35 from the border.
     const std::vector<std::uint16_t> other = {256, 768, 1280, 1792};
     for (std::size_t c = 0; c < 4; ++c) {
         EXPECT_EQ(weights[c], (VertexWeights{{0, 1}, {static_cast<std::uint16_t>(4096 - other[c]), other[c]}})) << c;
         EXPECT_EQ(weights[7 - c], (VertexWeights{{1, 0}, {static_cast<std::uint16_t>(4096 - other[c]), other[c]}}));
     }
-    // Half as wide: the columns at 25 and 35 from the border are out of it.
+    // Half as wide: the columns at 25 and 35 from the border are outside.
     const auto narrow = weights_on(strip, own, 40);
     EXPECT_EQ(narrow[1], alone(0));
     EXPECT_EQ(narrow[2], (VertexWeights{{0, 1}, {3584, 512}}));
@@ -124,7 +124,7 @@ TEST(SmoothWeights, AreTheSameMirrored) {
     const auto patch = grid(6, 2, 10);
     const auto weights = weights_on(patch, {0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1}, 50);
     for (std::size_t c = 0; c < 6; ++c)
-        EXPECT_EQ(weight_of(weights[c], 0), weight_of(weights[11 - c], 1)) << c;  // turned by half a circle
+        EXPECT_EQ(weight_of(weights[c], 0), weight_of(weights[11 - c], 1)) << c;  // turned by 180 degrees
 }
 
 TEST(SmoothWeights, AreEqualThirdsWhereThreeHandlesMeetFarFromTheWidth) {
@@ -137,7 +137,7 @@ TEST(SmoothWeights, AreEqualThirdsWhereThreeHandlesMeetFarFromTheWidth) {
 }
 
 TEST(SmoothWeights, KeepTheFourNearestHandlesOfMany) {
-    // A strip of columns with a handle each.
+    // A strip of columns, each with its own handle.
     const auto patch = grid(9, 2, 10);
     Handles own;
     for (int row = 0; row < 2; ++row)
@@ -194,7 +194,7 @@ TEST(SmoothWeights, AreSoundOnHostileMeshesForAnyNumberOfThreads) {
 }
 
 TEST(SmoothWeights, AreExactShortestPathsAlthoughVerticesRememberFewHandles) {
-    // Against Floyd and Warshall's paths, on small random meshes with many handles.
+    // Compared with the paths by Floyd and Warshall, on small random meshes with many handles.
     std::mt19937 random(12);
     for (int round = 0; round < 60; ++round) {
         const std::uint32_t n = 12;

@@ -1,4 +1,4 @@
-// Bytes as a hostile or damaged source would give them.
+// Bytes as from a hostile or damaged source.
 #pragma once
 
 #include <cstddef>
@@ -10,8 +10,8 @@
 
 namespace htvm::hostile {
 
-// Calls decode(bytes) on every beginning of the bytes (of long ones, on some 400), on many copies with a few flipped
-// bits, and on pure noise. Whatever decode gives is right: it must only come back.
+// Calls decode(bytes) on every prefix of the bytes (for long ones, on about 400), on many copies with a few flipped
+// bits, and on pure noise. Any result of decode is right, as long as it returns.
 template <class Decode>
 void try_everything(const std::vector<std::uint8_t>& bytes, const Decode& decode, int flips = 400) {
     const std::size_t stride = bytes.size() / 400 + 1;

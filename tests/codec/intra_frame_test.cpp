@@ -59,7 +59,7 @@ TEST(IntraFrame, PositionsOffTheLatticeAreRefused) {
     EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt_stream);
 }
 
-// A coder that gives back whatever the test wants.
+// A coder that returns whatever the test wants.
 ExternalIntraCoder coder_of(const LatticeMesh& mesh) {
     return {7, "test", [](const LatticeMesh&) { return std::vector<std::uint8_t>{1}; },
             [mesh](std::span<const std::uint8_t>) { return mesh; }};

@@ -11,7 +11,7 @@ namespace {
 
 using Edge = std::set<std::uint32_t>;
 
-// What every row promises: distinct, earlier, adjacent, bounded.
+// What holds for every row: distinct, earlier, adjacent, bounded.
 void expect_rows_hold(const intra_test::Connectivity& mesh, const Neighbours& neighbours) {
     ASSERT_EQ(neighbours.vertex_count(), mesh.vertex_count);
     std::vector<std::size_t> rank_of(mesh.vertex_count, mesh.vertex_count);

@@ -64,7 +64,7 @@ inline std::vector<Connectivity> awkward() {
     return out;
 }
 
-// Points near a sloping plane; every fifth set spans the whole lattice, corners included.
+// Points near a sloping plane; every fifth set spans the whole lattice, including its corners.
 inline std::vector<LatticePoint> points(std::size_t count, unsigned seed) {
     std::mt19937 random(seed);
     std::vector<LatticePoint> out(count);

@@ -1,4 +1,4 @@
-// What a decoder refuses as too large, and that no mesh, however regular, falls below the least size of a payload.
+// What a decoder refuses as too large; and no mesh, however regular, takes less than the least size of a payload.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,13 +19,15 @@ const CodedSequence& stream() {
     return coded;
 }
 
-// The errors that the stream meets under these options, all of kind limit.
+// The errors that the stream causes under these options, all of kind limit.
 std::vector<std::string> refusals(const DecoderOptions& options) {
     std::vector<std::string> out;
     Decoder decoder(options);
     for (const auto& packet : stream().packets) {
         const auto frame = decoder.push(packet);
-        if (frame || frame.error().kind == ErrorKind::corrupt_stream) continue;  // for want of what was refused
+        if (frame || frame.error().kind == ErrorKind::corrupt_stream)
+            continue;  // because it depends on what was
+                       // refused
         EXPECT_EQ(frame.error().kind, ErrorKind::limit);
         out.push_back(frame.error().message);
     }
@@ -112,7 +114,7 @@ TEST(Limits, DracoIsNotAskedForMoreThanTheFramesHeaderSays) {
     }
 }
 
-// A sheet of squares, still: next to nothing is to be said of it.
+// A sheet of squares that does not move, so that there is next to nothing to code.
 TestSequence flat_sheet(std::uint32_t side, int frames) {
     TestSequence out{"flat sheet", {}, {}};
     const auto shape = tfan_test::grid(side, side);

@@ -1,5 +1,5 @@
-// Lost P- and EP-frames cost nobody but themselves, and what stands in for them is what the format says; frames of
-// both kinds that contradict themselves are refused.
+// Lost P- and EP-frames affect no other frames, and their stand-ins are as the format says; inconsistent frames of both
+// kinds are refused.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ std::map<std::uint32_t, Mesh> by_number(const DecodedSequence& decoded) {
     return out;
 }
 
-// Two groups of five frames: I, then P-frames and EP-frames, all or in part.
+// Two groups of five frames: I, then P-frames and EP-frames, whole or in part.
 const CodedSequence& ten_frames() {
     static const CodedSequence coded = [] {
         auto sequence = walking(10, 500);
@@ -252,7 +252,7 @@ TEST(Predicted, OtherCountsThanTheReferenceMeshsAreRefused) {
         const auto frame = decoder.push(packet);
         ASSERT_FALSE(frame.has_value());
         EXPECT_EQ(frame.error().kind, ErrorKind::corrupt_stream);
-        // The sound one is still welcome.
+        // The undamaged one is still accepted.
         const auto again = decoder.push(packets[at]);
         ASSERT_TRUE(again.has_value() && again->has_value());
         expect_same_mesh((**again).mesh, ten_frames().reconstructions[packets[at].frame]);

@@ -17,14 +17,14 @@ std::size_t sum(const std::vector<std::uint32_t>& counts) {
     return std::accumulate(counts.begin(), counts.end(), std::size_t{0});
 }
 
-// Of a reference mesh without triangles, which says nothing of its vertices.
+// For a reference mesh without triangles, which tells nothing about its vertices.
 MappingPrior plain(std::size_t references) { return make_mapping_prior(std::vector<LatticePoint>(references), {}); }
 
 std::vector<std::uint8_t> encode_plain(const std::vector<std::uint32_t>& counts) {
     return encode_mapping(counts, plain(counts.size()));
 }
 
-// Triangles and positions without any sense: degenerate, duplicate, with many round one vertex.
+// Random triangles and positions: degenerate, duplicate, with many around one vertex.
 MappingPrior random_prior(std::mt19937& random, std::size_t references) {
     std::vector<LatticePoint> positions(references);
     for (auto& p : positions) {
@@ -75,7 +75,7 @@ TEST(Mapping, OneResidualEachCostsNextToNothing) {
 }
 
 TEST(Mapping, StaysBelowTheBoundOfThePaper) {
-    // Section IV-C3: a bit a node, N_I + N_t nodes; adaptive coding may add a little.
+    // Section IV-C3: one bit per node, N_I + N_t nodes; adaptive coding may add a little.
     std::mt19937 random(2);
     std::vector<std::uint32_t> counts(10000);
     for (auto& n : counts) n = below(random, 2) + below(random, 2);
@@ -83,12 +83,12 @@ TEST(Mapping, StaysBelowTheBoundOfThePaper) {
 }
 
 TEST(Mapping, AreasAreClassedAgainstTheirMean) {
-    // A small and a large triangle: areas 50 and 5000, so that the corners have 0.02 and 1.98 of the mean.
+    // A small and a large triangle: areas 50 and 5000, so the corners have 0.02 and 1.98 times the mean.
     const std::vector<LatticePoint> positions = {{0, 0, 0}, {10, 0, 0},  {0, 10, 0},
                                                  {0, 0, 5}, {100, 0, 5}, {0, 100, 5}};
     const auto prior = make_mapping_prior(positions, std::vector<Triangle>{{0, 1, 2}, {3, 4, 5}});
     EXPECT_EQ(prior.area_class, (std::vector<std::uint8_t>{0, 0, 0, 8, 8, 8}));
-    // Each corner's next corner, where its index is lower.
+    // The next corner of each corner, if its index is lower.
     EXPECT_EQ(prior.first_neighbour, (std::vector<std::uint32_t>{0, 0, 0, 1, 1, 1, 2}));
     EXPECT_EQ(prior.neighbours, (std::vector<std::uint32_t>{0, 3}));
 }

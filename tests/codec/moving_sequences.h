@@ -1,4 +1,4 @@
-// Sequences of which some bones move and others hardly, for P-frames and motion-based coding.
+// Sequences in which some bones move and others hardly do, for P-frames and motion-based coding.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ inline TestSequence walking(int frames, int vertices, int first = 40) {
     return out;
 }
 
-// The sequence with a skeleton like six spokes, three of which move by 100 mm a frame.
+// The sequence with a skeleton like six spokes, three of which move by 100 mm per frame.
 inline TestSequence with_spokes(TestSequence sequence) {
     sequence.name += ", with spokes";
     auto& skeleton = sequence.skeleton;
@@ -68,7 +68,7 @@ inline std::size_t frames_of(const CodedSequence& coded, FrameType type) {
                                                   [&](const FrameInfo& info) { return info.type == type; }));
 }
 
-// Whatever moved less than this is animated, however badly it fits.
+// Everything that moved less than this is animated, however badly it fits.
 inline EncoderOptions motion_based(double still_below, int key_interval = 4) {
     EncoderOptions options = test::enhanced_options();
     options.key_interval = key_interval;

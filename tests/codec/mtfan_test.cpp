@@ -14,7 +14,7 @@ namespace {
 using tfan_test::as_multiset;
 using tfan_test::TestMesh;
 
-// What encode_mtfan promises, checked on one mesh.
+// Checks everything that encode_mtfan promises on one mesh.
 void expect_comes_back(const TestMesh& mesh, int m, unsigned seed) {
     SCOPED_TRACE(mesh.name + " with m = " + std::to_string(m));
     const auto positions = tfan_test::positions_of(mesh, seed);
@@ -44,7 +44,7 @@ TEST(Mtfan, VerticesKeepTheirNumbers) {
 }
 
 TEST(Mtfan, TheDistanceOrderCountsOnlyVerticesNotYetVisited) {
-    // From vertex 0, the others are ever farther: each is the nearest of those that are left.
+    // Seen from vertex 0, the others are increasingly far: each is the nearest of those left.
     const std::vector<LatticePoint> positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {-3, 0, 0}, {0, -4, 0}};
     const std::vector<Triangle> triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}};
     EXPECT_EQ(encode_mtfan(positions, triangles, 4, {}).distance_order_counts,

@@ -1,5 +1,5 @@
-// The list of options: each can be read and set within its range and no further, does something, and what cannot go
-// together is refused.
+// The list of options: each can be read and set within its range and not beyond, has an effect, and combinations that
+// contradict each other are refused.
 #include "htvm/option_list.hpp"
 
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ Profile profile_of(const Option& option) {
 
 double default_of(const Option& option) { return option.get(default_options(profile_of(option))); }
 
-// Legal values, those that differ little from the default first.
+// Legal values, beginning with those that differ little from the default.
 std::vector<double> values_of(const Option& option) {
     std::vector<double> out;
     if (option.kind == OptionKind::on_or_off) return {0, 1};
@@ -219,8 +219,8 @@ TEST(Profiles, ThePapersDifferFromTopologyInFourChoices) {
             << option.name;
 }
 
-// Options that let others show: coarse steps at which vertices coincide, a bitrate, an error, parts and frames that are
-// animated, I-frames by motion.
+// Settings under which other options have an effect: coarse steps at which vertices coincide, a bitrate, an error,
+// animated parts and frames, I-frames by motion.
 std::vector<EncoderOptions> settings_for(const Option& option) {
     auto usual = default_options(profile_of(option));
     usual.key_interval = 6;
@@ -240,18 +240,18 @@ std::vector<EncoderOptions> settings_for(const Option& option) {
     return out;
 }
 
-// The bytes, or nothing where the options do not go together.
+// The bytes; nothing if the options contradict each other.
 std::optional<std::vector<std::uint8_t>> bytes_by(const TestSequence& sequence, const EncoderOptions& options) {
     if (!Encoder::create(options)) return {};
     return encode(sequence, options).bytes;
 }
 
 TEST(OptionList, EveryOptionChangesTheBytesButThreads) {
-    // A person moves, and is two metres away in the last frame: the scene changes.
+    // A person moves, and is two metres away in the last frame: a scene change.
     auto sequence = walking(5, 300);
     for (auto& frame : sequence.frames) {
         frame.mesh.normals.clear();
-        frame.mesh.texcoords.clear();  // with them I-frames are not simplified, and no two vertices are the same
+        frame.mesh.texcoords.clear();  // otherwise I-frames are not simplified, and no two vertices are equal
     }
     for (auto& p : sequence.frames.back().mesh.positions) p[0] += 2000;
     for (const auto& option : option_list()) {

@@ -144,7 +144,7 @@ TEST(PacketReader, APacketInsideADamagedOneIsFound) {
     EXPECT_EQ(frames(read(reader, bytes)), (std::vector<std::uint32_t>{2, 3}));
 }
 
-// A header that is sound and promises `size` bytes.
+// A valid header that promises `size` bytes.
 Bytes header_for(std::uint32_t size) {
     auto bytes = write_packet(packet_of(9, 0));
     bytes.resize(32);
@@ -158,7 +158,7 @@ Bytes header_for(std::uint32_t size) {
 }
 
 TEST(PacketReader, HeadersThatEachClaimAllThatFollowsTakeLinearTime) {
-    // Every header's CRC is right and its payload's is not: checked one by one, this would take hours.
+    // Every header's CRC is right and its payload's is wrong: checked one by one, this would take hours.
     constexpr std::uint32_t headers = 300000;
     Bytes bytes;
     for (std::uint32_t i = 0; i < headers; ++i) append(bytes, header_for((headers - i - 1) * 32));

@@ -1,5 +1,5 @@
-// What each profile takes and what it loses on small captures, as tests/data/pinned_rates.txt has it, so that a change
-// of rate or error shows in a diff. Where a change is meant, write the table anew and commit it:
+// The sizes and errors of each profile on small captures, compared with tests/data/pinned_rates.txt, so that a change
+// of rate or error shows in a diff. If a change is intended, rewrite the table and commit it:
 //   HTVM_WRITE_PINNED_RATES=1 build/release/test_codec --gtest_filter='PinnedRates.*'
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ const char* const heading =
     "# root mean square over all frames. Written by tests/codec/pinned_rates_test.cpp.\n"
     "# capture          profile      I  bytes   EP  bytes    P  bytes    T  bytes   stream     mm  levels\n";
 
-// Five frames of the synthetic person that begins to walk.
+// Five frames of the synthetic person as it begins to walk.
 std::vector<TestSequence> captures() {
     SynthOptions options;
     options.vertices = 800;

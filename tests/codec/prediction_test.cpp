@@ -80,7 +80,7 @@ TEST(Prediction, EachBoneMovesItsOwnVerticesAboutItsPivot) {
     EXPECT_EQ(normals[1], reference.mesh.normals[1]);
 }
 
-// The vertices of two_bones() in one strip, so that the bones share them.
+// The vertices of two_bones() in one strip, so that the bones share vertices.
 ReferenceMesh two_bones_that_share() {
     auto reference = two_bones();
     reference.weights = {
@@ -145,10 +145,12 @@ TEST(Prediction, OfSharedVerticesNeverLeavesTheLattice) {
         for (auto& p : reference.mesh.positions) p = corner(lattice_limit);
         for (auto& p : reference.pivots) p = corner(lattice_limit);
         std::vector<QuantisedTransform> transforms(3);
-        for (auto& t : transforms) t = {random_rotation(random), corner(2 * lattice_limit)};  // the most of a stream
+        for (auto& t : transforms)
+            t = {random_rotation(random), corner(2 * lattice_limit)};  // the largest that a
+                                                                       // stream can hold
         const auto moved = predict_positions(reference, transforms, {});
         for (const auto p : moved) ASSERT_TRUE(on_lattice(p));
-        // Where the sum overflowed, it would land on the other side.
+        // If the sum overflowed, it would end up on the other side.
         const double x =
             0.75 * (real(transforms[0].rotation) * real(reference.mesh.positions[0] - reference.pivots[0]) +
                     real(reference.pivots[0]) + real(transforms[0].shift))
@@ -196,7 +198,7 @@ TEST(Move, NeverLeavesTheLattice) {
             auto c = [&] { return test::below(random, 2) ? lattice_limit : -lattice_limit; };
             return LatticePoint{c(), c(), c()};
         };
-        const auto shift = corner() + corner();  // the most that a stream can say
+        const auto shift = corner() + corner();  // the largest that a stream can hold
         EXPECT_TRUE(on_lattice(move(corner(), rotation_matrix(random_rotation(random)), corner(), shift)));
     }
 }

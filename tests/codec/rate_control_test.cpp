@@ -17,7 +17,7 @@ struct Capture {
     double enhanced_bits = 200e3;  // at quality 50
     double intra_times = 2.5;
     double slope = 0.04;
-    int jump_at = -1;  // from here on the content costs twice the bits
+    int jump_at = -1;  // from here on, the content takes twice the bits
     int forced_percent = 0;
     int predicted_percent = 0;
     int frames = 300;
@@ -25,10 +25,11 @@ struct Capture {
 };
 
 struct Outcome {
-    double bits = 0, fullest = 0;  // total; the buffer's highest level over its capacity
-    double steepest = 0;           // quality change between consecutive EP-frames after the 60th frame
+    double bits = 0, fullest = 0;  // total; the buffer's highest level relative to its capacity
+    double steepest = 0;           // largest quality change between consecutive EP-frames after the 60th frame
     double lowest = 1000, highest = -1000;
-    double intra_apart = 0;  // most between an I-frame's quality and the EP-frame's before it, after the 60th frame
+    double intra_apart = 0;  // largest difference between an I-frame's quality and that of the EP-frame before it,
+                             // after the 60th frame
     int most_calls = 0;
 };
 
@@ -86,7 +87,7 @@ double target_of(const Capture& c, const RateControlOptions& options) {
     return options.bits_per_second / options.frames_per_second * c.frames;
 }
 
-// What a first pass at quality 50 finds; its noise is not the second pass's.
+// What a first pass at quality 50 finds; its noise differs from that of the second pass.
 std::vector<FrameCost> first_pass_of(const Capture& c) {
     std::mt19937 random(11), type_random(3);
     std::vector<FrameCost> costs;

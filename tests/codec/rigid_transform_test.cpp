@@ -29,7 +29,8 @@ TEST(QuantisedRotation, NoneIsTheIdentity) {
 }
 
 TEST(QuantisedRotation, IsWithinTwoQuantaOfTheRotation) {
-    // Each of three components is off by half of 2^-13 at most, against a largest of 1: sqrt(3) 2^-13 rad at most.
+    // Each of three components is off by at most half of 2^-13, relative to a largest component of 1: at most sqrt(3)
+    // 2^-13 rad.
     std::mt19937 random(1);
     for (int i = 0; i < 20000; ++i) {
         const auto q = random_quaternion(random);
@@ -53,7 +54,7 @@ TEST(QuantisedRotation, TheSignAndLengthOfTheQuaternionDoNotMatter) {
 TEST(QuantisedRotation, QuarterTurnsAreExact) {
     const auto m = rotation_matrix(quantise_rotation({1, 0, 0, 1}));  // about z
     EXPECT_EQ(rotate(m, {1000, 10, 3}), (LatticePoint{-10, 1000, 3}));
-    const auto half = rotation_matrix(quantise_rotation({0, 1, 0, 0}));  // half round about x
+    const auto half = rotation_matrix(quantise_rotation({0, 1, 0, 0}));  // 180 degrees about x
     EXPECT_EQ(rotate(half, {1, 2, 3}), (LatticePoint{1, -2, -3}));
 }
 

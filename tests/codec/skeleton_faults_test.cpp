@@ -1,5 +1,5 @@
-// What a tracker gets wrong costs bits, never correctness: errors at a given quality stay the same (paper, Fig. 20),
-// and what is animated without residuals is only what fits the capture.
+// A tracker's errors cost bits, never correctness: errors at a given quality stay the same (paper, Fig. 20), and only
+// what fits the capture is animated without residuals.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ struct Fault {
     std::function<void(Pose&, std::size_t frame, const Pose& first)> spoil;
 };
 
-// Joints of synth_skeleton() by name, so that the left limbs can be given for the right ones.
+// A joint of synth_skeleton() by name, so that left and right limbs can be swapped.
 std::size_t joint_named(const Skeleton& skeleton, const std::string& name) {
     const auto found = std::find(skeleton.joint_names.begin(), skeleton.joint_names.end(), name);
     EXPECT_NE(found, skeleton.joint_names.end()) << name;
@@ -37,7 +37,7 @@ std::vector<Fault> faults(const Skeleton& skeleton) {
          [](Pose& pose, std::size_t frame, const Pose&) {
              std::mt19937 random(static_cast<unsigned>(frame));
              for (auto& joint : pose.joints)
-                 for (auto& c : joint) c += between(random, -155, 155) / 10.0;  // even: variance 80
+                 for (auto& c : joint) c += between(random, -155, 155) / 10.0;  // uniform: variance 80
          }},
         {"left and right limbs swapped in every other frame",
          [mirrored](Pose& pose, std::size_t frame, const Pose&) {
@@ -56,7 +56,7 @@ std::vector<Fault> faults(const Skeleton& skeleton) {
     };
 }
 
-// Walking.
+// The synthetic person, walking.
 TestSequence walking(int frames) {
     SynthOptions options;
     options.vertices = 2000;
@@ -129,7 +129,7 @@ TEST(SkeletonFaults, NeverLetAnAnimatedFrameOrPartOfOneBeFartherOffThanAllowed) 
         }
         for (std::size_t t = 0; t < errors.size(); ++t)
             EXPECT_LE(errors[t], 1.2 * options.topology.animation_error)
-                << "frame " << t;  // asked by bone, measured by area
+                << "frame " << t;  // the limit is per bone, the measurement by area
         EXPECT_EQ(decode_packets(coded.packets).errors.size(), 0u);
     }
 }

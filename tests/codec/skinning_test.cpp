@@ -13,7 +13,7 @@ namespace {
 
 using test::between;
 
-// eq. 2, written down as it stands, in long double.
+// eq. 2 written down literally, in long double.
 long double by_equation_2(LatticePoint v, const BoneCylinder& bone) {
     using Real = long double;
     const Real ux = bone.second.x - bone.first.x, uy = bone.second.y - bone.first.y, uz = bone.second.z - bone.first.z;
@@ -125,7 +125,9 @@ TEST(Skinning, IsTheSameForAnyNumberOfThreads) {
 TEST(SubMeshes, HoldEveryVertexOnceByBoneAndAscending) {
     std::mt19937 random(4);
     std::vector<BoneIndex> bone_of(1000);
-    for (auto& bone : bone_of) bone = static_cast<BoneIndex>(test::below(random, 6) * 2);  // every second one is bare
+    for (auto& bone : bone_of)
+        bone = static_cast<BoneIndex>(test::below(random, 6) * 2);  // every second bone has no
+                                                                    // vertices
     const auto groups = group_by_bone(bone_of, 12);
     std::size_t total = 0;
     for (std::size_t bone = 0; bone < 12; ++bone) {

@@ -1,4 +1,4 @@
-// Sequences of meshes of every awkward kind, and their way through encoder, packets and decoder.
+// Sequences of awkward meshes of every kind, and their way through encoder, packets and decoder.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ struct TestSequence {
     std::vector<SequenceFrame> frames;
 };
 
-// The vertex's number as its colour: how a test knows it again.
+// The vertex's number as its colour, by which a test recognises it.
 inline Colour colour_of(std::size_t vertex) {
     return {static_cast<std::uint8_t>(vertex), static_cast<std::uint8_t>(vertex >> 8),
             static_cast<std::uint8_t>(vertex >> 16)};
@@ -60,7 +60,7 @@ inline void give_attributes(Mesh& mesh, unsigned which, unsigned seed) {
     }
 }
 
-// The connectivity with its own positions (or random ones), turned and shaken a little from frame to frame.
+// The connectivity with its own positions (or random ones), turned and perturbed a little from frame to frame.
 inline TestSequence sequence_of(const tfan_test::TestMesh& shape, int frames, unsigned attributes) {
     TestSequence out{shape.name, {}, {}};
     const auto positions = tfan_test::positions_of(shape, 11);
@@ -80,7 +80,8 @@ inline TestSequence sequence_of(const tfan_test::TestMesh& shape, int frames, un
     return out;
 }
 
-// A frame of the synthetic person with colours and normals. Kept: making it takes longer than most tests of it.
+// A frame of the synthetic person with colours and normals. Kept, since making it takes longer than most tests that use
+// it.
 inline SynthFrame synthetic_frame(int vertices, int frame) {
     static std::map<std::pair<int, int>, SynthFrame> made;
     const auto [entry, is_new] = made.try_emplace({vertices, frame});
@@ -106,7 +107,7 @@ inline TestSequence synthetic(bool skeleton, int frames, int vertices = 1500) {
     return out;
 }
 
-// Captures as they should not be, but are.
+// Captures with defects that occur in practice.
 inline std::vector<TestSequence> make_awkward_sequences() {
     std::vector<TestSequence> out;
     unsigned attributes = 0;

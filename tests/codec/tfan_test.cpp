@@ -14,7 +14,7 @@ namespace {
 using tfan_test::as_multiset;
 using tfan_test::TestMesh;
 
-// What encode_tfan promises, checked on one mesh.
+// Checks everything that encode_tfan promises on one mesh.
 void expect_comes_back(const TestMesh& mesh) {
     SCOPED_TRACE(mesh.name);
     const auto encoded = encode_tfan(mesh.vertex_count, mesh.triangles);

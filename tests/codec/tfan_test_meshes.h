@@ -20,10 +20,10 @@ struct TestMesh {
     std::string name;
     std::uint32_t vertex_count = 0;
     std::vector<Triangle> triangles;
-    std::vector<LatticePoint> positions;  // empty: random_positions() serves
+    std::vector<LatticePoint> positions;  // empty: random_positions() are used
 };
 
-// Triangles turned so that the lowest rotation comes first, sorted.
+// Triangles rotated so that the lowest corner comes first, then sorted.
 inline std::vector<Triangle> as_multiset(std::vector<Triangle> triangles) {
     for (auto& t : triangles) t = std::min({t, Triangle{t[1], t[2], t[0]}, Triangle{t[2], t[0], t[1]}});
     std::sort(triangles.begin(), triangles.end());
@@ -96,7 +96,7 @@ inline TestMesh fan(std::uint32_t count, bool closed) {
     return mesh;
 }
 
-// Random triangles that all share two vertices' worth of hubs.
+// Random triangles that all share two hub vertices.
 inline TestMesh shuffled_hub(std::uint32_t count) {
     std::mt19937 random(9);
     TestMesh mesh{"shuffled hub", count, {}, {}};
@@ -172,7 +172,7 @@ inline std::vector<LatticePoint> positions_of(const TestMesh& mesh, unsigned see
     return positions;
 }
 
-// Cut short, a bit flipped, or a byte replaced.
+// Truncated, with a flipped bit, or with a replaced byte.
 inline std::vector<std::uint8_t> damage(std::vector<std::uint8_t> bytes, std::mt19937& random) {
     if (bytes.empty()) return bytes;
     const auto at = random() % bytes.size();

@@ -1,4 +1,4 @@
-// T-frames at the decoder: what they may refer to, and meshes that are hard on the nodes.
+// T-frames in the decoder: what they may refer to, and meshes that are hard cases for the nodes.
 #include <gtest/gtest.h>
 
 #include "codec/enhanced_options.h"
@@ -24,7 +24,7 @@ TEST(TrackedDecoder, DecodesFramesFromTheIntraFrameAndFromTheFrameBefore) {
 }
 
 TEST(TrackedDecoder, ALostFrameCostsThoseThatReferToIt) {
-    auto packets = tracked_person();  // header, I, T from I, T from the one before, T from the one before, T from I
+    auto packets = tracked_person();  // header, I, T from I, T from the previous one, T from the previous one, T from I
     packets.erase(packets.begin() + 3);
     const auto decoded = decode_packets(packets);
     EXPECT_EQ(decoded.errors.size(), 1u);
@@ -51,8 +51,7 @@ TEST(TrackedDecoder, AHeaderWithoutNodesAllowsNoTrackedFrames) {
     EXPECT_EQ(decode_packets(packets).errors.size(), 4u);
 }
 
-// Rays that end nearer and nearer to a hub, all of them nodes; behind the hub, as far from the rays as the hub, a
-// crowd.
+// Rays that end nearer and nearer to a hub, all of them nodes; behind the hub, as far from it as the rays are, a crowd.
 LatticeMesh star(std::uint32_t rays, std::uint32_t crowd) {
     LatticeMesh mesh;
     for (std::uint32_t i = 0; i < rays; ++i) mesh.positions.push_back({static_cast<std::int32_t>(4 * rays - i), 0, 0});
@@ -62,7 +61,7 @@ LatticeMesh star(std::uint32_t rays, std::uint32_t crowd) {
 }
 
 TEST(TrackedDecoder, AStarDoesNotMakeEveryNodeSearchTheCrowdBehindItsHub) {
-    // Each ray may reach the hub and the crowd, but not the next ray: 4 * 900 at most against twice 3 * 900.
+    // Each ray may reach the hub and the crowd, but not the next ray: at most 4 * 900 against twice 3 * 900.
     const auto mesh = star(900, 100000);
     DeformationNodeOptions options;
     options.spacing = 3600;

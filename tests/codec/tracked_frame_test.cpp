@@ -76,7 +76,7 @@ TEST(TrackedFrames, TakeAFractionOfTheBitsForTheSameSurface) {
         for (std::size_t t = 1; t < 5; ++t) {
             EXPECT_EQ(coded.infos[t].type, FrameType::tracked);
             EXPECT_LT(coded.infos[t].bytes.total() * 2, enhanced.infos[t].bytes.total());
-            // At 30 mm between vertices and 1.5 mm of noise in every frame; the frames are some 30 mm apart.
+            // With 30 mm between vertices and 1.5 mm of noise in every frame; consecutive frames are about 30 mm apart.
             EXPECT_LT(surface_error(coded.reconstructions[t], sequence.frames[t].mesh), 4);
             EXPECT_GT(surface_error(coded.reconstructions[0], sequence.frames[t].mesh), 4);
         }
@@ -150,7 +150,7 @@ TEST(TrackedFrames, ThatAreLostAreConcealedByTheLastOne) {
 
 TEST(TrackedFrames, GiveWayToAnIntraFrameWhereTheSurfaceIsAnother) {
     auto sequence = walking(4, false);
-    for (std::size_t t = 2; t < 4; ++t) {  // another person stands beside the first
+    for (std::size_t t = 2; t < 4; ++t) {  // another person stands next to the first
         auto& mesh = sequence.frames[t].mesh;
         const auto one = mesh;
         for (const auto& p : one.positions) mesh.positions.push_back({p[0] + 1500, p[1], p[2]});
@@ -167,7 +167,8 @@ TEST(TrackedFrames, GiveWayToAnIntraFrameWhereTheSurfaceIsAnother) {
     EXPECT_EQ(types, (std::vector{FrameType::intra, FrameType::tracked, FrameType::intra, FrameType::tracked}));
 }
 
-// A stream's first two frames, an I-frame and a T-frame that refers to it, as the decoder works on them.
+// The first two frames of a stream, an I-frame and a T-frame that refers to it, in the form in which the decoder
+// processes them.
 struct FirstTrackedFrame {
     TrackedReference reference;
     std::vector<std::uint8_t> payload;

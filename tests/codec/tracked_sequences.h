@@ -1,4 +1,4 @@
-// Streams of T-frames that no encoder would write: any mesh, moved, displaced and recoloured by chance.
+// Streams of T-frames that no encoder would write: any mesh, randomly moved, displaced and recoloured.
 #pragma once
 
 #include <algorithm>
@@ -15,12 +15,12 @@ namespace htvm::test {
 using namespace internal;
 
 struct ChanceMotion {
-    double turn = 300, shift = 400;  // of a node's transform beside the common one, in quanta and lattice units
+    double turn = 300, shift = 400;  // of a node's transform relative to the common one, in quanta and lattice units
     double displacement = 60, colour = 20;
     FieldOptions fields;
 };
 
-// before: of the frame that it refers to, or null.
+// before: state of the frame that it refers to, or null.
 inline FramePayload tracked_by_chance(const TrackedReference& reference, const TrackedState* before,
                                       const ChanceMotion& motion, std::mt19937& random) {
     const auto number = [&](double size) {
@@ -63,7 +63,7 @@ inline FramePayload tracked_by_chance(const TrackedReference& reference, const T
     return out;
 }
 
-// A stream of I-frames with a few T-frames after each: from the I-frame, twice from the frame before, once more from
+// A stream of I-frames with a few T-frames after each: one from the I-frame, two from the previous frame, one more from
 // the I-frame. node_spacing: lattice units. first: the number of the first frame.
 inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra, std::int32_t node_spacing,
                                                const ChanceMotion& motion, std::uint32_t first, unsigned seed) {

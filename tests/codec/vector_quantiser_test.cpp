@@ -44,7 +44,7 @@ std::vector<Source> sources() {
     return out;
 }
 
-// The bits of a choice by the code lengths: what the quantiser weighs. An escape adds its components'.
+// The bits of a choice by the code lengths, as the quantiser counts them. An escape adds those of its components.
 double bits_of(const Codebook& codebook, std::size_t index, const ResidualVector& value) {
     double bits = codebook.lengths[index] / 8.0;
     if (index < codebook.codewords.size()) return bits;
@@ -97,7 +97,7 @@ TEST(Quantiser, ChoosesAsBruteForceOverAllCodewordsAndTheEscape) {
                     const auto& value = quantised.values[k];
                     EXPECT_EQ(value, index < codebook.codewords.size() ? codebook.codewords[index] : escape);
                     const double cost = error(e, value) + bit * bits_of(codebook, index, value);
-                    // The search runs in floats: of choices that differ by less than they resolve, either is right.
+                    // The search runs in floats: if choices differ by less than they resolve, either is right.
                     ASSERT_LE(cost, best * (1 + 1e-5) + 1e-9);
                 }
             }

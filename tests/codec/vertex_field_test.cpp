@@ -18,7 +18,7 @@ VertexHierarchy hierarchy_of(const intra_test::Connectivity& mesh, unsigned seed
     return build_vertex_hierarchy(intra_test::points(mesh.vertex_count, seed), mesh.triangles).value();
 }
 
-// Waves over the vertices, with noise on every second seed; on every seventh nothing but noise up to the limit.
+// Waves over the vertices, with noise for every second seed; for every seventh only noise, up to the limit.
 std::vector<std::int32_t> field(std::size_t vertices, std::size_t components, unsigned seed) {
     std::mt19937 random(seed);
     std::vector<std::int32_t> values(vertices * components);
@@ -242,7 +242,7 @@ TEST(VertexField, DecodesToTheSameOnEveryMachine) {
     std::uint32_t digest = 0;
     std::optional<FieldHistory> before;
     for (unsigned frame = 0; frame < 4; ++frame) {
-        // Steps of 16, then bytes that no encoder wrote but that make a field all the same.
+        // Steps of 16, then bytes that no encoder wrote but that form a field all the same.
         std::vector<std::uint8_t> bytes{static_cast<std::uint8_t>(1 + (frame > 0 ? 2 : 0)), 128, 32, 128, 32, 128, 32};
         std::mt19937 random(frame);
         for (int i = 0; i < 8000; ++i) bytes.push_back(static_cast<std::uint8_t>(random()));

@@ -9,7 +9,7 @@
 namespace htvm::internal {
 namespace {
 
-// What every hierarchy must be: each node of a finer level joined exactly once, counts and rows in order.
+// What must hold for every hierarchy: each node of a finer level is joined exactly once, counts and rows are in order.
 void expect_sound(const VertexHierarchy& hierarchy, std::size_t vertex_count) {
     ASSERT_EQ(hierarchy.vertex_count, vertex_count);
     std::size_t finer = vertex_count;

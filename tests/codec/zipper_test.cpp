@@ -14,8 +14,8 @@ namespace {
 
 constexpr double pi = 3.14159265358979;
 
-// A tube of `rows` rings with `around` vertices each, radius 1000, from z = low to z = high; open at both ends.
-// turned: by how much of a step the vertices are turned.
+// A tube of `rows` rings with `around` vertices each, radius 1000, from z = low to z = high, open at both ends. turned:
+// the fraction of a step by which the vertices are turned.
 LatticeMesh tube(int around, int rows, double low, double high, double turned = 0) {
     LatticeMesh mesh;
     for (int row = 0; row <= rows; ++row)
@@ -40,7 +40,7 @@ LatticeMesh tube(int around, int rows, double low, double high, double turned = 
     return mesh;
 }
 
-// The tube's ends drawn together: closed.
+// A tube whose ends are drawn together, so that it is closed.
 LatticeMesh capsule(int around, int rows, double low, double high, double turned = 0) {
     LatticeMesh mesh = tube(around, rows, low, high, turned);
     for (const bool top : {false, true}) {

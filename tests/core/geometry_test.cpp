@@ -52,7 +52,7 @@ TEST(ClosestOnTriangle, IsNearerThanAnySampleOfRandomTriangles) {
     }
 }
 
-// The hub of four triangles at the origin; one of them folds up, and is twice as large.
+// The hub of four triangles is at the origin; one of them folds up, and is twice as large.
 const std::vector<LatticePoint> hub = {{0, 0, 0}, {3, 0, 0}, {0, 3, 0}, {-3, 0, 0}, {0, 0, 6}};
 const std::vector<Triangle> around_hub = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}};
 

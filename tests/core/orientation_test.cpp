@@ -65,7 +65,7 @@ TEST(MinimalRotation, TakesOneDirectionToTheOtherByTheSmallestAngle) {
         const Vector3d moved = rotate(r, from);
         expect_vector({moved[0] / a, moved[1] / a, moved[2] / a}, {to[0] / b, to[1] / b, to[2] / b});
         const double cosine = (from[0] * to[0] + from[1] * to[1] + from[2] * to[2]) / (a * b);
-        EXPECT_NEAR((r[0] + r[4] + r[8] - 1) / 2, cosine, 1e-9);  // the trace tells the angle
+        EXPECT_NEAR((r[0] + r[4] + r[8] - 1) / 2, cosine, 1e-9);  // the angle follows from the trace
     }
 }
 

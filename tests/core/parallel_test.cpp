@@ -38,7 +38,7 @@ std::size_t threads_of_this_process() {
 
 double processor_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-// Runners of a caller's own.
+// Runners supplied by a caller.
 void in_order(std::size_t tasks, const std::function<void(std::size_t)>& task) {
     for (std::size_t t = 0; t < tasks; ++t) task(t);
 }
@@ -76,7 +76,7 @@ TEST(ParallelFor, UsesAllThreads) {
     std::latch all_here(4);
     std::atomic<int> waiting = 4;
     parallel_for(1000, pool, 1, [&](std::size_t, std::size_t) {
-        if (waiting-- > 0) all_here.arrive_and_wait();  // returns where four threads have come
+        if (waiting-- > 0) all_here.arrive_and_wait();  // returns once four threads have arrived
     });
 }
 
@@ -185,7 +185,7 @@ TEST(ParallelFor, HandsARunnerOneTaskForEachThread) {
     });
     parallel_for(1000, pool, 1, [](std::size_t, std::size_t) {});
     parallel_for(2, pool, 1, [](std::size_t, std::size_t) {});
-    parallel_for(2, pool, 5, [](std::size_t, std::size_t) {});  // too small to be cut
+    parallel_for(2, pool, 5, [](std::size_t, std::size_t) {});  // too small to be cut into pieces
     EXPECT_EQ(asked, (std::vector<std::size_t>{3, 2}));
 }
 
@@ -241,7 +241,7 @@ TEST(ThreadPool, TheCallerDoesWhatNoOtherThreadHasBegun) {
             release.wait(false);
         });
     });
-    both_busy.wait();  // the pool's thread has nothing to give until `release`
+    both_busy.wait();  // the pool's thread has nothing to offer until `release`
     int calls = 0;
     run(10, [&](std::size_t) { ++calls; });
     EXPECT_EQ(calls, 10);

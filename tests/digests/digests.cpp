@@ -1,11 +1,13 @@
-// Decodes streams and holds the digest of every frame against those beside them: the proof that a build of the decoder
-// gives the same bits as all others. It needs the decoder and the standard library alone, and no threads or exceptions,
-// so that it runs wherever the decoder does.
+// Decodes streams and compares the digest of every frame with the file next to the stream: this proves that a build of
+// the decoder gives the same bits as all others. It needs only the decoder and the standard library, and no threads or
+// exceptions, so that it runs wherever the decoder does.
 //
-//   digests THREADS FILE.htvm ...     FILE.digests has a line a frame (tests/codec/conformance_test.cpp writes them)
+//   digests THREADS FILE.htvm ...
 //
-// Prints a line a stream: its name, its frames, the CRC-32 of the lines of its digests; then, the same over all. Exits
-// with 1 where anything differs.
+// FILE.digests has one line per frame (tests/codec/conformance_test.cpp writes it).
+//
+// Prints one line per stream: its name, its frames, the CRC-32 of its lines of digests; then the same over all streams.
+// Exits with 1 if anything differs.
 #include <array>
 #include <bit>
 #include <cstdio>

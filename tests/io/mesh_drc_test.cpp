@@ -77,7 +77,7 @@ TEST(DrcReading, EveryAttributeFollowsItsPointThroughBothMeshCoders) {
                 EXPECT_NEAR(mesh->texcoords[v][1], p[1] / 64, 1e-4);
                 EXPECT_NEAR(mesh->normals[v][2], 1, 1e-4);
             }
-            for (const Triangle& t : mesh->triangles) {  // counter-clockwise, as they went in
+            for (const Triangle& t : mesh->triangles) {  // counter-clockwise, as in the input
                 const auto& [a, b, c] = t;
                 const auto& p = mesh->positions;
                 EXPECT_EQ((p[b][0] - p[a][0]) * (p[c][1] - p[a][1]) - (p[b][1] - p[a][1]) * (p[c][0] - p[a][0]), 1);
@@ -133,7 +133,7 @@ TEST(DrcReading, WhatIsNoDracoFileIsAnError) {
 
 TEST(DrcReading, CountsThatTheFileCannotHoldAreRefusedBeforeAllocation) {
     auto points = encoded_points(5, draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
-    points[11] = points[12] = points[13] = 0xff;  // the count, 24 bits of it
+    points[11] = points[12] = points[13] = 0xff;  // 24 bits of the count
     ASSERT_FALSE(read_drc(points));
     EXPECT_THAT(read_drc(points).error().message, testing::HasSubstr("16777215"));
     points[14] = 0x7f;

@@ -92,7 +92,7 @@ TEST(GuessUnit, GoesByTheDiagonalOfTheBoundingBox) {
     EXPECT_EQ(guess_unit(Mesh()), LengthUnit::millimetre);
 }
 
-// The captures are large and not part of the project: HTVM_DATA names the folder where they are.
+// The captures are large and not part of the project: HTVM_DATA is the folder that contains them.
 TEST(RealCaptures, FirstFramesReadAsDescribed) {
     const char* data = std::getenv("HTVM_DATA");
     if (!data) GTEST_SKIP() << "HTVM_DATA does not name the folder of the captures";

@@ -17,7 +17,7 @@ using testing::HasSubstr;
 
 Result<Mesh> read(const std::string& text) { return read_ply(bytes_of(text)); }
 
-// A value's bytes, the most significant first.
+// The bytes of a value, most significant first.
 template <class T, class Bits>
 std::string big_endian(T value) {
     const auto bits = std::bit_cast<Bits>(value);

@@ -28,7 +28,7 @@ struct Attributes {
     bool texcoords = true;
 };
 
-// Random positions, attributes and triangles: isolated vertices, duplicate and degenerate triangles occur.
+// Random positions, attributes and triangles, with some isolated vertices, duplicate and degenerate triangles.
 inline Mesh random_mesh(unsigned seed, std::size_t vertices, std::size_t triangles, Attributes attributes = {}) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> position(-2000, 2000);

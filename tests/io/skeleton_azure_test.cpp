@@ -13,7 +13,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// A body whose joint j stands at (x, j, 1000), turned by a quarter about z.
+// A body whose joint j is at (x, j, 1000), turned by 90 degrees about z.
 json body(int id, double x) {
     json positions = json::array(), orientations = json::array();
     for (int j = 0; j < 32; ++j) {

@@ -72,7 +72,7 @@ TEST(SkeletonBvh, ForwardKinematicsGivesJointsInMillimetres) {
     const auto& up = track->poses[1].joints;
     expect_vector(up[1], {0, 1700, 0});
     expect_vector(up[2], {0, 1950, 0});
-    // About y by 90 degrees x becomes -z; the elbow then turns the forearm up.
+    // Rotating by 90 degrees about y takes x to -z; the elbow then turns the forearm up.
     const auto& bent = track->poses[2].joints;
     expect_vector(bent[0], {10, 1400, 20});
     expect_vector(bent[1], {10, 1400, -280});
@@ -193,7 +193,7 @@ TEST(SkeletonBvh, AHeaderCannotMakeTheReaderAllocateMoreThanTheFileHolds) {
 TEST(SkeletonBvh, ATextThatIsCutAnywhereIsATrackOrAnError) {
     for (std::size_t size = 0; size < arm.size(); ++size) {
         const auto track = parse_skeleton_bvh(arm.substr(0, size));
-        EXPECT_EQ(track.has_value(), size >= arm.size() - 1) << size;  // only the last line's end may go
+        EXPECT_EQ(track.has_value(), size >= arm.size() - 1) << size;  // only the last line ending may be missing
     }
 }
 

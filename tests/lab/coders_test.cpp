@@ -62,7 +62,7 @@ TEST(BuiltInCoders, decode_every_frame_within_their_steps) {
     const auto facts = facts_of(synthetic_frame(0));
     const auto quality = quality_point(50);
     for (const auto& coder : built_in_coders(30)) {
-        if (coder.name == "htvm-t") continue;  // its vertices are the I-frame's, not near the capture's
+        if (coder.name == "htvm-t") continue;  // its vertices are those of the I-frame, not near the capture's
         const auto start = coder.start(facts, quality);
         ASSERT_TRUE(start) << coder.name;
         for (const int i : {0, 1, 2}) {
@@ -85,13 +85,13 @@ TEST(BuiltInCoders, only_the_coders_with_references_code_enhanced_frames) {
         const auto start = coder.start(facts, quality_point(40));
         ASSERT_TRUE(start);
         EXPECT_EQ(FrameType::intra, (*start)(synthetic_frame(0))->type);
-        if (coder.name == "htvm-rd" || coder.name == "htvm-t") continue;  // they measure which is better
+        if (coder.name == "htvm-rd" || coder.name == "htvm-t") continue;  // they choose by measuring
         const bool refers = coder.name == "paper" || coder.name == "htvm-ep" || coder.name == "htvm-motion";
         EXPECT_EQ(refers ? FrameType::enhanced : FrameType::intra, (*start)(synthetic_frame(1))->type) << coder.name;
     }
 }
 
-// The key of kept results: only what the sweep sets for each run itself is not part of it.
+// The key of stored results includes everything except what the sweep itself sets for each run.
 TEST(CodecUnderTest, settings_differ_where_options_do) {
     for (const auto profile : {Profile::tracked, Profile::topology, Profile::paper}) {
         std::set<std::string> settings = {codec_under_test("name", {}, default_options(profile)).settings};
@@ -155,7 +155,8 @@ Mesh triangle() {
 
 // Runs a peer's command on one frame in a folder of its own.
 Result<CodedFrame> run(const std::string& command) {
-    // A name of its own: tests run beside each other. With a space and a quote, which the shell must not see.
+    // A name of its own, since tests run in parallel. It contains a space and a quote, which the shell must not
+    // interpret.
     std::string name = (std::filesystem::path(testing::TempDir()) / "rd peer's XXXXXX").string();
     if (!mkdtemp(name.data())) return fail(ErrorKind::bad_input, "no temporary folder");
     const std::filesystem::path folder = name;

@@ -156,7 +156,7 @@ TEST(ChartScript, quotes_what_a_title_holds) {
     EXPECT_NE(std::string::npos, script.find("set output 'out/figure.svg'"));
 }
 
-// Two bones in a row, the second twice as far from where the first pose has them as the first.
+// Two bones in a row; the second moves twice as far from its place in the first pose as the first.
 Skeleton two_bones() {
     Skeleton skeleton;
     skeleton.joint_names = {"a", "b", "c"};

@@ -24,7 +24,7 @@ RdPoint point_of(const std::string& coder, double rate, double m1, double step) 
     return point;
 }
 
-// M1 over rate falls as 4 mm / rate for TFAN, and as slower than that for the paper's coder: level at 4 bpvf.
+// M1 over rate falls like 4 mm / rate for TFAN, and more slowly for the paper's coder: equal at 4 bpvf.
 std::vector<RdPoint> crossing_curves() {
     std::vector<RdPoint> points;
     for (const double rate : {1.0, 2.0, 4.0, 8.0, 16.0}) {

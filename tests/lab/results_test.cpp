@@ -125,7 +125,7 @@ TEST(RateDifferences, not_available_without_a_common_range) {
 TEST(CrossingSentence, says_where_and_who_is_ahead_below) {
     const std::vector<RdPoint> points{point_of("paper", 20, 25, 4), point_of("paper", 50, 400, 1),
                                       point_of("tfan", 20, 25, 8), point_of("tfan", 50, 400, 0.5)};
-    // In the middle of ln 1 and ln 16: 4 bits.
+    // Halfway between ln 1 and ln 16: 4 bits.
     EXPECT_EQ("M1: paper and tfan cross at 4.00 bpvf (2.00 mm; paper ahead below)\n",
               crossing_sentence(points, "paper", "tfan"));
 }

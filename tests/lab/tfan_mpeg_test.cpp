@@ -1,4 +1,4 @@
-// TFAN as published and in MPEG-4: what goes in comes back, whatever its triangles, at about MPEG's own rate.
+// TFAN as published and in MPEG-4: everything comes back, whatever the triangles, at about MPEG's own rate.
 #include "tfan_mpeg.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace htvm::lab {
 namespace {
 
-// Positions of their own for `count` vertices, on the corners of the finest grid that 10 bits have.
+// Distinct positions for `count` vertices, on the corners of the finest grid of 10 bits.
 Mesh with_vertices(std::uint32_t count, std::vector<Triangle> triangles) {
     Mesh mesh;
     for (std::uint32_t v = 0; v < count; ++v)
@@ -23,10 +23,10 @@ Mesh with_vertices(std::uint32_t count, std::vector<Triangle> triangles) {
     return mesh;
 }
 
-// Every triangle turned so that its lowest vertex is first, and all sorted: equal for equal sets.
+// Every triangle rotated so that its lowest vertex is first, and all sorted: equal for equal sets.
 std::vector<Triangle> as_a_set(std::vector<Triangle> triangles) {
     for (auto& t : triangles) std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-    // A degenerate triangle (a, b, a) has two lowest corners: both ways of turning it are the same.
+    // A degenerate triangle (a, b, a) has two lowest corners, so both rotations count as the same.
     for (auto& t : triangles)
         if (t[0] == t[2]) t = {t[0], t[0], t[1]};
     std::sort(triangles.begin(), triangles.end());
@@ -113,7 +113,7 @@ TEST(TfanMpeg, gives_back_any_triangles) {
     }
 }
 
-// MPEG's reference writes past its tables there.
+// MPEG's reference software writes past its tables here.
 TEST(TfanMpeg, gives_back_fans_of_more_than_256_vertices) {
     std::vector<Triangle> triangles;
     for (std::uint32_t v = 1; v < 20000; ++v) triangles.push_back({0, v, v + 1});
@@ -123,8 +123,8 @@ TEST(TfanMpeg, gives_back_fans_of_more_than_256_vertices) {
     expect_the_same(with_vertices(20001, triangles));
 }
 
-// The grid's corner: one triangle of three new vertices (all new: configuration 6), then at vertex 1, whose list is
-// {2: one triangle}, fans that begin there. Ten thousand such vertices take 2 bits each; ours, in contexts, less.
+// The corner of the grid is one triangle of three new vertices (all new: configuration 6); then, at vertex 1, whose
+// list is {2: one triangle}, fans begin there. Ten thousand such vertices take 2 bits each; ours, with contexts, less.
 TEST(TfanMpeg, codes_a_regular_grid_in_a_bit_or_two_a_vertex) {
     const auto frame = encode_mpeg_tfan(with_vertices(101 * 101, grid(100)), {});
     ASSERT_TRUE(frame);

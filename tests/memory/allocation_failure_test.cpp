@@ -1,4 +1,4 @@
-// Memory that runs out is an error of the packet or frame at hand, and no more than that.
+// If memory runs out, only the packet or frame being processed fails.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -11,15 +11,15 @@ namespace {
 
 using namespace test;
 
-// Failures tried, spread over all: 400, and fewer under sanitizers, which are slow.
+// Number of failures tried, spread over all allocations: 400, and fewer under sanitizers, which are slow.
 constexpr std::uint64_t most_failures = HTVM_MOST_FAILURES;
 
 struct Pushed {
     std::size_t frames = 0, errors = 0, other_errors = 0;
 };
 
-// Pushes all packets, and asks for a stand-in behind each. Errors other than those of what memory ran out for are of
-// frames that refer to lost ones.
+// Pushes all packets, and asks for a stand-in after each. Errors of other kinds come from frames that refer to lost
+// ones.
 Pushed push_all(Decoder& decoder, const std::vector<Packet>& packets) {
     Pushed out;
     for (const auto& packet : packets) {
@@ -37,8 +37,8 @@ std::size_t frames_in(const std::vector<Packet>& packets) {
     return static_cast<std::size_t>(std::count_if(packets.begin(), packets.end(), is_frame));
 }
 
-// Every allocation of decoding the stream fails once, or some `most` of them: then an error or a frame comes, nothing
-// is lost of the memory, and the decoder decodes the stream when it is sent again.
+// Lets every allocation made while decoding the stream fail once, or about `most` of them. Each time an error or a
+// frame must come, no memory may leak, and the decoder must decode the stream when it is sent again.
 void expect_survival(const std::vector<Packet>& packets, unsigned threads, bool all, std::uint64_t most) {
     DecoderOptions options;
     options.threads = threads;
@@ -107,7 +107,7 @@ struct Encoded {
     std::vector<Packet> packets;
 };
 
-// Pushes the frames, the ones in [from, to) while allocation n fails.
+// Pushes the frames; those in [from, to) while allocation n fails.
 void push_frames(Encoder& encoder, const TestSequence& sequence, std::int64_t& time, Encoded& out) {
     for (const auto& frame : sequence.frames) {
         const auto ok = encoder.push(frame.mesh, frame.pose ? &*frame.pose : nullptr, time += 33333);

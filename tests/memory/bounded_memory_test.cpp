@@ -1,4 +1,4 @@
-// Memory is bounded: by what the limits are computed from, by what was received, and whatever the stream's length.
+// Memory is bounded by what the limits are computed from and by what was received, whatever the length of the stream.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -16,7 +16,7 @@ namespace {
 
 using namespace test;
 
-// Triangles of their own three vertices each, or among all vertices by chance.
+// Triangles that each have their own three vertices, or random ones among all vertices.
 TestSequence soup(std::uint32_t vertices, std::uint32_t triangles, bool apart, int frames) {
     TestSequence out{"soup", {}, {}};
     std::mt19937 random(1);
@@ -41,7 +41,7 @@ EncoderOptions nothing_merged() {
     return options;
 }
 
-// What the decoder takes at any time is what the limits take it for, or less.
+// The decoder's memory never exceeds the estimate that the limits use.
 void expect_within_estimate(const std::vector<Packet>& packets, const std::string& name) {
     SCOPED_TRACE(name);
     DecoderOptions options;
@@ -114,7 +114,7 @@ TEST(DecoderMemory, IsNotTakenForWhatAHeaderClaims) {
     }
 }
 
-// What bones and mapping take is not there until a frame asks for it.
+// The memory for bones and mapping is not allocated until a frame needs it.
 TEST(DecoderMemory, SkinningIsNotMadeForTrackedFrames) {
     const auto packets = tracked_stream(2000);
     const auto held = [&](bool skinned) {
@@ -175,7 +175,7 @@ TEST(PacketReaderMemory, IsTakenForWhatWasPushedAlone) {
     Packet packet;
     packet.payload.assign(100, 1);
     auto bytes = write_packet(packet);
-    bytes[24 + 3] = 0x0F;  // the size becomes a quarter of a gigabyte
+    bytes[24 + 3] = 0x0F;  // makes the size a quarter of a gigabyte
     const auto crc = crc32(std::span(bytes).subspan(4, 24));
     for (std::size_t i = 0; i < 4; ++i) bytes[28 + i] = static_cast<std::uint8_t>(crc >> (8 * i));
     PacketReader reader;
@@ -187,7 +187,7 @@ TEST(PacketReaderMemory, IsTakenForWhatWasPushedAlone) {
     EXPECT_LT(allocations().most_live - live, 1000);
 }
 
-// The packets of a stream, over and over, as one longer stream.
+// The packets of a stream, repeated as one longer stream.
 std::vector<Packet> repeated(const std::vector<Packet>& packets, std::uint32_t times) {
     std::vector<Packet> out;
     std::uint32_t frames = 0;

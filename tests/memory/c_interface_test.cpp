@@ -1,4 +1,5 @@
-// Where memory runs out anywhere below the C interface, a status says so, nothing is thrown, and the handle goes on.
+// If memory runs out anywhere below the C interface, a status reports it, nothing is thrown, and the handle stays
+// usable.
 #include <gtest/gtest.h>
 
 #include "htvm/htvm.h"

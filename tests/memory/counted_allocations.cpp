@@ -9,7 +9,7 @@
 namespace {
 
 constexpr std::uint64_t never = std::numeric_limits<std::uint64_t>::max();
-// Before each block, its size. As large as the strictest alignment that operator new without one owes.
+// The size of each block is stored before it, in as many bytes as the strictest alignment of the plain operator new.
 constexpr std::size_t head = alignof(std::max_align_t);
 static_assert(head >= sizeof(std::size_t));
 

@@ -19,7 +19,7 @@ inline std::vector<Packet> animated_stream(int vertices) {
     return encode(walking(6, vertices), options).packets;
 }
 
-// Header, I and four T-frames, from the I-frame and from the frame before.
+// Header, I and four T-frames, from the I-frame and from the previous frame.
 inline std::vector<Packet> tracked_stream(int vertices) {
     EncoderOptions options = test::enhanced_options();
     options.key_interval = 1;

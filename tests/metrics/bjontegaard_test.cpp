@@ -39,13 +39,13 @@ TEST(Bjontegaard, a_tenth_of_the_bits_is_minus_90_percent) {
 }
 
 TEST(Bjontegaard, two_points_are_a_straight_line_in_the_logarithm) {
-    // Over the common range 1..2 the rate's ratio goes from 1 to 4: the mean of its logarithm is ln 2.
+    // Over the common range 1..2 the ratio of the rates goes from 1 to 4: the mean of its logarithm is ln 2.
     const Curve reference{{1, 0}, {1, 2}}, tested{{1, 1}, {4, 2}};
     EXPECT_NEAR(1, *bjontegaard_rate_difference(reference, tested), 1e-12);
 }
 
 TEST(Bjontegaard, averages_over_the_common_qualities_alone) {
-    // The tested curve costs twice the bits where both are, and whatever it costs below does not count.
+    // The tested curve takes twice the bits where both exist; its rates elsewhere do not count.
     const Curve reference{{1, 10}, {1, 20}}, tested{{100, 0}, {2, 10}, {2, 15}, {2, 20}, {2, 25}};
     EXPECT_NEAR(1, *bjontegaard_rate_difference(reference, tested), 1e-9);
 }
@@ -129,7 +129,7 @@ TEST(QualityAtRate, is_not_known_outside_the_points) {
 }
 
 TEST(CurveCrossings, straight_lines_cross_where_they_meet) {
-    // Over ln(rate) from ln 1 to ln 16: one rises from 0 to 4, the other from 1 to 3; they meet half way, at rate 4.
+    // Over ln(rate) from ln 1 to ln 16: one rises from 0 to 4, the other from 1 to 3; they meet halfway, at rate 4.
     const Curve steep{{1, 0}, {16, 4}}, flat{{1, 1}, {16, 3}};
     const auto crossings = curve_crossings(flat, steep);
     ASSERT_EQ(1u, crossings.size());

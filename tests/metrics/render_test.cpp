@@ -14,7 +14,7 @@
 namespace htvm {
 namespace {
 
-// One pixel is one mm, the picture's centre is the origin, seen along -z.
+// One pixel is one mm; the picture's centre is the origin, seen along -z.
 Camera pixel_camera(int width, int height) {
     Camera camera;
     camera.position = {{0, 0, 1000}};
@@ -55,11 +55,11 @@ TEST(Render, ARightTriangleCoversTheCentresInsideAndThoseOnItsTopOrLeftEdges) {
     Mesh triangle;  // pixel centres of the diagonal lie exactly on the slanted edge
     triangle.positions = {{-5, 5, 0}, {-5, -5, 0}, {5, -5, 0}};
     triangle.triangles = {{0, 1, 2}};
-    EXPECT_EQ(covered_pixels(render(triangle, pixel_camera(20, 20), unlit())), 45u);  // right edge: not its own
+    EXPECT_EQ(covered_pixels(render(triangle, pixel_camera(20, 20), unlit())), 45u);  // right edge: not included
     Mesh other;
     other.positions = {{-5, 5, 0}, {5, -5, 0}, {5, 5, 0}};
     other.triangles = {{0, 1, 2}};
-    EXPECT_EQ(covered_pixels(render(other, pixel_camera(20, 20), unlit())), 55u);  // left edge: its own
+    EXPECT_EQ(covered_pixels(render(other, pixel_camera(20, 20), unlit())), 55u);  // left edge: included
 }
 
 TEST(Render, TrianglesThatShareEdgesLeaveNoGapAndNoPixelIsDrawnTwice) {

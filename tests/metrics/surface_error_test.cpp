@@ -20,7 +20,7 @@ Point3 on_segment(const Point3& p, const Point3& a, const Point3& b) {
     return a + (b - a) * s;
 }
 
-// Every way of being nearest, tried one by one: the plane by its Gram matrix where the foot lies inside, all sides.
+// Tries every case of being nearest: the plane by its Gram matrix if the foot lies inside, and all sides.
 double brute_force_squared_distance(const Mesh& mesh, const Point3& p) {
     double best = std::numeric_limits<double>::infinity();
     auto consider = [&](const Point3& q) { best = std::min(best, dot(p - q, p - q)); };
@@ -97,7 +97,8 @@ TEST(SurfaceError, OfParallelPlanesIsTheirDistance) {
 
 TEST(SurfaceError, OfConcentricSpheresIsTheDifferenceOfTheirRadiiWithinOnePercent) {
     SurfaceErrorOptions options;
-    options.samples = 40000;  // from near the centre every triangle is about equally far: the slowest case there is
+    options.samples = 40000;  // seen from near the centre every triangle is about equally far, which is the slowest
+                              // case
     const auto error = surface_error(shapes::sphere(100, 6), shapes::sphere(104, 5), options);
     ASSERT_TRUE(error.has_value());
     EXPECT_NEAR(error->forward.rms, 4, 0.04);
@@ -112,8 +113,8 @@ TEST(SurfaceError, SlidingAlongThePlaneCostsNothingInside) {
     EXPECT_NEAR(error->rms, 0, 1e-6);
 }
 
-// A roof over the square: heights are uniform in 0..h over its area, so the RMS over the faces is h / sqrt 3, the mean
-// h / 2. The distance to the flat square below is the height.
+// A roof over the square: heights are uniform in 0..h over its area, so the RMS over the faces is h / sqrt 3 and the
+// mean h / 2. The distance to the flat square below is the height.
 TEST(SurfaceError, OverTheFacesOfARoofIsItsHeightOverRootThreeWithinOnePercent) {
     Mesh roof;
     roof.positions = {{0, 0, 0}, {50, 0, 20}, {100, 0, 0}, {0, 100, 0}, {50, 100, 20}, {100, 100, 0}};
@@ -129,7 +130,7 @@ TEST(SurfaceError, OverTheFacesOfARoofIsItsHeightOverRootThreeWithinOnePercent) 
     EXPECT_EQ(d->samples, 200000u);
 }
 
-// METRO's composition on the roof, by hand: vertices, edges and faces with the shares that METRO gives them.
+// METRO's composition on the roof, computed by hand: vertices, edges and faces with METRO's shares.
 TEST(SurfaceError, WeighsVerticesEdgesAndFacesAsMetroDoes) {
     Mesh roof;
     roof.positions = {{0, 0, 0}, {50, 0, 20}, {100, 0, 0}, {0, 100, 0}, {50, 100, 20}, {100, 100, 0}};

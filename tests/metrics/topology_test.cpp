@@ -15,7 +15,7 @@ Topology of(const Mesh& mesh, const TopologyMeasureOptions& options = {}) {
     return found.value_or(Topology{});
 }
 
-// Two planes beside each other, `gap` mm apart.
+// Two planes side by side, `gap` mm apart.
 Mesh two_planes(float gap) {
     Mesh left = shapes::plane(100, 10, 0);
     shapes::append(left, shapes::moved(shapes::plane(100, 10, 0), 100 + gap, 0, 0));

@@ -79,7 +79,7 @@ TEST(Align, PointsInOnePlaceOnlyShift) {
     EXPECT_LT((found(from[0]) - to[0]).norm(), 1e-9);
 }
 
-// An ellipsoid of three different axes, so that no turn leaves it as it was; with its normals.
+// An ellipsoid with three different axes, so that every turn changes it; with its normals.
 struct Body {
     std::vector<Point3f> points;
     std::vector<Vector3f> normals;
@@ -130,7 +130,7 @@ TEST(Registration, OutliersAreTrimmed) {
     RegistrationOptions options;
     options.iterations = 60;
     options.samples = 3000;
-    options.trim = 0.2;  // more than the outliers' seventh
+    options.trim = 0.2;  // more than the share of outliers, a seventh
     const auto trimmed = register_points(NearestPoints(body.points), {}, frame, {}, options);
     expect_near(trimmed, small_motion, 0.01, 2.5);
     options.trim = 0;

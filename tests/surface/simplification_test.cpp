@@ -34,7 +34,7 @@ Input plane(std::uint32_t cells) {
     return out;
 }
 
-// A sphere of so many rings, closed, about the origin.
+// A closed sphere of the given number of rings around the origin.
 Input sphere(double radius, std::uint32_t rings, double shift = 0) {
     Input out;
     const std::uint32_t around = 2 * rings;
@@ -182,7 +182,7 @@ TEST(Simplification, random_soups_stay_sound) {
     }
 }
 
-// One vertex in the middle of a disc, in all its triangles.
+// One vertex in the middle of a disc, shared by all its triangles.
 Input hub(std::uint32_t triangles) {
     Input out;
     out.positions.emplace_back(0, 0, 0);

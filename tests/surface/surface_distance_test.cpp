@@ -91,7 +91,7 @@ TEST(RegionErrors, AreSummedByLabel) {
     from.positions = {{10, 10, 1}, {20, 20, 2}, {30, 30, 3}, {40, 40, 4}};
     from.colours = {{0, 0, 0}, {0, 0, 0}, {3, 4, 0}, {0, 0, 0}};
     const Mesh to = painted(shapes::plane(100, 10, 0), {0, 0, 0});
-    const std::vector<std::uint16_t> labels = {0, 2, 2, 7};  // 7: of no region
+    const std::vector<std::uint16_t> labels = {0, 2, 2, 7};  // label 7 is no region
     const auto regions =
         region_errors(view(from), labels, 3, view(to), {to.positions, to.triangles}, {.threads = ThreadPool(2)});
     ASSERT_EQ(regions.size(), 3u);

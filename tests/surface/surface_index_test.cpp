@@ -15,7 +15,7 @@ float squared(const Point3f& a, const Point3f& b) {
     return x * x + y * y + z * z;
 }
 
-// Points of one kind: spread, on a coarse grid with many equal ones, in a line, all in one place.
+// Points of one kind: spread, on a coarse grid with many equal ones, in a line, or all in one place.
 std::vector<Point3f> points(std::size_t count, int kind, std::mt19937& random) {
     std::uniform_real_distribution<float> spread(-1000, 1000);
     std::vector<Point3f> out;
@@ -153,7 +153,7 @@ TEST(SurfaceIndex, ALargeTriangleAmongSmallOnesIsFoundFromItsMiddle) {
 }
 
 TEST(SurfaceIndex, PiecesThatTouchAreSearchedAcrossTheirSeam) {
-    // The query's nearest vertex belongs to both pieces, its triangle only to the second.
+    // The query's nearest vertex belongs to both pieces, but its triangle only to the second.
     const std::vector<Point3f> positions = {{0, 0, 0}, {0, 9, 0}, {-9, 0, 0}, {0, 0, 0}, {0, 9, 0}, {9, 0, 0}};
     const std::vector<Triangle> triangles = {{0, 1, 2}, {3, 5, 4}};
     const SurfaceIndex search(positions, triangles);

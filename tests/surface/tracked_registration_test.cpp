@@ -48,7 +48,7 @@ Surface moved(Surface surface, const std::function<Vector3d(const Vector3d&)>& m
     return surface;
 }
 
-// Handles along the x axis, each vertex between the two it lies between.
+// Handles along the x axis; each vertex follows the two that it lies between.
 DeformableMesh with_handles_along_x(const Surface& surface, double first, double last, std::size_t count,
                                     const DeformationOptions& options) {
     std::vector<Vector3d> handles;
@@ -80,8 +80,8 @@ DeformableMesh with_handles_along_x(const Surface& surface, double first, double
 }
 
 struct Rest {
-    double rms = 0, largest = 0;  // of what is left to the target points, for the vertices that have one
-    double valid = 0;             // their share
+    double rms = 0, largest = 0;  // of the remaining distances to the target points, for the vertices that have one
+    double valid = 0;             // share of these vertices
 };
 
 Rest rest_after(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions) {
@@ -105,7 +105,7 @@ SurfaceIndex target_of(const Surface& surface, const DeformationOptions& options
     return {surface.first, surface.second, {.cell = 20, .samples = options.back_samples}};
 }
 
-// Bent about z: a quarter circle per 600 mm.
+// Bent about z by a quarter circle per 600 mm.
 Vector3d bent(const Vector3d& p, double angle) {
     const double radius = 600 / angle, at = p.x() / radius;
     return {(radius - p.y()) * std::sin(at), radius - (radius - p.y()) * std::cos(at), p.z()};
@@ -133,7 +133,7 @@ TEST(RegisterDeformation, FollowsASphereThatMovesFiveCentimetres) {
     const auto mesh = with_handles_along_x(reference, -150, 150, 4, options);
     const auto motions = register_deformation(mesh, target, {}, options);
     EXPECT_LT(rest_after(mesh, target, motions).rms, 0.3);
-    for (std::size_t h = 0; h < motions.size(); ++h)  // a ball may turn, its middle may not stay behind
+    for (std::size_t h = 0; h < motions.size(); ++h)  // a ball may turn, but its centre must follow
         EXPECT_LT((motions[h](Vector3d::Zero()) - shift).norm(), 3);
 }
 

@@ -41,7 +41,7 @@ HalfEdgeMesh build(const Soup& soup, std::size_t fewest = 0) {
     return build_half_edges(soup.positions, soup.triangles, fewest);
 }
 
-// Twins, fans and valences agree with one another.
+// Twins, fans and valences are consistent.
 void expect_consistent(const HalfEdgeMesh& mesh) {
     for (std::uint32_t e = 0; e < mesh.origin.size(); ++e) {
         if (mesh.origin[e] == dead_half_edge) continue;
@@ -123,7 +123,7 @@ TEST(Collapse, StopsBeforeTheSurfaceWouldCloseUp) {
     expect_consistent(mesh);
     compact(mesh);
     EXPECT_EQ(euler_characteristic(mesh), 0);
-    EXPECT_GE(mesh.positions.size(), 7u);  // no torus has fewer vertices
+    EXPECT_GE(mesh.positions.size(), 7u);  // a torus needs at least that many vertices
 
     HalfEdgeMesh smallest = build(octahedron());
     collapse_to(smallest, 0);

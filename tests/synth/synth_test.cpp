@@ -29,7 +29,7 @@ SynthOptions small(int vertices = 1500) {
     return options;
 }
 
-// Each directed edge once, and its opposite once too.
+// Whether each directed edge appears once, and its opposite once too.
 bool closed_manifold_edges(const Mesh& mesh) {
     std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
     for (const auto& t : mesh.triangles)
@@ -48,7 +48,7 @@ double volume(const Mesh& mesh) {
     return sum / 6;
 }
 
-// How many vertices lie on the edges and diagonals of an axis-aligned grid through the origin.
+// The number of vertices on the edges and diagonals of an axis-aligned grid through the origin.
 std::size_t vertices_on_grid(const Mesh& mesh, double cell) {
     std::size_t count = 0;
     for (const auto& p : mesh.positions) {
@@ -272,7 +272,7 @@ TEST(Synth, OptionsOutOfRangeAreNamedAndDoNotCrash) {
         ASSERT_FALSE(checked.has_value());
         EXPECT_EQ(checked.error().kind, ErrorKind::bad_input);
     }
-    wrong[1].vertices = -5;  // the clamped count, but a small one
+    wrong[1].vertices = -5;  // the count is clamped, but small
     for (auto& options : wrong) {
         options.vertices = std::min(options.vertices, 150);
         const Mesh mesh = synth_frame(options, -3).mesh;
