@@ -1,9 +1,11 @@
 # The C interface (htvm/htvm.h): the decoder's part, which needs the standard library alone, and with it the encoder's.
 htvm_floor(c_decoder SOURCES src/c_api/c_status.cpp src/c_api/c_decoder.cpp LINKS htvm_decoder)
-htvm_floor(c SOURCES src/c_api/c_encoder.cpp LINKS htvm_c_decoder htvm_encoder)
+if(HTVM_BUILD_ENCODER)
+  htvm_floor(c SOURCES src/c_api/c_encoder.cpp LINKS htvm_c_decoder htvm_encoder)
+endif()
 
 # The examples, in C99: the header must be C, and its library be linked by a C program.
-if(HTVM_BUILD_TESTS)
+if(HTVM_BUILD_TESTS AND HTVM_BUILD_ENCODER)
   enable_language(C)
   foreach(example encode decode)
     add_executable(example_${example} examples/${example}.c)

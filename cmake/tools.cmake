@@ -21,6 +21,7 @@ htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PN
 # Draco-coded I-frames: plugs into the encoder and the decoder, which do not know libdraco.
 file(GLOB_RECURSE draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
 htvm_floor(draco SOURCES ${draco_sources} LINKS htvm_decoder htvm_libdraco)
+htvm_library(draco FLOORS draco LINKS decoder NEEDS $<BUILD_INTERFACE:${DRACO_LIBRARY}> $<INSTALL_INTERFACE:htvm::libdraco>)
 
 # The programs: everything but their main.cpp is a library, so that tests reach it. htvm_app is what users run,
 # htvm_laboratory what experiments need; both stand on htvm_command_line.
@@ -42,4 +43,3 @@ add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)
 add_executable(htvm-lab apps/lab/main.cpp)
 target_link_libraries(htvm-lab PRIVATE htvm_laboratory)
-install(TARGETS htvm htvm-lab)

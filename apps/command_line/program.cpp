@@ -1,6 +1,6 @@
 #include "command_line/program.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -8,8 +8,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
+#include <fstream>
 #include <new>
+#include <string_view>
 
+#include "command_line/completion.h"
+#include "command_line/manual.h"
+#include "command_line/option_text.h"
 #include "command_line/terminal.h"
 
 namespace htvm::app {
@@ -65,15 +71,42 @@ void say_no_such_command(const Program& program, const std::string& word) {
     fmt::print(stderr, "{}: error: there is no command '{}'; {}\n", program.name, word, hint);
 }
 
+// "0 done, 1 bad input, ..."
+std::string exit_codes_text() {
+    std::vector<std::string> out;
+    for (const auto& exit : exit_codes) out.push_back(fmt::format("{} {}", exit.code, exit.meaning));
+    return fmt::format("{}", fmt::join(out, ", "));
+}
+
+bool write_file(const std::filesystem::path& path, const std::string& text) {
+    std::error_code ignored;
+    std::filesystem::create_directories(path.parent_path(), ignored);
+    std::ofstream file(path, std::ios::binary);
+    file << text;
+    return static_cast<bool>(file.flush());
+}
+
+bool write_pages(const Program& program, const CLI::App& app, const std::filesystem::path& folder) {
+    const auto& name = program.name;
+    bool written = write_file(folder / "man1" / (name + ".1"), program_page(program, app)) &&
+                   write_file(folder / "bash" / name, bash_completion(app)) &&
+                   write_file(folder / "zsh" / ("_" + name), zsh_completion(app)) &&
+                   write_file(folder / "fish" / (name + ".fish"), fish_completion(app));
+    for (const auto* command : commands_of(app))
+        written = written && write_file(folder / "man1" / (name + "-" + command->get_name() + ".1"),
+                                        command_page(program, app, *command));
+    return written;
+}
+
 }  // namespace
 
 int run_program(const Program& program, int argc, char** argv) {
     speak_as(program.name);
     CLI::App app{program.description, program.name};
     app.footer(
-        fmt::format("Exit codes: 0 done, 1 bad input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit exceeded.\n"
+        fmt::format("Exit codes: {}.\n"
                     "'{} COMMAND --help' explains a command.{}{}",
-                    program.name, program.footer.empty() ? "" : "\n", program.footer));
+                    exit_codes_text(), program.name, program.footer.empty() ? "" : "\n", program.footer));
     app.set_version_flag("--version", program.name + " " HTVM_VERSION);
     app.failure_message(usage_message);
     app.require_subcommand(1);
@@ -82,6 +115,11 @@ int run_program(const Program& program, int argc, char** argv) {
     if (argc > 1 && names_no_command(app, argv[1])) {
         say_no_such_command(program, argv[1]);
         return 2;
+    }
+    if (argc == 3 && std::string_view(argv[1]) == "--write-pages") {
+        if (write_pages(program, app, argv[2])) return 0;
+        fmt::print(stderr, "{}: error: {} cannot be written to\n", program.name, argv[2]);
+        return 1;
     }
     try {
         app.parse(argc, argv);

@@ -1,6 +1,7 @@
 // A program with subcommands: what `htvm` and `htvm-lab` share from main() on.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <map>
 #include <string>
@@ -28,8 +29,17 @@ struct Program {
     std::map<std::string, std::string> elsewhere;  // commands of another program, and what to type for them
 };
 
-// Parses the command line, runs the chosen subcommand, and reports errors on stderr. The exit code: 0 done, 1 bad
-// input, 2 usage, 3 corrupt stream, 4 unsupported, 5 limit exceeded.
+struct ExitCode {
+    int code;
+    const char* meaning;
+};
+inline constexpr std::array exit_codes = {ExitCode{0, "done"},        ExitCode{1, "bad input"},
+                                          ExitCode{2, "usage"},       ExitCode{3, "corrupt stream"},
+                                          ExitCode{4, "unsupported"}, ExitCode{5, "limit exceeded"}};
+
+// Parses the command line, runs the chosen subcommand, and reports errors on stderr. Returns one of the exit codes.
+// `--write-pages FOLDER` writes man pages and shell completions to man1, bash, zsh and fish in that folder instead. The
+// build calls it, so pages and completions always match the options that the program parses.
 int run_program(const Program& program, int argc, char** argv);
 
 }  // namespace htvm::app

@@ -63,7 +63,8 @@ void add_calibrate(CLI::App& app, Run& run) {
             "--percentile", options->calibration.percentile,
             "Of the distances of a bone's vertices (default 70); 100, the paper's maximum, suffers from strays")
         ->check(CLI::Range(0.0, 100.0));
-    command->add_option("-o,--output", options->output, "The calibration, JSON (default: - for standard output)");
+    command->add_option("-o,--output", options->output, "The calibration, JSON (default: - for standard output)")
+        ->type_name("FILE");
     command->footer(
         "The first frame is used; --first N takes frame N.\n"
         "Example:  htvm calibrate capture/ --skeleton capture/skeleton.json -o radii.json");

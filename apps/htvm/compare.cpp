@@ -472,7 +472,8 @@ void add_picture_options(CLI::App& command, Options& o) {
     command.add_flag("--still-camera", o.follow_sequence,
                      "The cameras look at the box round the whole sequence instead of each frame's own\n"
                      "(reads the originals twice)");
-    command.add_option("--pictures", o.pictures, "Folder for PNG files: original, decoded, difference (4-fold)");
+    command.add_option("--pictures", o.pictures, "Folder for PNG files: original, decoded, difference (4-fold)")
+        ->type_name("FOLDER");
     command.add_option("--picture-views", o.picture_views, "How many of the views are written")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
@@ -485,21 +486,26 @@ void add_compare(CLI::App& app, Run& run) {
     auto& o = *options;
     CLI::App* command = app.add_subcommand("compare", "Measure decoded meshes against their originals");
     command->description(
-        "Measures decoded meshes against their originals, frame by frame: by the numbers in their names, in the order\n"
+        "Measure decoded meshes against their originals, frame by frame: by the numbers in their names, in the order\n"
         "of their names where they have none:\n"
         "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
         "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
         "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
         "  M3  PSNR of pictures from all round\n"
         "  topology  components, boundaries, cracks, flaps");
-    command->add_option("ORIGINAL", o.original, "A mesh file, folder, glob or %05d pattern")->required();
-    command->add_option("DECODED", o.decoded, "The same for the decoded meshes, or an .htvm stream")->required();
+    command->add_option("ORIGINAL", o.original, "A mesh file, folder, glob or %05d pattern")
+        ->type_name("FILE")
+        ->required();
+    command->add_option("DECODED", o.decoded, "The same for the decoded meshes, or an .htvm stream")
+        ->type_name("FILE")
+        ->required();
     command->add_option("--frames", o.frames, "Compare at most so many");
     command->add_option("--only", o.only, "Measure only some of m1, m2, d1, d2, m3, topology (comma between)")
         ->delimiter(',')
         ->check(CLI::IsMember({"m1", "m2", "d1", "d2", "m3", "topology"}))
         ->option_text("LIST");
     command->add_option("--unit", o.unit, "Of the files: mm, cm, m, or auto (by the first frame's size)")
+        ->check(CLI::IsMember({"auto", "mm", "cm", "m"}))
         ->capture_default_str();
     command->add_option("--samples", o.compare.surface_options.samples,
                         "For M2, in each direction (default: 10 times the triangles, as METRO)");
@@ -514,8 +520,10 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
     add_decoder_limits(*command, o.limits);
-    command->add_option("--csv", o.csv,
-                        "One line per frame to this file, or - for standard output; an infinite PSNR is inf");
+    command
+        ->add_option("--csv", o.csv,
+                     "One line per frame to this file, or - for standard output; an infinite PSNR is inf")
+        ->type_name("FILE");
     command->footer(
         "Examples:\n"
         "  htvm compare capture/ person.htvm\n"

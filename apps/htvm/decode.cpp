@@ -302,11 +302,14 @@ Result<void> decode(const Options& options) {
 void add_decode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("decode", "Turn an .htvm stream back into meshes");
-    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")
+        ->type_name("FILE")
+        ->required();
     command
         ->add_option("-o,--output", options->output,
                      "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one file (the\n"
                      "first frame alone), or - for PLY after PLY on standard output")
+        ->type_name("FILE")
         ->required();
     command->add_option("--format", options->format, "Format in a folder: ply (default) or obj")
         ->check(CLI::IsMember({"ply", "obj"}));

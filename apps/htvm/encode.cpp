@@ -166,7 +166,9 @@ void add_encode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("encode", "Compress a sequence of meshes into an .htvm stream");
     add_capture_options(*command, options->capture);
-    command->add_option("-o,--output", options->output, "The stream: a file, or - for standard output")->required();
+    command->add_option("-o,--output", options->output, "The stream: a file, or - for standard output")
+        ->type_name("FILE")
+        ->required();
     add_encoding_options(*command, options->encoding);
     command->add_flag("--json", options->json, "Print sizes by frame and layer as JSON on standard output");
     command->add_flag_callback(

@@ -1,6 +1,6 @@
 #include "encoder_options.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -116,7 +116,8 @@ void add_option(CLI::App& command, EncodingOptions& options, const Option& optio
         options.given.emplace_back(&option, *value * option.flag_factor);
     };
     command.add_option_function<std::string>(option.flag, take, help_of(option))
-        ->type_name(option.kind == OptionKind::word ? "WORD" : "NUMBER")
+        ->type_name(option.kind == OptionKind::word ? fmt::format("WORD:{{{}}}", fmt::join(option.words, ","))
+                                                    : "NUMBER")
         ->group(heading(option.group));
 }
 
@@ -135,7 +136,8 @@ void add_quality(CLI::App& command, EncodingOptions& options) {
         ->group(heading(OptionGroup::common));
     command
         .add_option("--profile", options.profile,
-                    wrapped("tracked (default): the fewest bits. Each frame is the last I-frame's mesh laid on the "
+                    wrapped("What the stream keeps. tracked (default): the fewest bits. Each frame is the last "
+                            "I-frame's mesh laid on the "
                             "frame's surface (T-frames), with or without a skeleton; connectivity and sampling are not "
                             "the capture's. topology: keeps every frame's own connectivity, for several times the "
                             "bits. paper: the same by the published method's own choices"))

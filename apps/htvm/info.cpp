@@ -162,7 +162,9 @@ Result<void> info(const Options& options) {
 void add_info(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("info", "Show what is in an .htvm stream: frames, sizes by layer, skeleton");
-    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")
+        ->type_name("FILE")
+        ->required();
     command->add_flag("--summary", options->summary, "The totals only, no line per frame");
     command->add_flag("--json", options->json, "Everything as JSON");
     add_packet_limits(*command, options->limits);

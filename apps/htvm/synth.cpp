@@ -145,7 +145,7 @@ void add_synth(CLI::App& app, Run& run) {
     auto& o = *options;
     CLI::App* command = app.add_subcommand("synth", "Make a synthetic capture of a person: meshes and skeleton");
     command->description(
-        "Makes a capture of a person who does not exist, to try the codec on: a dressed, coloured body, 1.75 m tall,\n"
+        "Make a capture of a person who does not exist, to try the codec on: a dressed, coloured body, 1.75 m tall,\n"
         "that starts in a T-pose, then walks, waves, turns and jumps in a cycle of 8 seconds. The surface is meshed "
         "anew\n"
         "in every frame, as reconstructions are: the number of vertices, their places and the triangles all change.\n"
@@ -153,6 +153,7 @@ void add_synth(CLI::App& app, Run& run) {
     command
         ->add_option("OUT_DIR,-o,--output", o.folder,
                      "Folder to write frame_00000.ply ..., skeleton.json, skeleton_true.json to")
+        ->type_name("FOLDER")
         ->required();
     command->add_option("--frames", o.frames, "How many frames")
         ->check(CLI::Range(1, most_frames))

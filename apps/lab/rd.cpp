@@ -274,6 +274,7 @@ Result<void> rate_distortion(const Options& options) {
 
 void add_sweep_options(CLI::App& command, Options& o) {
     command.add_option("-o,--output", o.output, "Folder for results, tables and curves; results in it are used again")
+        ->type_name("FOLDER")
         ->required();
     command
         .add_option("-q,--quality", o.qualities, "Qualities, comma between (default 20,35,50,65,80; see htvm encode)")

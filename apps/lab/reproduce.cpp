@@ -420,7 +420,9 @@ void add_reproduce(CLI::App& app, app::Run& run) {
     const auto options = std::make_shared<Options>();
     Options& o = *options;
     add_capture_options(*command, o.capture);
-    command->add_option("-o,--output", o.output, "Folder for report.html, figures and kept results")->required();
+    command->add_option("-o,--output", o.output, "Folder for report.html, figures and kept results")
+        ->type_name("FOLDER")
+        ->required();
     command->add_option("--figures", o.figures, "Figures of the paper, comma between, of 6 to 25 (default: all)")
         ->delimiter(',')
         ->check(CLI::Range(6, 25))
@@ -431,9 +433,11 @@ void add_reproduce(CLI::App& app, app::Run& run) {
     command->add_option("--title", o.title, "The capture's name in the report (default: the folder's)");
     command->add_option("--keyint", o.key_interval, "Frames from one I-frame to the next (default 30)")
         ->check(CLI::Range(1, 1000000));
-    command->add_option("--true-skeleton", o.true_skeleton,
-                        "For figure 20, the skeleton without tracking noise (default: skeleton_true.json beside\n"
-                        "skeleton.json where it is, else noise is added to the tracked skeleton)");
+    command
+        ->add_option("--true-skeleton", o.true_skeleton,
+                     "For figure 20, the skeleton without tracking noise (default: skeleton_true.json beside\n"
+                     "skeleton.json where it is, else noise is added to the tracked skeleton)")
+        ->type_name("FILE");
     command->add_option("--azimuth", o.azimuth,
                         "Degrees about the vertical from which frames are drawn; 0 looks along -z (default: the\n"
                         "body's front, as far as that can be told)");

@@ -1,0 +1,111 @@
+#include "command_line/option_text.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <set>
+#include <string_view>
+
+namespace htvm::app {
+namespace {
+
+std::vector<std::string> split(std::string_view text, char at) {
+    std::vector<std::string> out;
+    while (!text.empty()) {
+        const auto end = std::min(text.find(at), text.size());
+        out.emplace_back(text.substr(0, end));
+        text.remove_prefix(std::min(text.size(), end + 1));
+    }
+    return out;
+}
+
+// CLI11 writes what an option takes as "TEXT:{mm,cm,m}", "INT:INT in [1 - 64]" or as the program says: "y|z=y".
+void tell_value(const CLI::Option& option, OptionText& out) {
+    if (option.get_items_expected_max() == 0) return;
+    const std::string type = option.get_type_name(), said = option.get_option_text();
+    if (const auto words = said.substr(0, said.find('=')); words.find('|') != std::string::npos) {
+        out.words = split(words, '|');
+        out.value = words;
+        return;
+    }
+    if (const auto brace = type.find(":{"); brace != std::string::npos && type.ends_with('}'))
+        out.words = split(std::string_view(type).substr(brace + 2, type.size() - brace - 3), ',');
+    const auto kind = type.substr(0, type.find(':'));
+    if (!said.empty())
+        out.value = said;
+    else if (!out.words.empty())
+        out.value = fmt::format("{}", fmt::join(out.words, "|"));
+    else if (kind == "INT" || kind == "UINT" || kind == "FLOAT")
+        out.value = "NUMBER";
+    else
+        out.value = kind;
+}
+
+std::string names_of(const std::set<CLI::Option*>& options) {
+    std::vector<std::string> names;
+    for (const auto* option : options) names.push_back(option->get_name());
+    std::sort(names.begin(), names.end());
+    return fmt::format("{}", fmt::join(names, ", "));
+}
+
+// Indented lines of a description are a table.
+void tell_meaning(const CLI::Option& option, OptionText& text) {
+    const auto& description = option.get_description();
+    const auto table = std::min(description.find("\n "), description.size());
+    text.table = split(std::string_view(description).substr(table), '\n');
+    if (!text.table.empty()) text.table.erase(text.table.begin());  // the end of the line before
+    auto& out = text.meaning;
+    out = joined(description.substr(0, table));
+    while (out.ends_with(':') || out.ends_with('.')) out.pop_back();
+    const std::string type = option.get_type_name();
+    if (const auto range = type.find(" in ["); range != std::string::npos && type.ends_with(']')) {
+        auto limits = type.substr(range + 5, type.size() - range - 6);
+        if (const auto dash = limits.find(" - "); dash != std::string::npos) limits.replace(dash, 3, " to ");
+        out += "; " + limits;
+    }
+    if (!option.get_default_str().empty()) out += "; default " + option.get_default_str();
+    if (!option.get_needs().empty()) out += "; only with " + names_of(option.get_needs());
+    if (!option.get_excludes().empty()) out += "; not with " + names_of(option.get_excludes());
+}
+
+}  // namespace
+
+std::vector<OptionText> option_texts(const CLI::App& command) {
+    std::vector<OptionText> out;
+    for (const auto* option : command.get_options()) {
+        if (option->get_group().empty()) continue;
+        OptionText text;
+        for (const auto& name : option->get_snames()) text.names.push_back("-" + name);
+        for (const auto& name : option->get_lnames()) text.names.push_back("--" + name);
+        if (option->get_positional()) text.place = option->get_name(true);
+        tell_value(*option, text);
+        text.heading = option->get_group();
+        tell_meaning(*option, text);
+        text.required = option->get_required();
+        out.push_back(std::move(text));
+    }
+    return out;
+}
+
+std::vector<const CLI::App*> commands_of(const CLI::App& program) {
+    return program.get_subcommands([](const CLI::App*) { return true; });
+}
+
+std::string summary_of(const CLI::App& command) {
+    const auto text = joined(command.get_description());
+    return text.substr(0, std::min({text.find(": "), text.find(". "), text.find("; ")}));
+}
+
+std::string joined(const std::string& text) {
+    std::string out;
+    for (const auto& line : split(text, '\n')) {
+        const auto begin = line.find_first_not_of(' ');
+        if (begin == std::string::npos) continue;
+        if (!out.empty()) out += ' ';
+        out += line.substr(begin);
+    }
+    return out;
+}
+
+}  // namespace htvm::app

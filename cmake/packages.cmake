@@ -1,0 +1,57 @@
+# `cpack -G DEB` in the build folder: htvm (programs), libhtvm0.1 and libhtvm-draco0.1 (shared libraries), libhtvm-dev
+# (what programs are compiled with). `./dev package` configures a build as Debian's folders want it.
+find_program(DPKG_DEB dpkg-deb)
+if(NOT DPKG_DEB)
+  return()
+endif()
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_VENDOR "htvm developers")
+set(CPACK_PACKAGE_CONTACT "htvm developers")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "compression of human time-varying meshes")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_GROUPING IGNORE)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+# Dependencies are determined from what programs and libraries link.
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/lib)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_PRE_BUILD_SCRIPTS ${PROJECT_SOURCE_DIR}/cmake/compress_pages.cmake)
+execute_process(COMMAND gzip -9nc ${PROJECT_SOURCE_DIR}/CHANGELOG.md
+                OUTPUT_FILE ${PROJECT_BINARY_DIR}/install/changelog.gz COMMAND_ERROR_IS_FATAL ANY)
+
+# htvm_package(COMPONENT NAME SECTION CONTENTS): with the files that Debian wants in every package.
+set(CPACK_COMPONENTS_ALL "")
+function(htvm_package component name section contents)
+  string(TOUPPER ${component} upper)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_NAME ${name} PARENT_SCOPE)
+  set(CPACK_DEBIAN_${upper}_PACKAGE_SECTION ${section} PARENT_SCOPE)
+  set(CPACK_COMPONENT_${upper}_DESCRIPTION
+      "Compresses captured 3D people, one triangle mesh per frame, whose vertices\nand triangles change from frame to frame.\n.\nThis package has ${contents}."
+      PARENT_SCOPE)
+  set(CPACK_COMPONENTS_ALL ${CPACK_COMPONENTS_ALL} ${component} PARENT_SCOPE)
+  install(FILES cmake/debian_copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} RENAME copyright
+          COMPONENT ${component} EXCLUDE_FROM_ALL)
+  install(FILES ${PROJECT_BINARY_DIR}/install/changelog.gz DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name}
+          COMPONENT ${component} EXCLUDE_FROM_ALL)
+endfunction()
+set(development_needs libexpected-dev)
+if(HTVM_BUILD_TOOLS)
+  htvm_package(programs htvm graphics "the programs htvm and htvm-lab")
+  set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS gnuplot-nox)
+endif()
+if("shared" IN_LIST htvm_kinds)
+  htvm_package(runtime libhtvm${htvm_soversion} libs "the shared libraries")
+  list(APPEND development_needs "libhtvm${htvm_soversion} (= ${PROJECT_VERSION})")
+  if("draco" IN_LIST htvm_libraries)
+    htvm_package(draco libhtvm-draco${htvm_soversion} libs "the shared library that plugs Draco in")
+    set(CPACK_DEBIAN_DRACO_PACKAGE_DEPENDS "libhtvm${htvm_soversion} (= ${PROJECT_VERSION})")
+    list(APPEND development_needs "libhtvm-draco${htvm_soversion} (= ${PROJECT_VERSION})")
+  endif()
+endif()
+htvm_package(development libhtvm-dev libdevel "headers, libraries, and files for CMake and pkg-config")
+list(JOIN development_needs ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS libdraco-dev)
+include(CPack)
