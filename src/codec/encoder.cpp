@@ -123,7 +123,6 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
             options.tracked.node_spacing > 0 ? options.tracked.node_spacing : spacing_on_adults * adult;
         header.node_spacing = std::max(on_lattice(spacing * units), 1);
     }
-    configuration.intra_alone = options.key_interval == 1;
     return {};
 }
 

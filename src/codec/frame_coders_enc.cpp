@@ -1,6 +1,7 @@
 #include "codec/frame_coders_enc.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "codec/intra/intra_frame.h"
@@ -10,6 +11,9 @@
 
 namespace htvm::internal {
 namespace {
+
+enum class IntraUse : std::uint8_t { reference, alone };       // whether later frames may refer to it
+enum class TrackedParts : std::uint8_t { all, motion_alone };  // what of a T-frame is sent
 
 Packet frame_packet(PacketKind kind, const FramePayload& payload) {
     Packet packet;
@@ -43,7 +47,7 @@ FrameSteps tracked_steps(const FrameSteps& steps) {
 LatticeMesh simplified(FrameWork& work, const FrameSteps& steps) {
     constexpr double longest_edge = 40, reach = 30;  // mm on an adult
     constexpr double colour_steps = 2.5;
-    const auto& surface = work.target();
+    const auto& surface = work.surface();
     StageClock clock(work.stages);
     const auto& configuration = work.configuration;
     SimplifiedReferenceOptions options;
@@ -134,8 +138,6 @@ Candidate code_moving_part(FrameWork& work, const FrameSteps& steps, const std::
     return code_residuals(work, source, steps);
 }
 
-}  // namespace
-
 Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse use) {
     const auto& configuration = work.configuration;
     const bool tracked = configuration.tracked(), referred_to = use == IntraUse::reference;
@@ -195,19 +197,6 @@ Result<Candidate> code_enhanced(FrameWork& work, const FrameSteps& steps) {
     return out;
 }
 
-Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded) {
-    if (std::find(coded.begin(), coded.end(), true) == coded.end()) return code_predicted(work);
-    const auto& sub_meshes = work.reference().decoded.skinned.sub_meshes;
-    bool something = false, everything = true;
-    for (std::size_t bone = 0; bone < coded.size(); ++bone) {
-        const bool bare = sub_meshes.of(bone).empty();
-        something = something || (coded[bone] && !bare);
-        everything = everything && (coded[bone] || bare);
-    }
-    if (everything || !something) return code_enhanced(work, steps);
-    return code_moving_part(work, steps, coded);
-}
-
 Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts) {
     // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
     constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
@@ -222,7 +211,7 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     options.motion_alone = parts == TrackedParts::motion_alone;
     options.threads = configuration.threads;
     const bool from_last = nodes.frame && configuration.options.tracked.references == TrackedReferences::previous;
-    auto encoded = encode_tracked_frame(work.mesh, work.target(), *reference.tracked, work.node_motion(),
+    auto encoded = encode_tracked_frame(work.mesh, work.surface(), *reference.tracked, work.node_motion(),
                                         from_last ? &nodes.state : nullptr, options, work.stages);
     if (!encoded) return tl::unexpected(encoded.error());
     Candidate out;
@@ -239,11 +228,40 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     return out;
 }
 
-const std::array<FrameCoder, frame_type_count> frame_coders = {
+// By FrameType.
+using FrameCoder = Result<Candidate> (*)(FrameWork& work, const FrameSteps& steps);
+constexpr std::array<FrameCoder, frame_type_count> frame_coders = {
     [](FrameWork& work, const FrameSteps& steps) { return code_intra(work, steps, IntraUse::reference); },
     code_enhanced,
     [](FrameWork& work, const FrameSteps&) { return code_predicted(work); },
     [](FrameWork& work, const FrameSteps& steps) { return code_tracked(work, steps, TrackedParts::all); },
 };
+
+}  // namespace
+
+Result<Candidate> code_frame(FrameType type, FrameWork& work, const FrameSteps& steps) {
+    return frame_coders[static_cast<std::size_t>(type)](work, steps);
+}
+
+Result<Candidate> code_lone_intra(FrameWork& work, const FrameSteps& steps) {
+    return code_intra(work, steps, IntraUse::alone);
+}
+
+Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded) {
+    if (std::find(coded.begin(), coded.end(), true) == coded.end()) return code_predicted(work);
+    const auto& sub_meshes = work.reference().decoded.skinned.sub_meshes;
+    bool something = false, everything = true;
+    for (std::size_t bone = 0; bone < coded.size(); ++bone) {
+        const bool bare = sub_meshes.of(bone).empty();
+        something = something || (coded[bone] && !bare);
+        everything = everything && (coded[bone] || bare);
+    }
+    if (everything || !something) return code_enhanced(work, steps);
+    return code_moving_part(work, steps, coded);
+}
+
+Result<Candidate> code_motion_alone(FrameWork& work, const FrameSteps& steps) {
+    return code_tracked(work, steps, TrackedParts::motion_alone);
+}
 
 }  // namespace htvm::internal

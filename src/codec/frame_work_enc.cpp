@@ -20,7 +20,7 @@ RegistrationOptions registration_options(const EncoderOptions& options) {
 // for the motion of the nodes.
 Derived derived_of(const Configuration& configuration) {
     // Under rate control a stand-in for a frame that does not fit also refers to the I-frame.
-    const bool referred_to = !configuration.intra_alone || configuration.options.rate.bits_per_second > 0;
+    const bool referred_to = !configuration.intra_alone() || configuration.options.rate.bits_per_second > 0;
     return {.bones = referred_to && (configuration.header.skeleton_tracked || !configuration.tracked()),
             .nodes = referred_to && configuration.tracked()};
 }
@@ -69,7 +69,7 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
     in_use->bytes = static_cast<double>(sent.bytes());
     if (in_use->decoded.tracked)
         in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
-    else if (!in_use->decoded.skinned.bone_of_vertex.empty())
+    else if (in_use->decoded.has_bones)
         in_use->search = make_reference_search(in_use->decoded.skinned);
     out.reference = std::move(in_use);
     return out;
@@ -80,13 +80,14 @@ double FrameWork::edge() {
     return *edge_;
 }
 
-const SurfaceIndex& FrameWork::target() {
-    if (!target_) {
+const SurfaceIndex& FrameWork::surface() {
+    if (!surface_) {
         StageClock clock(stages);
-        target_ = captured_surface(mesh, deformation_options(configuration));
+        surface_ = configuration.tracked() ? captured_surface(mesh, deformation_options(configuration))
+                                           : SurfaceIndex(points_of(mesh.positions), mesh.triangles);
         clock.done("search structures");
     }
-    return *target_;
+    return *surface_;
 }
 
 const FrameMotion& FrameWork::bone_motion() {
@@ -102,11 +103,11 @@ const FrameMotion& FrameWork::bone_motion() {
 
 const std::vector<RigidMotion>& FrameWork::node_motion() {
     if (!node_motion_) {
-        const auto& surface = target();
+        const auto& target = surface();
         StageClock clock(stages);
         const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
         node_motion_ =
-            register_nodes(reference().deformable, surface, {sequence.nodes.last, sequence.nodes.before_last, skeletal},
+            register_nodes(reference().deformable, target, {sequence.nodes.last, sequence.nodes.before_last, skeletal},
                            deformation_options(configuration));
         clock.done("registration");
     }
@@ -131,27 +132,23 @@ SurfaceErrors FrameWork::errors_of(const LatticeMesh& decoded) {
     SurfaceDistanceOptions options;
     options.threads = configuration.threads;
     options.every = 4;
-    if (!captured_) {
-        auto points = points_of(mesh.positions);
-        SurfaceIndex search(points, mesh.triangles);
-        captured_ = CapturedSurface{std::move(points), std::move(search)};
-    }
+    const auto& captured = surface();
     const auto shown = points_of(decoded.positions);
-    return surface_errors({captured_->points, mesh.triangles, mesh.colours}, captured_->search,
+    return surface_errors({captured.positions, mesh.triangles, mesh.colours}, captured,
                           {shown, decoded.triangles, decoded.colours}, options);
 }
 
 TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_edge,
                                   std::span<const double> intra_squared) {
     constexpr double stray_in_edges = 2, reach = 25, region = 100;  // in mean edges; mm on an adult
-    const auto& surface = target();
+    const auto& captured = surface();
     StageClock clock(stages);
     TrackedFitOptions options;
     options.stray = std::max(stray_in_edges * reference_edge, 1.0);
     options.reach = std::max(reach * configuration.adult_millimetre, options.stray);
     options.region = region * configuration.adult_millimetre;
     options.threads = configuration.threads;
-    auto out = measure_tracked_fit(surface, decoded, intra_squared, options);
+    auto out = measure_tracked_fit(captured, decoded, intra_squared, options);
     clock.done("fit of the tracking");
     return out;
 }

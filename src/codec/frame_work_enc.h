@@ -30,8 +30,8 @@ struct Configuration {
     double units = 16;             // lattice units per millimetre
     double adult_millimetre = 16;  // the length on this subject that corresponds to a millimetre on an adult, in
                                    // lattice units
-    bool intra_alone = false;      // no frame refers to another
     bool tracked() const { return options.profile == Profile::tracked; }
+    bool intra_alone() const { return options.key_interval == 1; }  // nothing refers to anything
     double to_millimetres(double lattice_units) const { return lattice_units / units; }
 };
 
@@ -64,10 +64,9 @@ struct ReferenceInUse {
 struct BoneHistory {
     std::vector<RigidMotion> motion;  // of each bone in the previous frame; empty after the I-frame
     Codebooks codebooks;
-    double least_bytes = 0;   // size of the cheapest whole EP-frame; 0: none yet
-    double excess_bytes = 0;  // how much more the others took, in total
-    double plain_intra_bytes =
-        0;  // bytes per vertex of an I-frame that nothing refers to, for the choice of the cheaper; 0: unknown
+    double least_bytes = 0;        // size of the cheapest whole EP-frame; 0: none yet
+    double excess_bytes = 0;       // how much more the others took, in total
+    double plain_intra_bytes = 0;  // bytes per vertex of an I-frame that nothing refers to; 0: unknown
 };
 
 // What the T-frames since the I-frame leave for the next one.
@@ -135,8 +134,8 @@ public:
     // The current reference; there must be one.
     const ReferenceInUse& reference() const { return *sequence.reference; }
     std::int64_t frames_since_intra() const { return std::int64_t{sequence.next_frame} - reference().decoded.number; }
-    double edge();                 // mean edge of the captured mesh
-    const SurfaceIndex& target();  // the captured surface, prepared for registration to it
+    double edge();                  // mean edge of the captured mesh
+    const SurfaceIndex& surface();  // the captured surface; indexed by direction too if nodes are registered to it
     // The motion of each bone, and of each node, relative to the reference.
     const FrameMotion& bone_motion();
     const std::vector<RigidMotion>& node_motion();
@@ -147,16 +146,11 @@ public:
     TrackedFit tracked_fit(const LatticeMesh& decoded, double reference_edge, std::span<const double> intra_squared);
 
 private:
-    struct CapturedSurface {
-        std::vector<Point3f> points;
-        SurfaceIndex search;
-    };
     std::optional<double> edge_;
-    std::optional<SurfaceIndex> target_;
+    std::optional<SurfaceIndex> surface_;
     std::optional<FrameMotion> bone_motion_;
     std::optional<std::vector<RigidMotion>> node_motion_;
     std::optional<AnimationFit> animation_fit_;
-    std::optional<CapturedSurface> captured_;
 };
 
 // The registration's options, scaled to this subject.

@@ -29,13 +29,12 @@ bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
 bool can_be_moved(const FrameWork& work) {
     if (!work.sequence.reference) return false;
     const auto& reference = work.reference().decoded;
-    const bool derived =
-        work.configuration.tracked() ? reference.tracked.has_value() : !reference.skinned.bone_of_vertex.empty();
+    const bool derived = work.configuration.tracked() ? reference.tracked.has_value() : reference.has_bones;
     return derived && !reference.mesh().positions.empty() && !work.mesh.positions.empty() &&
            same_attributes(work.mesh, reference.mesh());
 }
 
-bool can_refer(const FrameWork& work) { return !work.configuration.intra_alone && can_be_moved(work); }
+bool can_refer(const FrameWork& work) { return !work.configuration.intra_alone() && can_be_moved(work); }
 
 bool is_due(const FrameWork& work) {
     return !can_refer(work) || work.frames_since_intra() >= work.configuration.options.key_interval;
@@ -77,10 +76,10 @@ std::vector<double> shifts_of_bones(const FrameWork& work) {
 // Uses motion-based coding if it is enabled and leaves something out; otherwise codes the whole frame.
 Result<Candidate> code_what_moves(FrameWork& work, const FrameSteps& steps) {
     const double still_below = work.configuration.options.topology.still_below * work.configuration.units;
-    if (!(still_below > 0)) return code_enhanced(work, steps);
+    if (!(still_below > 0)) return code_frame(FrameType::enhanced, work, steps);
     const auto shifts = shifts_of_bones(work);
     if (std::all_of(shifts.begin(), shifts.end(), [&](double shift) { return shift >= still_below; }))
-        return code_enhanced(work, steps);
+        return code_frame(FrameType::enhanced, work, steps);
     return code_coded_bones(
         work, steps,
         choose_coded_bones(shifts, work.animation_fit(), still_below, largest_animation_error(work.configuration)));
@@ -93,8 +92,8 @@ Result<Candidate> choose_by_motion(FrameWork& work, const FrameSteps& steps) {
     const double motion = work.configuration.to_millimetres(std::accumulate(shifts.begin(), shifts.end(), 0.0));
     const auto& options = work.configuration.options.topology;
     if (options.intra_above > 0 && motion > options.intra_above && may_be_intra(work))
-        return code_intra(work, steps, IntraUse::reference);
-    if (motion < options.predicted_below && animation_fits(work)) return code_predicted(work);
+        return code_frame(FrameType::intra, work, steps);
+    if (motion < options.predicted_below && animation_fits(work)) return code_frame(FrameType::predicted, work, steps);
     return code_what_moves(work, steps);
 }
 
@@ -106,7 +105,7 @@ Result<double> plain_intra_bytes(FrameWork& work, const FrameSteps& steps) {
     const auto& reference = work.reference();
     if (known > 0 && reference.intra.steps.geometry == steps.geometry && reference.intra.steps.colour == steps.colour)
         return known;
-    const auto plain = code_intra(work, steps, IntraUse::alone);
+    const auto plain = code_lone_intra(work, steps);
     if (!plain) return tl::unexpected(plain.error());
     return static_cast<double>(plain->bytes()) / static_cast<double>(work.mesh.positions.size());
 }
@@ -124,7 +123,7 @@ Result<Candidate> choose_the_cheaper(FrameWork& work, const FrameSteps& steps) {
     if (work.configuration.options.topology.still_below > 0) return code_what_moves(work, steps);
     const bool suspended = work.sequence.next_frame < work.sequence.trial.next && may_be_intra(work);
     if (!suspended) {
-        auto enhanced = code_enhanced(work, steps);
+        auto enhanced = code_frame(FrameType::enhanced, work, steps);
         if (!enhanced || !may_be_intra(work)) return enhanced;
         const auto plain = plain_intra_bytes(work, steps);
         if (!plain) return tl::unexpected(plain.error());
@@ -146,7 +145,7 @@ Result<Candidate> choose_the_cheaper(FrameWork& work, const FrameSteps& steps) {
         trial.next = work.sequence.next_frame + (2u << trial.losses);
     }
     const bool referred_to = work.sequence.next_frame + 1 >= trial.next;
-    auto intra = code_intra(work, steps, referred_to ? IntraUse::reference : IntraUse::alone);
+    auto intra = referred_to ? code_frame(FrameType::intra, work, steps) : code_lone_intra(work, steps);
     if (intra) intra->trial = trial;
     return intra;
 }
@@ -168,9 +167,9 @@ bool within(const SurfaceErrors& errors, const SurfaceErrors& allowed) {
 
 // Codes an I-frame, and measures the errors of one that nothing refers to.
 Result<Candidate> code_measured_intra(FrameWork& work, const FrameSteps& steps) {
-    auto out = code_intra(work, steps, IntraUse::reference);
+    auto out = code_frame(FrameType::intra, work, steps);
     if (!out) return out;
-    const auto plain = code_intra(work, steps, IntraUse::alone);
+    const auto plain = code_lone_intra(work, steps);
     if (!plain) return plain;
     StageClock clock(work.stages);
     out->intra->plain = work.errors_of(plain->decoded);
@@ -197,7 +196,7 @@ Result<std::optional<Candidate>> choose_animation(FrameWork& work, const FrameSt
         animated += coded.back() ? 0 : 1;
     }
     if (animated == 0) return Choice();
-    auto moved = code_predicted(work);
+    auto moved = code_frame(FrameType::predicted, work, steps);
     if (!moved) return tl::unexpected(moved.error());
     if (within(work.errors_of(moved->decoded), allowed)) return Choice(std::move(*moved));
     if (animated == coded.size()) return Choice();
@@ -221,7 +220,7 @@ Result<Candidate> choose_by_cost(FrameWork& work, const FrameSteps& steps) {
     auto animated = choose_animation(work, steps, allowed);
     if (!animated) return tl::unexpected(animated.error());
     if (*animated) return std::move(**animated);
-    auto enhanced = code_enhanced(work, steps);
+    auto enhanced = code_frame(FrameType::enhanced, work, steps);
     if (!enhanced) return enhanced;
     const bool good = within(work.errors_of(enhanced->decoded), allowed);
     const bool due = intra_is_paid_for(work, *enhanced);
@@ -252,12 +251,12 @@ bool lost_track(const FrameWork& work, const TrackedFit& fit) {
 // longer follow, so an I-frame is sent. An I-frame is also sent once a T-frame takes more bits than the last I-frame
 // did, if the shortest key interval has passed.
 Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps) {
-    auto tracked = code_tracked(work, steps, TrackedParts::all);
+    auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
     const auto fit = work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
     const bool expensive = may_be_intra(work) && static_cast<double>(tracked->bytes()) > reference.bytes;
-    if (expensive || lost_track(work, fit)) return code_intra(work, steps, IntraUse::reference);
+    if (expensive || lost_track(work, fit)) return code_frame(FrameType::intra, work, steps);
     auto& best = tracked->nodes->best_fit;
     if (best == 0 || fit.rms < best) best = fit.rms;
     return tracked;
@@ -271,7 +270,8 @@ Result<Candidate> choose(FrameWork& work, const FrameSteps& steps, bool force_in
     if (force_intra || is_due(work) || is_scene_change(work)) {
         if (options.profile != Profile::tracked && choice == FrameChoice::rate_distortion)
             return code_measured_intra(work, steps);
-        return code_intra(work, steps, work.configuration.intra_alone ? IntraUse::alone : IntraUse::reference);
+        return work.configuration.intra_alone() ? code_lone_intra(work, steps)
+                                                : code_frame(FrameType::intra, work, steps);
     }
     if (options.profile == Profile::tracked) return choose_tracked(work, steps);
     switch (choice) {
@@ -317,9 +317,9 @@ tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, doub
 
 // The cheapest frame there is: the motion of the nodes or bones alone.
 Result<Candidate> code_stand_in(FrameWork& work, double quality) {
-    auto out = work.configuration.tracked() ? code_tracked(work, steps_of(work.configuration, quality_steps(quality)),
-                                                           TrackedParts::motion_alone)
-                                            : code_predicted(work);
+    const auto steps = steps_of(work.configuration, quality_steps(quality));
+    auto out =
+        work.configuration.tracked() ? code_motion_alone(work, steps) : code_frame(FrameType::predicted, work, steps);
     if (out) out->stands_in = true;
     return out;
 }

@@ -1,5 +1,6 @@
 // What frames refer to: a decoded I-frame, numbered, and what both sides derive from it. Encoder and decoder build it
-// in the same way and never change it afterwards, so work on a frame can keep using the reference that it began with.
+// in the same way. The mesh never changes afterwards; what follows from bones or nodes may be derived later, since the
+// decoder does not know which kind of frame comes next.
 #pragma once
 
 #include <cstdint>
