@@ -25,22 +25,22 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
     command
         .add_option("input", options.input,
                     "The meshes, one file per frame (.ply, .obj, .drc): a folder, a pattern such as scan_%05d.ply, a\n"
-                    "quoted glob such as 'scan_*.ply', one file, or - for PLY after PLY on standard input")
+                    "quoted glob such as 'scan_*.ply', one file, or - for concatenated PLY on standard input")
         ->type_name("FILE")
         ->required();
     command
         .add_option("-s,--skeleton", options.skeleton,
                     "The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON. Without\n"
-                    "one, a single bone that spans the mesh serves, and fast limbs cost more bits")
+                    "one, a single bone that spans the mesh is used, and fast limbs cost more bits")
         ->type_name("FILE");
     command.add_option("--fps", options.fps, "Frames per second of the meshes (default: the skeleton's rate, else 30)")
         ->check(CLI::PositiveNumber);
-    command.add_option("--unit", options.unit, "Unit of the mesh files (default: told from the first mesh's size)")
+    command.add_option("--unit", options.unit, "Unit of the mesh files (default: guessed from the first mesh's size)")
         ->check(CLI::IsMember({"auto", "mm", "cm", "m"}));
     command.add_option("--frames", options.frames, "Use at most this many frames (default: all)");
-    command.add_option("--first", options.first, "Leave out this many frames at the beginning (default: 0)");
+    command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)");
     command.add_option("--skeleton-offset", options.skeleton_offset,
-                       "Seconds to add to the skeleton's clock, where it runs early or late");
+                       "Seconds to add to the skeleton's clock, if it is early or late");
 }
 
 Result<double> millimetres_of_unit(const std::string& name) {

@@ -59,9 +59,9 @@ void add_calibrate(CLI::App& app, Run& run) {
         ->description("The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON")
         ->required();
     command
-        ->add_option(
-            "--percentile", options->calibration.percentile,
-            "Of the distances of a bone's vertices (default 70); 100, the paper's maximum, suffers from strays")
+        ->add_option("--percentile", options->calibration.percentile,
+                     "Percentile of the distances of a bone's vertices (default 70); 100, the paper's maximum, suffers "
+                     "from outliers")
         ->check(CLI::Range(0.0, 100.0));
     command->add_option("-o,--output", options->output, "The calibration, JSON (default: - for standard output)")
         ->type_name("FILE");

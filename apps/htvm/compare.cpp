@@ -50,7 +50,7 @@ std::string topology_rows(const SequenceComparison& sums) {
     };
     add("components", &Topology::components);
     add("boundary edges", &Topology::boundary_edges);
-    add("  of coincident vertices made one", &Topology::open_edges);
+    add("  with coincident vertices merged", &Topology::open_edges);
     add("non-manifold edges", &Topology::non_manifold_edges);
     add("degenerate triangles", &Topology::degenerate_triangles);
     add("duplicate triangles", &Topology::duplicate_triangles);
@@ -453,24 +453,24 @@ Result<void> compare(Options options) {
 
 void add_picture_options(CLI::App& command, Options& o) {
     ViewOptions& v = o.compare.views;
-    command.add_option("--views", v.views, "Views round the body for M3; 0 leaves M3 out")
+    command.add_option("--views", v.views, "Views around the body for M3; 0: no M3")
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
-    command.add_option("--width", v.width, "Of the pictures, pixels")->capture_default_str();
-    command.add_option("--height", v.height, "Of the pictures, pixels")->capture_default_str();
-    command.add_option("--shading", o.compare.render.shading, "The body's shading; unlit is the colours alone")
+    command.add_option("--width", v.width, "Width of the pictures, pixels")->capture_default_str();
+    command.add_option("--height", v.height, "Height of the pictures, pixels")->capture_default_str();
+    command.add_option("--shading", o.compare.render.shading, "Shading of the body; unlit draws the colours alone")
         ->transform(CLI::CheckedTransformer(shadings))
         ->option_text("flat|smooth|unlit=smooth");
-    command.add_flag("--grey", o.grey, "Draw without the colours (also done where one side has none)");
+    command.add_flag("--grey", o.grey, "Draw without the colours (also done if one side has none)");
     command.add_option("--up", v.up, "Where the head is")
         ->transform(CLI::CheckedTransformer(axes))
         ->option_text("x|-x|y|-y|z|-z=y");
-    command.add_option("--azimuth", v.first_azimuth, "Of the first view, degrees round the body")
+    command.add_option("--azimuth", v.first_azimuth, "Direction of the first view, degrees around the body")
         ->capture_default_str();
-    command.add_option("--elevation", v.elevation, "That the views look down, degrees")->capture_default_str();
+    command.add_option("--elevation", v.elevation, "Degrees by which the views look down")->capture_default_str();
     command.add_flag("--orthographic", v.orthographic, "Parallel projection instead of perspective");
     command.add_flag("--still-camera", o.follow_sequence,
-                     "The cameras look at the box round the whole sequence instead of each frame's own\n"
+                     "The cameras look at the box around the whole sequence instead of each frame's own\n"
                      "(reads the originals twice)");
     command.add_option("--pictures", o.pictures, "Folder for PNG files: original, decoded, difference (4-fold)")
         ->type_name("FOLDER");
@@ -486,12 +486,12 @@ void add_compare(CLI::App& app, Run& run) {
     auto& o = *options;
     CLI::App* command = app.add_subcommand("compare", "Measure decoded meshes against their originals");
     command->description(
-        "Measure decoded meshes against their originals, frame by frame: by the numbers in their names, in the order\n"
-        "of their names where they have none:\n"
+        "Measure decoded meshes against their originals, frame by frame: by the numbers in their names, or in\n"
+        "the order of their names if they have none:\n"
         "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
         "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
         "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
-        "  M3  PSNR of pictures from all round\n"
+        "  M3  PSNR of pictures from all sides\n"
         "  topology  components, boundaries, cracks, flaps");
     command->add_option("ORIGINAL", o.original, "A mesh file, folder, glob or %05d pattern")
         ->type_name("FILE")
@@ -499,23 +499,23 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("DECODED", o.decoded, "The same for the decoded meshes, or an .htvm stream")
         ->type_name("FILE")
         ->required();
-    command->add_option("--frames", o.frames, "Compare at most so many");
-    command->add_option("--only", o.only, "Measure only some of m1, m2, d1, d2, m3, topology (comma between)")
+    command->add_option("--frames", o.frames, "Compare at most this many frames");
+    command->add_option("--only", o.only, "Measure only some of m1, m2, d1, d2, m3, topology, separated by commas")
         ->delimiter(',')
         ->check(CLI::IsMember({"m1", "m2", "d1", "d2", "m3", "topology"}))
         ->option_text("LIST");
-    command->add_option("--unit", o.unit, "Of the files: mm, cm, m, or auto (by the first frame's size)")
+    command->add_option("--unit", o.unit, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
         ->check(CLI::IsMember({"auto", "mm", "cm", "m"}))
         ->capture_default_str();
     command->add_option("--samples", o.compare.surface_options.samples,
-                        "For M2, in each direction (default: 10 times the triangles, as METRO)");
-    command->add_option("--seed", o.compare.surface_options.seed, "Of M2's samples")->capture_default_str();
-    command->add_option("--peak", o.peak_mm, "Of D1 and D2, mm (default: the originals' bounding box diagonal)")
+                        "Samples for M2, in each direction (default: 10 times the triangles, like METRO)");
+    command->add_option("--seed", o.compare.surface_options.seed, "Seed of M2's samples")->capture_default_str();
+    command->add_option("--peak", o.peak_mm, "Peak of D1 and D2, mm (default: the originals' bounding box diagonal)")
         ->check(CLI::PositiveNumber);
     command->add_option("--crack-width", o.compare.topology_options.crack_width,
                         "Widest crack, mm (default: half of the mean edge length)");
     command->add_option("--flap-distance", o.compare.topology_options.flap_distance,
-                        "Farthest apart that a flap's layers are, mm (default: the same)");
+                        "Largest distance of a flap's layers, mm (default: the same)");
     add_picture_options(*command, o);
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");

@@ -238,8 +238,8 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
     const auto others = output.other_meshes();
     if (others > 0 && summary.written() > 0)
         warn(
-            fmt::format("the output folder holds {} mesh files besides, of an earlier run perhaps; whoever reads the "
-                        "folder reads them too",
+            fmt::format("the output folder also contains {} other mesh files, perhaps from an earlier run, which will "
+                        "be read along with these",
                         others));
 }
 
@@ -254,9 +254,10 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
         return fail(summary.refused->kind, fmt::format("{}: {} frames could not be decoded; the first: {}",
                                                        options.input, summary.undecodable, summary.refused->message));
     if (input.damaged_bytes() > 0)
-        return fail(ErrorKind::corrupt_stream,
-                    fmt::format("{} is damaged: {} bytes were no sound packet; {} frames were decoded, {} lost besides",
-                                options.input, input.damaged_bytes(), summary.decoded, lost));
+        return fail(
+            ErrorKind::corrupt_stream,
+            fmt::format("{} is damaged: {} bytes are not valid packets; {} frames were decoded, {} others are lost",
+                        options.input, input.damaged_bytes(), summary.decoded, lost));
     const bool all = options.frames == 0 || summary.written() < options.frames;
     if (all && !output.one_file() && input.cut_short_bytes() > 0)
         return fail(ErrorKind::corrupt_stream, fmt::format("{} ends in the middle of a packet; the {} complete frames "
@@ -267,7 +268,7 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
         return fail(ErrorKind::corrupt_stream,
                     fmt::format("{} has packets that could not be read, but no frame was lost", options.input));
     return fail(ErrorKind::corrupt_stream,
-                fmt::format("{} is not whole: {} frames could not be decoded, {} are not in it", options.input,
+                fmt::format("{} is incomplete: {} frames could not be decoded, {} are missing", options.input,
                             summary.undecodable, summary.missing));
 }
 
@@ -307,8 +308,8 @@ void add_decode(CLI::App& app, Run& run) {
         ->required();
     command
         ->add_option("-o,--output", options->output,
-                     "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one file (the\n"
-                     "first frame alone), or - for PLY after PLY on standard output")
+                     "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one file (for\n"
+                     "the first frame only), or - for concatenated PLY on standard output")
         ->type_name("FILE")
         ->required();
     command->add_option("--format", options->format, "Format in a folder: ply (default) or obj")
@@ -317,8 +318,8 @@ void add_decode(CLI::App& app, Run& run) {
         ->check(CLI::IsMember({"capture", "mm", "cm", "m"}));
     command
         ->add_option("--conceal", options->conceal,
-                     "What stands for a frame that is lost: gap (default), nothing is written and the numbers go on;\n"
-                     "or animate, the I-frame's mesh moved as the last known frame was, for up to 300 in a row")
+                     "What to write for a lost frame: gap (default), nothing, and the numbers continue; or animate,\n"
+                     "the I-frame's mesh moved as in the last known frame, for up to 300 in a row")
         ->check(CLI::IsMember({"gap", "animate"}));
     command->add_option("--frames", options->frames, "Decode at most this many frames (default: all)");
     command->add_option("--threads", options->threads,
@@ -326,10 +327,11 @@ void add_decode(CLI::App& app, Run& run) {
     command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output");
     add_decoder_limits(*command, options->limits);
     command->footer(
-        "A damaged or shortened stream gives every frame that is whole, says what was lost, and exits with 3; so does\n"
-        "one that frames are missing from. A lost P- or EP-frame costs no other one; a lost T-frame those up to the\n"
-        "next I-frame, unless encoded with --tracked-from intra; a damaged sequence header all up to where it\n"
-        "comes again, with an I-frame ten frames later or more.\n"
+        "If a stream is damaged or truncated, every undamaged frame is decoded, losses are reported, and the\n"
+        "exit code is 3; likewise if frames are missing. A lost P- or EP-frame costs no other frame; a lost T-frame\n"
+        "costs those up to the next I-frame, unless encoded with --tracked-from intra; a damaged sequence header "
+        "costs\n"
+        "all frames until it is repeated, with an I-frame at least ten frames later.\n"
         "Examples:\n"
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"

@@ -140,7 +140,7 @@ void add_quality(CLI::App& command, EncodingOptions& options) {
                             "I-frame's mesh laid on the "
                             "frame's surface (T-frames), with or without a skeleton; connectivity and sampling are not "
                             "the capture's. topology: keeps every frame's own connectivity, for several times the "
-                            "bits. paper: the same by the published method's own choices"))
+                            "bits. paper: the same with the choices of the published method"))
         ->check(CLI::IsMember({"tracked", "topology", "paper"}))
         ->type_name("WORD")
         ->group(heading(OptionGroup::common));
@@ -232,7 +232,7 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
         out.radii = std::move(*radii);
     }
     if (out.radii.empty() && !out.skeleton.bones.empty())
-        note("bone radii are calibrated on the first frame; a T-pose suits best (see htvm calibrate)");
+        note("bone radii are calibrated on the first frame; a T-pose is best (see htvm calibrate)");
     if (options.intra == "draco") out.intra_coder = draco_intra_coder();
     return out;
 }
@@ -240,10 +240,10 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
 std::string options_in_markdown() {
     std::string out =
         "# Options of the encoder\n\n"
-        "Printed by `htvm encode --help-options`, from the one list that all of them are checked by\n"
+        "Printed by `htvm encode --help-options`, from the one list by which all of them are checked\n"
         "([encoder_options.cpp](../src/codec/encoder_options.cpp)). Names are those of the C++ struct's fields\n"
         "([encoder_options.hpp](../include/htvm/encoder_options.hpp)) and of the C interface\n"
-        "(`htvm_encoder_options_set`). What they do in full, with measurements: [algorithm.md](algorithm.md).\n";
+        "(`htvm_encoder_options_set`). Details and measurements: [algorithm.md](algorithm.md).\n";
     for (const auto group : {OptionGroup::common, OptionGroup::rate, OptionGroup::tracked, OptionGroup::topology}) {
         out += fmt::format("\n## {}\n\n| option | `htvm encode` | range | default | meaning |\n|---|---|---|---|---|\n",
                            group == OptionGroup::common ? "Every profile" : heading(group));
@@ -259,18 +259,18 @@ std::string options_in_markdown() {
         }
     }
     out +=
-        "\n## Beside the list\n\n"
+        "\n## Not in the list\n\n"
         "| field | `htvm encode` | meaning |\n|---|---|---|\n"
         "| `profile` | `--profile` | tracked (default), topology or paper: `default_options(profile)`, and "
         "`htvm_encoder_options_create` in C, give its defaults |\n"
         "| `geometry_step`, `colour_step` | `--quality` | both steps at once: `quality_steps(quality)` |\n"
-        "| `runner` | | threads of the caller's own (`htvm_encoder_options_set_run_tasks` in C) |\n"
-        "| `skeleton` | `--skeleton` | the capture's joints and bones; none: one bone that spans the mesh |\n"
-        "| `radii` | `--radii` | of the bones, from `calibrate()` or `htvm calibrate` |\n"
-        "| `intra_coder` | `--intra` | another coder of I-frames than TFAN |\n"
-        "| `rate.first_pass` | `--passes 2` | what every frame cost in a first run |\n"
-        "| `fps_numerator`, `fps_denominator` | `--fps` | or as the skeleton's file says |\n"
-        "| `unit_micrometres` | `--unit` | or as the meshes' size tells |\n";
+        "| `runner` | | the caller's own threads (`htvm_encoder_options_set_run_tasks` in C) |\n"
+        "| `skeleton` | `--skeleton` | the capture's joints and bones; none: one bone that spans the mesh is used |\n"
+        "| `radii` | `--radii` | radii of the bones, from `calibrate()` or `htvm calibrate` |\n"
+        "| `intra_coder` | `--intra` | a coder of I-frames other than TFAN |\n"
+        "| `rate.first_pass` | `--passes 2` | the size of every frame in a first run |\n"
+        "| `fps_numerator`, `fps_denominator` | `--fps` | default: as in the skeleton file |\n"
+        "| `unit_micrometres` | `--unit` | default: guessed from the size of the meshes |\n";
     return out;
 }
 

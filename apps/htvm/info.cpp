@@ -150,7 +150,7 @@ Result<void> info(const Options& options) {
         return fail(ErrorKind::limit, options.input + " has packets larger than --max-packet");
     if (input->damaged_bytes() > 0)
         return fail(ErrorKind::corrupt_stream,
-                    fmt::format("{}: {} bytes are no sound packet", options.input, input->damaged_bytes()));
+                    fmt::format("{}: {} bytes are not valid packets", options.input, input->damaged_bytes()));
     if (input->cut_short_bytes() > 0)
         return fail(ErrorKind::corrupt_stream, options.input + " ends in the middle of a packet");
     if (buffer) return check_buffer(options, *buffer);
@@ -168,10 +168,9 @@ void add_info(CLI::App& app, Run& run) {
     command->add_flag("--summary", options->summary, "The totals only, no line per frame");
     command->add_flag("--json", options->json, "Everything as JSON");
     add_packet_limits(*command, options->limits);
-    auto* bitrate =
-        command->add_option("--bitrate", options->megabits,
-                            "Check that the stream plays without a pause over a line of so many Mbit/s, by\n"
-                            "all bytes of its packets (exit code 5 where not)");
+    auto* bitrate = command->add_option("--bitrate", options->megabits,
+                                        "Check that the stream plays without a pause over a line of this many Mbit/s,\n"
+                                        "counting all bytes of its packets (exit code 5 if not)");
     bitrate->check(CLI::Range(1e-3, 1e6));
     command
         ->add_option("--buffer", options->buffer_seconds,
@@ -182,7 +181,7 @@ void add_info(CLI::App& app, Run& run) {
         "Columns: motion is the skeleton (I) or the bones' transforms (EP); fans and d.order are the connectivity's\n"
         "two parts, TFAN's and the distance order's; attribs are normals and texture coordinates; bpv is the frame's\n"
         "total, with packet and layer headers (overhead, below). All in bits per vertex of the captured mesh.\n"
-        "The lattice is what decoded positions lie on; the quality's step (encode -q) is coarser.");
+        "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.");
     command->callback([options, &run] { run = [options] { return info(*options); }; });
 }
 

@@ -92,14 +92,14 @@ namespace {
 // Numbers with a sign, or beyond 64 bits, are parsed as values far above this.
 constexpr std::uint64_t most_bytes = std::uint64_t{1} << 60;
 
-const char* const group = "Limits, for streams that may be hostile";
+const char* const group = "Limits, for untrusted streams";
 
 }  // namespace
 
 void add_decoder_limits(CLI::App& command, DecoderOptions& limits) {
     command
         .add_option("-M,--max-memory", limits.max_memory,
-                    "Most memory that decoding may take: bytes, or a number with K, M or G (default 4G)")
+                    "Most memory that decoding may use: bytes, or a number with K, M or G (default 4G)")
         ->transform(CLI::AsSizeValue(false))
         ->check(CLI::Range(std::uint64_t{1}, most_bytes, "from 1 to 2^60 bytes"))
         ->group(group);
@@ -111,11 +111,12 @@ void add_decoder_limits(CLI::App& command, DecoderOptions& limits) {
 }
 
 void add_packet_limits(CLI::App& command, DecoderOptions& limits) {
-    command.add_option("--max-bones", limits.max_bones, "Most bones of the skeleton (default 1024, the format's most)")
+    command
+        .add_option("--max-bones", limits.max_bones, "Most bones of the skeleton (default 1024, the format's maximum)")
         ->group(group);
     command
         .add_option("--max-packet", limits.max_packet_bytes,
-                    "Most bytes of a packet, likewise with K, M or G (default 256M); larger ones are passed over")
+                    "Most bytes of a packet, likewise with K, M or G (default 256M); larger ones are skipped")
         ->transform(CLI::AsSizeValue(false))
         ->check(CLI::Range(std::uint64_t{1}, most_bytes, "from 1 to 2^60 bytes"))
         ->group(group);

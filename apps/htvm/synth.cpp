@@ -145,10 +145,10 @@ void add_synth(CLI::App& app, Run& run) {
     auto& o = *options;
     CLI::App* command = app.add_subcommand("synth", "Make a synthetic capture of a person: meshes and skeleton");
     command->description(
-        "Make a capture of a person who does not exist, to try the codec on: a dressed, coloured body, 1.75 m tall,\n"
-        "that starts in a T-pose, then walks, waves, turns and jumps in a cycle of 8 seconds. The surface is meshed "
-        "anew\n"
-        "in every frame, as reconstructions are: the number of vertices, their places and the triangles all change.\n"
+        "Make a synthetic capture of a person, to try the codec on: a dressed, coloured body, 1.75 m tall, that\n"
+        "starts in a T-pose, then walks, waves, turns and jumps in a cycle of 8 seconds. The surface is meshed anew\n"
+        "in every frame, as reconstructions are: the number and positions of the vertices and the triangles\n"
+        "all change.\n"
         "The same options give the same bytes, and every frame can be made on its own (--first-frame).");
     command
         ->add_option("OUT_DIR,-o,--output", o.folder,
@@ -163,7 +163,7 @@ void add_synth(CLI::App& app, Run& run) {
         ->capture_default_str();
     command->add_option("--fps", o.synth.fps, "Frames per second")->capture_default_str();
     command->add_option("--vertices", o.synth.vertices, "Vertices per frame, within 3 %")->capture_default_str();
-    command->add_option("--seed", o.synth.seed, "Of the noise and the sampling; the motion stays the same")
+    command->add_option("--seed", o.synth.seed, "Seed of the noise and the sampling; the motion stays the same")
         ->capture_default_str();
     command
         ->add_option("--surface-noise", o.synth.surface_noise_power,
@@ -175,7 +175,7 @@ void add_synth(CLI::App& app, Run& run) {
                      "skeleton_true.json has none")
         ->capture_default_str();
     command->add_flag("--lattice", o.synth.lattice,
-                      "Leave the vertices on the edges of one regular grid (by default they keep to none)");
+                      "Keep the vertices on the edges of one regular grid (by default there is no grid)");
     command->add_flag("--normals", o.synth.normals, "Write vertex normals too");
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Print what was written as JSON on standard output");

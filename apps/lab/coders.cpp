@@ -132,7 +132,7 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
                          paper_options(key_interval)),
         codec_under_test(
             "htvm-ep",
-            "I- and EP-frames as of htvm encode --profile topology: reference vertices anywhere, point to plane", ours),
+            "I- and EP-frames as in htvm encode --profile topology: reference vertices anywhere, point to plane", ours),
         codec_under_test("htvm-motion",
                          "htvm-ep with motion-based coding: what fits the capture is animated, not coded", motion),
         codec_under_test("htvm-rd", "I-, EP- and P-frames chosen by measured bits and errors; slow", chosen),

@@ -576,8 +576,8 @@ Figure figure_25(const InternalRun& run, Easel& easel) {
     const auto encode = times(run, true), decode = times(run, false);
     Figure figure{
         "25", "time to encode and decode an EP-frame",
-        "About 5 frames a second encoded and 12 decoded, on a Core i7 2700K with a GTX 560 that helped.",
-        fmt::format("{:.0f} ms to encode ({:.1f} frames a second) and {:.0f} ms to decode ({:.1f}) on average.",
+        "About 5 frames per second encoded and 12 decoded, on a Core i7 2700K with a GTX 560 that helped.",
+        fmt::format("{:.0f} ms to encode ({:.1f} frames per second) and {:.0f} ms to decode ({:.1f}) on average.",
                     mean_of(encode), fps_of(encode), mean_of(decode), fps_of(decode)),
         fmt::format("Wall clock, {} threads, no graphics card; whatever else the machine was doing counts too.",
                     run.threads)};
@@ -648,7 +648,7 @@ std::vector<Claim> claims(const Findings& findings) {
         out.push_back(rate_claim("Connectivity's rate", 4.7, mean_of(layer_rates(run, connectivity_bytes))));
         out.push_back(rate_claim("Distance orders' rate", 1.3, mean_of(layer_rates(run, order_bytes))));
         const double encode = fps_of(times(run, true)), decode = fps_of(times(run, false));
-        Claim speed{"Frames a second, encoded and decoded", "about 5 and 12, with a graphics card",
+        Claim speed{"Frames per second, encoded and decoded", "about 5 and 12, with a graphics card",
                     fmt::format("{:.1f} and {:.1f}, on {} processor threads", encode, decode, run.threads),
                     "slower here", encode >= 5 && decode >= 12};
         if (speed.holds) speed.verdict = "faster here";

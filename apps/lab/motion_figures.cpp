@@ -222,7 +222,7 @@ Figure figure_17(const Findings& findings, Easel& easel) {
     Chart chart;
     chart.title = "Time of a frame, by threshold on the bones' motion";
     chart.x_label = rate_label;
-    chart.y_label = "ms a frame";
+    chart.y_label = "ms per frame";
     ChartLine encode{"encoding", colours[0], 7, 1, {}}, decode{"decoding", colours[1], 5, 1, {}};
     for (const auto& [threshold, point] : points) {
         encode.points.push_back({bits_per_vertex(*point), encode_ms(*point)});
@@ -365,7 +365,7 @@ Result<MotionShot> choose_shot(const SourceFrames& source, int key_interval, dou
         best = std::abs(part - 0.5);
         out.frame = i;
     }
-    if (out.frame == 0) return fail(ErrorKind::bad_input, "no frame behind an I-frame");
+    if (out.frame == 0) return fail(ErrorKind::bad_input, "no frame after an I-frame");
     return out;
 }
 

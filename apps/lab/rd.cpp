@@ -203,8 +203,9 @@ void print_tables(const Options& options, const std::string& title, const std::v
         for (const char* peer : {"tfan", "tfan-mpeg"}) crossings += crossing_sentence(points, coder, peer);
     if (!crossings.empty()) fmt::print("\n{}", crossings);
     fmt::print(
-        "\nbpvf and layers: bits per captured vertex, all frames, I-frames counted. one piece: what a coder does not\n"
-        "tell apart (geometry with connectivity). Rate differences: Bjontegaard, n/a without a common range.\n");
+        "\n"
+        "bpvf and layers: bits per captured vertex, all frames, including I-frames. one piece: what a coder does\n"
+        "not split up (geometry with connectivity). Rate differences: Bjontegaard, n/a without a common range.\n");
     if (options.coder_threads == 1)
         fmt::print("Speeds: processor time of one thread (peers: the wall clock, coding and decoding together).\n");
 }
@@ -277,14 +278,15 @@ void add_sweep_options(CLI::App& command, Options& o) {
         ->type_name("FOLDER")
         ->required();
     command
-        .add_option("-q,--quality", o.qualities, "Qualities, comma between (default 20,35,50,65,80; see htvm encode)")
+        .add_option("-q,--quality", o.qualities,
+                    "Qualities, separated by commas (default 20,35,50,65,80; see htvm encode)")
         ->delimiter(',')
         ->check(CLI::Range(0.0, 100.0))
         ->option_text("LIST");
     command
         .add_option(
             "--coders", o.coders,
-            "Comma between (default htvm-t,htvm-ep,paper,tfan,tfan-mpeg,draco10); none for peers alone:\n"
+            "Coders, separated by commas (default htvm-t,htvm-ep,paper,tfan,tfan-mpeg,draco10); none: only peers:\n"
             "  htvm-t   I- and T-frames, as htvm encode: a simplified mesh laid on each frame's surface\n"
             "  paper    I- and EP-frames as in the paper (reference vertices by bone)\n"
             "  htvm-ep  the same with reference vertices from the whole mesh, as htvm encode --profile topology\n"
@@ -295,26 +297,27 @@ void add_sweep_options(CLI::App& command, Options& o) {
             "  draco10, draco7  libdraco at compression level 10, 7, every frame by itself")
         ->delimiter(',')
         ->option_text("LIST");
-    command.add_option("--peer", o.peers, "NAME=COMMAND: another coder, see below; may be given again")
+    command.add_option("--peer", o.peers, "NAME=COMMAND: another coder, see below; may be repeated")
         ->option_text("NAME=COMMAND ...")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    command.add_option("--metrics", o.metrics, "Of m1, m2, m3 (pictures: slow), d1 (with d2); default m1,m2")
+    command.add_option("--metrics", o.metrics, "Any of m1, m2, m3 (pictures: slow), d1 (with d2); default m1,m2")
         ->delimiter(',')
         ->check(CLI::IsMember({"m1", "m2", "m3", "d1"}))
         ->option_text("LIST");
-    command.add_option("--samples", o.samples,
-                       "For M2 in each direction (default 200000, within 1 % of METRO's 10 per triangle; 0: that)");
-    command.add_option("--measure-every", o.measure_every, "Measure errors on every so many-th frame (default 1)")
+    command.add_option(
+        "--samples", o.samples,
+        "Samples for M2 in each direction (default 200000, within 1 % of METRO's 10 per triangle; 0: that)");
+    command.add_option("--measure-every", o.measure_every, "Measure errors on every n-th frame (default 1)")
         ->check(CLI::Range(1, 1000000));
-    command.add_option("--views", o.views, "For M3 (default 10)")->check(CLI::Range(1, 1000));
+    command.add_option("--views", o.views, "Views for M3 (default 10)")->check(CLI::Range(1, 1000));
     command.add_option("--keyint", o.key_interval, "Frames from one I-frame to the next (default 30)")
         ->check(CLI::Range(1, 1000000));
     command.add_flag("--geometry-only", o.geometry_only, "Leave the colours out");
 }
 
 void add_running_options(CLI::App& command, Options& o) {
-    command.add_option("--threads", o.threads, "Coders at work at once (default: one per core)");
+    command.add_option("--threads", o.threads, "Coders that run at once (default: one per core)");
     command
         .add_option("--coder-threads", o.coder_threads,
                     "Threads of each of our coders (default 1: speeds are then processor time of one thread)")
@@ -337,24 +340,22 @@ void add_rd(CLI::App& app, app::Run& run) {
     add_running_options(*command, *options);
     command->footer(
         "Every coder codes the whole sequence at every quality; all get the same steps. Draco's position bits are\n"
-        "those whose cell over the mean frame's bounding box is nearest to the step. Draco codes colours without\n"
-        "loss only: they are quantised to our colour step before. Normals and texture coordinates are left out.\n"
-        "Results are kept in OUTPUT/results; they are made anew where the inputs, the options or the program changed.\n"
-        "\n"
+        "those whose cell over the average frame's bounding box is nearest to the step. Draco codes colours only\n"
+        "losslessly, so they are quantised to our colour step first. Normals and texture coordinates are left out.\n"
+        "Results are kept in OUTPUT/results, and measured again if the inputs, the options or the program changed.\n\n"
         "A peer's COMMAND is run once per frame by the shell, with these replaced:\n"
         "  {in}       binary PLY of the frame, mm          {out}      the file to write, whose size is the rate\n"
         "  {decoded}  PLY to write, decoded from {out}     {q}        quality, 0 to 100\n"
         "  {step} {colour_step}  our steps there, mm and levels       {bits}  position bits, as for Draco\n"
-        "Exit status 0 is success.\n"
-        "\n"
+        "Exit status 0 is success.\n\n"
         "Examples:\n"
         "  htvm-lab rd capture/ -s capture/skeleton.json -o out/rd --png\n"
         "  htvm-lab rd capture/ -o out/rd --peer 'cl4=draco_encoder -i {in} -o {out} -cl 4 -qp {bits} &&\n"
         "      cp {out} {out}.drc && draco_decoder -i {out}.drc -o {decoded}'\n"
-        "Bits by layer of 60 frames of the synthetic capture at three qualities, TFAN and Draco beside:\n"
+        "Bits by layer of 60 frames of the synthetic capture at three qualities, with TFAN and Draco:\n"
         "  htvm synth out/synth --frames 60\n"
-        "  htvm-lab rd out/synth -s out/synth/skeleton.json -q 35,50,65 --coders paper,htvm-ep,tfan,draco10,draco7 "
-        "-o out/rd");
+        "  htvm-lab rd out/synth -s out/synth/skeleton.json -q 35,50,65 --coders paper,htvm-ep,tfan,draco10,draco7 -o "
+        "out/rd");
     command->callback([options, &run] { run = [options] { return rate_distortion(*options); }; });
 }
 

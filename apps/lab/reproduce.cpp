@@ -313,14 +313,14 @@ Result<FactList> capture_facts(const Options& options, const SourceFrames& sourc
     }
     const auto& facts = source.facts();
     const auto size = facts.box.high - facts.box.low;
-    FactList out{{"Frames", fmt::format("{}, {:g} a second", source.size(), facts.fps)},
-                 {"Vertices", fmt::format("{:.0f} a frame on average", mean_vertices(source))},
+    FactList out{{"Frames", fmt::format("{}, {:g} per second", source.size(), facts.fps)},
+                 {"Vertices", fmt::format("{:.0f} per frame on average", mean_vertices(source))},
                  {"Triangles", fmt::format("{:.0f}", triangles / looked_at)},
-                 {"Pieces", fmt::format("{:.1f} a frame", components / looked_at)},
-                 {"Boundary edges", fmt::format("{:.1f} a frame", boundary / looked_at)},
-                 {"Non-manifold edges", fmt::format("{:.1f} a frame", non_manifold / looked_at)},
+                 {"Pieces", fmt::format("{:.1f} per frame", components / looked_at)},
+                 {"Boundary edges", fmt::format("{:.1f} per frame", boundary / looked_at)},
+                 {"Non-manifold edges", fmt::format("{:.1f} per frame", non_manifold / looked_at)},
                  {"Colours", findings.has_colour ? "at the vertices" : "none"},
-                 {"Box round all frames", fmt::format("{:.0f} x {:.0f} x {:.0f} mm", size[0], size[1], size[2])},
+                 {"Box around all frames", fmt::format("{:.0f} x {:.0f} x {:.0f} mm", size[0], size[1], size[2])},
                  {"Skeleton", facts.skeleton.bones.empty()
                                   ? std::string("none: one bone that spans the mesh stands in")
                                   : fmt::format("{} joints, {} bones", facts.skeleton.joint_names.size(),
@@ -354,7 +354,7 @@ Result<Report> make_report(const Options& options, const Laboratory& laboratory,
     report.opening_caption = gallery->opening_caption;
     const auto name = capture_name(options);
     report.title = "The paper's experiments on " + name;
-    report.subtitle = fmt::format("{} frames of {:.0f} vertices, {:g} a second. htvm {}", source.size(),
+    report.subtitle = fmt::format("{} frames of {:.0f} vertices, {:g} per second. htvm {}", source.size(),
                                   mean_vertices(source), source.facts().fps, HTVM_VERSION);
     report.claims = claims(findings);
     report.summary = summary_paragraphs(
@@ -423,7 +423,7 @@ void add_reproduce(CLI::App& app, app::Run& run) {
     command->add_option("-o,--output", o.output, "Folder for report.html, figures and kept results")
         ->type_name("FOLDER")
         ->required();
-    command->add_option("--figures", o.figures, "Figures of the paper, comma between, of 6 to 25 (default: all)")
+    command->add_option("--figures", o.figures, "Figures of the paper from 6 to 25, separated by commas (default: all)")
         ->delimiter(',')
         ->check(CLI::Range(6, 25))
         ->option_text("LIST");
@@ -435,17 +435,17 @@ void add_reproduce(CLI::App& app, app::Run& run) {
         ->check(CLI::Range(1, 1000000));
     command
         ->add_option("--true-skeleton", o.true_skeleton,
-                     "For figure 20, the skeleton without tracking noise (default: skeleton_true.json beside\n"
-                     "skeleton.json where it is, else noise is added to the tracked skeleton)")
+                     "For figure 20, the skeleton without tracking noise (default: skeleton_true.json next to\n"
+                     "skeleton.json if it exists, else noise is added to the tracked skeleton)")
         ->type_name("FILE");
     command->add_option("--azimuth", o.azimuth,
                         "Degrees about the vertical from which frames are drawn; 0 looks along -z (default: the\n"
-                        "body's front, as far as that can be told)");
+                        "body's front, as far as it can be determined)");
     command->add_option("--threads", o.threads, "0: one per core")->check(CLI::Range(0, 1024));
     command->add_option("--memory", o.memory_megabytes, "MB of frames to hold in memory (default 1024)")
         ->check(CLI::Range(1, 1 << 20));
     command->footer(
-        "What was measured is kept in OUTPUT/results: run again with more figures, and only they cost time.\n"
+        "Measurements are kept in OUTPUT/results: if you run it again with more figures, only these take time.\n"
         "Needs gnuplot (Debian: gnuplot-nox).");
     command->callback([&run, options] { run = [options] { return reproduce(*options); }; });
 }

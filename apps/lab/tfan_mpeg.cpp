@@ -246,7 +246,7 @@ Traversed traverse(std::uint32_t vertex_count, std::span<const Triangle> triangl
 
 Result<std::vector<Triangle>> triangles_of(const FanSymbols& symbols, std::uint32_t vertex_count,
                                            std::uint32_t triangle_count) {
-    const auto damaged = [] { return fail(ErrorKind::corrupt_stream, "the fans name what cannot be"); };
+    const auto damaged = [] { return fail(ErrorKind::corrupt_stream, "the fans name an impossible vertex"); };
     FocusView view(vertex_count);
     Cursor fans{symbols.fans}, degrees{symbols.degrees}, configurations{symbols.configurations};
     Cursor operations{symbols.operations}, indices{symbols.indices};
@@ -455,7 +455,7 @@ Result<void> check(const Mesh& mesh, const MpegTfanSettings& settings) {
             return fail(ErrorKind::bad_input, "tfan-mpeg: a position is not finite");
     for (const Triangle& t : mesh.triangles)
         if (std::max({t[0], t[1], t[2]}) >= count)
-            return fail(ErrorKind::bad_input, "tfan-mpeg: a triangle names a vertex that is not there");
+            return fail(ErrorKind::bad_input, "tfan-mpeg: a triangle names a vertex that does not exist");
     return {};
 }
 

@@ -184,7 +184,7 @@ htvm_status htvm_decoder_send_packet(htvm_decoder* decoder, const uint8_t* packe
         auto whole = one.pull();
         if (!whole || one.damaged_bytes() > 0 || one.pending_bytes() > 0)
             return error.set(HTVM_CORRUPT_STREAM,
-                             "what was sent is not one whole, undamaged packet of a size accepted");
+                             "what was sent is not exactly one undamaged packet of an accepted size");
         decoder->packet = std::move(whole);
         return htvm_status{HTVM_OK};
     });

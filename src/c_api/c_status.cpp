@@ -122,9 +122,9 @@ const char* htvm_status_text(htvm_status status) {
         case HTVM_AGAIN:
             return "nothing to receive until more is sent";
         case HTVM_END:
-            return "nothing to receive any more";
+            return "nothing more to receive";
         case HTVM_BAD_INPUT:
-            return "the call or what it was given is wrong";
+            return "the call or one of its arguments is invalid";
         case HTVM_CORRUPT_STREAM:
             return "the stream is corrupt";
         case HTVM_UNSUPPORTED:
@@ -136,8 +136,8 @@ const char* htvm_status_text(htvm_status status) {
         case HTVM_BUFFER_TOO_SMALL:
             return "the caller's array is too short";
         case HTVM_INTERNAL:
-            return "a fault of the library";
+            return "a bug in the library";
         default:
-            return "no status of this version";
+            return "not a status of this version";
     }
 }

@@ -42,7 +42,7 @@ Result<void> check_skeleton(const EncoderOptions& o) {
         return bad("a skeleton has at most 1024 joints and bones");
     for (const auto& bone : skeleton.bones)
         if (bone.first >= skeleton.joint_names.size() || bone.second >= skeleton.joint_names.size())
-            return bad("a bone names a joint that the skeleton has not");
+            return bad("a bone names a joint that the skeleton does not have");
     if (!o.radii.empty() && o.radii.size() != skeleton.bones.size()) return bad("the radii are not one per bone");
     for (const auto r : o.radii)
         if (!(r >= 0 && r < 100000)) return bad("a bone radius must be within 0 and 100 m");

@@ -55,7 +55,7 @@ constexpr Option list[] = {
      .unit = "frames",
      .least = 1,
      .most = 1000000,
-     .meaning = "most frames from one I-frame to the next; 1: I-frames only",
+     .meaning = "largest number of frames from one I-frame to the next; 1: I-frames only",
      .get = [](const EncoderOptions& o) -> double { return o.key_interval; },
      .set = [](EncoderOptions& o, double value) { o.key_interval = static_cast<int>(value); },
      .flag = "--keyint"},
@@ -65,8 +65,8 @@ constexpr Option list[] = {
      .unit = "frames",
      .least = 1,
      .most = 1000000,
-     .meaning = "fewest frames from one I-frame to the next, unless the frame cannot refer to the I-frame or the scene "
-                "changes",
+     .meaning = "smallest number of frames from one I-frame to the next, unless the frame cannot refer to the I-frame "
+                "or the scene changes",
      .get = [](const EncoderOptions& o) -> double { return o.least_key_interval; },
      .set = [](EncoderOptions& o, double value) { o.least_key_interval = static_cast<int>(value); },
      .flag = "--min-keyint"},
@@ -76,7 +76,7 @@ constexpr Option list[] = {
      .least = 1,
      .most = 1024,
      .zero = "one per core",
-     .meaning = "threads at work at once; the bytes do not depend on it",
+     .meaning = "threads that work at the same time; the bytes do not depend on it",
      .get = [](const EncoderOptions& o) -> double { return o.threads; },
      .set = [](EncoderOptions& o, double value) { o.threads = static_cast<unsigned>(value); },
      .flag = "--threads"},
@@ -86,10 +86,9 @@ constexpr Option list[] = {
      .unit = "mm",
      .least = 1,
      .most = 1e6,
-     .zero = "told from the first mesh",
-     .meaning =
-         "longest side of the subject, which reaches, spacings and thresholds are in proportion to; adults, 1100 "
-         "to 2500 mm, are what these are known from",
+     .zero = "measured on the first mesh",
+     .meaning = "longest side of the subject, to which reaches, spacings and thresholds are scaled; they are tuned for "
+                "adults, 1100 to 2500 mm",
      .get = [](const EncoderOptions& o) -> double { return o.subject_size; },
      .set = [](EncoderOptions& o, double value) { o.subject_size = value; },
      .flag = "--subject-size"},
@@ -99,7 +98,7 @@ constexpr Option list[] = {
      .unit = "bits",
      .least = 1,
      .most = 16,
-     .zero = "4, or finer if the step is",
+     .zero = "4, or more if the step needs it",
      .meaning = "decoded positions are multiples of 2^-bits mm",
      .get = [](const EncoderOptions& o) -> double { return o.lattice_bits; },
      .set = [](EncoderOptions& o, double value) { o.lattice_bits = static_cast<int>(value); }},
@@ -108,7 +107,7 @@ constexpr Option list[] = {
      .kind = OptionKind::whole_number,
      .least = 1,
      .most = 4294967295,
-     .meaning = "frames a second, for players and rate control, times fps_denominator",
+     .meaning = "frames per second, for players and rate control, times fps_denominator",
      .get = [](const EncoderOptions& o) -> double { return o.fps_numerator; },
      .set = [](EncoderOptions& o, double value) { o.fps_numerator = static_cast<std::uint32_t>(value); }},
     {.name = "fps_denominator",
@@ -116,7 +115,7 @@ constexpr Option list[] = {
      .kind = OptionKind::whole_number,
      .least = 1,
      .most = 4294967295,
-     .meaning = "what fps_numerator is divided by",
+     .meaning = "divisor of fps_numerator",
      .get = [](const EncoderOptions& o) -> double { return o.fps_denominator; },
      .set = [](EncoderOptions& o, double value) { o.fps_denominator = static_cast<std::uint32_t>(value); }},
     {.name = "unit_micrometres",
@@ -125,7 +124,7 @@ constexpr Option list[] = {
      .unit = "micrometres",
      .least = 1,
      .most = 4294967295,
-     .meaning = "the capture's own unit, kept so that a decoder can give it back; meshes are given in mm all the same",
+     .meaning = "the capture's own unit, kept so that a decoder can restore it; meshes are passed in mm in any case",
      .get = [](const EncoderOptions& o) -> double { return o.unit_micrometres; },
      .set = [](EncoderOptions& o, double value) { o.unit_micrometres = static_cast<std::uint32_t>(value); }},
 
@@ -136,8 +135,8 @@ constexpr Option list[] = {
      .least = 1000,
      .most = 1e12,
      .zero = "none",
-     .meaning = "rate that the stream keeps to; the quality follows, and frames that do not fit into the buffer even "
-                "at the lowest send their motion alone or are dropped",
+     .meaning = "rate that the stream keeps; quality follows from it, and of frames that do not fit the buffer even at "
+                "the lowest quality only the motion is sent, or they are dropped",
      .get = [](const EncoderOptions& o) -> double { return o.rate.bits_per_second; },
      .set = [](EncoderOptions& o, double value) { o.rate.bits_per_second = value; },
      .flag = "--bitrate",
@@ -149,8 +148,8 @@ constexpr Option list[] = {
      .unit = "s",
      .least = 0.01,
      .most = 3600,
-     .meaning = "what the receiver's buffer holds of a stream with a bitrate, which is the delay that a live receiver "
-                "needs; a short capture may exceed the bitrate by it",
+     .meaning = "length of the receiver's buffer for a stream with a bitrate, which is the delay that a live receiver "
+                "needs; a short capture may exceed the bitrate by this much",
      .get = [](const EncoderOptions& o) -> double { return o.rate.buffer_seconds; },
      .set = [](EncoderOptions& o, double value) { o.rate.buffer_seconds = value; },
      .flag = "--buffer"},
@@ -161,8 +160,8 @@ constexpr Option list[] = {
      .least = 0.001,
      .most = 1000,
      .zero = "none",
-     .meaning = "error that every frame comes near to, root mean square between the surfaces (M2); where no quality "
-                "reaches it, the nearest serves, and T-frames may stay well above it",
+     .meaning = "error that every frame should have, RMS distance between the surfaces (M2); if no quality reaches it, "
+                "the nearest is taken, and T-frames may stay well above it",
      .get = [](const EncoderOptions& o) -> double { return o.rate.target_error; },
      .set = [](EncoderOptions& o, double value) { o.rate.target_error = value; },
      .flag = "--target-error"},
@@ -170,7 +169,7 @@ constexpr Option list[] = {
     {.name = "tracked.references",
      .group = OptionGroup::tracked,
      .kind = OptionKind::word,
-     .meaning = "what T-frames refer to: the frame before, or the I-frame alone, so that any of them may be lost, for "
+     .meaning = "what T-frames refer to: the previous frame, or only the I-frame, so that any of them may be lost, for "
                 "a few more bits",
      .words = tracked_references,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.references); },
@@ -182,8 +181,8 @@ constexpr Option list[] = {
      .unit = "geometry steps",
      .least = 0,
      .most = 10,
-     .zero = "they keep every vertex and their connectivity",
-     .meaning = "how far the I-frames' meshes, which the T-frames take over, may be simplified: error of their surface",
+     .zero = "it keeps all vertices and its connectivity",
+     .meaning = "how far the mesh of an I-frame, which T-frames take over, may be simplified: error of its surface",
      .get = [](const EncoderOptions& o) -> double { return o.tracked.simplify; },
      .set = [](EncoderOptions& o, double value) { o.tracked.simplify = value; },
      .flag = "--simplify"},
@@ -193,7 +192,7 @@ constexpr Option list[] = {
      .unit = "mm",
      .least = 1,
      .most = 10000,
-     .zero = "80 on an adult, in proportion on others",
+     .zero = "80 on an adult, in proportion to size on other subjects",
      .meaning = "distance between the nodes that move the mesh",
      .get = [](const EncoderOptions& o) -> double { return o.tracked.node_spacing; },
      .set = [](EncoderOptions& o, double value) { o.tracked.node_spacing = value; },
@@ -203,7 +202,7 @@ constexpr Option list[] = {
      .group = OptionGroup::topology,
      .kind = OptionKind::word,
      .meaning = "choice of frames: fixed, an I-frame every key interval and EP-frames between; motion, by how far the "
-                "skeleton's bones are from the last I-frame; rd, by measured bits and errors (slow); cheaper, as "
+                "skeleton's bones are from the last I-frame; rd, by measured bits and errors (slow); cheaper, like "
                 "fixed, but an I-frame wherever an EP-frame takes more bits",
      .words = frame_choices,
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.topology.frame_choice); },
@@ -215,8 +214,8 @@ constexpr Option list[] = {
      .unit = "mm",
      .least = 0,
      .most = 1e6,
-     .meaning = "choice by motion: frames whose bones moved less than this in all are P-frames, the I-frame's mesh "
-                "moved, where that fits the capture",
+     .meaning = "choice by motion: frames whose bones moved less than this in total become P-frames (the I-frame's "
+                "mesh, moved) if that fits the capture",
      .get = [](const EncoderOptions& o) -> double { return o.topology.predicted_below; },
      .set = [](EncoderOptions& o, double value) { o.topology.predicted_below = value; },
      .flag = "--predicted-below"},
@@ -227,7 +226,7 @@ constexpr Option list[] = {
      .least = 0,
      .most = 1e6,
      .zero = "never",
-     .meaning = "choice by motion: frames whose bones moved more than this in all are I-frames",
+     .meaning = "choice by motion: frames whose bones moved more than this in total become I-frames",
      .get = [](const EncoderOptions& o) -> double { return o.topology.intra_above; },
      .set = [](EncoderOptions& o, double value) { o.topology.intra_above = value; },
      .flag = "--intra-above"},
@@ -249,16 +248,16 @@ constexpr Option list[] = {
      .unit = "mm",
      .least = 0,
      .most = 1e6,
-     .zero = "unchecked, as the paper has it",
-     .meaning = "what would be animated is coded after all where it is farther than this from the capture's surface "
-                "(root mean square, bone by bone)",
+     .zero = "not checked, as in the paper",
+     .meaning = "a part that would be animated is coded after all if it is farther than this from the captured surface "
+                "(RMS, bone by bone)",
      .get = [](const EncoderOptions& o) -> double { return o.topology.animation_error; },
      .set = [](EncoderOptions& o, double value) { o.topology.animation_error = value; },
      .flag = "--animation-error"},
     {.name = "topology.scene_changes",
      .group = OptionGroup::topology,
      .kind = OptionKind::on_or_off,
-     .meaning = "an I-frame where much of the mesh is nowhere near the reference's",
+     .meaning = "an I-frame if much of the mesh is far from the reference's",
      .get = [](const EncoderOptions& o) -> double { return o.topology.scene_changes; },
      .set = [](EncoderOptions& o, double value) { o.topology.scene_changes = value != 0; },
      .flag = "--no-scene-changes",
@@ -277,7 +276,7 @@ constexpr Option list[] = {
      .kind = OptionKind::whole_number,
      .least = 1,
      .most = 64,
-     .meaning = "nearest vertices that the distance order counts",
+     .meaning = "number of nearest vertices that the distance order covers",
      .get = [](const EncoderOptions& o) -> double { return o.topology.nearest_vertices; },
      .set = [](EncoderOptions& o, double value) { o.topology.nearest_vertices = static_cast<int>(value); },
      .flag = "--nearest"},
@@ -305,7 +304,7 @@ constexpr Option list[] = {
      .unit = "mm",
      .least = 0,
      .most = 1000,
-     .zero = "none, each vertex moves with one bone",
+     .zero = "rigid, each vertex moves with one bone",
      .meaning = "width of the borders between bones, over which their motions blend",
      .get = [](const EncoderOptions& o) -> double { return o.topology.weight_width; },
      .set = [](EncoderOptions& o, double value) { o.topology.weight_width = value; },

@@ -39,7 +39,7 @@ Result<DracoCounts> claimed_counts(std::span<const std::uint8_t> bytes) {
     const int version = bytes[5] * 256 + bytes[6];
     if (version < 2 * 256 + 2) {
         return fail(ErrorKind::unsupported, "the Draco file is of bitstream version " + std::to_string(bytes[5]) + "." +
-                                                std::to_string(bytes[6]) + "; encode it anew with Draco 1.2 or later");
+                                                std::to_string(bytes[6]) + "; encode it again with Draco 1.2 or later");
     }
     const bool is_mesh = bytes[7] == 1;
     const bool edgebreaker = bytes[8] == 1;

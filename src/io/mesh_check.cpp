@@ -12,7 +12,7 @@ Result<void> check_attribute(std::size_t size, std::size_t vertices, std::string
     if (size == 0 || size == vertices) return {};
     return fail(ErrorKind::bad_input, "the mesh has " + std::to_string(vertices) + " vertices but " +
                                           std::to_string(size) + " " + std::string(name) +
-                                          "; give one a vertex, or none");
+                                          "; give one per vertex, or none");
 }
 
 }  // namespace

@@ -342,7 +342,7 @@ Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits) {
     }
     if (obj.positions.empty() && obj.foreign_line > 0)
         return bad_line(obj.foreign_line,
-                        "it is no statement of OBJ, and there is no vertex: this is another kind of file");
+                        "it is not an OBJ statement, and there is no vertex: this is another kind of file");
     if (auto ok = check_corners(obj); !ok) return tl::unexpected(ok.error());
     return mesh_of(obj);
 }

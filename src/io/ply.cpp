@@ -355,7 +355,7 @@ Result<PlyHeader> read_header(PlySource& source) {
     const std::uint64_t begin = source.consumed();
     const auto magic = take_line(source, line, 16);
     if (!magic || (*magic != "ply" && *magic != "PLY")) {
-        return fail(ErrorKind::bad_input, "this is no PLY: it does not begin with a line \"ply\"");
+        return fail(ErrorKind::bad_input, "this is not a PLY file: it does not begin with a line \"ply\"");
     }
     PlyHeader header;
     bool has_format = false;

@@ -109,7 +109,7 @@ std::vector<double> mesh_times(const SkeletonTrack& track, const MeshClock& mesh
             times.push_back(t < stamps.size() ? stamps[t]
                                               : stamps.back() + static_cast<double>(t + 1 - stamps.size()) / track.fps);
         if (mesh.fps == 0 && mesh.frames != stamps.size())
-            notes.push_back("The meshes' rate is not known: pose i is taken for mesh frame i.");
+            notes.push_back("The meshes' rate is not known: pose i is used for mesh frame i.");
         return times;
     }
     const double fps = mesh.fps > 0 ? mesh.fps : track.fps;

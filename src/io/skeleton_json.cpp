@@ -179,7 +179,7 @@ Result<void> check_writable(const SkeletonTrack& track) {
                                               std::to_string(track.timestamps.size()) + " timestamps.");
     if (!all_finite(track.timestamps) || !all_finite(track.radii) || !(track.fps >= 1e-3 && track.fps <= 1e6))
         return fail(ErrorKind::bad_input,
-                    "The skeleton has a timestamp or radius that is not finite, or no sane rate.");
+                    "The skeleton has a timestamp or radius that is not finite, or an invalid rate.");
     if (!std::is_sorted(track.timestamps.begin(), track.timestamps.end(), std::less_equal<>()))
         return fail(ErrorKind::bad_input, "The skeleton's timestamps do not increase.");
     if (!track.radii.empty() && track.radii.size() != bones)

@@ -257,7 +257,7 @@ Result<void> check_synth_options(const SynthOptions& options) {
                                               std::to_string(most_vertices) + " vertices, not " +
                                               std::to_string(options.vertices));
     if (!(options.fps >= 0.1 && options.fps <= 10000))
-        return fail(ErrorKind::bad_input, "the frame rate must be between 0.1 and 10000 frames a second");
+        return fail(ErrorKind::bad_input, "the frame rate must be between 0.1 and 10000 frames per second");
     if (!(options.surface_noise_power >= 0 && options.surface_noise_power <= 100))
         return fail(ErrorKind::bad_input, "the surface noise power must be between 0 and 100 mm^2");
     if (!(options.joint_noise_power >= 0 && options.joint_noise_power <= 1e6))

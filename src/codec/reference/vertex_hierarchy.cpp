@@ -192,7 +192,7 @@ Result<VertexHierarchy> build_vertex_hierarchy(std::span<const LatticePoint> pos
         for (const std::uint32_t v : triangles[t])
             if (v >= positions.size())
                 return fail(ErrorKind::bad_input,
-                            "vertex hierarchy: triangle " + std::to_string(t) + " names a vertex that is not there");
+                            "vertex hierarchy: triangle " + std::to_string(t) + " names a vertex that does not exist");
     VertexHierarchy hierarchy;
     hierarchy.vertex_count = positions.size();
     Layer fine = layer_of_vertices(positions, triangles);
