@@ -43,7 +43,7 @@ def function_name(program, begins):
 
 
 def instructions(program, begins, *arguments):
-    """How many run within that function while the program does its work."""
+    """The number of instructions within that function during a run of the program."""
     done = run("valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null",
                "--toggle-collect=" + function_name(program, begins), program, *arguments)
     return int(re.search(r"Collected : (\d+)", done.stderr).group(1))

@@ -1,10 +1,10 @@
-# The C interface (htvm/htvm.h): the decoder's part, which needs the standard library alone, and with it the encoder's.
+# The C interface (htvm/htvm.h): the decoder part, which needs only the standard library, and the encoder part.
 htvm_floor(c_decoder SOURCES src/c_api/c_status.cpp src/c_api/c_decoder.cpp LINKS htvm_decoder)
 if(HTVM_BUILD_ENCODER)
   htvm_floor(c SOURCES src/c_api/c_encoder.cpp LINKS htvm_c_decoder htvm_encoder)
 endif()
 
-# The examples, in C99: the header must be C, and its library be linked by a C program.
+# The examples, in C99: they check that the header is C, and that a C program can link the library.
 if(HTVM_BUILD_TESTS AND HTVM_BUILD_ENCODER)
   enable_language(C)
   foreach(example encode decode)

@@ -1,4 +1,4 @@
-# Refuses flags under which the decoder would give other bits than everywhere else (docs/bitstream.md, section 1). They
+# Refuses flags under which the decoder would give different bits (docs/bitstream.md, section 1). They
 # would come after, or undo, those that the project sets itself.
 string(TOUPPER "${CMAKE_BUILD_TYPE}" build_type)
 foreach(flags IN ITEMS CMAKE_CXX_FLAGS CMAKE_CXX_FLAGS_${build_type})

@@ -7,7 +7,7 @@ function(htvm_tests floor)
     add_executable(test_${floor} ${sources})
     target_include_directories(test_${floor} PRIVATE ${PROJECT_SOURCE_DIR}/tests)
     target_link_libraries(test_${floor} PRIVATE ${ARGN} GTest::gtest_main GTest::gmock)
-    # What is tested is optimised; optimising the tests would take longer than running them.
+    # The tested code is optimised; optimising the tests would take longer than running them.
     target_compile_options(test_${floor} PRIVATE -O1)
     htvm_precompile(test_${floor} <gmock/gmock.h> <gtest/gtest.h> <algorithm> <random> <string> <vector>)
     target_compile_definitions(test_${floor} PRIVATE HTVM_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
@@ -28,7 +28,7 @@ htvm_tests(core htvm_core)
 htvm_tests(entropy htvm_entropy)
 htvm_tests(surface htvm_surface)
 htvm_tests(codec htvm_encoder htvm_decoder htvm_draco htvm_synth)
-# Replaces operator new, hence a program of its own.
+# A program of its own, because it replaces operator new.
 htvm_tests(memory htvm_c htvm_encoder htvm_decoder htvm_synth)
 if(HTVM_SANITIZE)
   target_compile_definitions(test_memory PRIVATE HTVM_MOST_FAILURES=50)
@@ -58,6 +58,6 @@ endif()
 # Compares formats, in Python: sanitizers would only make it slow.
 if(NOT HTVM_SANITIZE)
   add_test(NAME second_decoder COMMAND ${PROJECT_SOURCE_DIR}/tests/second_decoder/check.sh $<TARGET_FILE:htvm>)
-  # COST: the longest of all begins first.
+  # COST: the longest test starts first.
   set_tests_properties(second_decoder PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 COST 100)
 endif()

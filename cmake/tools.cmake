@@ -1,4 +1,4 @@
-# What the programs are made of besides the codec.
+# The libraries that the programs use besides the codec.
 find_package(nlohmann_json 3.10 REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
@@ -12,19 +12,19 @@ target_link_libraries(htvm_libdraco INTERFACE ${DRACO_LIBRARY})
 
 htvm_floor(io DIRECTORY src/io LINKS htvm_core htvm_libdraco nlohmann_json::nlohmann_json)
 htvm_floor(synth DIRECTORY src/synth LINKS htvm_core Eigen3::Eigen)
-# It reads nothing, and makes what the tests of all else need: under sanitizers that would take half of their time.
+# It reads no input, and makes what other tests need: with sanitizers it would take half of their time.
 if(HTVM_SANITIZE MATCHES "address")
   target_compile_options(htvm_synth PRIVATE -fno-sanitize=all -O2)
 endif()
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
 
-# Draco-coded I-frames: plugs into the encoder and the decoder, which do not know libdraco.
+# Draco-coded I-frames: plugs into the encoder and the decoder, which do not depend on libdraco.
 file(GLOB_RECURSE draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
 htvm_floor(draco SOURCES ${draco_sources} LINKS htvm_decoder htvm_libdraco)
 htvm_library(draco FLOORS draco LINKS decoder NEEDS $<BUILD_INTERFACE:${DRACO_LIBRARY}> $<INSTALL_INTERFACE:htvm::libdraco>)
 
 # The programs: everything but their main.cpp is a library, so that tests reach it. htvm_app is what users run,
-# htvm_laboratory what experiments need; both stand on htvm_command_line.
+# htvm_laboratory what experiments need; both use htvm_command_line.
 function(htvm_program_library name folder)
   file(GLOB sources CONFIGURE_DEPENDS apps/${folder}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "/main\\.cpp$")

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Which of the decoder's lines run: fuzz/coverage.sh BUILD [CORPUS]
-# BUILD: a folder built by clang with coverage; CORPUS: what fuzzing has gathered, a folder a target.
+# BUILD: a folder built by clang with coverage; CORPUS: the inputs that fuzzing has collected, one folder per target.
 set -euo pipefail
 sources=$(cd "$(dirname "$0")" && pwd)
 build=$(realpath "$1") corpus=$(realpath -m "${2:-none}")

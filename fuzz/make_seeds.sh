@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the seeds of the fuzz targets that read files and streams, from tiny synthetic captures:
-#   fuzz/make_seeds.sh HTVM [FOLDER]      HTVM: the command line's program; FOLDER: fuzz/seeds unless given
-# The targets of single layers make sense of any bytes; their seeds are what fuzzing found worth keeping.
+#   fuzz/make_seeds.sh HTVM [FOLDER]      HTVM: the command line's program; FOLDER: default fuzz/seeds
+# The targets of single layers accept any bytes; their seeds are inputs that fuzzing found worth keeping.
 set -euo pipefail
 htvm=$(realpath "$1")
 out=$(realpath -m "${2:-$(dirname "$0")/seeds}")
@@ -45,8 +45,8 @@ json.dump({"joints": ["a", "b", "c"], "bones": [[0, 1], [1, 2]], "frames": poses
 PYTHON
 tiny="$work/tiny/skeleton.json"
 
-# stream NAME CAPTURE OPTIONS...: to decode_file as it is, to decode_stream behind a number of changes (none), to c_decoder
-# behind a dozen calls: send, receive, copy and ask, conceal, discard and send, receive and copy
+# stream NAME CAPTURE OPTIONS...: to decode_file as it is, to decode_stream after a number of changes (none), to c_decoder
+# after a dozen calls: send, receive, copy and ask, conceal, discard and send, receive and copy
 stream() {
     local name=$1 capture=$2
     shift 2

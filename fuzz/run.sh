@@ -2,14 +2,14 @@
 # Runs fuzz targets, each for some seconds, as many at a time as there are jobs:
 #   fuzz/run.sh BUILD SECONDS JOBS [TARGET...]
 # BUILD: a folder built with HTVM_FUZZ. In it, corpus/TARGET grows from run to run, findings/TARGET keeps what failed,
-# and fuzzing.log has a line for each run, its seconds the processor's. Exit code 1 where anything was found.
+# and fuzzing.log has a line for each run, in seconds of processor time. Exit code 1 if anything was found.
 set -euo pipefail
 sources=$(cd "$(dirname "$0")" && pwd)
 build=$(realpath "$1") seconds=$2 jobs=$3
 shift 3
 [ $# -gt 0 ] || set -- $(cd "$sources/targets" && ls *.cpp | sed 's/\.cpp$//')
 
-# The longest inputs, bytes: enough for a few small frames, few enough to be fast.
+# The longest inputs, bytes: enough for a few small frames, but short enough to be fast.
 longest() {
     case $1 in
         decode_* | c_* | encoder | import_* | packets) echo 4096 ;;
@@ -31,7 +31,7 @@ run_one() {
     [ "$target" = decode_file ] && folders+=("$sources/../tests/data/conformance")
     [ -f "$sources/dictionaries/$target.dict" ] && options+=("-dict=$sources/dictionaries/$target.dict")
     local TIMEFORMAT='%0U'
-    # A small quarantine: freed memory is found out a little less often, and most targets run three times as fast.
+    # A small quarantine: uses of freed memory are detected slightly less often, but most targets run three times as fast.
     export ASAN_OPTIONS=quarantine_size_mb=16:${ASAN_OPTIONS:-}
     { time "$build/fuzz_$target" -max_total_time="$seconds" -timeout="${FUZZ_TIMEOUT:-20}" -report_slow_units=10 \
         -rss_limit_mb=2048 -max_len="$(longest "$target")" -len_control=0 -print_final_stats=1 \

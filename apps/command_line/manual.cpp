@@ -77,7 +77,7 @@ struct Footer {
     std::string notes, examples;
 };
 
-// A command's footer ends with its examples: behind a line "Examples:", or behind the word.
+// A command's footer ends with its examples: after a line "Examples:", or after the word.
 Footer split_footer(const std::string& footer) {
     Footer out;
     std::istringstream lines(footer);

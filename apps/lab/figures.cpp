@@ -301,7 +301,7 @@ Figure figure_16(const Findings& findings, const ExperimentPlan& plan, Easel& ea
         "16", "picture quality (M3) against bit rate",
         "Ahead of TFAN up to 16 bpvf on one sequence, then level up to 19; up to 20 bpvf on the other.",
         against_peers(findings.pictures, "m3_foreground_db"),
-        fmt::format("10 views round the body at 1280 x 1024, {}; PSNR of the foreground, on 1 frame in {}; the "
+        fmt::format("10 views around the body at 1280 x 1024, {}; PSNR of the foreground, on 1 frame in {}; the "
                     "geometry step varies. The paper does not say whether its PSNR counts the background.",
                     shading, plan.picture_every)};
     figure.charts.push_back(draw(easel, "figure_16", curves(findings.pictures, "m3_foreground_db", "Pictures, M3")));

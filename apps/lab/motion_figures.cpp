@@ -288,7 +288,8 @@ Figure figure_18(const Findings& findings, Easel& easel) {
         value_of(full, "m3_foreground_db"), bits_per_vertex(full), value_of(least, "m3_foreground_db"),
         bits_per_vertex(least), value_of(full, "m2_mm"), value_of(least, "m2_mm"));
     figure.how = fmt::format(
-        "The runs of figure 17, nothing but the threshold changed; 10 views round the body, smooth shading{}; measured "
+        "The runs of figure 17, nothing but the threshold changed; 10 views around the body, smooth shading{}; "
+        "measured "
         "on 1 frame in {}.",
         findings.has_colour ? " with colours" : "", findings.motion_every);
     return figure;

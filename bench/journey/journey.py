@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The journey of a frame through the encoder: which source files it enters, and to which it comes back.
+"""The journey of a frame through the encoder: which source files it enters, and to which it returns.
 
 usage: journey.py [TREE] [--list]
 
@@ -39,7 +39,7 @@ def built(tree, folder):
 
 
 class Functions:
-    """Where the function at an address was written."""
+    """The source position of the function at an address."""
 
     def __init__(self, program, tree, addresses):
         lines = subprocess.run(["addr2line", "-f", "-C", "-e", program], check=True, stdout=subprocess.PIPE, text=True,
@@ -65,7 +65,7 @@ class Functions:
             return file.read().splitlines()[line - 1]
 
     def is_written(self, address):
-        """One that the compiler wrote stands at its type's first line."""
+        """Functions that the compiler generated are at the first line of their type."""
         return self.in_codec(address) and not re.match(r"\s*(template.*>\s*)?(struct|class)\b", self.first_line(address))
 
     def is_long(self, address):

@@ -4,12 +4,12 @@
 // arithmetic coder. The functions that encode a symbol are templates over a Writer with
 //     void bit(BinaryModel&, bool)          one decision under a model, which adapts
 //     void raw(std::uint32_t value, int n)  the n low bits of value, equally likely, n <= 32
-// of which there are two: RangeEncoder (bytes) and CostCounter (bits that the bytes would take, nothing written).
+// There are two: RangeEncoder (bytes) and CostCounter (counts the bits, without writing anything).
 // Decoding has the same shape with a Reader, the RangeDecoder:
 //     bool bit(BinaryModel&)
 //     std::uint32_t raw(int n)
 //
-// A layer whose syntax is full of cases is better written once, for both directions: a function that codes a value
+// A layer whose syntax is full of cases is better written once for both directions: a function that codes a value
 // takes a coder and the value that is wanted. With a WritingCoder it writes that value and returns it; with a
 // ReadingCoder it ignores what is wanted and returns what it reads. What both sides derive from the value then cannot
 // differ.

@@ -43,7 +43,7 @@ Result<void> check_track(const SkeletonTrack& track) {
         const std::string place = "The skeleton's pose " + std::to_string(t) + " (the first is 0)";
         const Pose& pose = track.poses[t];
         if (!std::isfinite(track.timestamps[t]) || (t > 0 && track.timestamps[t] <= track.timestamps[t - 1]))
-            return fail(ErrorKind::bad_input, place + " has a timestamp that is not after the one before it.");
+            return fail(ErrorKind::bad_input, place + " has a timestamp that is not after the previous one.");
         if (pose.joints.empty()) continue;
         if (pose.joints.size() != joints || (!pose.tracked.empty() && pose.tracked.size() != joints) ||
             (!pose.orientations.empty() && pose.orientations.size() != bones))

@@ -185,7 +185,8 @@ Result<void> read_clock(const json& frames, SkeletonTrack& track) {
         if (t == 0) continue;
         intervals.push_back(track.timestamps[t] - track.timestamps[t - 1]);
         if (!(intervals.back() > 0))
-            return fail(ErrorKind::bad_input, frame_place(t) + ": its timestamp is not after the frame before it");
+            return fail(ErrorKind::bad_input,
+                        frame_place(t) + ": its timestamp is not after that of the previous frame");
     }
     if (intervals.empty()) return {};
     const auto median = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);

@@ -126,7 +126,7 @@ Result<void> read_clock(const json& document, SkeletonTrack& track) {
         if (!seconds) return fail_at(place, seconds.error());
         if (std::abs(*seconds) > 1e12) return fail(ErrorKind::bad_input, place + ": is not a time in seconds");
         if (!track.timestamps.empty() && *seconds <= track.timestamps.back())
-            return fail(ErrorKind::bad_input, place + ": is not after the frame before it");
+            return fail(ErrorKind::bad_input, place + ": is not after the previous frame");
         track.timestamps.push_back(*seconds);
     }
     if (!fps && count >= 2) {

@@ -2,7 +2,7 @@
 //
 //   {
 //     "units": "mm",                         mm, cm or m: of the positions. Absent: mm
-//     "fps": 30,                             frames per second. Absent: told by the timestamps, else 30
+//     "fps": 30,                             frames per second. Absent: from the timestamps, else 30
 //     "joints": ["hip", "knee", "foot"],     names
 //     "bones": [[0, 1], [1, 2]],             first joint (the bone turns about it), second joint: indices or names
 //     "frames": [                            one per frame:

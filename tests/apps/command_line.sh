@@ -47,7 +47,7 @@ expect 0 "M1 geometry" "$htvm" compare capture a.htvm --only m1
 expect 0 "3 frames to out" "$htvm" decode a.htvm -o 'out/%03d.obj'
 [ -s out/002.obj ] || { echo "FAILED: out/002.obj was not written"; failures=$((failures + 1)); }
 
-# Through pipes, meshes in and meshes out, the same bytes as through files.
+# Through pipes, with meshes in and meshes out: the same bytes as through files.
 cat capture/frame_*.ply | "$htvm" encode - --fps 30 -o - 2>/dev/null >piped.htvm
 "$htvm" encode capture -o file.htvm 2>/dev/null
 cmp -s piped.htvm file.htvm || { echo "FAILED: a piped stream differs from a stream made from files"; failures=$((failures + 1)); }
@@ -60,7 +60,7 @@ cat files/*.ply | cmp -s - piped.ply || { echo "FAILED: piped meshes differ from
 "$htvm" encode capture -s capture/skeleton.json --threads 3 -o three.htvm 2>/dev/null
 cmp -s one.htvm three.htvm || { echo "FAILED: the bytes depend on the threads"; failures=$((failures + 1)); }
 
-# A bitrate, or an error, instead of a quality; and a stream checked against a line and a buffer.
+# A bitrate, or an error, instead of a quality; and checking a stream against a line and a buffer.
 expect 0 "target 2 Mbit/s" "$htvm" encode capture --bitrate 2 --buffer 0.5 -o rate.htvm
 expect 0 "a buffer of 0.5 s is at most" "$htvm" info rate.htvm --bitrate 2 --buffer 0.5
 expect 5 "overfills the buffer" "$htvm" info rate.htvm --bitrate 0.05 --buffer 0.1
@@ -87,7 +87,7 @@ cmp -s usual.htvm said.htvm || { echo "FAILED: options at their defaults change 
 "$htvm" encode capture --tracked-from intra -o intra.htvm 2>/dev/null
 cmp -s usual.htvm intra.htvm && { echo "FAILED: --tracked-from changes nothing"; failures=$((failures + 1)); }
 
-# Limits: what is beyond them is refused, with the option's name.
+# Limits: anything beyond them is refused, with the name of the option.
 expect 5 "max_memory" "$htvm" decode a.htvm -o limited -M 1M
 expect 5 "max_memory" "$htvm" compare capture a.htvm --only m1 --max-memory 1000000
 expect 5 "max_vertices" "$htvm" decode a.htvm -o limited --max-vertices 100
@@ -103,7 +103,7 @@ expect 0 "default 4G" "$htvm" decode --help
 expect 0 "external intra" "$htvm" encode capture --intra draco --keyint 2 -o draco.htvm
 expect 0 "3 frames to draco" "$htvm" decode draco.htvm -o draco
 
-# What goes wrong is said, and the exit code tells its kind.
+# Errors are reported, and the exit code tells their kind.
 expect 2 "" "$htvm"
 expect 2 "there is no command 'nonsense'" "$htvm" nonsense
 expect 2 "it is 'htvm-lab rd'" "$htvm" rd capture -o x
@@ -117,7 +117,7 @@ expect 3 "middle of a packet" "$htvm" decode short.htvm -o x
 { head -c 3000 a.htvm; printf 'damage'; tail -c +3007 a.htvm; } >damaged.htvm
 expect 3 "damaged" "$htvm" decode damaged.htvm -o x
 
-# Lost frames: everything else is decoded, it is said what is not, and --conceal shows something instead.
+# Lost frames: everything else is decoded, the losses are reported, and --conceal shows something instead.
 # The offsets of the packets are found by their sync words; pick KIND FRAME says where such a packet begins and ends.
 "$htvm" synth walk --frames 8 --first-frame 40 --vertices 500 2>/dev/null >/dev/null
 expect 0 '"type": "P"' "$htvm" encode walk -s walk/skeleton.json --profile topology --keyint 4 --still-below 100 --animation-error 0 --json -o walk.htvm
@@ -140,7 +140,7 @@ without() { # without KIND FRAME: the stream without that packet
     head -c "${place[0]}" walk.htvm
     tail -c +$((place[0] + place[1] + 1)) walk.htvm
 }
-harmed() { # harmed KIND FRAME: a byte of the packet's payload is another
+harmed() { # harmed KIND FRAME: the stream with one byte of that packet's payload changed
     local place
     place=($(packet "$1" "$2"))
     head -c $((place[0] + 40)) walk.htvm
@@ -149,7 +149,7 @@ harmed() { # harmed KIND FRAME: a byte of the packet's payload is another
 }
 "$htvm" decode walk.htvm -o walk_whole 2>/dev/null
 [ "$(packet 6 1)" ] && [ "$(packet 3 2)" ] && [ "$(packet 4 2)" ] || { echo "FAILED: walk.htvm has other kinds of frames"; failures=$((failures + 1)); }
-# lost STREAM GONE...: without --conceal all files but those; with it all files, those frames said to be concealed.
+# lost STREAM GONE...: without --conceal all files except those; with it all files, and those frames reported as concealed.
 lost() {
     local stream=$1 frame
     shift
@@ -198,7 +198,7 @@ expect 3 "frames 5 to 1056964607 are not in the stream; the I-frame's mesh, move
     "$htvm" decode far.htvm -o x --conceal animate
 [ "$(find x -name '*.ply' | wc -l)" -eq 306 ] || { echo "FAILED: a false frame number fills the disk"; failures=$((failures + 1)); }
 
-# Files are compared by their numbers: what is missing on one side moves nothing.
+# Files are compared by their numbers, so a missing file does not shift the others.
 without 3 2 >without.htvm
 rm -rf gap
 "$htvm" decode without.htvm -o gap 2>/dev/null

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Real captures through the codec: a folder each below HTVM_DATA, with skeleton.json where there is one. Skipped (77)
-# where HTVM_DATA is not set.
+# Real captures through the codec: one folder each below HTVM_DATA, with skeleton.json if there is one. Skipped (77)
+# if HTVM_DATA is not set.
 set -u
 htvm=$1
 [ -n "${HTVM_DATA:-}" ] && [ -d "$HTVM_DATA" ] || { echo "skipped: HTVM_DATA names no folder of real captures"; exit 77; }
@@ -16,7 +16,7 @@ for folder in "$HTVM_DATA"/*/; do
     for profile in tracked topology; do
         "$htvm" encode "$folder" "${skeleton[@]}" --profile $profile --frames 4 --keyint 3 -q 50 -o "$work/a.htvm" \
             >"$work/log" 2>&1 || { fail "$name: encode: $(tail -1 "$work/log")"; continue; }
-        # The same error in every profile, whatever the capture: 0.3 to 1 mm off the surface at -q 50.
+        # The same error in every profile and for every capture: a surface error of 0.3 to 1 mm at -q 50.
         "$htvm" compare "$folder" "$work/a.htvm" --frames 4 --only m2 --samples 20000 --json >"$work/m2.json" \
             2>"$work/log" || { fail "$name: compare: $(tail -1 "$work/log")"; continue; }
         awk -F'[:,]' '/"worst_frame_mm"/ {last=$2} END {exit !(last > 0.2 && last < 1)}' "$work/m2.json" ||

@@ -17,7 +17,7 @@ for stream in "$conformance"/*.htvm; do
         <(cut -d' ' -f1-4 "${stream%.htvm}.digests")
 done
 
-# A stream cut short gives its whole frames and says so.
+# A truncated stream gives its complete frames, and the truncation is reported.
 head -c $(($(wc -c <"$work/sheet.htvm") / 2)) "$work/sheet.htvm" >"$work/cut.htvm"
 ! "$decode" "$work/cut.htvm" >"$work/cut_lines" 2>"$work/cut_errors"
 grep -q 'cut short' "$work/cut_errors"

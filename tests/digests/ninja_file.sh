@@ -2,7 +2,7 @@
 # Prints a build.ninja that builds the decoder alone, by several compilers and for several machines:
 #   NAME/digests, NAME one of the builds below    tests/digests/digests.cpp on top of it
 #   build/wasm/htvm_decoder.wasm                  the C interface of the decoder, for JavaScript
-# To be run by ninja from the project's folder; everything comes to build/digests and build/wasm.
+# To be run by ninja from the project's folder; everything is written to build/digests and build/wasm.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -50,7 +50,7 @@ build clang-O2 clang++ "-O2" "-pthread" "${decoder[@]}" $tool
 build gcc-O2-32bit g++ "-O2 -m32 -msse2 -mfpmath=sse" "-m32 -pthread" "${decoder[@]}" $tool
 build wasm-O2 clang++ "$wasi -O2" "--target=wasm32-wasi -Wl,--strip-all" "${decoder[@]}" src/c_api/wasm_traps.cpp $tool
 
-# The C interface: every function of htvm.h that the decoder's part has is exported.
+# The C interface: exports every function of the decoder part of htvm.h.
 objects=
 for source in "${decoder[@]}" src/c_api/wasm_traps.cpp; do objects+=" $out/wasm-O2/${source//\//_}.o"; done
 for source in "${c_api[@]}"; do

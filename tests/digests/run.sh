@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Same bits everywhere: builds the decoder by several compilers and for several machines, decodes the conformance
-# streams with each and holds every frame against the digests stored. Prints a table; fails unless all agree.
+# streams with each and compares every frame with the stored digests. Prints a table; fails unless all agree.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 
@@ -37,7 +37,7 @@ build() {
     seconds "$begin"
 }
 
-# refused NAME COMMAND...: a build that must not succeed, because it would decode to other bits.
+# refused NAME COMMAND...: a build that must fail, because it would decode to different bits.
 refused() {
     local name=$1 words=$2 begin said
     shift 2
@@ -51,7 +51,7 @@ refused() {
 }
 
 mkdir -p $out/include
-ln -sfn /usr/include/tl $out/include/tl # the one header of others, for the machine that is not this one
+ln -sfn /usr/include/tl $out/include/tl # the only third-party header, for builds for other machines
 tests/digests/ninja_file.sh >$out/build.ninja
 
 row build "build, s" "decode, s" threads frames "digest of all"

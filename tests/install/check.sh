@@ -16,7 +16,7 @@ mv first both
 libraries=$(dirname "$(cd both && find lib* -name 'libhtvm_decoder.a')") # lib, or lib/x86_64-linux-gnu
 version=$(both/bin/htvm --version | cut -d' ' -f2)
 
-# An installation of one kind of library alone.
+# An installation of one kind of library only.
 for kind in static shared; do
     cp -a both $kind
     rm $kind/$libraries/cmake/htvm/htvm-*-"$([ $kind = static ] && echo shared || echo static)"*.cmake
@@ -26,7 +26,7 @@ rm static/$libraries/*.so* shared/$libraries/*.a
 # ---- what is there ----------------------------------------------------------------------------------------------------
 
 [ "$(cd both/include/htvm && echo *)" = "$(cd "$project/include/htvm" && echo *)" ] || fail "headers are not all installed"
-# Each header stands by itself.
+# Each header compiles by itself.
 for header in both/include/htvm/*.hpp; do
     c++ -std=c++20 -fsyntax-only -Wall -Wextra -Werror -Iboth/include -x c++ -include "$header" /dev/null ||
         fail "$header does not compile by itself"
@@ -48,13 +48,13 @@ fi
 
 # ---- programs -----------------------------------------------------------------------------------------------------------
 
-# links PROGRAM KIND: only with shared libraries does it need them when it starts.
+# links PROGRAM KIND: it needs shared libraries at start-up only if it was linked with them.
 links() {
     local needed
     needed=$(readelf -d "$1" | grep -cE "NEEDED.*libhtvm_[a-z_]+\.so\.${version%.*}\]") || true
     [ "$([ "$needed" -gt 0 ] && echo shared || echo static)" = "$2" ] || fail "$1 is not linked $2"
 }
-# decodes PROGRAM: the conformance streams, to the frames and counts that are theirs.
+# decodes PROGRAM: the conformance streams, to the expected frames and counts.
 decodes() {
     local stream
     for stream in "$conformance"/*.htvm; do
@@ -103,7 +103,7 @@ by_cmake static static "c c_decoder" -DBUILD_SHARED_LIBS=ON # there is nothing e
 by_cmake shared both "decoder encoder c c_decoder $draco" -DBUILD_SHARED_LIBS=ON
 by_cmake shared shared "shared decoder"
 by_cmake shared shared "c c_decoder" -DC_ALONE=ON
-# What is not there is said.
+# Missing components are reported.
 if cmake -S "$consumer" -B missing -DCMAKE_PREFIX_PATH="$work/static" "-DCOMPONENTS=decoder;shared" >missing.log 2>&1; then
     fail "shared libraries were found that are not there"
 fi

@@ -21,7 +21,7 @@ expect() {
 
 "$htvm" synth capture --frames 2 --vertices 400 >/dev/null 2>&1
 
-# It teaches how to begin, and where what is not its own is found.
+# It tells how to begin, and where commands of the other program are found.
 expect 0 "htvm-lab rd CAPTURE -o out/rd" "$lab" --help
 expect 0 "Rate-distortion" "$lab" --help
 expect 0 "htvm-lab " "$lab" --version
@@ -30,7 +30,7 @@ expect 2 "htvm-lab: error: there is no command 'nonsense'; 'htvm-lab --help' lis
 expect 2 "it is 'htvm encode'" "$lab" encode capture -o x.htvm
 for command in rd reproduce; do expect 0 "Usage" "$lab" $command --help; done
 
-# The sweep: tables, or JSON alone on standard output; kept results are used again.
+# The sweep: tables, or only JSON on standard output; stored results are used again.
 expect 2 "--output is required" "$lab" rd capture
 expect 2 "is not a number" "$lab" rd capture -o rd -q nan
 expect 1 "there is no coder 'none-such'; there are paper" "$lab" rd capture -o rd --coders none-such

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The threaded code under the thread sanitizer: tests/races/run.sh BUILD JOBS
 # BUILD: a folder built with HTVM_SANITIZE=thread. Runs the tests of the codec and of what is below it, JOBS parts of each
-# at a time, then encodes and decodes by the command line with four threads. Fails where two threads race.
+# at a time, then encodes and decodes on the command line with four threads. Fails if two threads race.
 set -euo pipefail
 build=$(realpath "$1") jobs=$2
 export TSAN_OPTIONS=halt_on_error=1:exitcode=66:${TSAN_OPTIONS:-}

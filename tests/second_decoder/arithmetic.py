@@ -19,7 +19,7 @@ class Model:
 
 
 class Models:
-    """As many models as anybody asks for, each made when it is first used."""
+    """Any number of models, each created when first used."""
 
     def __init__(self, kind=Model):
         self.kind, self.made = kind, {}
@@ -108,7 +108,7 @@ class Decoder:
             self.code = (self.code << 8 | self.next_byte()) & 0xFFFFFFFF
 
     def decide(self, one):
-        """A decision with a probability, nothing adapts."""
+        """A decision with a given probability; nothing adapts."""
         bound = (self.range >> 16) * one
         bit = self.code < bound
         if bit:

@@ -61,7 +61,7 @@ def sphere(rings, sectors, radius, turn, centre=(0, 0, 0)):
 
 
 def soup(random_numbers, vertices, triangles):
-    """Triangles between any vertices: some degenerate, some twice, some both ways round; the last vertices isolated."""
+    """Triangles between any vertices: some degenerate, some twice, some in both orientations; the last vertices isolated."""
     pick = lambda: random_numbers.randrange(max(1, vertices * 9 // 10))
     out = []
     for _ in range(triangles):
@@ -104,7 +104,7 @@ def main(folder):
         # A turning sphere with everything, meshed more finely from frame to frame.
         v, t, n, uv = sphere(6 + number, 9, 400, 0.05 * number)
         frame("attributes", number, v, t, colours=colours_of(v), normals=n, texcoords=uv)
-        # Two components with normals alone, one with half of its triangles turned over, one open.
+        # Two components with only normals, one with half of its triangles flipped, one open.
         v1, t1, n1, _ = sphere(5, 7, 300, 0.1 * number, (-500, 0, 0))
         v2, t2, n2, _ = sphere(6, 6, 200, 0.2 * number, (500, 40 * number, 0))
         t1 = [(b, a, c) if k % 2 else (a, b, c) for k, (a, b, c) in enumerate(t1)]
@@ -117,7 +117,7 @@ def main(folder):
         frame("sparse", number, v, soup(r, 40, 12))
         v = points(r, 14, 600)
         frame("dense", number, v, soup(r, 14, 500))
-        # Attributes that are smooth but for some noise.
+        # Attributes that are smooth except for some noise.
         v, t, n, uv = sphere(9, 12, 400, 0.03 * number)
         n = [tuple(x + r.gauss(0, 0.02) for x in xs) for xs in n]
         uv = [tuple(x + r.gauss(0, 0.002) for x in xs) for xs in uv]

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Holds the second decoder (docs/bitstream.md put into Python) against `htvm decode`, to the bit.
+# Compares the second decoder (docs/bitstream.md written in Python) with `htvm decode`, to the bit.
 #   check.sh HTVM     HTVM: the command line, as built
-# Exits with 77, which CTest can take as "skipped", where there is no Python 3.8.
+# Exits with 77, which CTest can treat as "skipped", if there is no Python 3.8.
 set -eu
 htvm=$1
 here=$(cd "$(dirname "$0")" && pwd)
@@ -62,7 +62,7 @@ same person "$person" --keyint 2 --lambda 0 --geometry-step 0.02 --colour-step 1
 for nearest in 1 5 8 9 64; do
     same person "$person" --nearest $nearest -q 70
 done
-# P-frames, and frames of which only the moving bones are coded.
+# P-frames, and frames in which only the moving bones are coded.
 "$htvm" synth "$work/moving" --vertices 500 --frames 5 --first-frame 40 >/dev/null 2>&1
 "$htvm" synth "$work/moving_normals" --vertices 400 --frames 4 --first-frame 60 --normals >/dev/null 2>&1
 same person "$person" --skeleton "$person/skeleton.json" --decide motion --predicted-below 400 --animation-error 0
@@ -81,7 +81,7 @@ for name in moving moving_normals; do
     same $name "$moving" --skeleton "$moving/skeleton.json" --decide rd
 done
 same normals "$work/normals" --skeleton "$work/normals/skeleton.json" -q 60 --weights 60
-# T-frames: of the encoder; and moved by chance, on meshes that it would not track.
+# T-frames: from the encoder; and moved at random, on meshes that it would not track.
 for keyint in 2 30; do
     for quality in 20 60 100; do
         same person "$person" --profile tracked --keyint $keyint -q $quality

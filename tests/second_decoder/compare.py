@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds the second decoder against another: compare.py STREAM.htvm FOLDER, the folder being what
+"""Compares the second decoder with another: compare.py STREAM.htvm FOLDER, the folder being what
 `htvm decode STREAM.htvm -o FOLDER --unit mm` wrote. Every float, index and colour must be the same to the bit. Prints a
 line per frame of how it was coded."""
 import math

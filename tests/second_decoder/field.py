@@ -12,7 +12,7 @@ def three(x):
 
 
 class Context:
-    """All of a rest's contexts but the level's are 0 for the mean of all."""
+    """All contexts of a rest except the level are 0 for the mean of all."""
 
     def __init__(self, level):
         self.level = level
@@ -20,7 +20,7 @@ class Context:
 
 
 class Component:
-    """What is known of one component, and its models. mean[0] is by vertex, mean[k + 1] by node of level k, which
+    """What is known about one component, and its models. mean[0] is by vertex, mean[k + 1] by node of level k, which
     size[k] is too."""
 
     def __init__(self, vertices, levels):
@@ -126,7 +126,7 @@ def values_of(components, turned):
 
 
 def decode_field(data, vertices, levels, number, before):
-    """number: of components. before: the frame before's field, or None."""
+    """number: of components. before: the previous frame's field, or None."""
     read = Bytes(data)
     flags = read.field("B")
     steps = [read.varint() for _ in range(number)]
@@ -135,7 +135,7 @@ def decode_field(data, vertices, levels, number, before):
     field.turned = flags & 1 != 0
     check(number == 3 or not field.turned, "a field of one component is turned")
     if flags & 2:
-        check(before and before.turned == field.turned, "a field needs one of the frame before")
+        check(before and before.turned == field.turned, "a field needs one of the previous frame")
     else:
         before = None
     decoder = Decoder(read.rest())

@@ -299,7 +299,7 @@ def decode_attributes(data, components, around=None, given=None):
         return []
     check(len(data) > 0, "an attribute layer is empty")
     predictor = data[0]
-    check(predictor in ((0, 2, 3, 4) if around else (0, 1)), "a predictor is not at hand")
+    check(predictor in ((0, 2, 3, 4) if around else (0, 1)), "a predictor is not available")
     decoder = Decoder(data[1:])
     by_surroundings, by_components = Models(ResidualContext), Models(ResidualContext)
     mantissa = Models(ResidualMantissa)

@@ -41,7 +41,7 @@ def angle_class(a, b, normal):
 
 
 class DistanceOrder:
-    """Which vertex each visited one is."""
+    """Which vertex each visiting number belongs to."""
 
     def __init__(self, data, positions, m):
         self.decoder = Decoder(data)

@@ -28,9 +28,9 @@ def predicted(n, parent, transforms, pivots, before):
 
 
 def decode_node_motion(data, parents, pivots, before):
-    """The transforms. before: the frame before's, or None."""
+    """The transforms. before: those of the previous frame, or None."""
     check(len(data) >= 3 and data[0] <= 1 and data[1] <= 10 and data[2] <= 20, "the steps of a motion are out of range")
-    check(data[0] == 0 or before is not None or not parents, "a motion needs the frame before")
+    check(data[0] == 0 or before is not None or not parents, "a motion needs the previous frame")
     decoder = Decoder(data[3:])
     same, rotation, shift = Model(), SignedModel(), SignedModel()
     transforms = []

@@ -28,7 +28,7 @@ def smoothed(positions, triangles, step):
 
 
 def pieces(count, links):
-    """What is connected: a name for each."""
+    """The connected pieces: a name for each vertex."""
     name = list(range(count))
 
     def find(v):
@@ -76,7 +76,7 @@ def steps_between(positions, triangles, spacing):
 
 
 def find_nodes(steps, spacing):
-    """The nodes' vertices, and whether they are all that are needed."""
+    """The nodes' vertices, and whether they suffice."""
     cover, reached, nodes = [INFINITY] * len(steps), [0] * len(steps), []
     for start in range(len(steps)):
         if cover[start] < INFINITY:
@@ -100,7 +100,7 @@ def find_nodes(steps, spacing):
 
 
 def find_near(steps, positions, nodes):
-    """Per vertex the five least (distance, node)."""
+    """Per vertex the five smallest (distance, node)."""
     near = [[] for _ in steps]
     queue = [(0, n, v) for n, v in enumerate(nodes)]
     while queue:

@@ -16,7 +16,7 @@ class Packet:
 
 
 def packets(data, max_payload=1 << 28):
-    """Every whole packet of a stream; damage is passed over."""
+    """Every whole packet of a stream; damage is skipped."""
     at = 0
     while True:
         at = data.find(b"HTVP", at)
@@ -112,7 +112,7 @@ def read_frame_payload(payload):
 
 
 def read_coded_frame(packet):
-    """That of an I- or EP-frame, which has a least size."""
+    """The payload of an I- or EP-frame, which has a least size."""
     frame = read_frame_payload(packet.payload)
     least = max(-(-frame.vertices // 64), -(-frame.triangles // 128))
     check(len(packet.payload) >= least, "the payload is too short for so many vertices or triangles")

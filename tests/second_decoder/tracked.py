@@ -13,7 +13,7 @@ from stream import COLOUR, GEOMETRY, TRANSFORMS
 
 
 class TrackedReference:
-    """What all T-frames of an I-frame have in common."""
+    """What all T-frames of an I-frame share."""
 
     def __init__(self, mesh, geometry_step, spacing):
         self.mesh = mesh
@@ -52,7 +52,7 @@ def normals_of(positions, triangles):
 
 
 def decode_tracked_mesh(frame, reference, before):
-    """The mesh and the state that it leaves. before: the frame before's state, or None."""
+    """The mesh and the state that it leaves. before: the previous frame's state, or None."""
     source = reference.mesh
     vertices = len(source.positions)
     check(frame.vertices == vertices and frame.triangles == len(source.triangles), "its counts are not the I-frame's")

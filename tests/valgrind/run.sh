@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The encoder and the decoder under valgrind: tests/valgrind/run.sh HTVM
 # HTVM: the command line, built without sanitizers. Encodes and decodes a small capture with every profile, and decodes the
-# conformance streams. Fails where memory is used wrongly, read before it was written, or lost.
+# conformance streams. Fails if memory is misused, read before it was written, or leaked.
 set -euo pipefail
 htvm=$(realpath "$1")
 streams=$(cd "$(dirname "$0")/../data/conformance" && pwd)

@@ -23,7 +23,7 @@ async function load(path) {
     return instance.exports;
 }
 
-// A decoder and its memory. Views are made anew for every access: the memory may have grown.
+// A decoder and its memory. Views are created for every access, because the memory may have grown.
 class Decoder {
     constructor(library) {
         this.library = library;
