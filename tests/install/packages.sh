@@ -27,7 +27,7 @@ has() {
     for pattern in "$@"; do grep -qE "^\./usr/$pattern$" "$package.files" || fail "$package lacks $pattern"; done
 }
 has htvm bin/htvm bin/htvm-lab share/man/man1/htvm-encode.1.gz share/bash-completion/completions/htvm \
-    share/zsh/site-functions/_htvm share/fish/vendor_completions.d/htvm.fish
+    share/zsh/vendor-completions/_htvm share/fish/vendor_completions.d/htvm.fish
 has "$shared" "lib/.*/libhtvm_c.so.$version" "lib/.*/libhtvm_decoder.so.${version%.*}"
 has libhtvm-dev include/htvm/htvm.h 'lib/.*/libhtvm_decoder\.(a|so)' 'lib/.*/pkgconfig/htvm-c.pc' \
     'lib/.*/cmake/htvm/htvm-config.cmake'
