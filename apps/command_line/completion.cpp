@@ -17,10 +17,10 @@ std::string replaced(std::string text, std::string_view what, std::string_view b
     return text;
 }
 
-// One line, as long as a list of completions has room for.
+// One line, short enough for a list of completions.
 std::string brief(std::string text) {
     constexpr std::size_t longest = 90;
-    // "--bitrate: seconds of stream ..." says with what the option goes.
+    // The part before the colon in "--bitrate: seconds of stream ..." names the option it belongs to.
     if (text.starts_with("--")) text.erase(0, text.find(": ") + 2);
     const auto clause = text.substr(0, std::min({text.find(": "), text.find(". "), text.find("; "), text.find(" (")}));
     return clause.size() <= longest ? clause : clause.substr(0, clause.rfind(' ', longest)) + " ...";
@@ -38,7 +38,7 @@ std::vector<std::string> option_names(const CLI::App& command) {
     return out;
 }
 
-// A function's name: that of a program has a dash.
+// A name for a shell function; those of programs may contain a dash.
 std::string function_of(const CLI::App& program) { return "_" + replaced(program.get_name(), "-", "_"); }
 
 // ---- bash -----------------------------------------------------------------------------------------------------------
@@ -66,7 +66,7 @@ std::string bash_values(const CLI::App& command) {
 
 std::string zsh_quoted(const std::string& text) { return "'" + replaced(text, "'", "'\\''") + "'"; }
 
-// Of a description within brackets, or before a colon.
+// Escapes text for a description in brackets, or before a colon.
 std::string zsh_text(std::string text) {
     for (const char* special : {"\\", "[", "]", ":"}) text = replaced(text, special, std::string("\\") + special);
     return text;

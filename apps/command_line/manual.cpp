@@ -14,7 +14,7 @@
 namespace htvm::app {
 namespace {
 
-// As roff takes it literally.
+// Escapes text so that roff prints it literally.
 std::string escaped(std::string_view text) {
     std::string out;
     if (text.starts_with('.') || text.starts_with('\'')) out += "\\&";
@@ -53,7 +53,7 @@ std::string lower_first(std::string text) {
     return text;
 }
 
-// Indented lines stay as they are, as commands and tables need it; others flow together.
+// Keeps indented lines, which are commands and tables, as they are; joins others into paragraphs.
 std::string paragraphs(const std::string& text) {
     std::string out;
     std::istringstream lines(text);
@@ -88,7 +88,7 @@ Footer split_footer(const std::string& footer) {
             const auto colon = line.find(':');
             const auto rest = line.find_first_not_of(' ', colon + 1);
             if (rest == std::string::npos) continue;
-            // A command is kept as it is, a sentence is not.
+            // A command is kept verbatim, a sentence is not.
             line = (line.compare(rest, 4, "htvm") == 0 ? "  " : "") + line.substr(rest);
             if (!line.starts_with(' ')) line += ':';
         }
@@ -111,7 +111,7 @@ std::string option_line(const OptionText& option) {
 
 std::string options_section(const CLI::App& command) {
     std::string out = ".SH OPTIONS\n";
-    // The groups in the order of their first options; what is given by its place comes first.
+    // The groups in the order of their first options; positional arguments come first.
     std::vector<std::pair<std::string, std::string>> groups = {{"", ""}};
     for (const auto& option : option_texts(command)) {
         const auto heading = option.heading == "Options" ? "" : option.heading;
@@ -160,7 +160,7 @@ std::string see_also(const Program& program, const CLI::App& app, const std::str
 
 std::string program_page(const Program& program, const CLI::App& app) {
     std::string out = title(program.name);
-    // "htvm compresses ...": a man page's name has its dash instead of the program's name in front.
+    // "htvm compresses ...": in a man page a dash takes the place of the program's name.
     const auto what = program.description.substr(program.name.size() + 1);
     out += fmt::format(".SH NAME\n{} \\- {}\n", escaped(program.name), escaped(what.substr(0, what.find(": "))));
     const auto name = escaped(program.name);

@@ -20,7 +20,7 @@ std::vector<std::string> split(std::string_view text, char at) {
     return out;
 }
 
-// CLI11 writes what an option takes as "TEXT:{mm,cm,m}", "INT:INT in [1 - 64]" or as the program says: "y|z=y".
+// CLI11 describes the value of an option as "TEXT:{mm,cm,m}", "INT:INT in [1 - 64]" or as set by the program: "y|z=y".
 void tell_value(const CLI::Option& option, OptionText& out) {
     if (option.get_items_expected_max() == 0) return;
     const std::string type = option.get_type_name(), said = option.get_option_text();
@@ -54,7 +54,7 @@ void tell_meaning(const CLI::Option& option, OptionText& text) {
     const auto& description = option.get_description();
     const auto table = std::min(description.find("\n "), description.size());
     text.table = split(std::string_view(description).substr(table), '\n');
-    if (!text.table.empty()) text.table.erase(text.table.begin());  // the end of the line before
+    if (!text.table.empty()) text.table.erase(text.table.begin());  // the end of the previous line
     auto& out = text.meaning;
     out = joined(description.substr(0, table));
     while (out.ends_with(':') || out.ends_with('.')) out.pop_back();

@@ -1,15 +1,16 @@
-// The decoder: packets in, meshes out. It depends on the standard library alone. Once made, it never throws.
+// The decoder: packets in, meshes out. It depends only on the standard library. Once constructed, it never throws.
 //
 //   htvm::Decoder decoder;
 //   for each packet:  auto frame = decoder.decode(packet);   // Result<std::optional<FrameView>>
 //                     if (frame && *frame) draw((*frame)->mesh, (*frame)->topology);
 //
-// What decode() gives is lent: the arrays are the decoder's, used again for the next frame. push() gives a copy.
+// decode() lends the frame: its arrays belong to the decoder, which reuses them for the next frame. push() returns a
+// copy.
 //
-// EP- and P-frames refer to I-frames (and to codebook packets) alone: any of them may be left out, but a lost codebook
-// costs the frames that name it, until the next one. T-frames refer to the I-frame or, by default, to the T-frame
-// before: a lost one then costs those up to the next that refers to an I-frame. A decoder may start at any I-frame once
-// it has seen the sequence header.
+// EP- and P-frames refer only to I-frames (and to codebook packets), so any of them may be left out; a lost codebook
+// costs the frames that use it, until the next one. T-frames refer to the I-frame or, by default, to the previous
+// T-frame: then a lost one costs those up to the next frame that refers to an I-frame, or is one. A decoder may start
+// at any I-frame once it has the sequence header.
 #pragma once
 
 #include <cstdint>

@@ -1,11 +1,11 @@
-// The encoder: push a mesh and a pose a frame, pull packets.
+// The encoder: for each frame push a mesh and a pose, then pull packets.
 //
 //   auto encoder = htvm::Encoder::create(options);        // Result<Encoder>
 //   encoder->push(mesh, &pose, timestamp_us);             // Result<void>
 //   while (auto packet = encoder->pull()) send(htvm::write_packet(*packet));
 //   encoder->finish();                                    // then pull the rest
 //
-// Memory is bounded by a few frames, whatever the sequence's length.
+// Memory is bounded by a few frames, whatever the length of the sequence.
 #pragma once
 
 #include <cstdint>

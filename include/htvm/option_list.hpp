@@ -1,5 +1,5 @@
-// The encoder's options as a list: what the check, the C interface, the command line, its help and docs/options.md
-// are made from, and what a dialogue or a binding to another language can be made from. An option is one field in
+// The encoder's options as a list. The check, the C interface, the command line, its help and docs/options.md are
+// derived from it; a dialogue or a binding to another language can be too. An option is one field in
 // encoder_options.hpp and one row in src/codec/encoder_options.cpp.
 //
 //   for (const htvm::Option& option : htvm::option_list())
@@ -7,8 +7,8 @@
 //       option.get(options)));
 //   if (auto set = htvm::set_option(options, "tracked.node_spacing", "60"); !set) show(set.error().message);
 //
-// Not in the list, as they are no numbers, words or switches: the profile, runner, skeleton, radii, intra_coder,
-// first_pass.
+// Not in the list, because they are not numbers, words or switches: the profile, runner, skeleton, radii,
+// intra_coder, first_pass.
 #pragma once
 
 #include <cstdint>

@@ -17,14 +17,14 @@ struct SequenceFiles {
     std::vector<std::uint64_t> numbers;  // the number in each name if a %d pattern was given, else empty; shows gaps
 };
 
-// The files that `what` means, which is, tried in this order:
-// - the name of a file: that one;
-// - a folder: its mesh files (.ply, .obj, .drc; hidden ones not) in natural order;
-// - a name with one %d or %05d in its last part: the files there are of that name with any number (with %05d of at
-//   least five digits, padded by zeros), by rising number; the first need not be 0 and numbers may be missing;
+// The files that `what` refers to. It may be, tried in this order:
+// - the name of a file: that file;
+// - a folder: its mesh files (.ply, .obj, .drc, without hidden ones) in natural order;
+// - a name with one %d or %05d in its last part: the existing files of that name with any number (with %05d: of at
+//   least five digits, padded with zeros), by ascending number; the first need not be 0 and numbers may be missing;
 // - a name with * (any characters) or ? (one character) in its last part: the mesh files that match, in natural order.
-// Fails (bad_input) where nothing is found, saying what was looked for and what is there instead, and where a folder or
-// a glob means files of different formats (each frame twice, most likely).
+// Fails (bad_input) if nothing is found, with what was looked for and what is there instead; also if a folder or a glob
+// contains files of different formats, since then it most likely contains each frame twice.
 Result<SequenceFiles> find_sequence(std::string_view what);
 
 // True if a sorts before b: letters by code, runs of digits by their number (2 before 10), equal numbers by fewer

@@ -30,15 +30,18 @@ struct AlignedPoses {
     std::vector<std::string> notes;  // what was filled in, resampled or assumed, one sentence each, for the user
 };
 
-// Poses at the mesh frames' times. A pose within 0.2 ms of a mesh frame is taken as it is; else joints are
-// interpolated linearly in time between the poses around it, which counts as tracked. Where the tracker lost a joint
-// or a frame (or skipped more than half a frame's time), the joint is interpolated in time between the nearest poses
-// that have it; before the first and after the last of them it is held: these have tracked = false. A joint that no
-// pose has is put where the nearest joint along the skeleton is.
-//   Where rate and length agree (within 0.5 %), or the mesh rate is unknown, pose i is mesh frame i. Where both have
-// timestamps that do not overlap at all, both are taken to start together.
-//   Orientations the file gives are interpolated likewise; those it gives in no frame are derived from positions
-// relative to the first mesh frame (derive_turning_orientations).
+// Poses at the times of the mesh frames. A pose within 0.2 ms of a mesh frame is taken as it is; otherwise joints are
+// interpolated linearly in time between the poses around it, which counts as tracked. If the tracker lost a joint or a
+// frame (or skipped more than half a frame's time), the joint is interpolated in time between the nearest poses that
+// have it, and held before the first and after the last of them; then it has tracked = false. A joint that no pose has
+// is put where the nearest joint along the skeleton is.
+//
+// If rate and length agree (within 0.5 %), or the mesh rate is unknown, pose i belongs to mesh frame i. If both have
+// timestamps that do not overlap at all, both are assumed to start together.
+//
+// Orientations in the file are interpolated in the same way. Those of a bone that has none in any frame are derived
+// from positions, relative to the first mesh frame (derive_turning_orientations).
+//
 // Errors (bad_input): no pose with a joint while there are mesh frames; arrays whose lengths disagree; timestamps that
 // are not finite or not in order.
 Result<AlignedPoses> align(const SkeletonTrack& track, const MeshClock& mesh, const AlignOptions& options = {});

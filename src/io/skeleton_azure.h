@@ -15,11 +15,11 @@ namespace htvm {
 //    "frames": [{"timestamp_usec": n, "frame_id": n, "num_bodies": n,
 //                "bodies": [{"body_id": n, "joint_positions": [[x, y, z] x 32],
 //                            "joint_orientations": [[w, x, y, z] x 32]}]}]}
-// The body seen in most frames is taken (the first seen among equals; a note says how many there were); a frame
-// without it is a missing frame. Absent joint_names or bone_list: the sensor's own 32 joints and 31 bones. Bones are
-// turned to run away from the pelvis, where the names are the sensor's (its list runs from the chest down), and each
-// is oriented as its first joint. Time starts at the first frame; fps is that of the median interval; without
-// timestamps: 30 fps. Errors (bad_input, limit) name the frame and the joint.
+// The body seen in most frames is taken (of equals, the one seen first; a note says how many there were); a frame
+// without it is a missing frame. Without joint_names or bone_list: the sensor's own 32 joints and 31 bones. If the
+// names are the sensor's, bones are turned to run away from the pelvis (the sensor's list runs from the chest down).
+// Each bone is oriented like its first joint. Time starts at the first frame; fps is that of the median interval;
+// without timestamps, 30 fps. Errors (bad_input, limit) name the frame and the joint.
 Result<SkeletonTrack> parse_skeleton_azure(std::string_view text);
 
 // The same from parsed JSON.
