@@ -422,12 +422,12 @@ void code_start(Coder& coder, FanModels& models, const OpenEdges& edges, FanStat
     }
 }
 
-// Decodes triangle_count triangles, in visiting numbers; false where the stream is corrupt. The Discovery says what is
+// Decodes triangle_count triangles, in visiting numbers; false if the stream is corrupt. The Discovery defines what is
 // coded besides the fans:
 //     static constexpr bool visits_isolated   whether vertices without triangles are visited as seeds
-//     bool seed()                             a seed takes the next visiting number; false where no vertex is left
+//     bool seed()                             a seed takes the next visiting number; false if no vertex is left
 //     FanHints hints(const FanState&)         contexts for the fan's next step
-//     bool discover(const FanState&)          a vertex met by the fan takes it; false where it cannot
+//     bool discover(const FanState&)          a vertex met by the fan takes it; false if it cannot
 template <class Discovery>
 bool decode_fans(RangeDecoder& decoder, std::uint32_t triangle_count, Discovery& discovery,
                  std::vector<Triangle>& triangles) {
@@ -570,7 +570,7 @@ inline std::uint32_t choose_start(FocusLinks& links, const OpenEdges& edges, std
     return links.any_start();
 }
 
-// Codes all triangles. The Discovery says what is coded besides the fans:
+// Codes all triangles. The Discovery defines what is coded besides the fans:
 //     static constexpr bool visits_isolated   whether vertices without triangles are visited as seeds
 //     void seed(vertex)                       a seed (input index) takes the next visiting number
 //     FanHints hints(const FanState&)         contexts for the fan's next step
