@@ -3,8 +3,8 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
-#include <iostream>
 #include <utility>
 
 #include "command_line/terminal.h"
@@ -15,8 +15,36 @@
 namespace htvm::app {
 namespace {
 
-const char* unit_name(double millimetres) {
-    return millimetres == 1000 ? "metres" : millimetres == 10 ? "centimetres" : "millimetres";
+// From the lowest to the highest vertex, in the mesh's unit; up: as in CaptureOptions.
+double height_of(const Mesh& mesh, const std::string& up) {
+    const auto along = [&](std::size_t axis) {
+        const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
+                                                     [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+        return mesh.positions.empty() ? 0.0 : static_cast<double>((*high)[axis]) - static_cast<double>((*low)[axis]);
+    };
+    if (up.empty()) return std::max(along(1), along(2));
+    return along(static_cast<std::size_t>(up.back() - 'x'));
+}
+
+std::string length_text(double millimetres) {
+    if (millimetres < 10) return fmt::format("{:.2g} mm", millimetres);
+    if (millimetres < 1000) return fmt::format("{:.0f} cm", millimetres / 10);
+    return fmt::format("{:.2f} m", millimetres / 1000);
+}
+
+// The rate at which the median interval repeats.
+FrameRate rate_of(const std::vector<std::int64_t>& times) {
+    std::vector<std::int64_t> intervals;
+    for (std::size_t k = 1; k < times.size(); ++k) intervals.push_back(times[k] - times[k - 1]);
+    const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+    std::nth_element(intervals.begin(), middle, intervals.end());
+    const double per_second = std::clamp(1e6 / static_cast<double>(*middle), 0.001, 1e6);
+    return {static_cast<std::uint32_t>(std::lround(per_second * 1000)), 1000};
+}
+
+std::string key_of_rate(const FrameRate& rate) {
+    return rate.denominator == 1000 ? fmt::format("{}", rate.per_second())
+                                    : fmt::format("{}/{}", rate.numerator, rate.denominator);
 }
 
 }  // namespace
@@ -33,138 +61,305 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
                     "The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON. Without\n"
                     "one, a single bone that spans the mesh is used, and fast limbs cost more bits")
         ->type_name("FILE");
-    command.add_option("--fps", options.fps, "Frames per second of the meshes (default: the skeleton's rate, else 30)")
-        ->check(CLI::PositiveNumber);
-    command.add_option("--unit", options.unit, "Unit of the mesh files (default: guessed from the first mesh's size)")
-        ->check(CLI::IsMember({"auto", "mm", "cm", "m"}));
+    command
+        .add_option_function<std::string>(
+            "--fps",
+            [&options](const std::string& text) {
+                const auto rate = parse_frame_rate(text);
+                if (!rate) throw CLI::ValidationError("--fps", rate.error().message);
+                options.fps = *rate;
+            },
+            "Frames per second of the meshes: 25, 29.97 or 30000/1001 (default: the skeleton's rate, else by the\n"
+            "timestamps, else 30)")
+        ->type_name("RATE");
+    command
+        .add_option("--timestamps", options.timestamps,
+                    "When each frame was captured, a file: CSV with the time in seconds or timecode, or\n"
+                    "frame,timestamp; or JSON, as 'htvm info --json' prints it. Default: what the PLY files say in a\n"
+                    "comment 'timestamp', unless --fps is given; else the numbers in the files' names, at --fps")
+        ->type_name("FILE");
+    std::vector<std::string> units = {"auto"};
+    for (const auto& unit : length_units) units.emplace_back(unit.symbol);
+    command
+        .add_option(
+            "--unit", options.unit,
+            "Unit of the mesh files: mm, cm, dm, m, in or ft (default: mm, cm or m, guessed from the first mesh's\n"
+            "size)")
+        ->check(CLI::IsMember(units));
+    auto* scale =
+        command
+            .add_option("--scale", options.scale,
+                        "Multiplies the positions, on top of the unit, where the capture is too large or too\n"
+                        "small. The skeleton stays as it is")
+            ->check(CLI::Range(1e-6, 1e6));
+    command
+        .add_option("--height", options.height,
+                    "Scales the positions so that the subject is that tall in the first frame, metres")
+        ->check(CLI::Range(0.001, 1e4))
+        ->excludes(scale);
+    command
+        .add_option(
+            "--up", options.up,
+            "Where the head is: x, -x, y, -y, z or -z (default: not known; for --height, y or z, whichever way\n"
+            "the subject is longer)")
+        ->check(CLI::IsMember({"x", "-x", "y", "-y", "z", "-z"}));
     command.add_option("--frames", options.frames, "Use at most this many frames (default: all)");
     command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)");
     command.add_option("--skeleton-offset", options.skeleton_offset,
                        "Seconds to add to the skeleton's clock, if it is early or late");
 }
 
-Result<double> millimetres_of_unit(const std::string& name) {
-    if (name == "mm") return 1.0;
-    if (name == "cm") return 10.0;
-    if (name == "m") return 1000.0;
-    return fail(ErrorKind::bad_input, "the unit '" + name + "' is not one of mm, cm, m");
+std::string key_of(const CaptureOptions& options) {
+    std::string key = fmt::format("first {}, frames {}, fps {}, unit {}, offset {}", options.first, options.frames,
+                                  key_of_rate(options.fps), options.unit, options.skeleton_offset);
+    if (options.scale != 1) key += fmt::format(", scale {}", options.scale);
+    if (options.height > 0) key += fmt::format(", height {}, up {}", options.height, options.up);
+    if (!options.timestamps.empty()) key += ", timestamps " + options.timestamps;
+    return key;
 }
 
 Result<Capture> Capture::open(const CaptureOptions& options) {
     Capture capture;
     capture.options_ = options;
     if (options.input == "-") {
-        capture.stream_ = std::make_unique<PlyStreamReader>(std::cin);
-    } else {
-        auto files = find_sequence(options.input);
-        if (!files) return tl::unexpected(files.error());
-        capture.files_ = std::move(*files);
-        const std::size_t found = capture.files_.paths.size();
-        if (options.first >= found)
-            return fail(ErrorKind::bad_input,
-                        fmt::format("--first {} leaves nothing: there are {} frames", options.first, found));
-        capture.frames_ = found - options.first;
-        if (options.frames > 0) capture.frames_ = std::min(capture.frames_, options.frames);
+        capture.pipe_.emplace(options.drop_late);
+    } else if (auto found = capture.find_files(); !found) {
+        return tl::unexpected(found.error());
     }
-    if (options.unit != "auto") {
-        auto unit = millimetres_of_unit(options.unit);
-        if (!unit) return tl::unexpected(unit.error());
-        capture.millimetres_per_unit_ = *unit;
-    }
-    capture.fps_ = options.fps > 0 ? options.fps : 30;
-    std::optional<SkeletonTrack> track;
-    if (!options.skeleton.empty()) {
-        auto read = read_skeleton(options.skeleton);
-        if (!read) return tl::unexpected(read.error());
-        track = std::move(*read);
-        if (options.fps <= 0 && track->fps > 0) capture.fps_ = track->fps;
-    }
-    // If file names are numbered, a gap in the numbers is a gap in time.
-    const auto& numbers = capture.files_.numbers;
-    for (std::size_t k = 0; k < numbers.size(); ++k)
-        capture.timestamps_.push_back(static_cast<double>(numbers[k] - numbers[0]) / capture.fps_);
-    if (track) {
-        MeshClock clock;
-        clock.frames = capture.stream_ ? track->poses.size() : capture.files_.paths.size();
-        clock.fps = capture.fps_;
-        clock.timestamps = capture.timestamps_;
-        AlignOptions align_options;
-        align_options.offset = options.skeleton_offset;
-        auto aligned = align(*track, clock, align_options);
-        if (!aligned) return fail(aligned.error().kind, options.skeleton + ": " + aligned.error().message);
-        for (const auto& line : track->notes) note("skeleton: " + line);
-        for (const auto& line : aligned->notes) note("skeleton: " + line);
-        capture.poses_ = std::move(aligned->poses);
-        capture.skeleton_ = std::move(track->skeleton);
-        capture.radii_ = std::move(track->radii);
-    } else {
-        note("no skeleton given: one bone that spans the mesh stands in (see --skeleton)");
-    }
-    if (auto ok = capture.peek(); !ok) return tl::unexpected(ok.error());
+    if (auto found = capture.find_poses(); !found) return tl::unexpected(found.error());
+    if (auto found = capture.find_unit(); !found) return tl::unexpected(found.error());
     return capture;
 }
 
-// Reads the first mesh, which determines the unit of all.
-Result<void> Capture::peek() {
-    auto mesh = read_next();
-    if (!mesh) return tl::unexpected(mesh.error());
-    if (!*mesh) return fail(ErrorKind::bad_input, "there is no mesh in " + options_.input);
-    if (millimetres_per_unit_ == 0) {
-        millimetres_per_unit_ = millimetres_per(guess_unit(**mesh));
-        if (millimetres_per_unit_ != 1)
-            note(fmt::format("the meshes look as if they were in {} (see --unit)", unit_name(millimetres_per_unit_)));
-        if (auto ok = scale_positions(**mesh, millimetres_per_unit_); !ok) return ok;
-    }
-    peeked_ = std::move(**mesh);
+Result<void> Capture::find_files() {
+    auto files = find_sequence(options_.input);
+    if (!files) return tl::unexpected(files.error());
+    files_ = std::move(*files);
+    places_ = places_in_time(files_);
+    const std::size_t found = files_.paths.size();
+    if (options_.first >= found)
+        return fail(ErrorKind::bad_input,
+                    fmt::format("--first {} leaves nothing: there are {} frames", options_.first, found));
+    frames_ = found - options_.first;
+    if (options_.frames > 0) frames_ = std::min(frames_, options_.frames);
+    next_ = options_.first;
     return {};
 }
 
-// In the unit of the files until that is known, then in mm.
-Result<std::optional<Mesh>> Capture::read_next() {
-    if (stream_) {
-        for (; read_ < options_.first; ++read_)
-            if (auto mesh = stream_->next(); !mesh || !*mesh) return mesh;
-        auto mesh = stream_->next();
-        if (!mesh || !*mesh) return mesh;
-        ++read_;
-        if (millimetres_per_unit_ > 0)
-            if (auto ok = scale_positions(**mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
-        return mesh;
+// ---- Times and poses ------------------------------------------------------------------------------------------------
+
+std::int64_t Capture::regular_time(std::uint64_t place) const {
+    return std::llround(static_cast<double>(place) / fps() * 1e6);
+}
+
+// Of --timestamps.
+Result<void> Capture::find_listed_times() {
+    auto listed = read_frame_times(options_.timestamps, options_.fps);
+    if (!listed) return tl::unexpected(listed.error());
+    listed_ = std::move(*listed);
+    if (pipe_) return {};
+    const bool by_number = !listed_.numbers.empty() && !files_.numbers.empty();
+    if (!by_number && listed_.microseconds.size() != files_.paths.size())
+        return fail(ErrorKind::bad_input, fmt::format("{} has {} times, but there are {} frames", options_.timestamps,
+                                                      listed_.microseconds.size(), files_.paths.size()));
+    if (!by_number) {
+        file_times_ = listed_.microseconds;
+        return {};
     }
-    if (read_ >= frames_) return std::optional<Mesh>{};
+    for (const auto number : files_.numbers) {
+        const auto found = std::lower_bound(listed_.numbers.begin(), listed_.numbers.end(), number);
+        if (found == listed_.numbers.end() || *found != number)
+            return fail(ErrorKind::bad_input, fmt::format("{} has no time for frame {}", options_.timestamps, number));
+        file_times_.push_back(listed_.microseconds[static_cast<std::size_t>(found - listed_.numbers.begin())]);
+    }
+    return {};
+}
+
+// Of the comments in PLY files, where they serve.
+void Capture::find_times_in_files() {
+    if (timestamp_in_file(files_.paths[0]).empty()) return;
+    const auto unused = [&](const std::filesystem::path& path, const std::string& why) {
+        warn(fmt::format("the timestamps in the files are not used: {} {}; --timestamps gives others", path.string(),
+                         why));
+        file_times_.clear();
+    };
+    for (const auto& path : files_.paths) {
+        const auto text = timestamp_in_file(path);
+        if (text.empty()) return unused(path, "has none");
+        const auto time = parse_time(text, options_.fps);
+        if (!time) return unused(path, "has one that is not understood: " + time.error().message);
+        if (!file_times_.empty() && *time <= file_times_.back())
+            return unused(path, "is not later than the one before");
+        file_times_.push_back(*time);
+    }
+}
+
+Result<void> Capture::find_times() {
+    if (!options_.timestamps.empty()) {
+        if (auto found = find_listed_times(); !found) return found;
+    } else if (!pipe_ && options_.fps.numerator == 0) {
+        find_times_in_files();
+    }
+    return {};
+}
+
+Result<void> Capture::find_poses() {
+    std::optional<SkeletonTrack> track;
+    if (!options_.skeleton.empty()) {
+        auto read = read_skeleton(options_.skeleton);
+        if (!read) return tl::unexpected(read.error());
+        track = std::move(*read);
+    }
+    if (auto found = find_times(); !found) return found;
+    const auto& times = pipe_ ? listed_.microseconds : file_times_;
+    if (options_.fps.numerator > 0) {
+        rate_ = options_.fps;
+    } else if (track && track->fps > 0) {
+        rate_ = {static_cast<std::uint32_t>(std::lround(track->fps * 1000)), 1000};
+    } else if (times.size() > 1) {
+        rate_ = rate_of(times);
+    }
+    if (!track) {
+        note("no skeleton given: one bone that spans the mesh stands in (see --skeleton)");
+        return {};
+    }
+    MeshClock clock;
+    clock.frames = pipe_ ? track->poses.size() : files_.paths.size();
+    clock.fps = fps();
+    const bool has_gaps = !places_.empty() && places_.back() + 1 != places_.size();
+    for (std::size_t k = 0; !pipe_ && (has_gaps || !file_times_.empty()) && k < files_.paths.size(); ++k)
+        clock.timestamps.push_back(file_times_.empty() ? static_cast<double>(places_[k]) / fps()
+                                                       : static_cast<double>(file_times_[k]) / 1e6);
+    AlignOptions align_options;
+    align_options.offset = options_.skeleton_offset;
+    auto aligned = align(*track, clock, align_options);
+    if (!aligned) return fail(aligned.error().kind, options_.skeleton + ": " + aligned.error().message);
+    for (const auto& line : track->notes) note("skeleton: " + line);
+    for (const auto& line : aligned->notes) note("skeleton: " + line);
+    poses_ = std::move(aligned->poses);
+    skeleton_ = std::move(track->skeleton);
+    radii_ = std::move(track->radii);
+    return {};
+}
+
+// ---- Units ----------------------------------------------------------------------------------------------------------
+
+// Reads the first mesh that can be read and has vertices, and with it the unit of all.
+Result<void> Capture::find_unit() {
+    std::optional<Error> error;
+    millimetres_per_unit_ = 1;
+    for (std::size_t end = options_.first + frames_;;) {
+        auto mesh = pipe_ ? read_pipe() : read_file();
+        if (mesh && !*mesh) break;
+        if (mesh) peeked_ = std::move(**mesh);
+        if (mesh) peeked_at_ = *at_;
+        if (!mesh && !error) error = mesh.error();
+        if (pipe_ || (peeked_ && !peeked_->positions.empty()) || next_ == end) break;
+    }
+    if (!peeked_ && error) return tl::unexpected(*error);
+    if (!peeked_) return fail(ErrorKind::bad_input, "there is no mesh in " + options_.input);
+    const bool guessed = options_.unit == "auto" && options_.height == 0 && options_.scale == 1;
+    const auto unit = options_.unit == "auto" ? guess_unit(*peeked_) : *length_unit(options_.unit);
+    millimetres_per_unit_ = options_.scale * millimetres_per(unit);
+    const double tall = height_of(*peeked_, options_.up);
+    if (options_.height > 0) {
+        if (!(tall > 0)) return fail(ErrorKind::bad_input, "--height: the first mesh is flat; give --scale or --up");
+        // In whole micrometres, as the stream keeps it.
+        millimetres_per_unit_ = std::max(std::round(1e6 * options_.height / tall), 1.0) / 1000;
+    }
+    constexpr double shortest = 400, tallest = 2600;  // millimetres, of people
+    const double millimetres = tall * millimetres_per_unit_;
+    if (guessed && tall > 0) {
+        const auto looks = fmt::format("the meshes look as if they were in {}, which makes the subject {} tall",
+                                       names_of(unit).name, length_text(millimetres));
+        if (millimetres < shortest || millimetres > tallest)
+            warn(looks + "; if that is wrong, give --unit or --height");
+        else if (unit != LengthUnit::millimetre)
+            note(looks + " (see --unit)");
+    }
+    if (auto ok = scale_positions(*peeked_, millimetres_per_unit_); !ok) return ok;
+    // From files all is read again but what is kept.
+    if (!pipe_) next_ = options_.first;
+    at_.reset();
+    return {};
+}
+
+// ---- Frames ---------------------------------------------------------------------------------------------------------
+
+Result<std::optional<Mesh>> Capture::read_file() {
+    if (next_ == options_.first + frames_) return std::optional<Mesh>{};
+    const std::size_t place = next_++;
+    const std::int64_t before = timestamp_us_;
+    missing_ = at_ ? static_cast<std::size_t>(places_[place] - places_[place - 1] - 1) : 0;
+    at_ = place;
+    timestamp_us_ = file_times_.empty() ? regular_time(places_[place]) : file_times_[place];
+    before_us_ = before;
+    if (peeked_ && place == peeked_at_) return std::exchange(peeked_, std::nullopt);
     MeshFileOptions options;
-    if (millimetres_per_unit_ > 0) options.millimetres_per_unit = millimetres_per_unit_;
-    auto mesh = read_mesh(files_.paths[options_.first + read_], options);
+    options.millimetres_per_unit = millimetres_per_unit_;
+    auto mesh = read_mesh(files_.paths[place], options);
     if (!mesh) return tl::unexpected(mesh.error());
-    ++read_;
     return std::optional<Mesh>{std::move(*mesh)};
 }
 
-Result<std::optional<Mesh>> Capture::next() {
-    if (options_.frames > 0 && given_ >= options_.frames) return std::optional<Mesh>{};
+Result<std::optional<Mesh>> Capture::read_pipe() {
     if (peeked_) {
-        ++given_;
+        at_ = peeked_at_;
         return std::exchange(peeked_, std::nullopt);
     }
-    auto mesh = read_next();
-    if (mesh && *mesh) ++given_;
+    for (;;) {
+        auto piped = pipe_->next();
+        if (!piped) return tl::unexpected(piped.error());
+        if (!*piped) return std::optional<Mesh>{};
+        auto& [mesh, place, timestamp] = **piped;
+        if (place < options_.first) continue;
+        at_ = place;
+        if (auto ok = find_piped_time(place, timestamp); !ok) return tl::unexpected(ok.error());
+        if (auto ok = scale_positions(mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
+        return std::optional<Mesh>{std::move(mesh)};
+    }
+}
+
+Result<void> Capture::find_piped_time(std::size_t place, const std::string& timestamp) {
+    if (!listed_.microseconds.empty()) {
+        if (place >= listed_.microseconds.size())
+            return fail(ErrorKind::bad_input, fmt::format("{} has {} times, but more frames came", options_.timestamps,
+                                                          listed_.microseconds.size()));
+        timestamp_us_ = listed_.microseconds[place];
+    } else if (timestamp.empty() || options_.fps.numerator > 0) {
+        timestamp_us_ = regular_time(place);
+    } else {
+        const auto time = parse_time(timestamp, rate_);
+        if (!time) return fail(ErrorKind::bad_input, fmt::format("{}: {}", name(), time.error().message));
+        timestamp_us_ = *time;
+    }
+    return {};
+}
+
+Result<std::optional<Mesh>> Capture::next() {
+    if (options_.frames > 0 && taken_ >= options_.frames) return std::optional<Mesh>{};
+    auto mesh = pipe_ ? read_pipe() : read_file();
+    if (!mesh || *mesh) ++taken_;
     return mesh;
 }
 
 void Capture::rewind() {
-    peeked_.reset();
-    read_ = given_ = 0;
+    at_.reset();
+    next_ = options_.first;
+    taken_ = 0;
 }
 
-const Pose* Capture::pose() const {
-    if (poses_.empty()) return nullptr;
-    return &poses_[std::min(options_.first + given_ - 1, poses_.size() - 1)];
+const Pose* Capture::pose() const { return poses_.empty() ? nullptr : &poses_[std::min(*at_, poses_.size() - 1)]; }
+
+std::string Capture::name() const {
+    if (pipe_) return fmt::format("mesh {} of standard input", at_.value_or(0));
+    return files_.paths[at_.value_or(options_.first)].string();
 }
 
-std::int64_t Capture::timestamp_us() const {
-    const std::size_t index = options_.first + given_ - 1;
-    const double seconds = timestamps_.empty() ? static_cast<double>(index) / fps_ : timestamps_[index];
-    return std::llround(seconds * 1e6);
+std::int64_t Capture::missing_timestamp_us(std::size_t k) const {
+    if (file_times_.empty()) return regular_time(places_[*at_] - missing_ + k);
+    return before_us_ +
+           (timestamp_us_ - before_us_) * static_cast<std::int64_t>(k + 1) / static_cast<std::int64_t>(missing_ + 1);
 }
 
 }  // namespace htvm::app

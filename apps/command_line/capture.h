@@ -1,16 +1,19 @@
-// A capture as the commands read it: meshes from files or standard input, each with its pose.
+// A capture as the programs read it: meshes from files or standard input, in millimetres, each with its pose and its
+// time.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "command_line/mesh_pipe.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "htvm/skeleton.hpp"
-#include "io/ply.h"
 #include "io/sequence.h"
+#include "io/timestamps.h"
 
 namespace CLI {
 class App;
@@ -19,50 +22,83 @@ class App;
 namespace htvm::app {
 
 struct CaptureOptions {
-    std::string input;           // folder, pattern, glob, file, or - for concatenated PLY on standard input
+    std::string input;           // folder, pattern, glob or file of meshes; - for PLY after PLY on standard input
     std::string skeleton;        // file; empty: none
-    double fps = 0;              // of the meshes; 0: that of the skeleton, or 30
-    std::string unit = "auto";   // of the mesh files: mm, cm, m, or auto
-    std::size_t frames = 0;      // at most this many; 0: all
-    std::size_t first = 0;       // number of frames to skip at the beginning
-    double skeleton_offset = 0;  // seconds to add to the skeleton's clock
+    FrameRate fps;               // of the meshes; not given: the skeleton's, else of their timestamps, else 30
+    std::string timestamps;      // file; empty: as the PLY files say, else by the files' numbers and the frame rate
+    std::string unit = "auto";   // of the mesh files: one of length_units, or auto
+    double scale = 1;            // of the mesh files' positions besides
+    double height = 0;           // metres: scales so that the first frame is that tall; 0: not
+    std::string up;              // y, -y, z, ...: where the head is; empty: y or z, along which the subject is longer
+    std::size_t frames = 0;      // at most; 0: all
+    std::size_t first = 0;       // frames to leave out at the beginning
+    double skeleton_offset = 0;  // seconds added to the skeleton's clock
+    bool drop_late = false;      // of standard input: drops frames that come faster than they are taken
 };
 
 // Adds the options above to a command.
 void add_capture_options(CLI::App& command, CaptureOptions& options);
 
-// The length in millimetres of the unit named mm, cm or m.
-Result<double> millimetres_of_unit(const std::string& name);
+// All that frames depend on besides the files, for names of kept results.
+std::string key_of(const CaptureOptions& options);
 
 class Capture {
 public:
-    // Opens the input, reads the skeleton, and reports on the terminal what it found and assumed.
+    // Opens the input, reads the skeleton and says on the terminal what it found and assumed.
     static Result<Capture> open(const CaptureOptions& options);
-    // The next frame's mesh in mm; nothing at the end.
+    // The next frame's mesh in mm, or nothing at the end. After an error of a file the next call gives the next file.
     Result<std::optional<Mesh>> next();
-    // Goes back to the first frame. Works for files only: standard input cannot be read twice.
+    // Whether there can be a next frame after an error: standard input is lost with its place.
+    bool survives_errors() const { return !pipe_; }
+    // Back to the first frame. From files only: standard input does not come again.
     void rewind();
-    // The pose for the last mesh from next(); null if there is no skeleton.
-    const Pose* pose() const;
-    std::int64_t timestamp_us() const;
-    std::size_t frames() const { return frames_; }  // 0: unknown, for standard input
+
+    // Of the frame that next() gave, or failed at, last:
+    const Pose* pose() const;  // null where there is no skeleton
+    std::int64_t timestamp_us() const { return timestamp_us_; }
+    std::string name() const;                                // its file, or its place on standard input
+    std::size_t missing_before() const { return missing_; }  // frames of the numbers between it and the one before
+    std::int64_t missing_timestamp_us(std::size_t k) const;  // of those, k from 0
+
+    std::size_t frames() const { return frames_; }  // 0: not known, from standard input
+    std::size_t dropped() const { return pipe_ ? pipe_->dropped() : 0; }
     const Skeleton& skeleton() const { return skeleton_; }
-    const std::vector<double>& radii() const { return radii_; }  // from the skeleton file; may be empty
-    double fps() const { return fps_; }
-    double millimetres_per_unit() const { return millimetres_per_unit_; }
+    const std::vector<double>& radii() const { return radii_; }  // from the skeleton's file; may be empty
+    const FrameRate& frame_rate() const { return rate_; }
+    double fps() const { return rate_.per_second(); }
+    double millimetres_per_unit() const { return millimetres_per_unit_; }  // scaling included
 
 private:
-    Result<void> peek();
-    Result<std::optional<Mesh>> read_next();
+    Result<void> find_files();
+    Result<void> find_times();
+    Result<void> find_listed_times();
+    void find_times_in_files();
+    Result<void> find_poses();
+    Result<void> find_unit();
+    Result<std::optional<Mesh>> read_file();
+    Result<std::optional<Mesh>> read_pipe();
+    Result<void> find_piped_time(std::size_t place, const std::string& timestamp);
+    std::int64_t regular_time(std::uint64_t place) const;
+
     CaptureOptions options_;
     SequenceFiles files_;
-    std::unique_ptr<PlyStreamReader> stream_;
-    std::optional<Mesh> peeked_;  // the first mesh, read ahead to find its unit
-    std::size_t frames_ = 0, read_ = 0, given_ = 0;
-    double fps_ = 30, millimetres_per_unit_ = 0;
+    std::vector<std::uint64_t> places_;     // of the files in time, in frames
+    std::optional<MeshPipe> pipe_;          // standard input
+    FrameTimes listed_;                     // of --timestamps
+    std::vector<std::int64_t> file_times_;  // microseconds, of each file, where they are not regular
+    FrameRate rate_{30000, 1000};
+    double millimetres_per_unit_ = 0;  // 0: not known yet
     Skeleton skeleton_;
     std::vector<Pose> poses_;
-    std::vector<double> radii_, timestamps_;
+    std::vector<double> radii_;
+    std::size_t frames_ = 0;
+
+    std::optional<Mesh> peeked_;        // the first mesh that can be read, in mm, read beforehand to tell its unit
+    std::size_t peeked_at_ = 0;         // its place
+    std::size_t next_ = 0, taken_ = 0;  // place of the next frame; frames that next() gave or failed at
+    std::optional<std::size_t> at_;     // place of the last one
+    std::int64_t timestamp_us_ = 0, before_us_ = 0;  // of the last one and of the one before
+    std::size_t missing_ = 0;
 };
 
 }  // namespace htvm::app

@@ -4,19 +4,23 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <new>
 #include <string_view>
+#include <utility>
 
 #include "command_line/completion.h"
+#include "command_line/interruption.h"
 #include "command_line/manual.h"
 #include "command_line/option_text.h"
 #include "command_line/terminal.h"
+#include "core/edit_distance.h"
+#include "io/output_file.h"
 
 namespace htvm::app {
 namespace {
@@ -31,19 +35,47 @@ int exit_code(ErrorKind kind) {
             return 4;
         case ErrorKind::limit:
             return 5;
+        case ErrorKind::disk_full:
+            return 6;
     }
     return 1;
 }
 
-// What is wrong with the command line, and where to find help.
-std::string usage_message(const CLI::App* app, const CLI::Error& error) {
-    std::string command = app->get_name();
-    for (const auto* named : app->get_subcommands()) command += " " + named->get_name();
-    return fmt::format("{}: error: {}; '{} --help' tells more\n", app->get_name(), error.what(), command);
+// Of these the word most like it, where it can have been meant; else empty.
+std::string meant_by(const std::string& word, const std::vector<std::string>& known) {
+    const auto distance = [&](const std::string& other) { return internal::edit_distance(word.substr(0, 100), other); };
+    const auto nearest = std::min_element(known.begin(), known.end(),
+                                          [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
+    const bool alike = nearest != known.end() && distance(*nearest) <= std::max<std::size_t>(word.size() / 3, 2) &&
+                       distance(*nearest) < word.size();
+    return alike ? *nearest : std::string();
 }
 
-// Writing buffered output can still fail: a full disk must not look like success.
-bool output_arrived() { return std::fflush(stdout) == 0 && std::ferror(stdout) == 0; }
+std::vector<std::string> flags_of(const CLI::App& command) {
+    std::vector<std::string> out;
+    for (const auto* option : command.get_options())
+        for (const auto& name : option->get_lnames()) out.push_back("--" + name);
+    return out;
+}
+
+// What was wrong with the command line, what may have been meant, and where to read on.
+std::string usage_message(const CLI::App* app, const CLI::Error& error) {
+    std::string command = app->get_name(), meant;
+    for (const auto* named : app->get_subcommands()) {
+        command += " " + named->get_name();
+        for (const auto& word : named->remaining())
+            if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*named));
+    }
+    const std::string hint = meant.empty() ? "" : fmt::format("did you mean {}? ", meant);
+    return fmt::format("{}: error: {}; {}'{} --help' tells more\n", app->get_name(), error.what(), hint, command);
+}
+
+// Output that is still buffered may fail to arrive: a full disk must not look like success.
+Result<void> output_arrived() {
+    errno = 0;
+    if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return {};
+    return tl::unexpected(write_error("standard output", errno));
+}
 
 // CLI11 accepts "nan" as a number within any range, and "-1" as a very large one.
 void refuse_odd_numbers(const CLI::App& command) {
@@ -57,17 +89,24 @@ void refuse_odd_numbers(const CLI::App& command) {
         }
 }
 
-// For an unknown command, CLI11 only says that one is missing.
-bool names_no_command(const CLI::App& app, const std::string& word) {
-    const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
-    return !word.starts_with('-') && std::none_of(commands.begin(), commands.end(),
-                                                  [&](const CLI::App* command) { return command->get_name() == word; });
+std::vector<std::string> command_names(const CLI::App& app) {
+    std::vector<std::string> out;
+    for (const auto* command : commands_of(app)) out.push_back(command->get_name());
+    return out;
 }
 
-void say_no_such_command(const Program& program, const std::string& word) {
+// For an unknown command, CLI11 only says that one is missing.
+bool names_no_command(const CLI::App& app, const std::string& word) {
+    const auto commands = command_names(app);
+    return !word.starts_with('-') && std::find(commands.begin(), commands.end(), word) == commands.end();
+}
+
+void say_no_such_command(const Program& program, const CLI::App& app, const std::string& word) {
     const auto found = program.elsewhere.find(word);
-    const std::string hint = found == program.elsewhere.end() ? fmt::format("'{} --help' lists them", program.name)
-                                                              : fmt::format("it is '{}'", found->second);
+    const auto meant = meant_by(word, command_names(app));
+    const std::string hint = found != program.elsewhere.end() ? fmt::format("it is '{}'", found->second)
+                             : meant.empty()                  ? fmt::format("'{} --help' lists them", program.name)
+                                                              : fmt::format("did you mean '{}'?", meant);
     fmt::print(stderr, "{}: error: there is no command '{}'; {}\n", program.name, word, hint);
 }
 
@@ -78,64 +117,97 @@ std::string exit_codes_text() {
     return fmt::format("{}", fmt::join(out, ", "));
 }
 
-bool write_file(const std::filesystem::path& path, const std::string& text) {
+Result<void> write_page(const std::filesystem::path& path, const std::string& text) {
     std::error_code ignored;
     std::filesystem::create_directories(path.parent_path(), ignored);
-    std::ofstream file(path, std::ios::binary);
-    file << text;
-    return static_cast<bool>(file.flush());
+    return write_file(path, text);
 }
 
-bool write_pages(const Program& program, const CLI::App& app, const std::filesystem::path& folder) {
+Result<void> write_pages(const Program& program, const CLI::App& app, const std::filesystem::path& folder) {
     const auto& name = program.name;
-    bool written = write_file(folder / "man1" / (name + ".1"), program_page(program, app)) &&
-                   write_file(folder / "bash" / name, bash_completion(app)) &&
-                   write_file(folder / "zsh" / ("_" + name), zsh_completion(app)) &&
-                   write_file(folder / "fish" / (name + ".fish"), fish_completion(app));
+    std::map<std::filesystem::path, std::string> pages = {
+        {std::filesystem::path("man1") / (name + ".1"), program_page(program, app)},
+        {std::filesystem::path("bash") / name, bash_completion(app)},
+        {std::filesystem::path("zsh") / ("_" + name), zsh_completion(app)},
+        {std::filesystem::path("fish") / (name + ".fish"), fish_completion(app)}};
     for (const auto* command : commands_of(app))
-        written = written && write_file(folder / "man1" / (name + "-" + command->get_name() + ".1"),
-                                        command_page(program, app, *command));
-    return written;
+        pages[std::filesystem::path("man1") / (name + "-" + command->get_name() + ".1")] =
+            command_page(program, app, *command);
+    for (const auto& [path, text] : pages)
+        if (auto written = write_page(folder / path, text); !written) return written;
+    return {};
+}
+
+// "help encode" is "encode --help".
+std::vector<std::string> asked_words(int argc, char** argv) {
+    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    if (words.empty() || words[0] != "help") return words;
+    return words.size() > 1 ? std::vector<std::string>{words[1], "--help"} : std::vector<std::string>{"--help"};
+}
+
+int exit_with(const Program& program, const Error& error) {
+    fmt::print(stderr, "{}: error: {}\n", program.name, error.message);
+    return interruption() != 0 ? 128 + interruption() : exit_code(error.kind);
 }
 
 }  // namespace
 
+void show_first(CLI::App& command, std::vector<std::string> names) {
+    command.set_help_flag();
+    command.add_flag_callback(
+        "-h,--help",
+        [&command, names = std::move(names)] {
+            std::size_t hidden = 0;
+            for (auto* option : command.get_options([](const CLI::Option*) { return true; })) {
+                const bool is_first =
+                    option->get_positional() || option->check_name("--help") || option->check_name("--help-all") ||
+                    option->check_name("--quiet") ||
+                    std::any_of(names.begin(), names.end(), [&](auto& name) { return option->check_name(name); });
+                if (is_first) continue;
+                option->group("");
+                ++hidden;
+            }
+            command.footer(fmt::format("{}\n--help-all shows {} more options.", command.get_footer(), hidden));
+            throw CLI::CallForHelp();
+        },
+        "Print the everyday options and exit");
+    command.add_flag_callback(
+        "--help-all", [] { throw CLI::CallForHelp(); }, "Print all options and exit");
+}
+
 int run_program(const Program& program, int argc, char** argv) {
     speak_as(program.name);
     CLI::App app{program.description, program.name};
-    app.footer(
-        fmt::format("Exit codes: {}.\n"
-                    "'{} COMMAND --help' explains a command.{}{}",
-                    exit_codes_text(), program.name, program.footer.empty() ? "" : "\n", program.footer));
-    app.set_version_flag("--version", program.name + " " HTVM_VERSION);
+    app.footer(fmt::format("Exit codes: {}.\n'{} COMMAND --help' explains a command.{}{}", exit_codes_text(),
+                           program.name, program.footer.empty() ? "" : "\n", program.footer));
+    app.set_version_flag("-V,--version", program.name + " " HTVM_VERSION);
     app.failure_message(usage_message);
     app.require_subcommand(1);
     Run run;
     for (const auto add : program.commands) add(app, run);
-    if (argc > 1 && names_no_command(app, argv[1])) {
-        say_no_such_command(program, argv[1]);
+    for (auto* command : app.get_subcommands([](const CLI::App*) { return true; }))
+        command->add_flag_callback("--quiet", quieten, "Say nothing but warnings and errors");
+    app.add_subcommand("help", fmt::format("Explain a command: {} help COMMAND", program.name));
+    auto words = asked_words(argc, argv);
+    if (!words.empty() && names_no_command(app, words[0])) {
+        say_no_such_command(program, app, words[0]);
         return 2;
     }
     if (argc == 3 && std::string_view(argv[1]) == "--write-pages") {
-        if (write_pages(program, app, argv[2])) return 0;
-        fmt::print(stderr, "{}: error: {} cannot be written to\n", program.name, argv[2]);
-        return 1;
+        const auto written = write_pages(program, app, argv[2]);
+        return written ? 0 : exit_with(program, written.error());
     }
     try {
-        app.parse(argc, argv);
+        std::reverse(words.begin(), words.end());  // as CLI11 wants them
+        app.parse(words);
         for (const auto* command : app.get_subcommands()) refuse_odd_numbers(*command);
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : 2;
     }
     try {
-        const auto done = run();
-        if (done && output_arrived()) return 0;
-        if (done) {
-            fmt::print(stderr, "{}: error: standard output cannot be written\n", program.name);
-            return 1;
-        }
-        fmt::print(stderr, "{}: error: {}\n", program.name, done.error().message);
-        return exit_code(done.error().kind);
+        auto done = run();
+        if (done) done = output_arrived();
+        return done ? 0 : exit_with(program, done.error());
     } catch (const std::bad_alloc&) {
         fmt::print(stderr, "{}: error: out of memory\n", program.name);
         return 5;

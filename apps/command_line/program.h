@@ -33,13 +33,20 @@ struct ExitCode {
     int code;
     const char* meaning;
 };
-inline constexpr std::array exit_codes = {ExitCode{0, "done"},        ExitCode{1, "bad input"},
-                                          ExitCode{2, "usage"},       ExitCode{3, "corrupt stream"},
-                                          ExitCode{4, "unsupported"}, ExitCode{5, "limit exceeded"}};
+inline constexpr std::array exit_codes = {
+    ExitCode{0, "done"},        ExitCode{1, "bad input"},
+    ExitCode{2, "usage"},       ExitCode{3, "corrupt stream"},
+    ExitCode{4, "unsupported"}, ExitCode{5, "limit exceeded, or frames dropped"},
+    ExitCode{6, "disk full"},   ExitCode{130, "interrupted (143: by SIGTERM)"},
+};
 
 // Parses the command line, runs the chosen subcommand, and reports errors on stderr. Returns one of the exit codes.
+// `NAME help COMMAND` is `NAME COMMAND --help`; every command has --quiet.
 // `--write-pages FOLDER` writes man pages and shell completions to man1, bash, zsh and fish in that folder instead. The
 // build calls it, so pages and completions always match the options that the program parses.
 int run_program(const Program& program, int argc, char** argv);
+
+// Of a command with many options: --help shows these alone, and --help-all shows all of them.
+void show_first(CLI::App& command, std::vector<std::string> names);
 
 }  // namespace htvm::app

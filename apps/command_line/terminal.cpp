@@ -15,19 +15,30 @@ long long now_ms() {
 }
 
 std::string speaker = "htvm";
+bool quiet = false;
 
 }  // namespace
 
 void speak_as(const std::string& program) { speaker = program; }
-void note(const std::string& line) { fmt::print(stderr, "{}: {}\n", speaker, line); }
+void quieten() { quiet = true; }
+void note(const std::string& line) {
+    if (!quiet) fmt::print(stderr, "{}: {}\n", speaker, line);
+}
+void tell(const std::string& lines) {
+    if (!quiet) fmt::print(stderr, "{}", lines);
+}
 void warn(const std::string& line) { fmt::print(stderr, "{}: warning: {}\n", speaker, line); }
+
+std::string counted(std::size_t count, const std::string& what) {
+    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
 
 Progress::Progress(std::string what, std::size_t total) : what_(std::move(what)), total_(total), start_ms_(now_ms()) {}
 
 void Progress::step(const std::string& detail) {
     ++done_;
     const long long now = now_ms();
-    if (!isatty(STDERR_FILENO) || (now - last_ms_ < 100 && done_ != total_)) return;
+    if (quiet || !isatty(STDERR_FILENO) || (now - last_ms_ < 100 && done_ != total_)) return;
     last_ms_ = now;
     shown_ = true;
     const double seconds = static_cast<double>(now - start_ms_) / 1000.0;

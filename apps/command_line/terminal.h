@@ -8,8 +8,15 @@ namespace htvm::app {
 
 // Sets the program's name, which precedes every note and warning; "htvm" before the first call.
 void speak_as(const std::string& program);
+// From here on notes, tables and progress are left out; warnings stay.
+void quieten();
 void note(const std::string& line);
 void warn(const std::string& line);
+// Lines of their own, as they are: a table.
+void tell(const std::string& lines);
+
+// "1 frame", "2 frames".
+std::string counted(std::size_t count, const std::string& what);
 
 // A line that is rewritten in place, at most ten times per second; only on a terminal.
 class Progress {

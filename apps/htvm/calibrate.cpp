@@ -2,7 +2,6 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
-#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +9,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "htvm/encoder.hpp"
+#include "io/output_file.h"
 
 namespace htvm::app {
 namespace {
@@ -42,10 +42,7 @@ Result<void> calibrate_capture(const Options& options) {
         fmt::print("{}\n", out.dump(2));
         return {};
     }
-    std::ofstream file(options.output);
-    file << out.dump(2) << "\n";
-    if (!file.flush()) return fail(ErrorKind::bad_input, options.output + " cannot be written");
-    return {};
+    return write_file(options.output, out.dump(2) + "\n");
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -17,6 +16,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/thread.h"
+#include "io/output_file.h"
 #include "io/sequence.h"
 #include "sequences.h"
 #include "stream_file.h"
@@ -397,11 +397,7 @@ Result<void> write_csv(const Options& options, const Measured& measured, double 
         fmt::print("{}", text);
         return {};
     }
-    std::ofstream file(options.csv, std::ios::binary);
-    file << text;
-    file.close();
-    if (!file) return fail(ErrorKind::bad_input, options.csv + " cannot be written.");
-    return {};
+    return write_file(options.csv, text);
 }
 
 nlohmann::json as_json(const Options& options, const Measured& measured, double peak_mm) {

@@ -3,10 +3,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
-#include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,15 +20,17 @@
 #include "commands.h"
 #include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
+#include "io/output_file.h"
 #include "io/ply.h"
 #include "io/sequence.h"
+#include "io/timestamps.h"
 #include "stream_file.h"
 
 namespace htvm::app {
 namespace {
 
 struct Options {
-    std::string input, output, format = "ply", unit = "capture", conceal = "gap";
+    std::string input, output, timestamps, format = "ply", unit = "capture", conceal = "gap";
     std::size_t frames = 0;
     unsigned threads = 0;
     bool json = false;
@@ -44,6 +47,7 @@ struct Summary {
     std::optional<std::int64_t> timestamp_us;  // of the previous frame
     double decode_seconds = 0;
     std::optional<Error> refused;  // the error of the first frame that was refused because of a limit or this version
+    FrameTimes times;              // of the frames written
     nlohmann::json list = nlohmann::json::array();
     std::size_t written() const { return decoded + concealed; }
     double frames_per_second() const { return static_cast<double>(decoded) / std::max(decode_seconds, 1e-9); }
@@ -66,21 +70,21 @@ public:
         return out;
     }
     // Returns the name of the file written.
-    Result<std::string> write(Mesh& mesh, std::uint32_t frame, double millimetres_per_unit) {
+    Result<std::string> write(Mesh& mesh, const FrameInfo& info, double millimetres_per_unit) {
         if (!standard_) {
-            const auto path = output_path(names_, frame);
+            const auto path = output_path(names_, info.frame);
             MeshFileOptions file_options;
             file_options.millimetres_per_unit = millimetres_per_unit;
+            file_options.timestamp = time_text(info.timestamp_us);
             if (auto ok = write_mesh(path, mesh, file_options); !ok) return tl::unexpected(ok.error());
             written_.insert(path.filename().string());
             return path.string();
         }
         if (auto ok = scale_positions(mesh, 1 / millimetres_per_unit); !ok) return tl::unexpected(ok.error());
-        const auto bytes = write_ply(mesh);
+        const auto bytes = write_ply(mesh, time_text(info.timestamp_us));
         if (!bytes) return tl::unexpected(bytes.error());
-        std::cout.write(reinterpret_cast<const char*>(bytes->data()), static_cast<std::streamsize>(bytes->size()));
-        std::cout.flush();
-        if (!std::cout) return fail(ErrorKind::bad_input, "standard output cannot be written");
+        if (std::fwrite(bytes->data(), 1, bytes->size(), stdout) != bytes->size() || std::fflush(stdout) != 0)
+            return tl::unexpected(write_error("standard output", errno));
         return std::string("-");
     }
     bool one_file() const { return !standard_ && names_.one_file; }
@@ -103,7 +107,7 @@ private:
 
 Result<double> output_unit(const Options& options, const SequenceInfo& info) {
     if (options.unit == "capture") return info.unit_micrometres / 1000.0;
-    return millimetres_of_unit(options.unit);
+    return millimetres_per(*length_unit(options.unit));
 }
 
 // The data that the steps of decoding work on.
@@ -121,8 +125,10 @@ bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.wri
 Result<void> write(Decoding& d, DecodedFrame& frame) {
     const auto unit = output_unit(d.options, *d.decoder.sequence());
     if (!unit) return tl::unexpected(unit.error());
-    const auto name = d.output.write(frame.mesh, frame.info.frame, *unit);
+    const auto name = d.output.write(frame.mesh, frame.info, *unit);
     if (!name) return tl::unexpected(name.error());
+    d.summary.times.numbers.push_back(frame.info.frame);
+    d.summary.times.microseconds.push_back(frame.info.timestamp_us);
     d.progress.step();
     if (!d.options.json) return {};
     auto entry = frame_json(frame.info);
@@ -291,6 +297,8 @@ Result<void> decode(const Options& options) {
             if (!*more) break;
         }
     }
+    if (!options.timestamps.empty())
+        if (auto ok = write_file(options.timestamps, frame_times_csv(summary.times)); !ok) return ok;
     if (options.json) print_json(summary, *input);
     if (!decoder.sequence() && input->oversized_packets() == 0)
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
@@ -312,10 +320,19 @@ void add_decode(CLI::App& app, Run& run) {
                      "the first frame only), or - for concatenated PLY on standard output")
         ->type_name("FILE")
         ->required();
+    command
+        ->add_option(
+            "--timestamps", options->timestamps,
+            "Write when each frame was captured to this file too, CSV, as 'htvm encode --timestamps' reads it\n"
+            "(PLY files say it in a comment anyway)")
+        ->type_name("FILE");
     command->add_option("--format", options->format, "Format in a folder: ply (default) or obj")
         ->check(CLI::IsMember({"ply", "obj"}));
-    command->add_option("--unit", options->unit, "Unit of the positions: the capture's (default), mm, cm or m")
-        ->check(CLI::IsMember({"capture", "mm", "cm", "m"}));
+    std::vector<std::string> units = {"capture"};
+    for (const auto& unit : length_units) units.emplace_back(unit.symbol);
+    command
+        ->add_option("--unit", options->unit, "Unit of the positions: the capture's (default), mm, cm, dm, m, in or ft")
+        ->check(CLI::IsMember(units));
     command
         ->add_option("--conceal", options->conceal,
                      "What to write for a lost frame: gap (default), nothing, and the numbers continue; or animate,\n"

@@ -219,9 +219,10 @@ void check_together(const EncodingOptions& options) {
 
 Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture) {
     auto out = without_capture(options);
-    out.fps_numerator = static_cast<std::uint32_t>(std::lround(capture.fps() * 1000));
-    out.fps_denominator = 1000;
-    out.unit_micrometres = static_cast<std::uint32_t>(std::lround(capture.millimetres_per_unit() * 1000));
+    out.fps_numerator = capture.frame_rate().numerator;
+    out.fps_denominator = capture.frame_rate().denominator;
+    out.unit_micrometres =
+        static_cast<std::uint32_t>(std::clamp(std::round(capture.millimetres_per_unit() * 1000), 1.0, 4294967295.0));
     out.skeleton = capture.skeleton();
     out.radii = capture.radii();
     if (!options.radii_file.empty()) {

@@ -20,14 +20,6 @@ namespace htvm::app {
 
 namespace {
 
-Result<std::optional<LengthUnit>> unit_named(const std::string& name) {
-    if (name == "auto") return std::optional<LengthUnit>{};
-    if (name == "mm") return std::optional(LengthUnit::millimetre);
-    if (name == "cm") return std::optional(LengthUnit::centimetre);
-    if (name == "m") return std::optional(LengthUnit::metre);
-    return fail(ErrorKind::bad_input, "There is no unit '" + name + "': give mm, cm, m or auto.");
-}
-
 Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) {
     auto input = StreamInput::open(path, options.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
@@ -67,7 +59,8 @@ Result<MeshSource> open_meshes(const std::string& name, const std::string& unit,
     if (name == "-")
         return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
     if (name.ends_with(".htvm")) return open_stream(name, limits);
-    const auto chosen = unit_named(unit);
+    const bool guess = unit == "auto";
+    const auto chosen = guess ? LengthUnit::millimetre : length_unit(unit);
     if (!chosen) return tl::unexpected(chosen.error());
     const auto files = find_sequence(name);
     if (!files) return tl::unexpected(files.error());
@@ -75,8 +68,8 @@ Result<MeshSource> open_meshes(const std::string& name, const std::string& unit,
     source.name = name;
     source.frames = files->paths.size();
     source.numbers = files->numbers;
-    if (*chosen) source.millimetres_per_unit = millimetres_per(**chosen);
-    source.next = [paths = files->paths, guess = !*chosen,
+    source.millimetres_per_unit = millimetres_per(*chosen);
+    source.next = [paths = files->paths, guess,
                    given = std::size_t{0}](MeshSource& self) mutable -> Result<std::optional<Mesh>> {
         if (given == paths.size()) return std::optional<Mesh>{};
         auto mesh = read_mesh(paths[given]);
@@ -93,24 +86,7 @@ Result<MeshSource> open_meshes(const std::string& name, const std::string& unit,
 
 namespace {
 
-struct NameParts {
-    std::string before, after;
-    std::uint64_t number = 0;
-};
-
-std::optional<NameParts> parts_of(const std::filesystem::path& path) {
-    constexpr const char* digits = "0123456789";
-    const std::string stem = path.stem().string();
-    const auto last = stem.find_last_of(digits);
-    if (last == std::string::npos) return std::nullopt;
-    const auto other = stem.find_last_not_of(digits, last);
-    const auto first = other == std::string::npos ? 0 : other + 1;
-    NameParts out{stem.substr(0, first), stem.substr(last + 1), 0};
-    if (std::from_chars(stem.data() + first, stem.data() + last + 1, out.number).ec != std::errc()) return std::nullopt;
-    return out;
-}
-
-// The position of a number, if it exists.
+// The place of a number, if it is there.
 std::optional<std::size_t> place_of(std::span<const std::uint64_t> ascending, std::uint64_t number) {
     const auto at = std::lower_bound(ascending.begin(), ascending.end(), number);
     if (at == ascending.end() || *at != number) return std::nullopt;
@@ -118,19 +94,6 @@ std::optional<std::size_t> place_of(std::span<const std::uint64_t> ascending, st
 }
 
 }  // namespace
-
-std::vector<std::uint64_t> numbers_in_names(std::span<const std::filesystem::path> paths) {
-    std::vector<std::uint64_t> out;
-    std::optional<NameParts> first;
-    for (const auto& path : paths) {
-        const auto parts = parts_of(path);
-        if (!parts || (first && (parts->before != first->before || parts->after != first->after))) return {};
-        if (!first) first = parts;
-        if (!out.empty() && parts->number <= out.back()) return {};
-        out.push_back(parts->number);
-    }
-    return out;
-}
 
 std::vector<FramePair> pair_by_number(std::span<const std::uint64_t> original, std::span<const std::uint64_t> decoded) {
     std::vector<FramePair> best;

@@ -32,9 +32,6 @@ Result<MeshSource> open_meshes(const std::string& name, const std::string& unit,
 
 // ---- Which frames belong together -----------------------------------------------------------------------------------
 
-// The last number in each name, if the names differ only in it; else empty.
-std::vector<std::uint64_t> numbers_in_names(std::span<const std::filesystem::path> paths);
-
 struct FramePair {
     std::size_t original, decoded;  // positions in their sequences
 };

@@ -5,6 +5,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <iostream>
@@ -49,43 +50,32 @@ std::optional<Packet> StreamInput::next() {
 
 Result<StreamOutput> StreamOutput::open(const std::string& path) {
     StreamOutput output;
-    output.path_ = path;
-    output.standard_ = path == "-";
-    if (output.standard_) return output;
+    if (path == "-") return output;
     if (is_mesh_file_name(path))
         return fail(ErrorKind::bad_input,
                     path + " is the name of a mesh, but a stream would be written there; give one that ends in .htvm");
-    // An existing file is kept until there is something to replace it.
-    output.file_.open(path, std::ios::binary | std::ios::app);
-    if (!output.file_) {
-        const std::string reason = std::strerror(errno);
-        const auto folder = std::filesystem::path(path).parent_path();
-        std::error_code error;
-        if (!folder.empty() && !std::filesystem::exists(folder, error))
-            return fail(ErrorKind::bad_input,
-                        path + " cannot be written: there is no folder " + folder.string() + "; make it first");
-        return fail(ErrorKind::bad_input, path + " cannot be written: " + reason);
-    }
+    auto file = OutputFile::create(path);
+    if (!file) return tl::unexpected(file.error());
+    output.file_.emplace(std::move(*file));
     return output;
 }
 
 Result<void> StreamOutput::write(const Packet& packet) {
     const auto bytes = write_packet(packet);
-    if (bytes_ == 0 && !standard_) {
-        file_.close();
-        file_.open(path_, std::ios::binary | std::ios::trunc);
+    if (file_) {
+        if (auto written = file_->write(bytes); !written) return written;
+    } else if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() || std::fflush(stdout) != 0) {
+        return tl::unexpected(write_error("standard output", errno));
     }
-    std::ostream& out = standard_ ? std::cout : file_;
-    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    out.flush();
-    if (!out)
-        return fail(ErrorKind::bad_input,
-                    (standard_ ? "standard output" : path_) + " cannot be written: " + std::strerror(errno));
     bytes_ += bytes.size();
     return {};
 }
 
-// ---- What the commands accept as a stream ---------------------------------------------------------------------------
+Result<void> StreamOutput::finish() { return file_ ? file_->finish() : Result<void>(); }
+
+std::string StreamOutput::keep() { return file_ ? file_->keep().string() : std::string(); }
+
+// ---- What the commands accept of a stream ---------------------------------------------------------------------------
 
 namespace {
 

@@ -10,6 +10,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+#include "io/output_file.h"
 
 namespace CLI {
 class App;
@@ -33,16 +34,18 @@ private:
     PacketReader reader_;
 };
 
+// A file is there once it is finished: until then its packets are in a file beside it, and what was there before stays.
 class StreamOutput {
 public:
     static Result<StreamOutput> open(const std::string& path);  // "-" is standard output
     Result<void> write(const Packet& packet);
+    Result<void> finish();
+    // Where a stream that ends early is left, beside its place; empty where it went to a pipe.
+    std::string keep();
     std::uint64_t bytes() const { return bytes_; }
 
 private:
-    std::string path_;
-    std::ofstream file_;
-    bool standard_ = false;
+    std::optional<OutputFile> file_;  // none: standard output
     std::uint64_t bytes_ = 0;
 };
 

@@ -96,15 +96,12 @@ Result<std::string> common_key(const Options& options) {
     if (!files) return tl::unexpected(files.error());
     auto inputs = files->paths;
     if (!options.capture.skeleton.empty()) inputs.emplace_back(options.capture.skeleton);
-    const auto& c = options.capture;
     std::string metrics;
     for (const auto& metric : std::set<std::string>(options.metrics.begin(), options.metrics.end()))
         metrics += metric + " ";
-    return fmt::format(
-        "{}; first {}, frames {}, fps {}, unit {}, offset {}; geometry only {}; {}samples {}, views {}, "
-        "every {}; coder threads {}",
-        fingerprint(inputs), c.first, c.frames, c.fps, c.unit, c.skeleton_offset, options.geometry_only, metrics,
-        options.samples, options.views, options.measure_every, options.coder_threads);
+    return fmt::format("{}; {}; geometry only {}; {}samples {}, views {}, every {}; coder threads {}",
+                       fingerprint(inputs), key_of(options.capture), options.geometry_only, metrics, options.samples,
+                       options.views, options.measure_every, options.coder_threads);
 }
 
 struct Task {

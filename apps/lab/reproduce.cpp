@@ -120,14 +120,14 @@ Result<Laboratory> laboratory_of(const Options& options, const SourceFrames& sou
     auto inputs = files->paths;
     for (const auto& name : {options.capture.skeleton, true_skeleton_file(options)})
         if (!name.empty()) inputs.emplace_back(name);
-    const auto& c = options.capture;
+    auto measured = options.capture;
+    measured.frames = source.size();
     Laboratory out{&source,
                    ResultCache(path(options.output) / "results"),
                    {},
                    path(options.output) / "work",
                    thread_count(options.threads)};
-    out.common_key = fmt::format("{}; first {}, frames {}, fps {}, unit {}, offset {}", fingerprint(inputs), c.first,
-                                 source.size(), c.fps, c.unit, c.skeleton_offset);
+    out.common_key = fmt::format("{}; {}", fingerprint(inputs), key_of(measured));
     for (const auto& folder : {path(options.output) / "results", path(options.output) / "figures", out.work_folder})
         if (auto made = make_folder(folder); !made) return tl::unexpected(made.error());
     return out;

@@ -12,6 +12,7 @@ enum class ErrorKind {
     corrupt_stream,  // the stream is inconsistent or ends too early
     unsupported,     // valid, but not supported by this build or version
     limit,           // larger than a configured limit
+    disk_full,       // what is written to a file finds no room; never from the encoder or the decoder
 };
 
 // One clear sentence for the user: what is wrong, where, and what to do.

@@ -28,6 +28,8 @@ htvm_status status_of(ErrorKind kind) {
             return HTVM_UNSUPPORTED;
         case ErrorKind::limit:
             return HTVM_LIMIT;
+        case ErrorKind::disk_full:
+            break;
     }
     return HTVM_INTERNAL;
 }

@@ -3,9 +3,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <numeric>
 #include <vector>
 
+#include "core/edit_distance.h"
 #include "htvm/option_list.hpp"
 
 namespace htvm {
@@ -334,22 +334,6 @@ std::string words_text(const Option& option) {
 
 std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
 
-// Edit distance: the number of characters to insert, remove or change to turn one text into the other.
-std::size_t edits(std::string_view a, std::string_view b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), std::size_t{0});
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        std::size_t diagonal = row[0];
-        row[0] = i + 1;
-        for (std::size_t j = 0; j < b.size(); ++j) {
-            const std::size_t changed = diagonal + (a[i] != b[j]);
-            diagonal = row[j + 1];
-            row[j + 1] = std::min({changed, row[j] + 1, row[j + 1] + 1});
-        }
-    }
-    return row.back();
-}
-
 }  // namespace
 
 EncoderOptions default_options(Profile profile) {
@@ -375,8 +359,9 @@ const Option& nearest_option(std::string_view name) {
     const auto distance = [&](const Option& option) {
         const std::string_view whole = option.name, flag = option.flag;
         const auto last = whole.substr(whole.find('.') + 1);
-        auto out = std::min(edits(shown, whole), edits(shown, last));
-        if (!flag.empty()) out = std::min({out, edits(shown, flag), edits(shown, flag.substr(2))});
+        auto out = std::min(internal::edit_distance(shown, whole), internal::edit_distance(shown, last));
+        if (!flag.empty())
+            out = std::min({out, internal::edit_distance(shown, flag), internal::edit_distance(shown, flag.substr(2))});
         return out;
     };
     return *std::min_element(std::begin(list), std::end(list),

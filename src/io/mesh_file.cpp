@@ -11,6 +11,7 @@
 
 #include "io/drc.h"
 #include "io/obj.h"
+#include "io/output_file.h"
 #include "io/ply.h"
 
 namespace htvm {
@@ -47,15 +48,6 @@ Result<Mesh> parse(MeshFormat format, const std::vector<std::uint8_t>& bytes, co
             break;
     }
     return read_drc(bytes, limits);
-}
-
-Result<void> write_file(const std::filesystem::path& path, const char* data, std::size_t size) {
-    std::ofstream file(path, std::ios::binary | std::ios::trunc);
-    if (!file) return fail_at(path, ErrorKind::bad_input, "cannot be opened for writing; see that its folder exists");
-    file.write(data, static_cast<std::streamsize>(size));
-    file.close();
-    if (!file) return fail_at(path, ErrorKind::bad_input, "could not be written in full; is the disk full?");
-    return {};
 }
 
 }  // namespace
@@ -102,6 +94,13 @@ Result<void> scale_positions(Mesh& mesh, double factor) {
     return {};
 }
 
+std::string timestamp_in_file(const std::filesystem::path& path) {
+    if (format_of(path) != MeshFormat::ply) return {};
+    std::ifstream file(path, std::ios::binary);
+    if (!file) return {};
+    return read_ply_timestamp(file).value_or(std::string());
+}
+
 Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options) {
     const auto format = format_of(path);
     if (!format) {
@@ -132,25 +131,22 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         written = &scaled;
     }
     if (*format == MeshFormat::ply) {
-        const auto bytes = write_ply(*written);
+        const auto bytes = write_ply(*written, options.timestamp);
         if (!bytes) return fail_at(path, bytes.error());
-        return write_file(path, reinterpret_cast<const char*>(bytes->data()), bytes->size());
+        return write_file(path, *bytes);
     }
     const auto text = write_obj(*written);
     if (!text) return fail_at(path, text.error());
-    return write_file(path, text->data(), text->size());
+    return write_file(path, *text);
 }
 
-double millimetres_per(LengthUnit unit) {
-    switch (unit) {
-        case LengthUnit::metre:
-            return 1000;
-        case LengthUnit::centimetre:
-            return 10;
-        case LengthUnit::millimetre:
-            break;
+Result<LengthUnit> length_unit(std::string_view symbol) {
+    std::string symbols;
+    for (const auto& unit : length_units) {
+        if (symbol == unit.symbol) return unit.unit;
+        symbols += (symbols.empty() ? "" : ", ") + std::string(unit.symbol);
     }
-    return 1;
+    return fail(ErrorKind::bad_input, "the unit '" + std::string(symbol) + "' is not one of " + symbols);
 }
 
 LengthUnit guess_unit(const Mesh& mesh) {

@@ -1,8 +1,12 @@
 // Mesh files: the extension (.ply, .obj, .drc, in either case) decides the format.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "htvm/mesh.hpp"
@@ -14,7 +18,11 @@ namespace htvm {
 struct MeshFileOptions {
     double millimetres_per_unit = 1;  // for the file's coordinates: 1000 for a file in metres; finite, above 0
     MeshLimits limits;                // the largest mesh to accept
+    std::string timestamp;            // for the comment of a PLY file that is written (ply.h); empty: none
 };
+
+// When a PLY file says that its frame was captured (ply.h); empty if it does not say, is no PLY or cannot be read.
+std::string timestamp_in_file(const std::filesystem::path& path);
 
 // Reads a mesh and scales its positions to millimetres. Every error message begins with the file's name.
 Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options = {});
@@ -34,9 +42,27 @@ Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path,
 // the factor is not finite and above 0.
 Result<void> scale_positions(Mesh& mesh, double factor);
 
-enum class LengthUnit { millimetre, centimetre, metre };
+enum class LengthUnit { millimetre, centimetre, decimetre, metre, inch, foot };
 
-double millimetres_per(LengthUnit unit);  // 1, 10, 1000
+struct LengthUnitNames {
+    LengthUnit unit;
+    const char* symbol;  // "mm"
+    const char* name;    // "millimetres"
+    double millimetres;
+};
+inline constexpr std::array length_units = {
+    LengthUnitNames{LengthUnit::millimetre, "mm", "millimetres", 1},
+    LengthUnitNames{LengthUnit::centimetre, "cm", "centimetres", 10},
+    LengthUnitNames{LengthUnit::decimetre, "dm", "decimetres", 100},
+    LengthUnitNames{LengthUnit::metre, "m", "metres", 1000},
+    LengthUnitNames{LengthUnit::inch, "in", "inches", 25.4},
+    LengthUnitNames{LengthUnit::foot, "ft", "feet", 304.8},
+};
+
+constexpr const LengthUnitNames& names_of(LengthUnit unit) { return length_units[static_cast<std::size_t>(unit)]; }
+constexpr double millimetres_per(LengthUnit unit) { return names_of(unit).millimetres; }
+// bad_input names the symbols that there are.
+Result<LengthUnit> length_unit(std::string_view symbol);
 
 // The unit that a mesh of a person is probably in, by the diagonal of its bounding box: metres below 10, centimetres
 // below 600, otherwise millimetres. A person's diagonal is 0.5 m (an infant) to 3 m (arms and legs spread), so the

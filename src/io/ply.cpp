@@ -375,9 +375,10 @@ Result<PlyHeader> read_header(PlySource& source) {
     return header;
 }
 
-Result<Mesh> read_one(PlySource& source, const MeshLimits& limits) {
+Result<Mesh> read_one(PlySource& source, const MeshLimits& limits, std::string* timestamp = nullptr) {
     const auto header = read_header(source);
     if (!header) return tl::unexpected(header.error());
+    if (timestamp) *timestamp = header->timestamp;
     Body body{source, header->format, limits};
     bool has_vertices = false;
     for (const PlyElement& element : header->elements) {
@@ -438,13 +439,20 @@ Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& lim
     return std::move(read->mesh);
 }
 
+Result<std::string> read_ply_timestamp(std::istream& stream) {
+    PlySource source(*stream.rdbuf());
+    const auto header = read_header(source);
+    if (!header) return tl::unexpected(header.error());
+    return header->timestamp;
+}
+
 PlyStreamReader::PlyStreamReader(std::istream& stream, const MeshLimits& limits) : stream_(stream), limits_(limits) {}
 
 Result<std::optional<Mesh>> PlyStreamReader::next() {
     if (error_) return tl::unexpected(*error_);
     PlySource source(*stream_.rdbuf());
     if (!take_white_space(source)) return std::optional<Mesh>();
-    auto mesh = read_one(source, limits_);
+    auto mesh = read_one(source, limits_, &timestamp_);
     if (!mesh) {
         error_ = Error{mesh.error().kind,
                        "mesh " + std::to_string(meshes_read_) + " of the stream: " + mesh.error().message};

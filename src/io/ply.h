@@ -6,6 +6,9 @@
 // of a floating-point type are 0..1, 16-bit ones 0..65535, others 0..255. Normals, colours and texture coordinates that
 // are not finite become 0; normals are not normalised. Triangle strips are refused (unsupported).
 //
+// A comment in the header may say when the frame was captured: "comment timestamp 1.25", in any form that parse_time()
+// reads (timestamps.h).
+//
 // Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
 //
 // Errors: bad_input, with the vertex or face (counted from 0), if the file is truncated, a position is not finite or an
@@ -17,6 +20,8 @@
 #include <iosfwd>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "htvm/mesh.hpp"
@@ -37,9 +42,12 @@ Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const 
 // silently.
 Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
 
+// The text after "comment timestamp" in the header of the PLY at the start of the stream; empty if there is none.
+Result<std::string> read_ply_timestamp(std::istream& stream);
+
 // Binary little-endian: float x y z, then, if the mesh has them, float nx ny nz, float s t, uchar red green blue; faces
-// as uchar, uint vertex_indices. Fails (bad_input) if check_mesh does.
-Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh);
+// as uchar, uint vertex_indices. timestamp: for the comment; empty: none. Fails (bad_input) if check_mesh does.
+Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view timestamp = {});
 
 // Reads PLYs that follow one another in a stream. One mesh is held at a time, and the stream is not read past the end
 // of the mesh returned, so the meshes of a live stream are available as soon as they are complete.
@@ -50,10 +58,13 @@ public:
     // The next mesh; nothing at the end of the stream. After an error it is unknown where the next mesh begins, so the
     // same error (which names the mesh, counted from 0) is returned again.
     Result<std::optional<Mesh>> next();
+    // For the mesh that next() returned, as from read_ply_timestamp().
+    const std::string& timestamp() const { return timestamp_; }
 
 private:
     std::istream& stream_;
     MeshLimits limits_;
+    std::string timestamp_;
     std::size_t meshes_read_ = 0;
     std::optional<Error> error_;
 };

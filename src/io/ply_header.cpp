@@ -134,6 +134,10 @@ std::uint64_t fewest_element_bytes(const PlyElement& element, PlyFormat format) 
 
 Result<bool> read_ply_header_line(PlyHeader& header, std::string_view line) {
     const std::vector<std::string_view> words = words_of(line);
+    if (words.size() > 2 && words[0] == "comment" && words[1] == "timestamp") {
+        header.timestamp = words[2];
+        if (words.size() > 3) header.timestamp.append(" ").append(words[3]);  // its unit
+    }
     if (words.empty() || words[0] == "comment" || words[0] == "obj_info") return false;
     if (words[0] == "end_header") return true;
     Result<void> read;

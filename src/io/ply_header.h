@@ -31,6 +31,7 @@ struct PlyElement {
 struct PlyHeader {
     PlyFormat format = PlyFormat::ascii;
     std::vector<PlyElement> elements;
+    std::string timestamp;  // what stands behind "comment timestamp"; empty: nothing does
 };
 
 // The longest header, from "ply" to "end_header", that a reader accepts, in bytes.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <system_error>
@@ -113,6 +115,7 @@ Result<SequenceFiles> sequence_of(const fs::path& folder, const std::vector<std:
                                               folder.string() + "; say which, such as \"" + (folder / "*").string() +
                                               *extensions.begin() + "\"");
     }
+    files.numbers = numbers_in_names(files.paths);
     return files;
 }
 
@@ -164,6 +167,23 @@ Result<SequenceFiles> files_of_glob(const fs::path& folder, const std::string& g
     return sequence_of(folder, found);
 }
 
+struct NameParts {
+    std::string before, after;
+    std::uint64_t number = 0;
+};
+
+std::optional<NameParts> parts_of(const fs::path& path) {
+    constexpr const char* digits = "0123456789";
+    const std::string stem = path.stem().string();
+    const auto last = stem.find_last_of(digits);
+    if (last == std::string::npos) return std::nullopt;
+    const auto other = stem.find_last_not_of(digits, last);
+    const auto first = other == std::string::npos ? 0 : other + 1;
+    NameParts out{stem.substr(0, first), stem.substr(last + 1), 0};
+    if (std::from_chars(stem.data() + first, stem.data() + last + 1, out.number).ec != std::errc()) return std::nullopt;
+    return out;
+}
+
 }  // namespace
 
 Result<SequenceFiles> find_sequence(std::string_view what) {
@@ -188,6 +208,36 @@ Result<SequenceFiles> find_sequence(std::string_view what) {
     if (!names) return tl::unexpected(names.error());
     return fail(ErrorKind::bad_input,
                 "there is no file or folder " + std::string(what) + ": " + what_is_there(folder, *names));
+}
+
+std::vector<std::uint64_t> numbers_in_names(std::span<const fs::path> paths) {
+    std::vector<std::uint64_t> out;
+    std::optional<NameParts> first;
+    for (const auto& path : paths) {
+        const auto parts = parts_of(path);
+        if (!parts || (first && (parts->before != first->before || parts->after != first->after))) return {};
+        if (!first) first = parts;
+        if (!out.empty() && parts->number <= out.back()) return {};
+        out.push_back(parts->number);
+    }
+    return out;
+}
+
+std::vector<std::uint64_t> places_in_time(const SequenceFiles& files) {
+    const auto& numbers = files.numbers;
+    std::vector<std::uint64_t> in_order(files.paths.size());
+    std::iota(in_order.begin(), in_order.end(), std::uint64_t{0});
+    if (numbers.size() < 2) return in_order;
+    std::map<std::uint64_t, std::size_t> steps;
+    for (std::size_t k = 1; k < numbers.size(); ++k) ++steps[numbers[k] - numbers[k - 1]];
+    const auto usual =
+        std::max_element(steps.begin(), steps.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    std::vector<std::uint64_t> out;
+    for (const auto number : numbers) {
+        if ((number - numbers[0]) % usual->first != 0) return in_order;
+        out.push_back((number - numbers[0]) / usual->first);
+    }
+    return out.back() >= 2 * out.size() ? in_order : out;
 }
 
 bool natural_less(std::string_view a, std::string_view b) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,7 +15,7 @@ namespace htvm {
 
 struct SequenceFiles {
     std::vector<std::filesystem::path> paths;  // one per frame, in order; never empty
-    std::vector<std::uint64_t> numbers;  // the number in each name if a %d pattern was given, else empty; shows gaps
+    std::vector<std::uint64_t> numbers;        // each name's number, ascending; empty if the names have none
 };
 
 // The files that `what` refers to. It may be, tried in this order:
@@ -26,6 +27,15 @@ struct SequenceFiles {
 // Fails (bad_input) if nothing is found, with what was looked for and what is there instead; also if a folder or a glob
 // contains files of different formats, since then it most likely contains each frame twice.
 Result<SequenceFiles> find_sequence(std::string_view what);
+
+// The last number in each name, if the names differ only in it and the numbers ascend; else empty.
+std::vector<std::uint64_t> numbers_in_names(std::span<const std::filesystem::path> paths);
+
+// When each file was captured, in frames since the first: a number that is missing is a frame that is missing. The
+// most frequent step between numbers (1; 10 if every tenth frame was kept) is one frame. 0, 1, 2 and so on if there are
+// no numbers, if not all steps are multiples of that, or if more frames would be missing than there are (numbers that
+// are times of a clock).
+std::vector<std::uint64_t> places_in_time(const SequenceFiles& files);
 
 // True if a sorts before b: letters by code, runs of digits by their number (2 before 10), equal numbers by fewer
 // leading zeros.

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "io/output_file.h"
 #include "io/skeleton_azure.h"
 #include "io/skeleton_json.h"
 #include "io/skeleton_json_value.h"
@@ -51,11 +52,7 @@ Result<SkeletonTrack> read_skeleton(const std::string& path, const SkeletonReadO
 Result<void> write_skeleton(const std::string& path, const SkeletonTrack& track) {
     const auto text = format_skeleton_json(track);
     if (!text) return fail_at(path, text.error());
-    std::ofstream file(path, std::ios::binary);
-    file.write(text->data(), static_cast<std::streamsize>(text->size()));
-    file.close();
-    if (!file) return fail(ErrorKind::bad_input, path + ": cannot be written; check the folder and the space left");
-    return {};
+    return write_file(path, *text);
 }
 
 }  // namespace htvm

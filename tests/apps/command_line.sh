@@ -1,24 +1,6 @@
 #!/usr/bin/env bash
 # The command line from end to end on a small synthetic capture: what it writes, what it says, how it exits.
-set -u
-htvm=$1
-project=$(cd "$(dirname "$0")/../.." && pwd)
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failures=0
-
-# expect CODE WORDS COMMAND...: the command exits with CODE and says WORDS on its standard error or output.
-expect() {
-    local code=$1 words=$2 said
-    shift 2
-    said=$("$@" 2>&1 </dev/null | tr -d '\0'; exit "${PIPESTATUS[0]}")
-    local got=$?
-    if [ $got -ne "$code" ] || ! grep -qF -- "$words" <<<"$said"; then
-        printf 'FAILED: %s\n  exit %d, expected %d; said, without "%s":\n%s\n' "$*" $got "$code" "$words" "$said"
-        failures=$((failures + 1))
-    fi
-}
+. "$(dirname "$0")/expect.sh"
 
 expect 0 "3 frames" "$htvm" synth capture --frames 3 --vertices 600
 expect 0 '"radii"' "$htvm" calibrate capture -s capture/skeleton.json
@@ -74,7 +56,7 @@ expect 0 "target error 1 mm" "$htvm" encode capture --target-error 1 -o error.ht
 
 # Every option of the list that has a flag is in the help, and does what its name in the library says.
 for flag in $("$htvm" encode --help-options | grep -oE '^\| `[a-z_.]+` \| `--[a-z-]+' | grep -oE -- '--[a-z-]+'); do
-    expect 0 "$flag" "$htvm" encode --help
+    expect 0 "$flag" "$htvm" encode --help-all
 done
 "$htvm" encode --help-options | cmp - "$project/docs/options.md" ||
     { echo "FAILED: docs/options.md is not what 'htvm encode --help-options' prints"; failures=$((failures + 1)); }
@@ -106,6 +88,8 @@ expect 0 "3 frames to draco" "$htvm" decode draco.htvm -o draco
 # Errors are reported, and the exit code tells their kind.
 expect 2 "" "$htvm"
 expect 2 "there is no command 'nonsense'" "$htvm" nonsense
+expect 2 "did you mean 'encode'?" "$htvm" enocde capture
+expect 2 "did you mean --quality?" "$htvm" encode capture --qualty 50 -o x.htvm
 expect 2 "it is 'htvm-lab rd'" "$htvm" rd capture -o x
 expect 2 "it is 'htvm-lab reproduce'" "$htvm" reproduce --help
 expect 2 "quality" "$htvm" encode capture -q 200 -o x.htvm
@@ -207,7 +191,15 @@ expect 0 "frame 42 of walk left out: gap has no such" "$htvm" compare walk gap -
 "$htvm" compare walk gap --only m1 --csv - 2>/dev/null >gap.csv
 cmp -s whole.csv gap.csv || { echo "FAILED: a missing file changes what others are compared with"; failures=$((failures + 1)); }
 
+# Help: the everyday options first, all on demand; the exit codes.
+expect 0 "--skeleton" "$htvm" encode --help
+expect 0 "--help-all shows" "$htvm" help encode
+expect 0 "--still-below" "$htvm" encode --help-all
+"$htvm" encode --help | grep -q -- "--still-below" && fail "the short help shows what few need"
+expect 0 "6 disk full" "$htvm" help
+expect 2 "did you mean 'encode'?" "$htvm" help encod
+[ "$("$htvm" -V)" = "$("$htvm" --version)" ] || fail "-V is not --version"
+[ -z "$("$htvm" encode capture -o quiet.htvm --quiet 2>&1)" ] || fail "--quiet says something"
 for command in synth encode decode info calibrate compare; do expect 0 "Usage" "$htvm" $command --help; done
 
-[ $failures -eq 0 ] && echo "the command line does what it should"
-exit $failures
+done_with "the command line does what it should"

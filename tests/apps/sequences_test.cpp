@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "io/sequence.h"
+
 namespace htvm::app {
 namespace {
 

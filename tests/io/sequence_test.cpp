@@ -107,6 +107,17 @@ TEST_F(Sequence, AGlobIsTheMeshFilesThatMatch) {
     EXPECT_THAT(found("*.obj"), ElementsAre("f1.obj"));
 }
 
+TEST(PlacesInTime, AMissingNumberIsAMissingFrame) {
+    const auto places = [](std::vector<std::uint64_t> numbers) {
+        return places_in_time({std::vector<std::filesystem::path>(numbers.size()), numbers});
+    };
+    EXPECT_THAT(places({4, 5, 7, 8}), ElementsAre(0, 1, 3, 4));
+    EXPECT_THAT(places({0, 10, 20, 40}), ElementsAre(0, 1, 2, 4)) << "every tenth was kept, and one is missing";
+    EXPECT_THAT(places({0, 33, 67, 100, 133}), ElementsAre(0, 1, 2, 3, 4)) << "times of a clock";
+    EXPECT_THAT(places({1, 2, 3, 100}), ElementsAre(0, 1, 2, 3)) << "more would be missing than there are";
+    EXPECT_THAT(places_in_time({std::vector<std::filesystem::path>(3), {}}), ElementsAre(0, 1, 2)) << "no numbers";
+}
+
 TEST_F(Sequence, APatternIsTheFilesWithANumberInItsPlace) {
     touch({"f00002.drc", "f00010.drc", "f100000.drc", "f0003.drc", "f000004.drc", "fx.drc", "f00005.ply"});
     EXPECT_THAT(found("f%05d.drc"), ElementsAre("f00002.drc", "f00010.drc", "f100000.drc"));

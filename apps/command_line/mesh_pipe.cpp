@@ -1,0 +1,118 @@
+#include "command_line/mesh_pipe.h"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <istream>
+#include <mutex>
+#include <streambuf>
+#include <thread>
+#include <utility>
+
+#include "command_line/interruption.h"
+#include "io/ply.h"
+
+namespace htvm::app {
+namespace {
+
+// Meshes that may wait for the encoder: as many as it takes to get over an I-frame, which takes longer than others.
+constexpr std::size_t most_waiting = 8;
+
+// Standard input that ends where the program was interrupted, or nobody wants more of it: a read alone would wait on.
+class InterruptibleInput : public std::streambuf {
+public:
+    explicit InterruptibleInput(const std::atomic<bool>& unwanted) : unwanted_(unwanted) {}
+
+private:
+    int_type underflow() override {
+        while (interruption() == 0 && !unwanted_) {
+            pollfd input = {STDIN_FILENO, POLLIN, 0};
+            constexpr int look_up_after = 100;  // milliseconds
+            if (poll(&input, 1, look_up_after) <= 0) continue;
+            const auto got = read(STDIN_FILENO, bytes_.data(), bytes_.size());
+            if (got <= 0) break;
+            setg(bytes_.data(), bytes_.data(), bytes_.data() + got);
+            return traits_type::to_int_type(bytes_[0]);
+        }
+        return traits_type::eof();
+    }
+
+    const std::atomic<bool>& unwanted_;
+    std::array<char, 1 << 16> bytes_;
+};
+
+}  // namespace
+
+struct MeshPipe::State {
+    using Next = Result<std::optional<PipedMesh>>;
+
+    State() : input(unwanted), stream(&input), reader(stream) {}
+    ~State() {
+        unwanted = true;
+        if (thread.joinable()) thread.join();
+    }
+
+    Next read() {
+        auto mesh = reader.next();
+        if (interruption() != 0) return std::optional<PipedMesh>();  // in the middle of a mesh, perhaps
+        if (!mesh) return tl::unexpected(mesh.error());
+        if (!*mesh) return std::optional<PipedMesh>();
+        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp()});
+    }
+
+    void read_on() {
+        for (;;) {
+            auto next = read();
+            const bool last = !next || !*next;
+            const std::lock_guard lock(mutex);
+            if (!last && waiting.size() == most_waiting) {
+                waiting.pop_front();
+                ++dropped;
+            }
+            waiting.push_back(std::move(next));
+            changed.notify_one();
+            if (last) return;
+        }
+    }
+
+    std::atomic<bool> unwanted = false;
+    InterruptibleInput input;
+    std::istream stream;
+    PlyStreamReader reader;
+    std::size_t came = 0;
+    // drop_late alone; those below the mutex are guarded by it.
+    std::thread thread;
+    std::condition_variable changed;
+    mutable std::mutex mutex;
+    std::deque<Next> waiting;  // ends with nothing or an error, which stays
+    std::size_t dropped = 0;
+};
+
+MeshPipe::MeshPipe(bool drop_late) : state_(std::make_unique<State>()) {
+    if (drop_late) state_->thread = std::thread([state = state_.get()] { state->read_on(); });
+}
+MeshPipe::MeshPipe(MeshPipe&&) noexcept = default;
+MeshPipe::~MeshPipe() = default;
+
+Result<std::optional<PipedMesh>> MeshPipe::next() {
+    auto& state = *state_;
+    if (!state.thread.joinable()) return state.read();
+    std::unique_lock lock(state.mutex);
+    state.changed.wait(lock, [&] { return !state.waiting.empty(); });
+    auto& front = state.waiting.front();
+    if (!front || !*front) return front;
+    auto next = std::move(front);
+    state.waiting.pop_front();
+    return next;
+}
+
+std::size_t MeshPipe::dropped() const {
+    const std::lock_guard lock(state_->mutex);
+    return state_->dropped;
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,92 @@
+#include "io/output_file.h"
+
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace htvm {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Where the bytes end up: behind a symbolic link, what it leads to.
+fs::path place_of(const fs::path& path) {
+    std::error_code error;
+    if (!fs::is_symlink(path, error)) return path;
+    auto target = fs::canonical(path, error);
+    return error ? path : target;
+}
+
+Error open_error(const fs::path& path, int reason) {
+    std::error_code ignored;
+    const auto folder = path.parent_path();
+    if (!folder.empty() && !fs::exists(folder, ignored))
+        return {ErrorKind::bad_input,
+                path.string() + " cannot be written: there is no folder " + folder.string() + "; make it first"};
+    return write_error(path.string(), reason);
+}
+
+}  // namespace
+
+Error write_error(std::string_view name, int reason) {
+    const bool full = reason == ENOSPC || reason == EDQUOT;
+    return {full ? ErrorKind::disk_full : ErrorKind::bad_input,
+            std::string(name) + " cannot be written: " + std::strerror(reason)};
+}
+
+Result<OutputFile> OutputFile::create(const fs::path& path) {
+    OutputFile out;
+    std::error_code ignored;
+    out.path_ = place_of(path);
+    const auto there = fs::status(out.path_, ignored);
+    if (fs::is_directory(there)) return tl::unexpected(write_error(path.string(), EISDIR));
+    if (!fs::exists(there) || fs::is_regular_file(there)) out.partial_ = out.path_.string() + ".partial";
+    const auto& opened = out.partial_.empty() ? out.path_ : out.partial_;
+    out.file_.reset(std::fopen(opened.c_str(), "wb"));
+    if (!out.file_) return tl::unexpected(open_error(path, errno));
+    if (!out.partial_.empty() && fs::exists(there)) fs::permissions(out.partial_, there.permissions(), ignored);
+    return out;
+}
+
+OutputFile::~OutputFile() {
+    if (!file_ || partial_.empty()) return;
+    file_.reset();
+    std::error_code ignored;
+    fs::remove(partial_, ignored);
+}
+
+Result<void> OutputFile::write(std::span<const std::uint8_t> bytes) {
+    const bool at_once = partial_.empty();
+    if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size() ||
+        (at_once && std::fflush(file_.get()) != 0))
+        return tl::unexpected(write_error(path_.string(), errno));
+    return {};
+}
+
+Result<void> OutputFile::finish() {
+    if (std::fflush(file_.get()) != 0) return tl::unexpected(write_error(path_.string(), errno));
+    if (!partial_.empty() && std::rename(partial_.c_str(), path_.c_str()) != 0)
+        return tl::unexpected(write_error(path_.string(), errno));
+    file_.reset();
+    return {};
+}
+
+fs::path OutputFile::keep() {
+    file_.reset();
+    return partial_;
+}
+
+Result<void> write_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
+    auto file = OutputFile::create(path);
+    if (!file) return tl::unexpected(file.error());
+    if (auto ok = file->write(bytes); !ok) return ok;
+    return file->finish();
+}
+
+Result<void> write_file(const fs::path& path, std::string_view text) {
+    return write_file(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
+
+}  // namespace htvm

@@ -1,0 +1,48 @@
+// Files that are there in whole or not at all: written beside their place, under a name that ends in .partial, and
+// renamed when they are complete. What was there before stays until then.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "htvm/result.hpp"
+
+namespace htvm {
+
+class OutputFile {
+public:
+    // A pipe or a device, such as /dev/null, is written to at once, and has nothing that could be renamed.
+    static Result<OutputFile> create(const std::filesystem::path& path);
+    OutputFile(OutputFile&&) noexcept = default;
+    OutputFile& operator=(OutputFile&&) = delete;
+    // Removes what was neither finished nor kept.
+    ~OutputFile();
+
+    Result<void> write(std::span<const std::uint8_t> bytes);
+    // Puts the file in its place.
+    Result<void> finish();
+    // Leaves what was written so far beside its place and gives its name; an empty one where all went to a pipe or a
+    // device.
+    std::filesystem::path keep();
+
+private:
+    OutputFile() = default;
+    struct Close {
+        void operator()(std::FILE* file) const { std::fclose(file); }
+    };
+    std::filesystem::path path_, partial_;  // partial_: empty where path_ is a pipe or a device
+    std::unique_ptr<std::FILE, Close> file_;
+};
+
+// A whole file at once.
+Result<void> write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
+Result<void> write_file(const std::filesystem::path& path, std::string_view text);
+
+// "NAME cannot be written: REASON", of kind disk_full where that is the reason; reason: an errno.
+Error write_error(std::string_view name, int reason);
+
+}  // namespace htvm

@@ -1,0 +1,112 @@
+#!/usr/bin/env bash
+# Captures as they come: frames that are bad or missing, units and sizes, times, points without a surface.
+. "$(dirname "$0")/expect.sh"
+
+"$htvm" synth capture --frames 6 --vertices 600 --quiet
+# times STREAM: of its frames, in milliseconds.
+times() { "$htvm" info "$1" --json | awk -F'[:,]' '/"timestamp_us"/ { printf "%d ", ($2 + 500) / 1000 }'; }
+# has_times STREAM TIMES...
+has_times() {
+    local stream=$1
+    shift
+    [ "$(times "$stream")" = "$* " ] || fail "$stream has frames at $(times "$stream")ms, not at $* ms"
+}
+
+# A frame that cannot be read.
+cp -r capture bad
+echo nonsense >bad/frame_00003.ply
+expect 1 "bad/frame_00003.ply" "$htvm" encode bad -o x.htvm
+expect 1 "--on-bad-frame skip goes on without" "$htvm" encode bad -o x.htvm
+expect 0 "frame_00003.ply: this is not a PLY file: it does not begin with a line \"ply\"; it is left out" \
+    "$htvm" encode bad --on-bad-frame skip -o skipped.htvm
+has_times skipped.htvm 0 33 67 133 167
+expect 0 '"repeated_frames": 1' "$htvm" encode bad --on-bad-frame repeat --json -o repeated.htvm
+has_times repeated.htvm 0 33 67 100 133 167
+expect 2 "--on-bad-frame" "$htvm" encode bad --on-bad-frame perhaps -o x.htvm
+# The first one.
+echo nonsense >bad/frame_00000.ply
+expect 0 "2 bad frames left out" "$htvm" encode bad --on-bad-frame skip -o skipped.htvm
+has_times skipped.htvm 33 67 133 167
+# One that cannot be coded, beyond the lattice, and one without triangles.
+cp -r capture odd
+{ sed '/end_header/q' capture/frame_00002.ply | sed 's/vertex .*/vertex 1/;s/face .*/face 0/;s/binary_little_endian/ascii/'; echo "1e12 0 0 0 0 0"; } >odd/frame_00002.ply
+expect 1 "frame_00002.ply" "$htvm" encode odd -o x.htvm
+expect 0 "frame_00002.ply" "$htvm" encode odd --on-bad-frame skip -o skipped.htvm
+has_times skipped.htvm 0 33 100 133 167
+sed -i 's/1e12/0/' odd/frame_00002.ply
+expect 0 "1 of 6 frames has no triangles" "$htvm" encode odd -o x.htvm
+expect 0 "frame_00002.ply has no triangles; the frame before is repeated" "$htvm" encode odd --on-bad-frame repeat -o x.htvm
+# From standard input there is no way to the next one.
+expect 1 "mesh 1 of the stream" bash -c "cat capture/frame_00000.ply bad/frame_00003.ply | '$htvm' encode - --on-bad-frame skip -o x.htvm"
+
+# A number that is missing.
+cp -r capture gap
+rm gap/frame_00002.ply gap/frame_00003.ply
+expect 0 "2 frames are missing before gap/frame_00004.ply" "$htvm" encode gap -o gap.htvm
+has_times gap.htvm 0 33 133 167
+expect 0 '"filled_frames": 2' "$htvm" encode gap --fill --json -o filled.htvm
+has_times filled.htvm 0 33 67 100 133 167
+mkdir tenths
+for k in 0 1 3 4; do cp capture/frame_0000$k.ply tenths/${k}0.ply; done
+"$htvm" encode tenths -o tenths.htvm --quiet 2>/dev/null
+has_times tenths.htvm 0 33 100 133
+
+# Units: the guess says what it makes of the subject, and others can be named.
+expect 0 "unit_mm\": 25.4" bash -c "'$htvm' encode capture --unit in -o x.htvm --quiet && '$htvm' info --json x.htvm"
+"$htvm" encode capture -o plain.htvm --quiet
+"$htvm" decode plain.htvm -o dm --unit dm --quiet
+expect 0 "warning: the meshes look as if they were in centimetres, which makes the subject 18 cm tall; if that is wrong" \
+    "$htvm" encode dm -o x.htvm
+[ -z "$("$htvm" encode dm --unit dm -o x.htvm --quiet 2>&1)" ] || fail "a unit that is named is doubted"
+"$htvm" encode capture --scale 0.1 -o doll.htvm --quiet
+expect 0 "unit_mm\": 0.1" "$htvm" info --json doll.htvm
+"$htvm" decode doll.htvm -o doll --unit mm --quiet
+"$htvm" encode doll --height 1.8 -o tall.htvm --quiet
+"$htvm" decode tall.htvm -o tall --unit m --quiet
+expect 0 "" "$htvm" compare doll tall.htvm --only m1
+heights() { # of the first mesh in a folder, as the guess of its unit tells
+    "$htvm" encode "$1" --frames 1 -o x.htvm 2>&1 | grep -o "subject .* tall"
+}
+[ "$(heights tall)" = "subject 1.80 m tall" ] || fail "--height 1.8 makes the $(heights tall)"
+expect 2 "excludes" "$htvm" encode doll --height 1.8 --scale 2 -o x.htvm
+
+# Times: of a file, in any of its forms; of the PLY files themselves; frame rates as fractions.
+printf '%s\n' 0 0.05 0.0833 0.2 0.25 1 >times.csv
+expect 0 "" "$htvm" encode capture --timestamps times.csv -o timed.htvm
+has_times timed.htvm 0 50 83 200 250 1000
+"$htvm" decode timed.htvm -o timed --timestamps decoded.csv --quiet
+"$htvm" encode timed -o again.htvm --quiet
+has_times again.htvm 0 50 83 200 250 1000
+"$htvm" encode capture --timestamps decoded.csv -o again.htvm --quiet
+has_times again.htvm 0 50 83 200 250 1000
+cat timed/*.ply | "$htvm" encode - -o again.htvm --quiet
+has_times again.htvm 0 50 83 200 250 1000
+"$htvm" info timed.htvm --json >times.json
+"$htvm" encode capture --timestamps times.json -o again.htvm --quiet
+has_times again.htvm 0 50 83 200 250 1000
+"$htvm" encode timed --fps 10 -o again.htvm --quiet
+has_times again.htvm 0 100 200 300 400 500
+printf '00:00:01:0%d\n' 0 1 2 3 4 5 >timecode.csv
+"$htvm" encode capture --fps 25 --timestamps timecode.csv -o again.htvm --quiet
+has_times again.htvm 1000 1040 1080 1120 1160 1200
+expect 1 "needs the frame rate" "$htvm" encode capture --timestamps timecode.csv -o x.htvm
+expect 1 "times.csv has 6 times, but there are 4 frames" "$htvm" encode gap --timestamps times.csv -o x.htvm
+"$htvm" encode gap --timestamps decoded.csv -o again.htvm --quiet 2>/dev/null
+has_times again.htvm 0 50 250 1000
+sed -i 's/0.05/0.5/' times.csv
+expect 1 "times.csv: line 3: the time 0.0833 is not above the one before" "$htvm" encode capture --timestamps times.csv -o x.htvm
+"$htvm" encode capture --fps 30000/1001 -o ntsc.htvm --quiet
+has_times ntsc.htvm 0 33 67 100 133 167
+expect 0 "29.97 frames/s" "$htvm" info ntsc.htvm
+expect 2 "write it as 30, 29.97 or 30000/1001" "$htvm" encode capture --fps 30/0 -o x.htvm
+
+# Points without a surface.
+mkdir points
+for k in 0 1; do
+    { sed '/end_header/q' capture/frame_00000.ply | sed 's/vertex .*/vertex 2/;s/face .*/face 0/;s/binary_little_endian/ascii/'
+      printf '0 0 0 0 0 0\n0 1700 0 0 0 0\n'; } >points/$k.ply
+done
+expect 1 "make a mesh of the points first, or give --profile topology" "$htvm" encode points -o x.htvm
+expect 0 "2 of 2 frames have no triangles" "$htvm" encode points --profile topology -o x.htvm
+
+done_with "captures are taken as they come"
