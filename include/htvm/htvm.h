@@ -244,6 +244,31 @@ htvm_status htvm_decoder_joint_name(htvm_decoder* decoder, uint32_t joint, char*
 /* The two joints of the bone, first the one that it turns about, and its radius in mm. Each pointer may be NULL. */
 htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* first, uint32_t* second, double* radius);
 
+/* Where the current frame's bytes went: bytes[0] headers, counts and checksums, bytes[n] the layer of number n
+ * (docs/bitstream.md, section 4). HTVM_LAYERS numbers are always enough. HTVM_BAD_INPUT: there is no current frame.
+ * HTVM_BUFFER_TOO_SMALL below HTVM_LAYERS. */
+enum { HTVM_LAYERS = 12 };
+htvm_status htvm_decoder_layer_bytes(htvm_decoder* decoder, uint64_t* bytes, size_t capacity);
+/* What people call layer n: "geometry"; "overhead" for 0. NULL where there is no such layer. */
+const char* htvm_layer_name(uint32_t layer);
+
+/* ---- index ---------------------------------------------------------------------------------------------------- */
+
+/* A place where decoding can start, once the sequence header is known. */
+typedef struct htvm_index_entry {
+    int64_t timestamp_us;
+    uint64_t offset; /* of its packet, bytes from the start of the stream */
+    uint32_t frame;
+    uint32_t reserved; /* 0 */
+} htvm_index_entry;
+
+/* What an index packet (kind 5), header and checksums included, says; for players that seek. *count is set to its number
+ * of entries; HTVM_BUFFER_TOO_SMALL where capacity is less, and nothing is written (so a capacity of 0 asks for the
+ * number). HTVM_CORRUPT_STREAM: not one whole, undamaged index packet. Frames and timestamps are what the stream says:
+ * check them against the packets found there. */
+htvm_status htvm_index_read(const uint8_t* packet, size_t size, htvm_index_entry* entries, size_t capacity,
+                            size_t* count);
+
 /* ---- encoder -------------------------------------------------------------------------------------------------- */
 
 typedef struct htvm_encoder htvm_encoder;

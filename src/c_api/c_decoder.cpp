@@ -6,6 +6,7 @@
 #include <string>
 
 #include "c_api/c_status.h"
+#include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 
 using htvm::c_api::check_struct;
@@ -330,4 +331,44 @@ htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* fi
     if (second) *second = sequence->skeleton.bones[bone].second;
     if (radius) *radius = sequence->radii[bone];
     return HTVM_OK;
+}
+
+htvm_status htvm_decoder_layer_bytes(htvm_decoder* decoder, uint64_t* bytes, size_t capacity) {
+    static_assert(HTVM_LAYERS == htvm::layer_count);
+    if (!decoder) return HTVM_BAD_INPUT;
+    if (!decoder->current) return no_frame(decoder->error);
+    if (!bytes) return decoder->error.set(HTVM_BAD_INPUT, "bytes is NULL");
+    if (capacity < HTVM_LAYERS) return decoder->error.set(HTVM_BUFFER_TOO_SMALL, "capacity is below HTVM_LAYERS");
+    const auto& taken = decoder->current->info.bytes;
+    std::copy(taken.of_layer.begin(), taken.of_layer.end(), bytes);
+    bytes[0] = taken.overhead;
+    return HTVM_OK;
+}
+
+const char* htvm_layer_name(uint32_t layer) {
+    if (layer == 0) return "overhead";
+    const auto* found = std::find_if(htvm::frame_layers.begin(), htvm::frame_layers.end(),
+                                     [&](const auto& name) { return static_cast<uint32_t>(name.layer) == layer; });
+    return found == htvm::frame_layers.end() ? nullptr : found->name;
+}
+
+htvm_status htvm_index_read(const uint8_t* packet, size_t size, htvm_index_entry* entries, size_t capacity,
+                            size_t* count) {
+    if (!packet || !count || (!entries && capacity > 0)) return HTVM_BAD_INPUT;
+    *count = 0;
+    LastError error;  // there is no handle to keep it in
+    return guarded(error, [&] {
+        htvm::PacketReader reader;
+        reader.push({packet, size});
+        const auto whole = reader.pull();
+        if (!whole || reader.damaged_bytes() > 0 || reader.pending_bytes() > 0 ||
+            whole->kind != htvm::PacketKind::index)
+            return htvm_status{HTVM_CORRUPT_STREAM};
+        const auto index = htvm::internal::read_sequence_index(whole->payload);
+        if (!index) return error.set(index.error());
+        *count = index->size();
+        if (capacity < index->size()) return htvm_status{HTVM_BUFFER_TOO_SMALL};
+        for (const auto& entry : *index) *entries++ = {entry.timestamp_us, entry.offset, entry.frame, 0};
+        return htvm_status{HTVM_OK};
+    });
 }

@@ -2,7 +2,6 @@
 // Decodes every FOLDER/*.htvm, sent in pieces, and holds each frame against FOLDER/*.digests.
 import { readFile, readdir } from 'node:fs/promises';
 import { join } from 'node:path';
-import { WASI } from 'node:wasi';
 import { crc32 } from './crc32.mjs';
 
 const OK = 0, AGAIN = 1, BAD_INPUT = -1, CORRUPT_STREAM = -2;
@@ -16,10 +15,8 @@ const maxMemory = 256n << 20n;
 const [modulePath, folder] = process.argv.slice(2);
 
 async function load(path) {
-    const wasi = new WASI({ version: 'preview1' });
-    const module = await WebAssembly.compile(await readFile(path));
-    const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: wasi.wasiImport });
-    wasi.initialize(instance);
+    const { instance } = await WebAssembly.instantiate(await readFile(path), {});
+    instance.exports._initialize();
     return instance.exports;
 }
 

@@ -1,0 +1,42 @@
+// Builds the packages into packages/*/dist: node build.mjs. The decoder's WebAssembly must be there: ./dev wasm.
+import { execFileSync } from 'node:child_process';
+import { copyFile, mkdir, readFile, rm, writeFile } from 'node:fs/promises';
+import { fileURLToPath } from 'node:url';
+import { build } from 'esbuild';
+
+process.chdir(fileURLToPath(new URL('.', import.meta.url)));
+const wasm = '../build/wasm/htvm_decoder.wasm';
+const packages = ['decoder', 'three', 'player'];
+
+for (const name of packages) {
+    await rm(`packages/${name}/dist`, { recursive: true, force: true });
+    await mkdir(`packages/${name}/dist`, { recursive: true });
+    await copyFile('../LICENSE', `packages/${name}/LICENSE`);
+}
+execFileSync('node', ['layouts.mjs', '../include/htvm/htvm.h', wasm, 'packages/decoder/src/layouts.ts'], { stdio: 'inherit' });
+execFileSync('node', ['node_modules/typescript/bin/tsc', '-b'], { stdio: 'inherit' });
+for (const name of packages) await rm(`packages/${name}/dist/.tsbuildinfo`);
+
+const common = { bundle: true, format: 'esm', target: 'es2022', sourcemap: true, logLevel: 'warning' };
+const from = (name, file) => [`packages/${name}/src/${file}.ts`];
+const to = (name, file) => `packages/${name}/dist/${file}.js`;
+const needed = { external: ['three', '@htvm/*'] };
+await build({ ...common, entryPoints: from('decoder', 'index'), outfile: to('decoder', 'index') });
+await build({ ...common, entryPoints: from('decoder', 'node'), outfile: to('decoder', 'node'), platform: 'node' });
+await build({ ...common, ...needed, entryPoints: from('three', 'index'), outfile: to('three', 'index') });
+await build({ ...common, ...needed, entryPoints: from('player', 'index'), outfile: to('player', 'index') });
+
+// For pages without a build step: everything in one file, beside the worker and the decoder.
+const whole = { ...common, minify: true, sourcemap: false, legalComments: 'none' };
+const notice = `/*! htvm player, Apache-2.0; with three.js, MIT: htvm-player.LICENSES.txt */`;
+await build({ ...whole, entryPoints: from('player', 'index'), outfile: to('player', 'htvm-player'), banner: { js: notice } });
+await build({
+    ...whole, format: 'iife', entryPoints: from('player', 'worker'), outfile: to('player', 'htvm-worker'),
+    banner: { js: '/*! htvm player, Apache-2.0 */' }, logOverride: { 'empty-import-meta': 'silent' },
+});
+await copyFile(wasm, 'packages/decoder/dist/htvm_decoder.wasm');
+await copyFile(wasm, 'packages/player/dist/htvm_decoder.wasm');
+const licence = async (title, path) => `${title}\n${'='.repeat(title.length)}\n\n${(await readFile(path, 'utf8')).trim()}\n`;
+await writeFile(
+    'packages/player/dist/htvm-player.LICENSES.txt',
+    `${await licence('three.js (in htvm-player.js)', 'node_modules/three/LICENSE')}\n${await licence('htvm', '../LICENSE')}`);

@@ -1,0 +1,232 @@
+// The bar at the bottom, what is said on the picture, and the panel with statistics.
+
+export interface ControlActions {
+    togglePlay(): void;
+    seek(fraction: number): void;
+    step(frames: number): void;
+    setRate(rate: number): void;
+    toggleLoop(): void;
+    toggleLit(): void;
+    toggleStatistics(): void;
+    screenshot(): void;
+    toggleFullscreen(): void;
+    enterVr(): void;
+}
+
+export interface ControlState {
+    playing: boolean;
+    waiting: boolean;
+    timeUs: number;
+    durationUs: number | null;
+    loop: boolean;
+    lit: boolean;
+    statistics: boolean;
+    rate: number;
+    fullscreen: boolean;
+}
+
+export const rates = [0.25, 0.5, 0.75, 1, 1.25, 1.5, 2];
+
+const icons = {
+    play: 'M8 5.5v13l10.5-6.5z',
+    pause: 'M7 5h3.5v14H7zM13.5 5H17v14h-3.5z',
+    back: 'M6 5h2.5v14H6zM18 5.5v13L9.5 12z',
+    forward: 'M15.5 5H18v14h-2.5zM6 5.5v13l8.5-6.5z',
+    loop: 'M7 7h9V4l5 4.5-5 4.5v-3H9v4H6V8a1 1 0 0 1 1-1zm10 10H8v3l-5-4.5L8 11v3h7v-4h3v6a1 1 0 0 1-1 1z',
+    light: 'M12 3a6 6 0 0 0-3.5 10.9V17h7v-3.1A6 6 0 0 0 12 3zM9 18.5h6V20H9zM10.5 21h3v1h-3z',
+    statistics: 'M4 20V11h4v9zM10 20V4h4v16zM16 20v-6h4v6z',
+    screenshot: 'M9 5 7.5 7H4v12h16V7h-3.5L15 5zm3 4a4 4 0 1 1 0 8 4 4 0 0 1 0-8z',
+    fullscreen: 'M4 4h6v2H6v4H4zM14 4h6v6h-2V6h-4zM4 14h2v4h4v2H4zM18 14h2v6h-6v-2h4z',
+    vr: 'M3 7h18v10h-6l-2-3h-2l-2 3H3zm4.5 3a2 2 0 1 0 0 4 2 2 0 0 0 0-4zm9 0a2 2 0 1 0 0 4 2 2 0 0 0 0-4z',
+};
+
+/** As people write it: 1:02.5. */
+export function timeText(us: number): string {
+    const tenths = Math.floor(us / 1e5);
+    const minutes = Math.floor(tenths / 600);
+    const rest = tenths % 600;
+    return `${minutes}:${String(Math.floor(rest / 10)).padStart(2, '0')}.${rest % 10}`;
+}
+
+function icon(path: string): SVGSVGElement {
+    const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+    svg.setAttribute('viewBox', '0 0 24 24');
+    svg.setAttribute('aria-hidden', 'true');
+    const shape = document.createElementNS('http://www.w3.org/2000/svg', 'path');
+    shape.setAttribute('d', path);
+    svg.append(shape);
+    return svg;
+}
+
+function setIcon(button: HTMLButtonElement, path: string): void {
+    const shape = button.querySelector('path')!;
+    if (shape.getAttribute('d') !== path) shape.setAttribute('d', path);
+}
+
+function setText(element: Element, text: string): void {
+    if (element.textContent !== text) element.textContent = text;
+}
+
+export function make<Name extends keyof HTMLElementTagNameMap>(
+    name: Name, part: string, attributes: Record<string, string> = {}): HTMLElementTagNameMap[Name] {
+    const element = document.createElement(name);
+    element.className = part;
+    element.setAttribute('part', part);
+    for (const [attribute, value] of Object.entries(attributes)) element.setAttribute(attribute, value);
+    return element;
+}
+
+export class Controls {
+    readonly bar = make('div', 'bar', { role: 'group', 'aria-label': 'Player controls' });
+    #play: HTMLButtonElement;
+    #back: HTMLButtonElement;
+    #forward: HTMLButtonElement;
+    #loop: HTMLButtonElement;
+    #light: HTMLButtonElement;
+    #statistics: HTMLButtonElement;
+    #fullscreen: HTMLButtonElement;
+    #vr: HTMLButtonElement;
+    #time = make('span', 'time');
+    #scrub = make('input', 'scrub', { type: 'range', min: '0', max: '1000', step: '1', 'aria-label': 'Position' });
+    #rate = make('select', 'rate', { 'aria-label': 'Speed', title: 'Speed' });
+    #scrubbing = false;
+
+    constructor(actions: ControlActions) {
+        const button = (name: keyof typeof icons, label: string, action: () => void): HTMLButtonElement => {
+            const element = make('button', name, { type: 'button', 'aria-label': label, title: label });
+            element.append(icon(icons[name]));
+            element.addEventListener('click', action);
+            return element;
+        };
+        this.#play = button('play', 'Play (Space)', actions.togglePlay);
+        this.#back = button('back', 'One frame back (,)', () => actions.step(-1));
+        this.#forward = button('forward', 'One frame on (.)', () => actions.step(1));
+        this.#loop = button('loop', 'Play again and again (L)', actions.toggleLoop);
+        this.#light = button('light', 'Light', actions.toggleLit);
+        this.#statistics = button('statistics', 'Statistics (S)', actions.toggleStatistics);
+        const screenshot = button('screenshot', 'Save a picture', actions.screenshot);
+        this.#vr = button('vr', 'Enter VR', actions.enterVr);
+        this.#fullscreen = button('fullscreen', 'Full screen (F)', actions.toggleFullscreen);
+        this.#vr.hidden = true;
+        for (const rate of rates) {
+            const option = document.createElement('option');
+            option.value = String(rate);
+            option.textContent = `${rate}×`;
+            this.#rate.append(option);
+        }
+        this.#rate.value = '1';
+        this.#rate.addEventListener('change', () => actions.setRate(Number(this.#rate.value)));
+        this.#scrub.addEventListener('input', () => actions.seek(Number(this.#scrub.value) / 1000));
+        this.#scrub.addEventListener('pointerdown', () => (this.#scrubbing = true));
+        for (const type of ['pointerup', 'pointercancel', 'change'])
+            this.#scrub.addEventListener(type, () => (this.#scrubbing = false));
+        this.bar.append(
+            this.#play, this.#back, this.#forward, this.#time, this.#scrub, this.#rate, this.#loop, this.#light,
+            this.#statistics, screenshot, this.#vr, this.#fullscreen);
+    }
+
+    offerVr(): void {
+        this.#vr.hidden = false;
+    }
+
+    show(state: ControlState): void {
+        const label = state.playing ? 'Pause (Space)' : 'Play (Space)';
+        setIcon(this.#play, state.playing ? icons.pause : icons.play);
+        if (this.#play.title !== label) {
+            this.#play.title = label;
+            this.#play.setAttribute('aria-label', label);
+        }
+        const known = state.durationUs !== null;
+        setText(this.#time, known ? `${timeText(state.timeUs)} / ${timeText(state.durationUs!)}` : timeText(state.timeUs));
+        this.#scrub.disabled = !known;
+        if (known && !this.#scrubbing) {
+            const value = String(Math.round((1000 * state.timeUs) / Math.max(state.durationUs!, 1)));
+            if (this.#scrub.value !== value) {
+                this.#scrub.value = value;
+                this.#scrub.setAttribute('aria-valuetext', `${(state.timeUs / 1e6).toFixed(1)} of ${(state.durationUs! / 1e6).toFixed(1)} seconds`);
+                this.#scrub.style.setProperty('--done', `${Number(value) / 10}%`);
+            }
+        }
+        const press = (button: HTMLButtonElement, on: boolean): void => {
+            if (button.getAttribute('aria-pressed') !== String(on)) button.setAttribute('aria-pressed', String(on));
+        };
+        press(this.#loop, state.loop);
+        press(this.#light, state.lit);
+        press(this.#statistics, state.statistics);
+        press(this.#fullscreen, state.fullscreen);
+        const rate = String(state.rate);
+        if (this.#rate.value !== rate && rates.includes(state.rate)) this.#rate.value = rate;
+    }
+}
+
+export const styles = `
+:host {
+    --_ink: #1d232b; --_paper: #f4f5f7; --_paper2: #dde1e7; --_bar: rgba(255, 255, 255, 0.82); --_accent: #2563eb;
+    display: block; position: relative; aspect-ratio: 4 / 3; overflow: hidden; contain: content; container-type: size;
+    border-radius: 8px; color: var(--_ink); font: 13px/1.4 system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif;
+    background: var(--htvm-background, radial-gradient(ellipse at 50% 35%, var(--_paper), var(--_paper2)));
+    -webkit-user-select: none; user-select: none;
+}
+:host([hidden]) { display: none; }
+:host(.dark) {
+    --_ink: #e8ebf0; --_paper: #2b313b; --_paper2: #14171c; --_bar: rgba(24, 28, 34, 0.8); --_accent: #7aa2ff;
+}
+:host(.whole-window) { position: fixed !important; inset: 0 !important; z-index: 2147483647; width: 100vw !important; height: 100dvh !important; margin: 0 !important; aspect-ratio: auto !important; border-radius: 0; }
+:host(:fullscreen) { border-radius: 0; aspect-ratio: auto; width: 100%; height: 100%; }
+canvas { position: absolute; inset: 0; width: 100%; height: 100%; display: block; outline: none; touch-action: none; cursor: grab; }
+canvas:active { cursor: grabbing; }
+canvas:focus-visible { box-shadow: inset 0 0 0 2px var(--_accent); }
+.poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; pointer-events: none; }
+.bar {
+    position: absolute; left: 10px; right: 10px; bottom: 10px; display: flex; align-items: center; gap: 2px; padding: 4px 6px;
+    background: var(--_bar); border-radius: 10px; backdrop-filter: blur(10px); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
+    transition: opacity 0.25s;
+}
+:host(.resting) .bar:not(:hover):not(:focus-within) { opacity: 0; }
+[hidden] { display: none !important; }
+button {
+    all: unset; box-sizing: border-box; width: 34px; height: 34px; padding: 7px; border-radius: 7px; cursor: pointer;
+    flex: none; color: inherit;
+}
+button:hover { background: color-mix(in srgb, currentColor 12%, transparent); }
+button:focus-visible, select:focus-visible { outline: 2px solid var(--_accent); outline-offset: -2px; }
+button[aria-pressed="true"] { color: var(--_accent); }
+svg { display: block; width: 20px; height: 20px; fill: currentColor; }
+.time { font-variant-numeric: tabular-nums; padding: 0 8px; white-space: nowrap; flex: none; }
+.scrub { flex: 1; min-width: 40px; height: 26px; margin: 0 6px; background: none; -webkit-appearance: none; appearance: none; cursor: pointer; }
+.scrub:focus-visible { outline: 2px solid var(--_accent); border-radius: 6px; }
+.scrub::-webkit-slider-runnable-track {
+    height: 4px; border-radius: 2px;
+    background: linear-gradient(to right, var(--_accent) var(--done, 0%), color-mix(in srgb, currentColor 25%, transparent) var(--done, 0%));
+}
+.scrub::-moz-range-track { height: 4px; border-radius: 2px; background: color-mix(in srgb, currentColor 25%, transparent); }
+.scrub::-moz-range-progress { height: 4px; border-radius: 2px; background: var(--_accent); }
+.scrub::-webkit-slider-thumb { -webkit-appearance: none; width: 14px; height: 14px; margin-top: -5px; border-radius: 50%; background: var(--_accent); }
+.scrub::-moz-range-thumb { width: 14px; height: 14px; border: 0; border-radius: 50%; background: var(--_accent); }
+.scrub:disabled { opacity: 0.4; cursor: default; }
+.rate { font: inherit; color: inherit; background: none; border: 0; border-radius: 7px; height: 34px; cursor: pointer; flex: none; }
+.rate option { color: #000; background: #fff; }
+.notice {
+    position: absolute; left: 50%; top: 12px; transform: translateX(-50%); max-width: calc(100% - 40px); padding: 6px 12px;
+    border-radius: 8px; background: var(--_bar); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
+}
+.failure { position: absolute; inset: 0; display: flex; align-items: center; justify-content: center; padding: 24px; text-align: center; user-select: text; -webkit-user-select: text; }
+.failure > div { max-width: 46em; max-height: 100%; overflow-wrap: anywhere; padding: 14px 18px; border-radius: 10px; background: var(--_bar); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18); }
+.failure strong { display: block; margin-bottom: 4px; }
+.spinner {
+    position: absolute; left: 50%; top: 50%; width: 36px; height: 36px; margin: -18px; border-radius: 50%; pointer-events: none;
+    border: 3px solid color-mix(in srgb, currentColor 20%, transparent); border-top-color: var(--_accent);
+    animation: turn 0.9s linear infinite;
+}
+@keyframes turn { to { transform: rotate(1turn); } }
+@media (prefers-reduced-motion: reduce) { .spinner { animation-duration: 6s; } .bar { transition: none; } }
+.panel {
+    position: absolute; left: 10px; top: 10px; margin: 0; padding: 8px 12px; border-radius: 8px; background: var(--_bar);
+    font: 11.5px/1.55 ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace; white-space: pre; pointer-events: none;
+    box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
+}
+.description { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
+@container (max-width: 620px) { .back, .forward, .screenshot { display: none; } }
+@container (max-width: 470px) { .rate, .statistics, .light { display: none; } }
+@container (max-width: 330px) { .time { display: none; } }
+`;

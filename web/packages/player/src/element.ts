@@ -1,0 +1,669 @@
+// <htvm-player src="person.htvm" autoplay loop controls>: the element that pages use. docs/player.md is its manual.
+import { crc32, type SequenceInfo } from '@htvm/decoder';
+import { browserClock, type Clock } from './clock.js';
+import { Controls, make, styles, type ControlActions } from './controls.js';
+import type { FailureCode, FrameReport } from './messages.js';
+import { Orbit } from './orbit.js';
+import { Playback } from './playback.js';
+import { StageScene, type Axis } from './scene.js';
+import { Statistics, type StatisticsSummary } from './statistics.js';
+import { startWorker } from './worker_start.js';
+
+export interface FramePresentedDetail {
+    frame: number;
+    /** I, EP, P, T. */
+    letter: string;
+    /** Seconds; 0 is the stream's first frame. */
+    time: number;
+    vertices: number;
+    triangles: number;
+    topology: number;
+    /** True while the frame that was sought is still being decoded, and one before it is shown. */
+    preview: boolean;
+    /** CRC-32 of what is shown: positions, triangles, colours, and the stream's own normals and texture coordinates. */
+    digest(): number;
+}
+
+export interface PlayerStatistics extends StatisticsSummary {
+    framesShown: number;
+    /** Of the decoder's memory, which only grows, up to 512 MB. */
+    wasmBytes: number;
+    /** Of the file, kept for seeks and loops; at most 64 MB. */
+    heldBytes: number;
+    /** On the graphics card. */
+    geometries: number;
+    textures: number;
+    /** How often triangles were sent to the graphics card: once for each topology. */
+    indexUploads: number;
+}
+
+export interface PlayerErrorDetail {
+    code: FailureCode;
+    /** In words. */
+    message: string;
+}
+
+const keepNoticeMs = 6000;
+const restAfterMs = 2500;
+const yAxes: readonly string[] = ['x', 'y', 'z', '-x', '-y', '-z'];
+
+/**
+ * Events: loadedmetadata, durationchange, play, pause, seeking, seeked, waiting, ended, timeupdate, error (its detail a
+ * PlayerErrorDetail), notice (its detail a sentence), framepresented (its detail a FramePresentedDetail).
+ */
+export class HtvmPlayerElement extends HTMLElement {
+    static readonly observedAttributes = ['src', 'loop', 'controls', 'poster', 'lit', 'up', 'theme', 'floor', 'statistics', 'label', 'orbit'];
+    /** Where the worker and the decoder lie; beside this file unless told, before the first element has a src. */
+    static workerUrl: URL | string = new URL('./htvm-worker.js', import.meta.url);
+    static decoderUrl: URL | string = new URL('./htvm_decoder.wasm', import.meta.url);
+
+    #canvas = make('canvas', 'canvas', { tabindex: '0', role: 'img' });
+    #poster = make('img', 'poster', { alt: '' });
+    #spinner = make('div', 'spinner', { 'aria-hidden': 'true' });
+    #notice = make('div', 'notice', { role: 'status' });
+    #failure = make('div', 'failure', { role: 'alert' });
+    #description = make('div', 'description', { id: 'description' });
+    #panel = make('pre', 'panel', { 'aria-hidden': 'true' });
+    #controls: Controls;
+    #scene: StageScene | null = null;
+    #orbit: Orbit | null = null;
+    #playback: Playback;
+    #statistics = new Statistics();
+    #clock: Clock = browserClock;
+    #request: number | null = null;
+    #dirty = false;
+    #sequence: SequenceInfo | null = null;
+    #error: PlayerErrorDetail | null = null;
+    #shownFrames = 0;
+    #noticeUntil = 0;
+    #restAt = 0;
+    #lastTimeUpdate = 0;
+    #texcoords: Float32Array | null = null; // of the topology that is shown
+    #wantsPlay = false;
+    #contextLost = false;
+    #wholeWindow = false;
+    #connected = false;
+    #idleWaiting: (() => void)[] = [];
+    #resized: ResizeObserver;
+    #dark = matchMedia('(prefers-color-scheme: dark)');
+
+    constructor() {
+        super();
+        const root = this.attachShadow({ mode: 'open', delegatesFocus: true });
+        const sheet = new CSSStyleSheet();
+        sheet.replaceSync(styles);
+        root.adoptedStyleSheets = [sheet];
+        this.#controls = new Controls(this.#actions());
+        for (const part of [this.#notice, this.#failure, this.#panel, this.#spinner, this.#poster]) part.hidden = true;
+        this.#canvas.setAttribute('aria-describedby', 'description');
+        root.append(this.#canvas, this.#poster, this.#panel, this.#spinner, this.#notice, this.#failure, this.#controls.bar, this.#description);
+        this.#playback = new Playback(
+            () => startWorker(new URL(HtvmPlayerElement.workerUrl, location.href)),
+            new URL(HtvmPlayerElement.decoderUrl, location.href).href,
+            () => this.#clock.now(),
+            {
+                opened: (sequence, layerNames) => {
+                    this.#sequence = sequence;
+                    this.#statistics.reset(layerNames);
+                    this.#send('loadedmetadata');
+                },
+                extent: () => {
+                    this.#send('durationchange');
+                    this.#schedule();
+                },
+                arrived: () => this.#schedule(),
+                sought: () => this.#send('seeked'),
+                waiting: () => this.#send('waiting'),
+                ended: () => {
+                    this.#wantsPlay = false;
+                    this.#send('pause');
+                    this.#send('ended');
+                    this.#invalidate();
+                },
+                notice: (text) => this.#say(text),
+                failed: (code, message) => this.#fail({ code, message }),
+                restarted: () => this.#scene?.mesh.forgetTopology(),
+            },
+        );
+        this.#resized = new ResizeObserver(() => this.#resize());
+        this.addEventListener('keydown', (event) => this.#key(event));
+        this.addEventListener('pointermove', () => this.#stir());
+        this.addEventListener('focusin', () => this.#stir());
+        this.#canvas.addEventListener('webglcontextlost', (event) => {
+            event.preventDefault();
+            this.#contextLost = true;
+        });
+        this.#canvas.addEventListener('webglcontextrestored', () => {
+            this.#contextLost = false;
+            this.#scene?.restore();
+            this.#invalidate();
+        });
+        this.addEventListener('fullscreenchange', () => this.#invalidate());
+    }
+
+    // ---- for pages ------------------------------------------------------------------------------------------------
+
+    get src(): string {
+        return this.getAttribute('src') ?? '';
+    }
+    set src(value: string) {
+        this.setAttribute('src', value);
+    }
+
+    get autoplay(): boolean {
+        return this.hasAttribute('autoplay');
+    }
+    set autoplay(on: boolean) {
+        this.toggleAttribute('autoplay', on);
+    }
+
+    get loop(): boolean {
+        return this.hasAttribute('loop');
+    }
+    set loop(on: boolean) {
+        this.toggleAttribute('loop', on);
+    }
+
+    get lit(): boolean {
+        return this.hasAttribute('lit');
+    }
+    set lit(on: boolean) {
+        this.toggleAttribute('lit', on);
+    }
+
+    get paused(): boolean {
+        return !this.#wantsPlay;
+    }
+
+    /** Seconds; 0 is the first frame. Setting it seeks. */
+    get currentTime(): number {
+        return this.#playback.timeUs / 1e6;
+    }
+    set currentTime(seconds: number) {
+        if (!Number.isFinite(seconds)) return;
+        this.#send('seeking');
+        this.#playback.seek(seconds * 1e6);
+        this.#schedule();
+    }
+
+    /** Seconds; NaN while it is not known. */
+    get duration(): number {
+        return this.#playback.durationUs === null ? NaN : this.#playback.durationUs / 1e6;
+    }
+
+    /** 0.25 to 2. */
+    get playbackRate(): number {
+        return this.#playback.rate;
+    }
+    set playbackRate(rate: number) {
+        this.#playback.setRate(Math.min(2, Math.max(0.25, rate)));
+        this.#invalidate();
+    }
+
+    /** What the stream's header says; null before loadedmetadata. */
+    get sequence(): SequenceInfo | null {
+        return this.#sequence;
+    }
+
+    get error(): PlayerErrorDetail | null {
+        return this.#error;
+    }
+
+    /** Frames/s, Mbit/s and decoding times of the last 60 frames shown. */
+    get statistics(): PlayerStatistics {
+        const { wasmBytes, heldBytes } = this.#playback;
+        const { geometries, textures } = this.#scene?.renderer.info.memory ?? { geometries: 0, textures: 0 };
+        return {
+            ...this.#statistics.summary(), framesShown: this.#shownFrames, wasmBytes, heldBytes, geometries, textures,
+            indexUploads: this.#scene?.mesh.uploads.indices ?? 0,
+        };
+    }
+
+    play(): void {
+        if (this.#wantsPlay || this.#error) return;
+        this.#wantsPlay = true;
+        this.#playback.play();
+        this.#send('play');
+        this.#invalidate();
+    }
+
+    pause(): void {
+        if (!this.#wantsPlay) return;
+        this.#wantsPlay = false;
+        this.#playback.pause();
+        this.#send('pause');
+        this.#invalidate();
+    }
+
+    /** To the next frame, or the one before (-1). Pauses. Resolves when it is shown. */
+    async step(frames: 1 | -1 = 1): Promise<void> {
+        this.pause();
+        this.#playback.step(frames);
+        this.#schedule();
+        await this.#playback.idle();
+        await this.#drawn();
+    }
+
+    /** Resolves when nothing is under way until the clock moves on: what is due is drawn, what fits is decoded. */
+    async idle(): Promise<void> {
+        for (;;) {
+            await this.#playback.idle();
+            await this.#drawn();
+            if (!this.#dirty && this.#playback.settled) return;
+        }
+    }
+
+    /** The picture as it is, without the controls. */
+    async screenshot(type = 'image/png'): Promise<Blob> {
+        if (!this.#scene) throw new Error('there is no picture yet');
+        this.#scene.render();
+        return new Promise((resolve, reject) => {
+            this.#canvas.toBlob((blob) => (blob ? resolve(blob) : reject(new Error('there is no picture'))), type);
+        });
+    }
+
+    /** The view as at the beginning. */
+    resetView(): void {
+        const [yaw = 0, pitch = 7, distance] = (this.getAttribute('orbit') ?? '').split(/[\s,]+/).filter(Boolean).map(Number);
+        const radians = Math.PI / 180;
+        this.#scene?.resetView((yaw || 0) * radians, (pitch || 0) * radians, distance && distance > 0 ? distance : undefined);
+        this.#invalidate();
+    }
+
+    /** Where time comes from. For tests; set it before `src`. */
+    get clock(): Clock {
+        return this.#clock;
+    }
+    set clock(clock: Clock) {
+        if (this.#request !== null) this.#clock.cancel(this.#request);
+        this.#request = null;
+        this.#clock = clock;
+        this.#schedule();
+    }
+
+    // ---- the element's life ---------------------------------------------------------------------------------------
+
+    connectedCallback(): void {
+        this.#connected = true;
+        if (!this.hasAttribute('role')) this.setAttribute('role', 'region');
+        this.#describe();
+        this.#applyTheme();
+        this.#dark.addEventListener('change', this.#applyTheme);
+        document.addEventListener('visibilitychange', this.#visibility);
+        this.#resized.observe(this);
+        this.#controls.bar.hidden = !this.hasAttribute('controls');
+        void this.#offerVr();
+        if (this.src) this.#load();
+    }
+
+    disconnectedCallback(): void {
+        this.#connected = false;
+        this.#playback.close();
+        this.#resized.disconnect();
+        this.#dark.removeEventListener('change', this.#applyTheme);
+        document.removeEventListener('visibilitychange', this.#visibility);
+        if (this.#request !== null) this.#clock.cancel(this.#request);
+        this.#request = null;
+        this.#scene?.forget();
+    }
+
+    attributeChangedCallback(name: string, before: string | null, value: string | null): void {
+        if (before === value) return;
+        switch (name) {
+            case 'src':
+                if (this.#connected) this.#load();
+                break;
+            case 'loop':
+                this.#playback.setLoop(this.loop);
+                this.#invalidate();
+                break;
+            case 'controls':
+                this.#controls.bar.hidden = value === null;
+                break;
+            case 'poster':
+                if (value) this.#poster.src = value;
+                this.#poster.hidden = !value || this.#shownFrames > 0;
+                break;
+            case 'lit':
+                this.#scene?.setLit(this.lit);
+                this.#invalidate();
+                break;
+            case 'up':
+                this.#scene?.setUp(this.#up());
+                break;
+            case 'theme':
+                this.#applyTheme();
+                break;
+            case 'floor':
+                if (this.#scene) this.#scene.floorVisible = value !== 'none';
+                this.#invalidate();
+                break;
+            case 'orbit':
+                this.resetView();
+                break;
+            case 'statistics':
+                this.#panel.hidden = value === null;
+                this.#invalidate();
+                break;
+            case 'label':
+                this.#describe();
+                break;
+        }
+    }
+
+    #up(): Axis {
+        const axis = this.getAttribute('up') ?? 'y';
+        return (yAxes.includes(axis) ? axis : 'y') as Axis;
+    }
+
+    #load(): void {
+        this.#error = null;
+        this.#failure.hidden = true;
+        this.#notice.hidden = true;
+        this.#sequence = null;
+        this.#shownFrames = 0;
+        this.#texcoords = null;
+        this.#poster.hidden = !this.hasAttribute('poster');
+        this.#scene?.forget();
+        if (!this.src) {
+            this.#playback.close();
+            return;
+        }
+        this.#playback.setLoop(this.loop);
+        this.#playback.open(new URL(this.src, document.baseURI).href);
+        if (document.visibilityState === 'hidden') this.#playback.hide();
+        if (this.autoplay || this.#wantsPlay) {
+            this.#wantsPlay = true;
+            this.#playback.play();
+            this.#send('play');
+        }
+        this.#describe();
+        this.#invalidate();
+    }
+
+    // Made when there is something to draw: pages may have more players than a browser has graphics contexts.
+    #stage(): StageScene {
+        if (this.#scene) return this.#scene;
+        const scene = new StageScene(this.#canvas);
+        scene.setUp(this.#up());
+        scene.setLit(this.lit);
+        scene.floorVisible = this.getAttribute('floor') !== 'none';
+        scene.below = this.hasAttribute('controls') ? 0.1 : 0;
+        this.#orbit = new Orbit(this.#canvas, scene.view, () => this.#invalidate(), () => this.resetView());
+        this.#scene = scene;
+        this.#applyTheme();
+        this.#resize();
+        return scene;
+    }
+
+    // ---- pictures -------------------------------------------------------------------------------------------------
+
+    #invalidate(): void {
+        this.#dirty = true;
+        this.#schedule();
+    }
+
+    #schedule(): void {
+        if (this.#request !== null || !this.#connected || this.#scene?.renderer.xr.isPresenting) return;
+        if (!this.#dirty && !this.#playback.needsTicks) return;
+        this.#request = this.#clock.request(() => {
+            this.#request = null;
+            this.#picture();
+        });
+    }
+
+    #picture(): void {
+        const now = this.#clock.now();
+        const frame = document.visibilityState === 'hidden' ? null : this.#playback.tick();
+        if (frame) this.#present(frame, now);
+        if (this.#noticeUntil > 0 && now > this.#noticeUntil) {
+            this.#notice.hidden = true;
+            this.#noticeUntil = 0;
+        }
+        const loading = !this.#error && this.src !== '' && this.#playback.stalled;
+        this.#spinner.hidden = !loading;
+        const resting = this.#wantsPlay && now > this.#restAt;
+        this.classList.toggle('resting', resting && this.#shownFrames > 0);
+        if (this.#scene && !this.#contextLost && (frame || this.#dirty)) this.#scene.render();
+        if (!this.#controls.bar.hidden) this.#showControls();
+        this.#dirty = false;
+        for (const resolve of this.#idleWaiting.splice(0)) resolve();
+        this.#schedule();
+    }
+
+    #drawn(): Promise<void> {
+        if (!this.#dirty && !this.#playback.needsTicks) return Promise.resolve();
+        return new Promise((resolve) => {
+            this.#idleWaiting.push(resolve);
+            this.#invalidate();
+            // A clock that stands still makes a picture only when told; what is due now is drawn now.
+            if (this.#clock !== browserClock && this.#request !== null) {
+                this.#clock.cancel(this.#request);
+                this.#request = null;
+                this.#picture();
+            }
+        });
+    }
+
+    #present(frame: FrameReport, now: number): void {
+        const scene = this.#stage();
+        scene.setFrame(frame);
+        if (frame.indices) this.#texcoords = frame.texcoords;
+        if (this.#shownFrames++ === 0) {
+            this.#poster.hidden = true;
+            this.resetView();
+            this.#orbit?.setReach(scene.view.distance);
+        }
+        this.#statistics.add(frame, now);
+        if (!this.#panel.hidden) this.#panel.textContent = this.#statistics.text(frame, this.#playback.buffered);
+        const { frame: number, letter, timeUs, vertices, triangles, topology, preview } = frame;
+        const digest = (): number => this.#digest(frame);
+        const detail: FramePresentedDetail = {
+            frame: number, letter, time: timeUs / 1e6, vertices, triangles, topology, preview, digest,
+        };
+        this.dispatchEvent(new CustomEvent('framepresented', { detail }));
+        if (now - this.#lastTimeUpdate >= 250) {
+            this.#lastTimeUpdate = now;
+            this.#send('timeupdate');
+        }
+    }
+
+    // Of what the graphics card was given.
+    #digest(frame: FrameReport): number {
+        if (frame.buffer.byteLength === 0) throw new Error('this frame is not shown any more');
+        const geometry = this.#scene!.mesh.geometry;
+        const part = (array: ArrayBufferView, bytes: number): Uint8Array => new Uint8Array(array.buffer, array.byteOffset, bytes);
+        const array = (name: string): ArrayBufferView => geometry.getAttribute(name).array as unknown as ArrayBufferView;
+        let crc = crc32(part(array('position'), 12 * frame.vertices));
+        if (geometry.index) crc = crc32(part(geometry.index.array as unknown as ArrayBufferView, 12 * frame.triangles), crc);
+        if (frame.colours) {
+            const padded = array('color') as Uint8Array;
+            crc = crc32(Uint8Array.from({ length: 3 * frame.vertices }, (_, i) => padded[4 * Math.floor(i / 3) + (i % 3)]!), crc);
+        }
+        if (frame.streamNormals) crc = crc32(part(array('normal'), 12 * frame.vertices), crc);
+        if (this.#texcoords) crc = crc32(part(this.#texcoords, this.#texcoords.byteLength), crc);
+        return crc;
+    }
+
+    #showControls(): void {
+        const { timeUs, durationUs, stalled, rate } = this.#playback;
+        this.#controls.show({
+            playing: this.#wantsPlay,
+            waiting: stalled,
+            timeUs,
+            durationUs,
+            loop: this.loop,
+            lit: this.lit,
+            statistics: !this.#panel.hidden,
+            rate,
+            fullscreen: this.#isFullscreen(),
+        });
+    }
+
+    #resize(): void {
+        const { clientWidth, clientHeight } = this;
+        if (clientWidth === 0 || clientHeight === 0) return;
+        this.#scene?.resize(clientWidth, clientHeight, devicePixelRatio);
+        // At once: to change its size empties the canvas.
+        if (this.#scene && !this.#contextLost && this.#shownFrames > 0) this.#scene.render();
+        this.#invalidate();
+    }
+
+    #applyTheme = (): void => {
+        const theme = this.getAttribute('theme');
+        const dark = theme === 'dark' || (theme !== 'light' && this.#dark.matches);
+        this.classList.toggle('dark', dark);
+        this.#scene?.setTheme(dark);
+        this.#invalidate();
+    };
+
+    #visibility = (): void => {
+        if (document.visibilityState === 'hidden') this.#playback.hide();
+        else this.#playback.show();
+        this.#schedule();
+    };
+
+    // ---- words ----------------------------------------------------------------------------------------------------
+
+    #describe(): void {
+        const label = this.getAttribute('label') ?? 'Three-dimensional video of a person';
+        if (!this.hasAttribute('aria-label')) this.setAttribute('aria-label', label);
+        this.#canvas.setAttribute('aria-label', label);
+        this.#description.textContent =
+            'Drag or use the arrow keys to turn the view, shift to move it, plus and minus to come nearer or go away, 0 to ' +
+            'go back. Space plays and pauses, comma and full stop go by one frame.';
+    }
+
+    #say(text: string): void {
+        this.#notice.textContent = text;
+        this.#notice.hidden = false;
+        this.#noticeUntil = this.#clock.now() + keepNoticeMs;
+        this.dispatchEvent(new CustomEvent('notice', { detail: text }));
+        this.#invalidate();
+    }
+
+    #fail(detail: PlayerErrorDetail): void {
+        this.#error = detail;
+        this.#wantsPlay = false;
+        const box = document.createElement('div');
+        const title = document.createElement('strong');
+        title.textContent = 'This cannot be played';
+        box.append(title, detail.message);
+        this.#failure.replaceChildren(box);
+        this.#failure.hidden = false;
+        this.#poster.hidden = true;
+        this.dispatchEvent(new CustomEvent('error', { detail }));
+        this.#invalidate();
+    }
+
+    #send(name: string): void {
+        this.dispatchEvent(new Event(name));
+    }
+
+    // ---- what people do -------------------------------------------------------------------------------------------
+
+    #actions(): ControlActions {
+        return {
+            togglePlay: () => (this.paused ? this.play() : this.pause()),
+            seek: (fraction) => {
+                if (Number.isFinite(this.duration)) this.currentTime = fraction * this.duration;
+            },
+            step: (frames) => void this.step(frames as 1 | -1),
+            setRate: (rate) => (this.playbackRate = rate),
+            toggleLoop: () => (this.loop = !this.loop),
+            toggleLit: () => (this.lit = !this.lit),
+            toggleStatistics: () => this.toggleAttribute('statistics'),
+            screenshot: () => void this.#savePicture(),
+            toggleFullscreen: () => void this.#toggleFullscreen(),
+            enterVr: () => void this.#enterVr(),
+        };
+    }
+
+    #stir(): void {
+        this.#restAt = this.#clock.now() + restAfterMs;
+        if (this.classList.contains('resting')) this.#invalidate();
+    }
+
+    #key(event: KeyboardEvent): void {
+        if (event.altKey || event.ctrlKey || event.metaKey || !this.hasAttribute('controls')) return;
+        const target = event.composedPath()[0];
+        const inWidget = target instanceof HTMLButtonElement || target instanceof HTMLSelectElement;
+        if (event.key === ' ' && inWidget) return;
+        const actions: Record<string, () => void> = {
+            ' ': () => (this.paused ? this.play() : this.pause()),
+            k: () => (this.paused ? this.play() : this.pause()),
+            ',': () => void this.step(-1),
+            '.': () => void this.step(1),
+            l: () => (this.loop = !this.loop),
+            s: () => this.toggleAttribute('statistics'),
+            f: () => void this.#toggleFullscreen(),
+            Escape: () => this.#setWholeWindow(false),
+            Home: () => (this.currentTime = 0),
+        };
+        const action = actions[event.key];
+        if (!action) return;
+        if (event.key !== 'Escape') event.preventDefault();
+        action();
+    }
+
+    async #savePicture(): Promise<void> {
+        const address = URL.createObjectURL(await this.screenshot());
+        const link = document.createElement('a');
+        link.href = address;
+        const name = new URL(this.src, document.baseURI).pathname.split('/').at(-1)?.replace(/\.\w+$/, '') || 'picture';
+        link.download = `${name}-${this.currentTime.toFixed(2)}s.png`;
+        link.click();
+        setTimeout(() => URL.revokeObjectURL(address), 10000);
+    }
+
+    #isFullscreen(): boolean {
+        return document.fullscreenElement === this || this.#wholeWindow;
+    }
+
+    async #toggleFullscreen(): Promise<void> {
+        if (document.fullscreenElement === this) return document.exitFullscreen();
+        if (this.#wholeWindow) return this.#setWholeWindow(false);
+        try {
+            await this.requestFullscreen();
+        } catch {
+            this.#setWholeWindow(true);
+        }
+    }
+
+    // Where a browser gives elements no full screen, as on phones: the whole of the window.
+    #setWholeWindow(on: boolean): void {
+        this.#wholeWindow = on;
+        this.classList.toggle('whole-window', on);
+        this.#invalidate();
+    }
+
+    async #offerVr(): Promise<void> {
+        try {
+            if (await navigator.xr?.isSessionSupported('immersive-vr')) this.#controls.offerVr();
+        } catch {
+            // A page that may not ask has no VR.
+        }
+    }
+
+    async #enterVr(): Promise<void> {
+        const scene = this.#stage();
+        const { xr } = scene.renderer;
+        const session = await navigator.xr!.requestSession('immersive-vr', { optionalFeatures: ['local-floor'] });
+        if (this.#request !== null) this.#clock.cancel(this.#request);
+        this.#request = null;
+        xr.enabled = true;
+        await xr.setSession(session);
+        scene.standBack(1.8);
+        scene.renderer.setAnimationLoop(() => {
+            const frame = this.#playback.tick();
+            if (frame) this.#present(frame, this.#clock.now());
+            scene.render();
+        });
+        session.addEventListener('end', () => {
+            scene.renderer.setAnimationLoop(null);
+            xr.enabled = false;
+            scene.standBack(0);
+            this.#resize();
+        });
+    }
+}

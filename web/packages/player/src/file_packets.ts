@@ -1,0 +1,210 @@
+// The packets of a file in order, from any place where decoding can start.
+import { isFrame, packetKind, PacketSplitter, type DecoderModule, type Packet } from '@htvm/decoder';
+import { SourceError, type ByteSource } from './byte_source.js';
+
+// What packets are read from.
+type Bytes = Pick<ByteSource, 'read' | 'size' | 'contentType'>;
+
+/** A packet, and the media time of its frame: 0 is the first frame's. */
+export interface TimedPacket extends Packet {
+    timeUs: number;
+}
+
+interface AccessPoint {
+    timeUs: number;
+    offset: number;
+    frame: number;
+    /** What to take from timestamps for media time. */
+    base: number;
+    /** The sequence header in force there; null where an index names the place and it was not read yet. */
+    sequence: Uint8Array | null;
+    fromIndex: boolean;
+}
+
+const largestIndex = 1 << 16; // looked for in so many bytes at the end of a file
+const largestSurvey = 1 << 24; // of a file without an index
+
+export class FilePackets {
+    /** Of a frame, as the stream's header tells it; set by whoever decodes that. */
+    frameUs = 1e6 / 30;
+    /** Of the whole, or null while it is not known. */
+    durationUs: number | null = null;
+    /** Whether an index told the places to start. */
+    indexed = false;
+    #source: Bytes;
+    #module: DecoderModule;
+    #splitter = new PacketSplitter();
+    #points: AccessPoint[] = []; // by offset
+    #base: number | null = null;
+    #lastTimestamp: number | null = null;
+    #end = 0; // media time of the last frame seen from the beginning on
+    #sequence: Uint8Array | null = null;
+    #expected: AccessPoint | null = null; // what the next packet must be
+    #packets = 0;
+    #framesInIndex: number | null = null;
+
+    constructor(source: Bytes, module: DecoderModule) {
+        this.#source = source;
+        this.#module = module;
+    }
+
+    /** Bytes that are no packets, or damaged ones, in what was read. */
+    get damagedBytes(): number {
+        return this.#splitter.damagedBytes;
+    }
+
+    /** Bytes of a packet that the end of the file cuts short. */
+    get pendingBytes(): number {
+        return this.#splitter.pendingBytes;
+    }
+
+    /** True where no place after the ones seen so far can be reached without reading all before it. */
+    get seekable(): boolean {
+        return this.indexed || this.durationUs !== null;
+    }
+
+    /**
+     * Goes to the last place known where decoding can start for a frame at `timeUs`. Gives the sequence header in force
+     * there, to be sent to the decoder first, or null where it is the first packet to come.
+     */
+    seek(timeUs: number): Uint8Array | null {
+        let point: AccessPoint | null = null;
+        for (const candidate of this.#points) if (candidate.timeUs <= timeUs) point = candidate;
+        point ??= this.#points[0] ?? null;
+        this.#lastTimestamp = null;
+        this.#expected = null;
+        if (!point || !this.#sequence) {
+            this.#splitter = new PacketSplitter(0);
+            return null;
+        }
+        this.#splitter = new PacketSplitter(point.offset);
+        this.#base = point.base;
+        if (point.fromIndex) this.#expected = point;
+        if (point.sequence) this.#sequence = point.sequence;
+        return this.#sequence;
+    }
+
+    /** The next packet, lent until the next call; null at the end of the file. */
+    async next(): Promise<TimedPacket | null> {
+        for (;;) {
+            const packet = this.#splitter.next();
+            if (!packet) {
+                this.#checkThatItIsAStream(false);
+                const bytes = await this.#source.read(this.#splitter.nextOffset);
+                if (bytes) {
+                    this.#splitter.push(bytes);
+                    continue;
+                }
+                this.#checkThatItIsAStream(true);
+                if (this.#end > 0 || this.#points.length > 0) this.durationUs = this.#end + this.frameUs;
+                return null;
+            }
+            ++this.#packets;
+            if (this.#expected && !this.#isAsExpected(packet)) continue;
+            if (packet.kind === packetKind.sequence) this.#sequence = packet.bytes.slice();
+            if (packet.kind === packetKind.index) this.#takeIndex(packet);
+            if (isFrame(packet.kind)) return this.#timed(packet);
+            return { ...packet, timeUs: 0 };
+        }
+    }
+
+    /**
+     * Finds out what there is beyond what was read, so that it can be reached: by an index at the end of the file, else
+     * by going through the file where all of it is here. True where there is nothing more to be found out.
+     */
+    async survey(source: ByteSource): Promise<boolean> {
+        if (this.seekable) return true;
+        if (source.ranges && (await source.findSize()) !== null) {
+            const end = await source.readEnd(largestIndex);
+            const splitter = new PacketSplitter(end?.offset);
+            if (end) splitter.push(end.bytes);
+            for (let packet = splitter.next(); packet; packet = splitter.next())
+                if (packet.kind === packetKind.index) this.#takeIndex(packet);
+            if (this.indexed) return true;
+        }
+        const { size, contentType } = source;
+        if (size === null || size > largestSurvey) return false;
+        let whole = true;
+        const here = async (offset: number): Promise<Uint8Array | null> => {
+            const bytes = source.peek(offset);
+            if (!bytes && offset < size) whole = false;
+            return bytes;
+        };
+        const other = new FilePackets({ read: here, size, contentType }, this.#module);
+        other.frameUs = this.frameUs;
+        while (await other.next());
+        if (!whole) return false;
+        for (const point of other.#points) this.#add(point);
+        this.durationUs = other.durationUs;
+        return true;
+    }
+
+    // A file that has something else where its index says that a frame is has been replaced, or its index is another's.
+    #isAsExpected(packet: Packet): boolean {
+        const point = this.#expected!;
+        this.#expected = null;
+        if (packet.offset === point.offset && packet.frame === point.frame && packet.kind === packetKind.intra) {
+            point.fromIndex = false;
+            point.sequence = this.#sequence;
+            return true;
+        }
+        // What was read from the beginning on is sound; the rest is found by reading on from there.
+        this.#points = this.#points.filter(({ fromIndex }) => !fromIndex);
+        this.indexed = false;
+        const last = this.#points.at(-1);
+        this.#splitter = new PacketSplitter(last?.offset ?? 0);
+        return false;
+    }
+
+    #timed(packet: Packet): TimedPacket {
+        this.#base ??= packet.timestampUs;
+        // Joined files: the next begins where the one before ended.
+        if (this.#lastTimestamp !== null && packet.timestampUs <= this.#lastTimestamp)
+            this.#base += packet.timestampUs - this.#lastTimestamp - this.frameUs;
+        this.#lastTimestamp = packet.timestampUs;
+        const timeUs = packet.timestampUs - this.#base;
+        this.#end = Math.max(this.#end, timeUs);
+        if (packet.kind === packetKind.intra)
+            this.#add({
+                timeUs, offset: packet.offset, frame: packet.frame, base: this.#base, sequence: this.#sequence,
+                fromIndex: false,
+            });
+        return { ...packet, timeUs };
+    }
+
+    #takeIndex(packet: Packet): void {
+        if (this.indexed) return; // of joined files the first
+        let entries;
+        try {
+            entries = this.#module.readIndex(packet.bytes);
+        } catch {
+            return; // one can do without
+        }
+        const first = entries[0];
+        if (!first) return;
+        this.#base ??= first.timestampUs;
+        for (const { frame, timestampUs, offset } of entries) {
+            const timeUs = timestampUs - this.#base;
+            this.#add({ timeUs, offset, frame, base: this.#base, sequence: null, fromIndex: true });
+        }
+        this.indexed = true;
+        this.#framesInIndex = packet.frame;
+        const last = this.#points.at(-1)!.timeUs;
+        // The index counts frames; how long they take is known from those read, or the stream's header.
+        this.durationUs ??= Math.max(this.#framesInIndex * this.frameUs, last + this.frameUs);
+    }
+
+    #add(point: AccessPoint): void {
+        const at = this.#points.findIndex(({ offset }) => offset >= point.offset);
+        if (at < 0) this.#points.push(point);
+        else if (this.#points[at]!.offset !== point.offset) this.#points.splice(at, 0, point);
+        else if (!point.fromIndex) this.#points[at] = point;
+    }
+
+    #checkThatItIsAStream(atEnd: boolean): void {
+        if (this.#packets > 0 || !(atEnd || this.damagedBytes > 1 << 18)) return;
+        if (atEnd && this.#source.size === 0) throw new SourceError('empty', 'The file is empty.');
+        const page = this.#source.contentType.startsWith('text/html') ? ': the server sent a web page' : '';
+        throw new SourceError('not-htvm', `This is not an htvm stream${page}.`);
+    }
+}

@@ -1,0 +1,408 @@
+// What is shown when: frames come from the worker ahead of time, and each is shown from its timestamp on.
+//
+// There are two times. Media time is the stream's: 0 is its first frame. Present time goes on through loops, and begins
+// anew with each seek; the clock runs in it.
+import type { SequenceInfo } from '@htvm/decoder';
+import type { FailureCode, FrameReport, Report, Request } from './messages.js';
+
+export interface PlaybackListener {
+    opened(sequence: SequenceInfo, layerNames: readonly string[]): void;
+    extent(durationUs: number | null, seekable: boolean): void;
+    /** Something arrived: a picture may be due. */
+    arrived(): void;
+    sought(): void;
+    /** Frames do not come as fast as they are shown. */
+    waiting(): void;
+    ended(): void;
+    notice(text: string): void;
+    failed(code: FailureCode, text: string): void;
+    /** The decoder was started anew: topology numbers begin again. */
+    restarted(): void;
+}
+
+const mostFrames = 12; // decoded ahead, the one shown included
+const mostBytes = 96 << 20; // that they may take, if at least 3 can be had
+const mostTraps = 3;
+
+export class Playback {
+    durationUs: number | null = null;
+    seekable = false;
+    wasmBytes = 0;
+    heldBytes = 0;
+    #listener: PlaybackListener;
+    #makeWorker: () => Promise<Worker>;
+    #now: () => number;
+    #wasmUrl: string;
+    #url = '';
+    #worker: Worker | null = null;
+    #opening = 0; // counts open() and close(): what an older one brings is not for us
+    #serial = 0;
+    #ring: FrameReport[] = [];
+    #preview: FrameReport | null = null;
+    #current: FrameReport | null = null;
+    #foreign: FrameReport | null = null; // one that is shown still, from a worker that is gone
+    #room = 3;
+    #roomSetFor = 0;
+    #awaiting = false; // the frame that was sought
+    #soughtUs = 0;
+    #endedSerial = -1;
+    #playing = false;
+    #stalled = false;
+    #hidden = false;
+    #loop = false;
+    #rate = 1;
+    #anchorUs = 0; // present time at #anchorNow
+    #anchorNow = 0;
+    #failed = false;
+    #traps: number[] = [];
+    #idleWaiting: (() => void)[] = [];
+
+    constructor(makeWorker: () => Promise<Worker>, wasmUrl: string, now: () => number, listener: PlaybackListener) {
+        this.#makeWorker = makeWorker;
+        this.#wasmUrl = wasmUrl;
+        this.#now = now;
+        this.#listener = listener;
+    }
+
+    get playing(): boolean {
+        return this.#playing;
+    }
+    get stalled(): boolean {
+        return this.#stalled || this.#awaiting;
+    }
+    get rate(): number {
+        return this.#rate;
+    }
+    get current(): FrameReport | null {
+        return this.#current;
+    }
+    get buffered(): number {
+        return this.#ring.length;
+    }
+
+    /** Media time, microseconds. */
+    get timeUs(): number {
+        if (this.#awaiting || !this.#current) return this.#soughtUs;
+        const since = this.#presentUs() - this.#current.presentUs;
+        return this.#current.timeUs + Math.min(Math.max(since, 0), this.#current.durationUs);
+    }
+
+    open(url: string): void {
+        this.close();
+        this.#url = url;
+        this.#traps = [];
+        this.#failed = false;
+        this.durationUs = null;
+        this.seekable = false;
+        void this.#start(0);
+    }
+
+    close(): void {
+        ++this.#opening;
+        this.#worker?.terminate();
+        this.#worker = null;
+        this.#ring = [];
+        this.#preview = null;
+        this.#current = null;
+        this.#roomSetFor = 0;
+        this.#awaiting = false;
+        this.#url = '';
+        this.#checkIdle();
+    }
+
+    play(): void {
+        if (this.#playing) return;
+        if (this.#endedSerial === this.#serial && this.#ring.length === 0 && !this.#awaiting) this.seek(0);
+        this.#anchor();
+        this.#playing = true;
+        this.#checkIdle();
+    }
+
+    pause(): void {
+        this.#anchor();
+        this.#playing = false;
+        this.#stalled = false;
+    }
+
+    setRate(rate: number): void {
+        this.#anchor();
+        this.#rate = rate;
+    }
+
+    setLoop(on: boolean): void {
+        this.#loop = on;
+        this.#send({ type: 'loop', on });
+    }
+
+    /** To the frame at a media time. */
+    seek(timeUs: number): void {
+        if (this.#url === '') return;
+        if (this.durationUs !== null) timeUs = Math.min(timeUs, this.durationUs - 1);
+        this.#soughtUs = Math.max(0, timeUs);
+        ++this.#serial;
+        for (const frame of this.#ring.splice(0)) this.#done(frame);
+        if (this.#preview) this.#done(this.#preview);
+        this.#preview = null;
+        this.#awaiting = true;
+        this.#stalled = false;
+        this.#anchorUs = this.#soughtUs;
+        this.#anchorNow = this.#now();
+        this.#send({ type: 'seek', serial: this.#serial, timeUs: this.#soughtUs });
+    }
+
+    /** By frames, from the one shown; paused. */
+    step(frames: number): void {
+        this.pause();
+        const current = this.#current;
+        if (!current || this.#awaiting) return;
+        if (frames === 1 && this.#ring.length > 0) {
+            this.#anchorUs = this.#ring[0]!.presentUs;
+            this.#anchorNow = this.#now();
+        } else {
+            const ended = this.#endedSerial === this.#serial && this.#ring.length === 0;
+            const target = current.timeUs + frames * current.durationUs + current.durationUs / 2;
+            this.seek(frames > 0 && ended && this.#loop ? 0 : target);
+        }
+    }
+
+    /** The page cannot be seen: stop decoding; the clock goes on. */
+    hide(): void {
+        this.#hidden = true;
+        if (this.#playing) this.#send({ type: 'rest' });
+        this.#checkIdle();
+    }
+
+    /** It can again: to where the clock is by now. */
+    show(): void {
+        if (!this.#hidden) return;
+        this.#hidden = false;
+        if (!this.#playing || this.#awaiting) return;
+        const current = this.#current;
+        let timeUs = this.#presentUs();
+        if (current) timeUs += current.timeUs - current.presentUs;
+        if (this.#loop && this.durationUs) timeUs %= this.durationUs;
+        this.seek(timeUs);
+    }
+
+    /** The frame to show from now on, where it is another than before. Its arrays stay until the next one is taken. */
+    tick(): FrameReport | null {
+        let show = this.#preview;
+        this.#preview = null;
+        if (!this.#awaiting) {
+            const at = this.#presentUs();
+            while (this.#ring.length > 0 && this.#ring[0]!.presentUs <= at) {
+                const next = this.#ring.shift()!;
+                if (show) this.#passOver(show, next);
+                show = next;
+            }
+            if (this.#playing && this.#ring.length === 0) this.#runDry(show ?? this.#current, at);
+        }
+        if (show) {
+            if (this.#current) this.#done(this.#current);
+            this.#current = show;
+        }
+        this.#checkIdle();
+        return show;
+    }
+
+    /** Whether time must be looked at again soon. */
+    get needsTicks(): boolean {
+        return !this.#failed && ((this.#playing && !this.#hidden && !this.stalled) || this.#preview !== null || this.#due());
+    }
+
+    /** Resolves when nothing is under way: frames are decoded as far ahead as there is room, or all, or it failed. */
+    idle(): Promise<void> {
+        return new Promise((resolve) => {
+            this.#idleWaiting.push(resolve);
+            this.#checkIdle();
+        });
+    }
+
+    /** Whether idle() would resolve at once. */
+    get settled(): boolean {
+        if (this.#url === '' || this.#failed || (this.#hidden && this.#playing)) return true;
+        const held = this.#ring.length + (this.#current ? 1 : 0) + (this.#preview ? 1 : 0);
+        return !this.#awaiting && (held >= this.#room || this.#endedSerial === this.#serial);
+    }
+
+    #due(): boolean {
+        return !this.#awaiting && this.#ring.length > 0 && this.#ring[0]!.presentUs <= this.#presentUs();
+    }
+
+    #checkIdle(): void {
+        if (this.settled) for (const resolve of this.#idleWaiting.splice(0)) resolve();
+    }
+
+    #presentUs(): number {
+        if (!this.#playing || this.#stalled || this.#awaiting) return this.#anchorUs;
+        return this.#anchorUs + (this.#now() - this.#anchorNow) * 1000 * this.#rate;
+    }
+
+    #anchor(): void {
+        this.#anchorUs = this.#presentUs();
+        this.#anchorNow = this.#now();
+    }
+
+    // There is no frame after this one, yet or at all.
+    #runDry(last: FrameReport | null, at: number): void {
+        if (!last || at < last.presentUs + last.durationUs) return;
+        this.#anchorUs = last.presentUs + last.durationUs;
+        this.#anchorNow = this.#now();
+        if (this.#endedSerial === this.#serial) {
+            if (this.#loop) {
+                this.seek(0);
+            } else {
+                this.#playing = false;
+                this.#listener.ended();
+            }
+        } else if (!this.#stalled) {
+            this.#stalled = true;
+            this.#listener.waiting();
+        }
+    }
+
+    // A frame that is not shown, since the next is due already: what the next one needs of it is handed on.
+    #passOver(frame: FrameReport, next: FrameReport): void {
+        if (frame.indices && !next.indices && next.topology === frame.topology) {
+            next.indices = frame.indices;
+            next.texcoords = frame.texcoords;
+        }
+        this.#done(frame);
+    }
+
+    #done(frame: FrameReport): void {
+        if (frame === this.#foreign) return;
+        this.#send({ type: 'done', buffer: frame.buffer }, [frame.buffer]);
+    }
+
+    #send(request: Request, transfer: Transferable[] = []): void {
+        this.#worker?.postMessage(request, transfer);
+    }
+
+    async #start(timeUs: number): Promise<void> {
+        const opening = ++this.#opening;
+        this.#soughtUs = timeUs;
+        this.#awaiting = true;
+        const serial = ++this.#serial;
+        this.#anchorUs = timeUs;
+        let worker: Worker;
+        try {
+            worker = await this.#makeWorker();
+        } catch (error) {
+            if (opening === this.#opening) this.#fail('decoder', `The player's worker could not be started: ${error}.`);
+            return;
+        }
+        if (opening !== this.#opening) {
+            worker.terminate();
+            return;
+        }
+        this.#worker = worker;
+        worker.onmessage = ({ data }: MessageEvent<Report>) => {
+            if (worker === this.#worker) this.#take(data);
+        };
+        worker.onerror = (event) => {
+            event.preventDefault();
+            if (worker === this.#worker) this.#restart(event.message || 'its worker stopped');
+        };
+        this.#send({
+            type: 'open', url: this.#url, wasmUrl: this.#wasmUrl, serial, timeUs, loop: this.#loop, traps: this.#traps,
+        });
+        this.#roomSetFor = 0;
+        this.#send({ type: 'room', frames: this.#room });
+        if (this.#serial !== serial) this.#send({ type: 'seek', serial: this.#serial, timeUs: this.#soughtUs });
+    }
+
+    #restart(text: string, atUs?: number): void {
+        this.#worker?.terminate();
+        this.#worker = null;
+        this.#ring = [];
+        this.#preview = null;
+        this.#foreign = this.#current;
+        if (atUs !== undefined) this.#traps.push(atUs);
+        if (atUs === undefined || this.#traps.length > mostTraps) {
+            this.#fail('decoder', `This stream cannot be played: ${text}.`);
+            return;
+        }
+        this.#listener.notice(`A part of the stream stopped the decoder, which was started again: ${text}.`);
+        this.#listener.restarted();
+        void this.#start(this.timeUs);
+    }
+
+    #fail(code: FailureCode, text: string): void {
+        this.#failed = true;
+        this.#awaiting = false;
+        this.#playing = false;
+        this.#worker?.terminate();
+        this.#worker = null;
+        this.#listener.failed(code, text);
+        this.#checkIdle();
+    }
+
+    #take(report: Report): void {
+        switch (report.type) {
+            case 'opened':
+                this.#listener.opened(report.sequence, report.layerNames);
+                break;
+            case 'extent':
+                this.durationUs = report.durationUs;
+                this.seekable = report.seekable;
+                this.#listener.extent(report.durationUs, report.seekable);
+                break;
+            case 'frame':
+                this.#takeFrame(report);
+                break;
+            case 'ended':
+                if (report.serial !== this.#serial) break;
+                this.#endedSerial = report.serial;
+                // Sought beyond the last frame that can be decoded: what is shown stays.
+                this.#awaiting = false;
+                this.#stalled = false;
+                this.#listener.arrived();
+                break;
+            case 'notice':
+                this.#listener.notice(report.text);
+                break;
+            case 'failed':
+                this.#fail(report.code, report.text);
+                break;
+            case 'trapped':
+                this.#restart(report.text, report.atUs);
+                break;
+            case 'memory':
+                this.wasmBytes = report.wasmBytes;
+                this.heldBytes = report.heldBytes;
+                break;
+        }
+        this.#checkIdle();
+    }
+
+    #takeFrame(frame: FrameReport): void {
+        if (frame.serial !== this.#serial) {
+            this.#done(frame);
+            return;
+        }
+        if (frame.buffer.byteLength > this.#roomSetFor) {
+            this.#roomSetFor = frame.buffer.byteLength;
+            this.#room = Math.max(3, Math.min(mostFrames, Math.floor(mostBytes / (frame.buffer.byteLength + 1))));
+            this.#send({ type: 'room', frames: this.#room });
+        }
+        if (frame.preview) {
+            if (this.#preview) this.#passOver(this.#preview, frame);
+            this.#preview = frame;
+        } else {
+            this.#ring.push(frame);
+            if (this.#awaiting) {
+                this.#awaiting = false;
+                const end = frame.presentUs + frame.durationUs;
+                this.#anchorUs = Math.max(frame.presentUs, Math.min(this.#soughtUs, end - 1));
+                this.#anchorNow = this.#now();
+                this.#listener.sought();
+            } else if (this.#stalled) {
+                this.#stalled = false;
+                this.#anchorUs = Math.max(this.#anchorUs, frame.presentUs);
+                this.#anchorNow = this.#now();
+            }
+        }
+        this.#listener.arrived();
+    }
+}

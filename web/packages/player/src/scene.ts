@@ -1,0 +1,330 @@
+// What is drawn: the mesh, upright in metres, on a floor with a grid and a contact shadow, seen by a camera that turns
+// about it.
+import { HtvmMesh, srgbVertexColours } from '@htvm/three';
+import {
+    Box3, Color, DirectionalLight, Group, HemisphereLight, LinearFilter, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+    NoBlending, OrthographicCamera, PerspectiveCamera, PlaneGeometry, Quaternion, Scene, ShaderMaterial, Vector3,
+    WebGLRenderer, WebGLRenderTarget,
+} from 'three';
+import type { Material } from 'three';
+import type { FrameReport } from './messages.js';
+
+export type Axis = 'x' | 'y' | 'z' | '-x' | '-y' | '-z';
+
+const axes: Record<Axis, [number, number, number]> = {
+    x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], '-x': [-1, 0, 0], '-y': [0, -1, 0], '-z': [0, 0, -1],
+};
+
+/** Where the camera is: turned about a point. Angles in radians, lengths in metres. */
+export interface View {
+    yaw: number;
+    pitch: number;
+    distance: number;
+    target: Vector3;
+}
+
+const shadowPixels = 256;
+
+export class StageScene {
+    readonly renderer: WebGLRenderer;
+    readonly mesh = new HtvmMesh();
+    readonly camera = new PerspectiveCamera(32, 1, 0.01, 100);
+    readonly view: View = { yaw: 0, pitch: 0.12, distance: 3, target: new Vector3(0, 0.9, 0) };
+    /** Without which there is nothing but the mesh. */
+    floorVisible = true;
+    /** Share of the picture's height that controls cover at the bottom. */
+    below = 0;
+    lit = false;
+    #scene = new Scene();
+    #stage = new Group(); // stands on the floor, its middle above the origin
+    #upright = new Group(); // turns the stream's up axis to y
+    #grid: Mesh<PlaneGeometry, ShaderMaterial>;
+    #shadow: ContactShadow;
+    #unlitMaterial = this.mesh.material;
+    #litMaterial: Material = srgbVertexColours(new MeshLambertMaterial({ vertexColors: true }));
+    #clayMaterial: Material = new MeshLambertMaterial({ color: 0xb9b2a8 });
+    #bounds: Box3 | null = null; // of the first frame, upright, metres, not yet moved onto the floor
+    #home: { distance: number; target: Vector3 } | null = null;
+    #shadowIsOld = true;
+
+    constructor(canvas: HTMLCanvasElement) {
+        this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'high-performance' });
+        this.renderer.setClearColor(0, 0);
+        this.#upright.add(this.mesh);
+        this.#stage.add(this.#upright);
+        this.#grid = gridPlane();
+        this.#shadow = new ContactShadow(this.mesh);
+        const sun = new DirectionalLight(0xffffff, 2.2);
+        sun.position.set(1.2, 2.5, 2);
+        this.#scene.add(this.#stage, this.#grid, this.#shadow.plane, new HemisphereLight(0xffffff, 0x8a8178, 1.6), sun);
+        this.#grid.visible = this.#shadow.plane.visible = false;
+    }
+
+    dispose(): void {
+        this.mesh.dispose();
+        for (const material of [this.#unlitMaterial, this.#litMaterial, this.#clayMaterial]) material.dispose();
+        this.#grid.geometry.dispose();
+        this.#grid.material.dispose();
+        this.#shadow.dispose();
+        this.renderer.dispose();
+    }
+
+    setUp(axis: Axis): void {
+        const up = new Vector3(...axes[axis]);
+        this.#upright.quaternion.copy(new Quaternion().setFromUnitVectors(up, new Vector3(0, 1, 0)));
+        this.#bounds = null;
+    }
+
+    setTheme(dark: boolean): void {
+        this.#grid.material.uniforms['colour']!.value = new Color(dark ? 0xaab4c4 : 0x55606e);
+        this.#shadow.setStrength(dark ? 0.75 : 0.5);
+    }
+
+    /** The next stream brings a first frame again. */
+    forget(): void {
+        this.#bounds = null;
+        this.#home = null;
+        this.mesh.forgetTopology();
+        this.mesh.geometry.setDrawRange(0, 0);
+        this.#grid.visible = this.#shadow.plane.visible = false;
+    }
+
+    setFrame(frame: FrameReport): void {
+        this.mesh.setFrame(frame);
+        const coloured = frame.colours !== null;
+        this.mesh.material = !coloured ? this.#clayMaterial : this.lit ? this.#litMaterial : this.#unlitMaterial;
+        if (frame.vertices > 0) {
+            const box = this.#uprightBox(frame.bounds);
+            if (!this.#bounds) this.#standOnFloor(box);
+            this.#shadow.moveOver(box.translate(this.#stage.position), this.#upright.quaternion, this.#stage.position);
+        }
+        this.#shadowIsOld = true;
+    }
+
+    setLit(lit: boolean): void {
+        this.lit = lit;
+        if (this.mesh.material !== this.#clayMaterial) this.mesh.material = lit ? this.#litMaterial : this.#unlitMaterial;
+    }
+
+    /** Back to where the whole is seen, turned as given. */
+    resetView(yaw = 0, pitch = 0.12, distance?: number): void {
+        this.view.yaw = yaw;
+        this.view.pitch = pitch;
+        if (this.#home) {
+            this.view.distance = distance ?? this.#home.distance;
+            this.view.target.copy(this.#home.target);
+        }
+    }
+
+    /** Size of the picture, CSS pixels. */
+    resize(width: number, height: number, pixelRatio: number): void {
+        this.renderer.setPixelRatio(Math.min(pixelRatio, 2));
+        this.renderer.setSize(width, height, false);
+        this.camera.aspect = width / Math.max(height, 1);
+        this.camera.updateProjectionMatrix();
+    }
+
+    render(): void {
+        const { yaw, pitch, distance, target } = this.view;
+        if (!this.renderer.xr.isPresenting) {
+            const across = Math.cos(pitch) * distance;
+            this.camera.position.set(Math.sin(yaw) * across, Math.sin(pitch) * distance, Math.cos(yaw) * across).add(target);
+            this.camera.lookAt(target);
+            this.camera.near = distance / 100;
+            this.camera.far = distance * 20 + 10;
+            this.camera.updateProjectionMatrix();
+        }
+        const visible = this.floorVisible && this.#bounds !== null;
+        this.#grid.visible = this.#shadow.plane.visible = visible;
+        if (visible && this.#shadowIsOld) this.#shadow.render(this.renderer);
+        this.#shadowIsOld = false;
+        this.renderer.render(this.#scene, this.camera);
+    }
+
+    /** In virtual reality: how far from the viewer the mesh stands, metres; 0 otherwise. */
+    standBack(distance: number): void {
+        this.#scene.position.set(0, 0, -distance);
+    }
+
+    /** After the graphics context was lost and is back. */
+    restore(): void {
+        this.#shadowIsOld = true;
+    }
+
+    #uprightBox(bounds: FrameReport['bounds']): Box3 {
+        const corner = new Vector3(bounds[0], bounds[1], bounds[2]).multiplyScalar(0.001);
+        const other = new Vector3(bounds[3], bounds[4], bounds[5]).multiplyScalar(0.001);
+        corner.applyQuaternion(this.#upright.quaternion);
+        other.applyQuaternion(this.#upright.quaternion);
+        return new Box3().setFromPoints([corner, other]);
+    }
+
+    #standOnFloor(box: Box3): void {
+        this.#bounds = box.clone();
+        const middle = box.getCenter(new Vector3());
+        const size = box.getSize(new Vector3());
+        this.#stage.position.set(-middle.x, -box.min.y, -middle.z);
+        // Whatever way it is turned, with some room to move in.
+        const radius = (Math.max(0.5 * Math.hypot(size.x, size.z), 0.5 * size.y) * 1.14) / (1 - this.below);
+        const distance = radius / Math.sin((this.camera.fov * Math.PI) / 360);
+        this.#home = { distance, target: new Vector3(0, 0.5 * size.y - this.below * radius, 0) };
+        this.view.distance = distance;
+        this.view.target.copy(this.#home.target);
+        // Lines half a metre apart for what is as large as a person, and so on by tens.
+        const cell = 10 ** Math.round(Math.log10(Math.max(size.x, size.y, size.z, 1e-3) / 1.8)) * 0.5;
+        this.#grid.scale.setScalar(cell * 24);
+    }
+}
+
+function gridPlane(): Mesh<PlaneGeometry, ShaderMaterial> {
+    const material = new ShaderMaterial({
+        transparent: true,
+        depthWrite: false,
+        uniforms: { colour: { value: new Color(0x55606e) } },
+        vertexShader: `
+            varying vec2 place;
+            void main() {
+                place = position.xz;
+                gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+            }`,
+        fragmentShader: `
+            uniform vec3 colour;
+            varying vec2 place;
+            void main() {
+                vec2 cell = place * 24.0;
+                vec2 width = fwidth(cell);
+                vec2 line = 1.0 - min(abs(fract(cell - 0.5) - 0.5) / max(width, 1e-4), 1.0);
+                float fade = 1.0 - smoothstep(0.1, 0.5, length(place));
+                float alpha = max(line.x, line.y) * fade * 0.4;
+                gl_FragColor = vec4(colour, alpha);
+            }`,
+    });
+    const plane = new Mesh(new PlaneGeometry(1, 1).rotateX(-Math.PI / 2), material);
+    plane.renderOrder = -2;
+    return plane;
+}
+
+// The mesh seen from below, the nearer to the floor the darker, blurred.
+class ContactShadow {
+    readonly plane: Mesh<PlaneGeometry, MeshBasicMaterial>;
+    #scene = new Scene();
+    #caster: Mesh;
+    #casterMaterial: ShaderMaterial;
+    #camera = new OrthographicCamera(-1, 1, 1, -1, 0, 1);
+    #targets = [0, 1].map(() => new WebGLRenderTarget(shadowPixels, shadowPixels, { minFilter: LinearFilter, magFilter: LinearFilter, depthBuffer: true }));
+    #blur: Mesh<PlaneGeometry, ShaderMaterial>;
+    #blurCamera = new OrthographicCamera(-0.5, 0.5, 0.5, -0.5, 0, 1);
+    #blurScene = new Scene();
+    #source: HtvmMesh;
+
+    constructor(source: HtvmMesh) {
+        this.#source = source;
+        this.#casterMaterial = new ShaderMaterial({
+            blending: NoBlending,
+            side: 2,
+            uniforms: { reach: { value: 1 } },
+            vertexShader: `
+                varying float height;
+                void main() {
+                    vec4 world = modelMatrix * vec4(position, 1.0);
+                    height = world.y;
+                    gl_Position = projectionMatrix * viewMatrix * world;
+                }`,
+            fragmentShader: `
+                uniform float reach;
+                varying float height;
+                void main() {
+                    float near = clamp(1.0 - height / reach, 0.0, 1.0);
+                    gl_FragColor = vec4(near * near);
+                }`,
+        });
+        this.#caster = new Mesh(source.geometry, this.#casterMaterial);
+        this.#caster.frustumCulled = false;
+        this.#caster.matrixAutoUpdate = false;
+        this.#scene.add(this.#caster);
+        const blurMaterial = new ShaderMaterial({
+            blending: NoBlending,
+            depthTest: false,
+            uniforms: { picture: { value: null }, step: { value: new Vector3() } },
+            vertexShader: `
+                varying vec2 place;
+                void main() {
+                    place = uv;
+                    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+                }`,
+            fragmentShader: `
+                uniform sampler2D picture;
+                uniform vec3 step;
+                varying vec2 place;
+                void main() {
+                    float sum = 0.0, weights = 0.0;
+                    for (int i = -4; i <= 4; ++i) {
+                        float weight = exp(-0.12 * float(i * i));
+                        sum += weight * texture2D(picture, place + step.xy * float(i)).r;
+                        weights += weight;
+                    }
+                    gl_FragColor = vec4(sum / weights);
+                }`,
+        });
+        this.#blur = new Mesh(new PlaneGeometry(1, 1), blurMaterial);
+        this.#blurScene.add(this.#blur);
+        // Black where the picture is white.
+        const material = new MeshBasicMaterial({
+            color: 0x000000, alphaMap: this.#targets[0]!.texture, transparent: true, opacity: 0.5, depthWrite: false,
+        });
+        this.plane = new Mesh(new PlaneGeometry(1, 1).rotateX(-Math.PI / 2), material);
+        this.plane.renderOrder = -1;
+    }
+
+    setStrength(opacity: number): void {
+        this.plane.material.opacity = opacity;
+    }
+
+    dispose(): void {
+        for (const target of this.#targets) target.dispose();
+        this.plane.geometry.dispose();
+        this.plane.material.dispose();
+        this.#casterMaterial.dispose();
+        this.#blur.geometry.dispose();
+        this.#blur.material.dispose();
+    }
+
+    /** box: of the mesh as it stands on the floor. */
+    moveOver(box: Box3, turn: Quaternion, place: Vector3): void {
+        const middle = box.getCenter(new Vector3());
+        const size = box.getSize(new Vector3());
+        const side = Math.max(size.x, size.z) * 1.5;
+        const half = side / 2;
+        Object.assign(this.#camera, { left: -half, right: half, top: half, bottom: -half, near: 0, far: size.y * 2 });
+        // From below, so that what is lower wins by depth.
+        this.#camera.position.set(middle.x, -0.25 * size.y, middle.z);
+        this.#camera.up.set(0, 0, 1);
+        this.#camera.lookAt(middle.x, 1, middle.z);
+        this.#camera.updateProjectionMatrix();
+        this.#casterMaterial.uniforms['reach']!.value = 0.6 * size.y;
+        this.#caster.matrix.compose(place, turn, this.#source.scale);
+        // A picture from below is a mirror image of one from above.
+        this.plane.scale.set(side, 1, -side);
+        this.plane.position.set(middle.x, 0.001 * size.y, middle.z);
+    }
+
+    render(renderer: WebGLRenderer): void {
+        const xr = renderer.xr.enabled;
+        renderer.xr.enabled = false;
+        const [first, second] = this.#targets as [WebGLRenderTarget, WebGLRenderTarget];
+        renderer.setRenderTarget(first);
+        renderer.clear();
+        renderer.render(this.#scene, this.#camera);
+        const { uniforms } = this.#blur.material;
+        for (const radius of [1.0, 2.2]) {
+            for (const [from, to, x, y] of [[first, second, radius, 0], [second, first, 0, radius]] as const) {
+                uniforms['picture']!.value = from.texture;
+                uniforms['step']!.value.set(x / shadowPixels, y / shadowPixels, 0);
+                renderer.setRenderTarget(to);
+                renderer.render(this.#blurScene, this.#blurCamera);
+            }
+        }
+        renderer.setRenderTarget(null);
+        renderer.xr.enabled = xr;
+    }
+}

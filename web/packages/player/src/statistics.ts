@@ -1,0 +1,69 @@
+// What the panel says, from the frames shown last.
+import type { FrameReport } from './messages.js';
+
+const kept = 60; // frames
+
+interface Shown {
+    now: number;
+    bytes: number;
+    durationUs: number;
+    decodeMs: number;
+    layers: number[];
+}
+
+export interface StatisticsSummary {
+    framesPerSecond: number;
+    megabitsPerSecond: number;
+    /** Mean and most of the frames kept. */
+    decodeMs: number;
+    slowestDecodeMs: number;
+    /** Share of each layer, largest first. */
+    layers: { name: string; share: number }[];
+}
+
+export class Statistics {
+    #shown: Shown[] = [];
+    #names: readonly string[] = [];
+
+    reset(layerNames: readonly string[]): void {
+        this.#names = layerNames;
+        this.#shown = [];
+    }
+
+    add(frame: FrameReport, now: number): void {
+        const { bytes, durationUs, decodeMs, layers } = frame;
+        this.#shown.push({ now, bytes, durationUs, decodeMs, layers });
+        if (this.#shown.length > kept) this.#shown.shift();
+    }
+
+    summary(): StatisticsSummary {
+        const shown = this.#shown;
+        const sum = (value: (frame: Shown) => number): number => shown.reduce((total, frame) => total + value(frame), 0);
+        const elapsed = shown.length > 1 ? shown.at(-1)!.now - shown[0]!.now : 0;
+        const bytes = sum((frame) => frame.bytes);
+        const byLayer = this.#names.map((name, i) => ({ name, share: sum((frame) => frame.layers[i] ?? 0) / Math.max(bytes, 1) }));
+        return {
+            framesPerSecond: elapsed > 0 ? (1000 * (shown.length - 1)) / elapsed : 0,
+            megabitsPerSecond: (8 * bytes) / Math.max(sum((frame) => frame.durationUs), 1),
+            decodeMs: sum((frame) => frame.decodeMs) / Math.max(shown.length, 1),
+            slowestDecodeMs: shown.reduce((most, frame) => Math.max(most, frame.decodeMs), 0),
+            layers: byLayer.filter(({ share }) => share > 0).sort((a, b) => b.share - a.share),
+        };
+    }
+
+    text(frame: FrameReport, buffered: number): string {
+        const { framesPerSecond, megabitsPerSecond, decodeMs, slowestDecodeMs, layers } = this.summary();
+        const lines = [
+            `frame    ${frame.frame} (${frame.letter}), ${frame.bytes} bytes`,
+            `mesh     ${frame.vertices} vertices, ${frame.triangles} triangles`,
+            `shown    ${framesPerSecond.toFixed(1)} frames/s`,
+            `stream   ${megabitsPerSecond.toFixed(2)} Mbit/s`,
+            `decoding ${decodeMs.toFixed(1)} ms, at most ${slowestDecodeMs.toFixed(1)}`,
+            `ahead    ${buffered} frames`,
+            ...layers.slice(0, 5).map(({ name, share }, i) => {
+                return `${i === 0 ? 'bits' : '    '}     ${String(Math.round(100 * share)).padStart(2)} % ${name}`;
+            }),
+        ];
+        return lines.join('\n');
+    }
+}

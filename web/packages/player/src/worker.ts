@@ -1,0 +1,403 @@
+// The player's worker: fetches, decodes, makes normals, and hands frames over as far as the player has room for them.
+import { Decoder, DecoderError, DecoderModule, isFrame, packetKind, type Frame } from '@htvm/decoder';
+import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
+import { FilePackets, type TimedPacket } from './file_packets.js';
+import type { FrameReport, Report, Request } from './messages.js';
+import { vertexNormals } from './normals.js';
+
+const scope = globalThis as unknown as {
+    postMessage(message: Report, transfer?: Transferable[]): void;
+    onmessage: ((event: MessageEvent<Request>) => void) | null;
+};
+const post = (report: Report, transfer: Transferable[] = []): void => scope.postMessage(report, transfer);
+
+const mostReopenings = 4;
+const previewBeyond = 3; // frames between where decoding starts and what is sought
+
+class Session {
+    #url: string;
+    #module: DecoderModule;
+    #source: ByteSource;
+    #file: FilePackets;
+    #decoder: Decoder;
+    #serial: number;
+    #timeUs: number;
+    #traps: number[]; // times of frames that stopped the decoder before
+    #passingOver = false; // up to the next I-frame, after such a frame
+    #loop: boolean;
+    #resting = false;
+    #room = 2;
+    #out = 0; // frames that the player has
+    #spare: ArrayBuffer[] = [];
+    #sums = new Float32Array(0);
+    #wake: (() => void) | null = null;
+    #opened = false;
+    #reopenings = 0;
+    #decodedAny = false;
+    #lastError = '';
+    #noticed = new Set<string>();
+    #sentTopology = -1;
+    #loopUs = 0; // what loops before this one took
+    #frames = 0;
+    #surveyAt = 1; // frames sent before what is beyond is looked for
+    #reportedExtent = '';
+    #at = 0; // time of the packet being decoded
+
+    constructor(request: Request & { type: 'open' }, module: DecoderModule) {
+        this.#url = request.url;
+        this.#module = module;
+        this.#serial = request.serial;
+        this.#timeUs = request.timeUs;
+        this.#traps = request.traps;
+        this.#loop = request.loop;
+        this.#source = new ByteSource(this.#url);
+        this.#file = new FilePackets(this.#source, module);
+        this.#decoder = module.createDecoder();
+    }
+
+    take(request: Request): void {
+        switch (request.type) {
+            case 'seek':
+                this.#serial = request.serial;
+                this.#timeUs = request.timeUs;
+                this.#resting = false;
+                this.#source.interrupt();
+                break;
+            case 'loop':
+                this.#loop = request.on;
+                break;
+            case 'room':
+                this.#room = request.frames;
+                break;
+            case 'done':
+                --this.#out;
+                if (this.#spare.length < this.#room) this.#spare.push(request.buffer);
+                break;
+            case 'rest':
+                this.#resting = true;
+                break;
+            case 'open':
+                break;
+        }
+        this.#wake?.();
+    }
+
+    async run(): Promise<void> {
+        for (;;) {
+            const serial = this.#serial;
+            try {
+                await this.#play(serial);
+            } catch (error) {
+                if (error instanceof Interrupted) continue;
+                if (error instanceof DecoderError && error.code === 'trap') {
+                    post({ type: 'trapped', text: error.message, atUs: this.#at });
+                    return;
+                }
+                if (error instanceof SourceChanged && ++this.#reopenings <= mostReopenings) {
+                    this.#reopen();
+                    continue;
+                }
+                this.#fail(error);
+                return;
+            }
+            while (this.#serial === serial) await this.#signal();
+        }
+    }
+
+    #signal(): Promise<void> {
+        return new Promise((resolve) => (this.#wake = resolve));
+    }
+
+    #fail(error: unknown): void {
+        if (error instanceof SourceError) post({ type: 'failed', code: error.code, text: error.message });
+        else if (error instanceof SourceChanged)
+            post({ type: 'failed', code: 'changed', text: `${this.#url} changes all the time.` });
+        else post({ type: 'failed', code: 'decoder', text: error instanceof Error ? error.message : String(error) });
+    }
+
+    #reopen(): void {
+        this.#source.close();
+        this.#source = new ByteSource(this.#url);
+        this.#file = new FilePackets(this.#source, this.#module);
+        this.#surveyAt = 1;
+        // Where decoding went on; what was sought is behind.
+        this.#timeUs = Math.max(this.#timeUs, this.#at);
+        this.#notice('The file was replaced while it played; this is the new one.');
+    }
+
+    // Decodes from what is sought to the end, and on as long as it is to loop.
+    async #play(serial: number): Promise<void> {
+        this.#loopUs = 0;
+        this.#sentTopology = -1;
+        let sought: number | null = this.#timeUs;
+        for (;;) {
+            this.#begin(sought ?? 0);
+            const last = await this.#seekAndShow(serial, sought ?? 0, sought === null);
+            if (last === 'superseded') return;
+            this.#survey();
+            sought = null;
+            for (;;) {
+                const packet = await this.#file.next();
+                if (!packet) break;
+                const frame = this.#decode(packet);
+                if (!frame) continue;
+                if (!(await this.#haveRoom(serial))) return;
+                this.#send(serial, frame, packet.timeUs, false);
+                this.#survey();
+            }
+            this.#checkTheEnd();
+            if (!this.#loop) break;
+            this.#loopUs += this.#file.durationUs ?? 0;
+        }
+        const durationUs = this.#file.durationUs ?? 0;
+        post({ type: 'ended', serial, frames: this.#frames, durationUs });
+        this.#tellMemory();
+    }
+
+    #begin(timeUs: number): void {
+        const header = this.#file.seek(timeUs);
+        this.#frames = 0;
+        this.#decoder.discard();
+        if (!header) return;
+        this.#decoder.sendPacket(header);
+        this.#decoder.receive();
+    }
+
+    // Reads on to the frame at that time, and decodes what it needs and no more. quietly: as in a loop, where the first
+    // frame is one like all others.
+    async #seekAndShow(serial: number, timeUs: number, quietly: boolean): Promise<'shown' | 'superseded'> {
+        let group: TimedPacket[] = [];
+        let bytes = 0;
+        for (;;) {
+            const packet = await this.#file.next();
+            if (this.#serial !== serial) return 'superseded';
+            if (!packet) break;
+            if (packet.kind === packetKind.intra && packet.timeUs <= timeUs) {
+                group = group.filter(({ kind }) => kind === packetKind.sequence);
+                bytes = 0;
+            }
+            group.push({ ...packet, bytes: packet.bytes.slice() });
+            bytes += packet.size;
+            if (isFrame(packet.kind) && packet.timeUs + this.#file.frameUs / 2 > timeUs) break;
+            if (bytes > 1 << 26) break;
+            if (packet.kind === packetKind.sequence) {
+                // Frames' duration is in it.
+                this.#decode(group.pop()!);
+            }
+        }
+        const frames = group.filter(({ kind }) => isFrame(kind)).length;
+        let left = frames;
+        for (const packet of group) {
+            const frame = this.#decode(packet);
+            if (isFrame(packet.kind)) --left;
+            if (!frame) continue;
+            const preview = left > 0;
+            if (preview && !(packet === group[0] && left > previewBeyond && !quietly)) continue;
+            if (!(await this.#haveRoom(serial))) return 'superseded';
+            this.#send(serial, frame, packet.timeUs, preview);
+            // Let a newer seek be heard between frames.
+            await new Promise((resolve) => setTimeout(resolve));
+            if (this.#serial !== serial) return 'superseded';
+        }
+        return 'shown';
+    }
+
+    // Waits until the player has room for a frame. False where it wants others by now.
+    async #haveRoom(serial: number): Promise<boolean> {
+        while (this.#serial === serial && (this.#out >= this.#room || this.#resting)) await this.#signal();
+        return this.#serial === serial;
+    }
+
+    #decode(packet: TimedPacket): { frame: Frame; decodeMs: number } | null {
+        if (packet.kind === packetKind.index) {
+            this.#tellExtent();
+            return null;
+        }
+        if (isFrame(packet.kind)) {
+            this.#at = packet.timeUs;
+            if (this.#traps.includes(packet.timeUs)) this.#passingOver = true;
+            else if (packet.kind === packetKind.intra) this.#passingOver = false;
+            if (this.#passingOver) return null;
+        }
+        const begin = performance.now();
+        let frame: Frame | null = null;
+        try {
+            this.#decoder.sendPacket(packet.bytes);
+            frame = this.#decoder.receive();
+        } catch (error) {
+            if (!(error instanceof DecoderError) || error.code === 'trap') throw error;
+            this.#lastError = error.message;
+            if (packet.kind === packetKind.sequence && error.code === 'unsupported')
+                throw new SourceError('version', `This page's player cannot show this stream: ${error.message}`);
+            if (error.code === 'limit') this.#notice(`A frame is beyond what the player takes: ${error.message}`);
+            else this.#notice(`A part of the stream could not be decoded: ${error.message}`);
+            return null;
+        }
+        if (packet.kind === packetKind.sequence) this.#tellSequence();
+        return frame ? { frame, decodeMs: performance.now() - begin } : null;
+    }
+
+    #tellSequence(): void {
+        const sequence = this.#decoder.sequence();
+        if (!sequence) return;
+        this.#file.frameUs = 1e6 / sequence.framesPerSecond;
+        if (this.#opened) return;
+        this.#opened = true;
+        post({ type: 'opened', sequence, layerNames: this.#module.layerNames, version: this.#module.version });
+    }
+
+    #tellExtent(): void {
+        const { durationUs, seekable } = this.#file;
+        const text = `${durationUs} ${seekable}`;
+        if (text === this.#reportedExtent) return;
+        this.#reportedExtent = text;
+        post({ type: 'extent', durationUs, seekable });
+    }
+
+    #tellMemory(): void {
+        post({ type: 'memory', wasmBytes: this.#module.memoryBytes, heldBytes: this.#source.heldBytes });
+    }
+
+    #notice(text: string): void {
+        if (this.#noticed.has(text) || this.#noticed.size >= 8) return;
+        this.#noticed.add(text);
+        post({ type: 'notice', text });
+    }
+
+    // Once something is shown, and again where not all of a small file was there yet.
+    #survey(): void {
+        if (this.#frames < this.#surveyAt) return;
+        this.#surveyAt = Infinity;
+        const again = 4 * Math.max(this.#frames, 1);
+        this.#file.survey(this.#source).then(
+            (done) => {
+                if (!done) this.#surveyAt = again;
+                this.#tellExtent();
+            },
+            () => undefined, // one can do without
+        );
+    }
+
+    // At the end of the file: what is there to say of the whole.
+    #checkTheEnd(): void {
+        if (!this.#decodedAny)
+            throw new SourceError(
+                'decoder', this.#lastError ? `Nothing of this stream can be shown: ${this.#lastError}` : 'This stream has no frames.');
+        if (this.#file.pendingBytes > 0)
+            this.#notice('The file is cut off: it ends in the middle of a packet. What is whole is shown.');
+        this.#tellExtent();
+    }
+
+    #buffer(bytes: number): ArrayBuffer {
+        let best = -1;
+        for (let i = 0; i < this.#spare.length; ++i) {
+            const size = this.#spare[i]!.byteLength;
+            if (size >= bytes && (best < 0 || size < this.#spare[best]!.byteLength)) best = i;
+        }
+        if (best >= 0) return this.#spare.splice(best, 1)[0]!;
+        this.#spare.shift(); // too small for these frames
+        return new ArrayBuffer(bytes + (bytes >> 3));
+    }
+
+    #send(serial: number, { frame, decodeMs }: { frame: Frame; decodeMs: number }, timeUs: number, preview: boolean): void {
+        const { vertices } = frame;
+        const normalBytes = frame.normals ? 12 : 4;
+        const buffer = this.#buffer(Math.max((12 + normalBytes + 4) * vertices, 16));
+        const positions = new Float32Array(buffer, 0, 3 * vertices);
+        positions.set(frame.positions);
+        let normals: Float32Array | Int8Array;
+        if (frame.normals) {
+            normals = new Float32Array(buffer, 12 * vertices, 3 * vertices);
+            normals.set(frame.normals);
+        } else {
+            normals = new Int8Array(buffer, 12 * vertices, 4 * vertices);
+            if (this.#sums.length < 3 * vertices) this.#sums = new Float32Array(3 * vertices + (vertices >> 1));
+            vertexNormals(positions, frame.indices, vertices, this.#sums, normals);
+        }
+        const colours = frame.colours && new Uint8Array(buffer, (12 + normalBytes) * vertices, 4 * vertices);
+        if (colours) {
+            const rgb = frame.colours!;
+            for (let v = 0, from = 0, to = 0; v < vertices; ++v) {
+                colours[to++] = rgb[from++]!;
+                colours[to++] = rgb[from++]!;
+                colours[to++] = rgb[from++]!;
+                colours[to++] = 255;
+            }
+        }
+        const newTopology = frame.topology !== this.#sentTopology;
+        this.#sentTopology = frame.topology;
+        const indices = newTopology ? frame.indices.slice() : null;
+        const texcoords = newTopology && frame.texcoords ? frame.texcoords.slice() : null;
+        const report: FrameReport = {
+            type: 'frame',
+            serial,
+            kind: frame.kind,
+            letter: frame.letter,
+            frame: frame.frame,
+            timeUs,
+            presentUs: timeUs + this.#loopUs,
+            durationUs: this.#file.frameUs,
+            preview,
+            topology: frame.topology,
+            vertices,
+            triangles: frame.triangles,
+            bytes: frame.bytes,
+            layers: this.#decoder.layerBytes(),
+            decodeMs,
+            bounds: boundsOf(positions),
+            buffer,
+            positions,
+            colours,
+            normals,
+            streamNormals: frame.normals !== null,
+            indices,
+            texcoords,
+        };
+        const transfer: Transferable[] = [buffer];
+        if (indices) transfer.push(indices.buffer);
+        if (texcoords) transfer.push(texcoords.buffer);
+        ++this.#out;
+        ++this.#frames;
+        this.#decodedAny = true;
+        if (this.#frames % 64 === 1) this.#tellMemory();
+        post(report, transfer);
+    }
+}
+
+function boundsOf(positions: Float32Array): FrameReport['bounds'] {
+    const bounds: FrameReport['bounds'] = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
+    for (let i = 0; i < positions.length; i += 3)
+        for (let c = 0; c < 3; ++c) {
+            const value = positions[i + c]!;
+            if (value < bounds[c]!) bounds[c] = value;
+            if (value > bounds[c + 3]!) bounds[c + 3] = value;
+        }
+    return bounds;
+}
+
+let session: Promise<Session> | null = null;
+
+async function open(request: Request & { type: 'open' }): Promise<Session> {
+    let opened: Session;
+    try {
+        opened = new Session(request, await DecoderModule.load(await fetch(request.wasmUrl)));
+    } catch (error) {
+        const csp = error instanceof WebAssembly.CompileError && String(error).includes('Content Security Policy');
+        const why = csp
+            ? 'the page\'s Content-Security-Policy forbids it: add "wasm-unsafe-eval" to its script-src'
+            : String(error instanceof Error ? error.message : error);
+        post({ type: 'failed', code: 'decoder', text: `The decoder could not be started: ${why}.` });
+        throw error;
+    }
+    void opened.run();
+    return opened;
+}
+
+scope.onmessage = ({ data }) => {
+    if (data.type === 'open') {
+        session = open(data);
+        session.catch(() => undefined); // it was told
+    } else {
+        void session?.then((opened) => opened.take(data), () => undefined);
+    }
+};

@@ -1,0 +1,131 @@
+// Decoded frames as one three.js object, in one draw call.
+import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, MeshBasicMaterial } from 'three';
+import type { Material, TypedArray } from 'three';
+
+/** A frame to show: what `@htvm/decoder` gives, or the same with what a player has made of it. */
+export interface MeshFrame {
+    vertices: number;
+    triangles: number;
+    /** Frames with the same number have the same triangles and texture coordinates: those are uploaded once. */
+    topology: number;
+    /** Millimetres, 3 a vertex. */
+    positions: Float32Array;
+    /** 3 a triangle. Null where the last frame shown had the same topology. */
+    indices: Uint32Array | null;
+    /** sRGB, 3 or 4 a vertex. */
+    colours: Uint8Array | null;
+    /** 3 a vertex, or of bytes 4 a vertex with 127 for 1. */
+    normals: Float32Array | Int8Array | null;
+    /** 2 a vertex; like indices. */
+    texcoords: Float32Array | null;
+}
+
+/**
+ * A mesh that shows one frame after the other. Arrays are copied, so that a frame may be lent. Buffers grow and stay:
+ * nothing is allocated from frame to frame. Its unit is the metre (frames' is the millimetre).
+ */
+export class HtvmMesh extends Mesh<BufferGeometry, Material> {
+    /** How often each array went to the graphics card. */
+    readonly uploads = { positions: 0, indices: 0 };
+    #topology = -1;
+
+    /** The default material shows vertex colours as they are, unlit. */
+    constructor(material: Material = srgbVertexColours(new MeshBasicMaterial({ vertexColors: true }))) {
+        super(new BufferGeometry(), material);
+        this.frustumCulled = false; // bounds would have to be found for every frame
+        this.scale.setScalar(0.001);
+        this.geometry.setDrawRange(0, 0);
+    }
+
+    setFrame(frame: MeshFrame): void {
+        this.#set('position', frame.positions, 3, frame.vertices, false);
+        if (frame.colours) {
+            // Four bytes a vertex, since graphics cards want each to begin at a multiple of four.
+            const padded = frame.colours.length === 3 * frame.vertices && frame.vertices > 0 ? 3 : 4;
+            this.#set('color', frame.colours, 4, frame.vertices, true, padded);
+        } else {
+            this.#remove('color');
+        }
+        if (frame.normals) {
+            const bytes = frame.normals instanceof Int8Array;
+            this.#set('normal', frame.normals, bytes ? 4 : 3, frame.vertices, bytes);
+        } else {
+            this.#remove('normal');
+        }
+        ++this.uploads.positions;
+        if (frame.topology !== this.#topology) {
+            if (!frame.indices) throw new Error('a frame of another topology needs its indices');
+            this.#topology = frame.topology;
+            this.#set('index', frame.indices, 1, 3 * frame.triangles, false);
+            if (frame.texcoords) this.#set('uv', frame.texcoords, 2, frame.vertices, false);
+            else this.#remove('uv');
+            this.geometry.setDrawRange(0, 3 * frame.triangles);
+            ++this.uploads.indices;
+        }
+    }
+
+    /** Forgets what topology is shown: for another decoder, which numbers them anew. */
+    forgetTopology(): void {
+        this.#topology = -1;
+    }
+
+    /** Frees what it holds on the graphics card. */
+    override dispose(): void {
+        this.geometry.dispose();
+        this.material.dispose();
+    }
+
+    // Copies `count` elements into an attribute that has room for them; `given`: numbers each has in `values`.
+    #set(name: string, values: TypedArray, itemSize: number, count: number, normalized: boolean, given = itemSize): void {
+        const geometry = this.geometry;
+        const old = name === 'index' ? geometry.index : (geometry.getAttribute(name) as BufferAttribute | undefined);
+        let attribute = old;
+        if (!attribute || attribute.count < count || attribute.array.constructor !== values.constructor) {
+            // The graphics card's buffers cannot grow; these go, and all are uploaded anew.
+            if (old) geometry.dispose();
+            const room = old && old.count < count ? count + (count >> 2) : count;
+            const array = new (values.constructor as new (length: number) => TypedArray)(Math.max(room, 1) * itemSize);
+            attribute = new BufferAttribute(array, itemSize, normalized);
+            attribute.setUsage(DynamicDrawUsage);
+            if (name === 'index') geometry.setIndex(attribute);
+            else geometry.setAttribute(name, attribute);
+        }
+        const array = attribute.array;
+        if (given === itemSize) {
+            array.set(values.subarray(0, count * itemSize) as never);
+        } else {
+            for (let v = 0; v < count; ++v) {
+                for (let c = 0; c < given; ++c) array[itemSize * v + c] = values[given * v + c]!;
+                array[itemSize * v + given] = 255;
+            }
+        }
+        attribute.clearUpdateRanges();
+        attribute.addUpdateRange(0, count * itemSize);
+        attribute.needsUpdate = true;
+    }
+
+    #remove(name: string): void {
+        if (!this.geometry.hasAttribute(name)) return;
+        this.geometry.dispose();
+        this.geometry.deleteAttribute(name);
+    }
+}
+
+/**
+ * Makes a material take vertex colours as sRGB, as captures have them; three.js takes them as linear. Only of a frame
+ * with colours: without them set `vertexColors` to false.
+ */
+export function srgbVertexColours<M extends Material>(material: M): M {
+    material.onBeforeCompile = (shader) => {
+        shader.vertexShader = shader.vertexShader.replace(
+            '#include <color_vertex>',
+            `#include <color_vertex>
+            #ifdef USE_COLOR_ALPHA
+                vColor.rgb = mix(pow((vColor.rgb + 0.055) / 1.055, vec3(2.4)), vColor.rgb / 12.92,
+                                 vec3(lessThanEqual(vColor.rgb, vec3(0.04045))));
+            #endif`,
+        );
+    };
+    material.customProgramCacheKey = () => 'htvm-srgb-vertex-colours';
+    return material;
+}
