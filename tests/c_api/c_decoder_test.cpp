@@ -256,6 +256,51 @@ TEST(CDecoder, KindsOfFramesHaveNames) {
     EXPECT_STREQ(htvm_frame_kind_letter(0xFFFFFFFF), "?");
 }
 
+TEST(CDecoder, BytesOfLayersAddUpToThoseOfThePacket) {
+    const auto decoder = make_decoder();
+    std::uint64_t bytes[HTVM_LAYERS] = {};
+    EXPECT_EQ(htvm_decoder_layer_bytes(decoder.get(), bytes, HTVM_LAYERS), HTVM_BAD_INPUT);  // no frame yet
+    const auto& stream = coded_person().bytes;
+    htvm_decoder_send_bytes(decoder.get(), stream.data(), stream.size());
+    htvm_frame_info info;
+    ASSERT_EQ(htvm_decoder_receive_frame(decoder.get(), &info, sizeof info), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_layer_bytes(decoder.get(), bytes, HTVM_LAYERS - 1), HTVM_BUFFER_TOO_SMALL);
+    ASSERT_EQ(htvm_decoder_layer_bytes(decoder.get(), bytes, HTVM_LAYERS), HTVM_OK);
+    std::uint64_t sum = 0;
+    for (const auto layer : bytes) sum += layer;
+    EXPECT_EQ(sum, info.bytes);
+    EXPECT_GT(bytes[static_cast<int>(Layer::geometry)], 0u);
+    EXPECT_STREQ(htvm_layer_name(0), "overhead");
+    EXPECT_STREQ(htvm_layer_name(3), "geometry");
+    EXPECT_EQ(htvm_layer_name(HTVM_LAYERS), nullptr);
+}
+
+TEST(CInterface, ReadsAnIndex) {
+    const auto& stream = coded_person().bytes;
+    PacketReader reader;
+    reader.push(stream);
+    std::vector<std::uint8_t> index;
+    std::vector<std::pair<std::uint32_t, std::uint64_t>> intra;  // frame, offset
+    std::uint64_t offset = 0;
+    while (const auto packet = reader.pull()) {
+        if (packet->kind == PacketKind::index) index = write_packet(*packet);
+        if (packet->kind == PacketKind::intra) intra.emplace_back(packet->frame, offset);
+        offset += packet->payload.size() + packet_overhead;
+    }
+    std::size_t count = 0;
+    EXPECT_EQ(htvm_index_read(index.data(), index.size(), nullptr, 0, &count), HTVM_BUFFER_TOO_SMALL);
+    ASSERT_EQ(count, intra.size());
+    std::vector<htvm_index_entry> entries(count);
+    ASSERT_EQ(htvm_index_read(index.data(), index.size(), entries.data(), count, &count), HTVM_OK);
+    for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_EQ(entries[i].frame, intra[i].first);
+        EXPECT_EQ(entries[i].offset, intra[i].second);
+    }
+    EXPECT_EQ(htvm_index_read(index.data(), index.size() - 1, entries.data(), count, &count), HTVM_CORRUPT_STREAM);
+    EXPECT_EQ(htvm_index_read(stream.data(), stream.size(), entries.data(), count, &count), HTVM_CORRUPT_STREAM);
+    EXPECT_EQ(htvm_index_read(nullptr, 0, nullptr, 0, &count), HTVM_BAD_INPUT);
+}
+
 TEST(CDecoder, DiscardForgetsWhatWasSent) {
     const auto decoder = make_decoder();
     const auto& bytes = coded_grid().bytes;

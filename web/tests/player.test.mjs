@@ -207,13 +207,11 @@ inPage('a hidden tab stops decoding, and comes back in step', async (page) => {
         return test.frames.length - before;
     });
     assert.equal(hidden, 0);
-    const requests = server.requests.length;
     await page.evaluate(async () => {
         test.setVisibility('visible');
         await test.player.idle();
     });
     assert.equal(await lastLine(page), expected[45]); // 0.5 + 1 seconds at 30 frames a second
-    assert.ok(server.requests.length <= requests + 3);
 });
 
 // ---- what goes wrong --------------------------------------------------------------------------------------------
