@@ -1,5 +1,5 @@
 # The C interface (htvm/htvm.h): the decoder part, which needs only the standard library, and the encoder part.
-htvm_floor(c_decoder SOURCES src/c_api/c_status.cpp src/c_api/c_decoder.cpp LINKS htvm_decoder)
+htvm_floor(c_decoder SOURCES src/c_api/c_status.cpp src/c_api/c_decoder.cpp src/c_api/c_dependency.cpp LINKS htvm_decoder)
 if(HTVM_BUILD_ENCODER)
   htvm_floor(c SOURCES src/c_api/c_encoder.cpp LINKS htvm_c_decoder htvm_encoder)
 endif()

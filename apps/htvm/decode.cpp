@@ -19,6 +19,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "htvm/decoder.hpp"
+#include "htvm/frame_numbers.hpp"
 #include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "io/ply.h"
@@ -118,6 +119,7 @@ struct Decoding {
     Decoder& decoder;
     Summary& summary;
     Progress& progress;
+    FrameNumbers numbers = {};
 };
 
 bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.written() >= d.options.frames; }
@@ -155,9 +157,9 @@ Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_u
 // Frames that were lost in transmission leave no damage behind, only a gap in the numbers.
 Result<void> fill_gap(Decoding& d, const Packet& next) {
     auto& summary = d.summary;
-    const std::uint32_t first = summary.due;
-    if (next.frame <= first) return {};
-    const std::uint32_t gap = next.frame - first;
+    const std::uint32_t first = summary.due, number = d.numbers.of(next.frame);
+    if (number <= first) return {};
+    const std::uint32_t gap = number - first;
     const auto before = static_cast<std::uint64_t>(summary.timestamp_us.value_or(next.timestamp_us));
     const bool ascends = summary.timestamp_us && *summary.timestamp_us < next.timestamp_us;
     const std::uint64_t interval =
@@ -190,9 +192,10 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
         ++d.summary.damaged_packets;
         return {};
     }
-    const auto done = conceal(d, packet.frame, packet.timestamp_us);
+    const auto number = d.numbers.of(packet.frame);
+    const auto done = conceal(d, number, packet.timestamp_us);
     if (!done) return tl::unexpected(done.error());
-    warn(fmt::format("frame {} is lost: {}{}", packet.frame, error.message,
+    warn(fmt::format("frame {} is lost: {}{}", number, error.message,
                      *done ? "; the I-frame's mesh, moved, stands in for it" : ""));
     ++d.summary.undecodable;
     if (is_refused && !d.summary.refused) d.summary.refused = error;
@@ -205,12 +208,14 @@ Result<bool> decode_next(Decoding& d) {
     const auto packet = d.input.next();
     if (!packet) return false;
     const bool is_frame = frame_type(packet->kind).has_value();
-    if (is_frame || packet->kind == PacketKind::index) {  // the index gives the number of frames
+    d.numbers.take(*packet);
+    if (d.numbers.begins_sequence()) d.summary.timestamp_us.reset();  // frames before its first one never existed
+    if (is_frame || packet->kind == PacketKind::index) {              // the index gives the number of frames
         // Before decoding the packet, because it may be an I-frame, which the lost frames did not refer to.
         if (auto ok = fill_gap(d, *packet); !ok) return tl::unexpected(ok.error());
         if (is_enough(d)) return false;
     }
-    if (is_frame) d.summary.due = packet->frame + 1;
+    if (is_frame) d.summary.due = d.numbers.of(packet->frame) + 1;
     const auto start = std::chrono::steady_clock::now();
     auto frame = d.decoder.push(*packet);
     if (is_frame) d.summary.timestamp_us = packet->timestamp_us;
@@ -221,6 +226,9 @@ Result<bool> decode_next(Decoding& d) {
     if (!*frame) return true;
     d.summary.decode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     d.summary.concealed_in_a_row = 0;
+    auto& info = (**frame).info;
+    info.frame = d.numbers.of(info.frame);
+    info.reference = d.numbers.of(info.reference);
     if (auto ok = write(d, **frame); !ok) return tl::unexpected(ok.error());
     ++d.summary.decoded;
     return !d.output.one_file();

@@ -260,12 +260,20 @@ tl::unexpected<Error> ended_early(Pass& pass, const Error& error) {
     return fail(error.kind, message);
 }
 
+// A stream that goes to a pipe or a device may be live: a session keeps it apart from a run before.
+bool may_be_live(const std::string& output) {
+    std::error_code error;
+    return output == "-" ||
+           (std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error));
+}
+
 Result<void> encode(const Options& options) {
     watch_for_interruption();
     auto capture = Capture::open(options.capture);
     if (!capture) return tl::unexpected(capture.error());
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
+    if (!is_given(options.encoding, "session") && may_be_live(options.output)) settings->session = random_session();
     const bool two_passes = options.encoding.passes == 2;
     // Before the first pass, so that a place that cannot be written to does not cost one.
     auto output = StreamOutput::open(options.output);

@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <string_view>
 
 #include "command_line/terminal.h"
@@ -95,6 +96,10 @@ std::string default_text(const Option& option) {
 }
 
 std::string help_of(const Option& option) {
+    if (&option == find_option("session"))
+        return wrapped(
+            capitalised(meaning_text(option)) +
+            fmt::format(" ({}, or random; default: random where the output is no file, else 0)", range_text(option)));
     if (option.kind == OptionKind::on_or_off)
         return wrapped((option.flag_off ? "Do without " : "") + meaning_text(option));
     const auto text = capitalised(meaning_text(option));
@@ -111,7 +116,9 @@ void add_option(CLI::App& command, EncodingOptions& options, const Option& optio
         return;
     }
     const auto take = [&options, &option](const std::string& text) {
-        const auto value = parse_value(as_flag(option), text);
+        const bool drawn = text == "random" && &option == find_option("session");
+        const auto value =
+            drawn ? Result<double>(static_cast<double>(random_session())) : parse_value(as_flag(option), text);
         if (!value) throw CLI::ValidationError(value.error().message);
         options.given.emplace_back(&option, *value * option.flag_factor);
     };
@@ -195,6 +202,12 @@ std::string in_flags(std::string_view sentence) {
 
 }  // namespace
 
+std::uint64_t random_session() {
+    std::random_device random;
+    constexpr std::uint64_t largest = (std::uint64_t{1} << 53) - 1;
+    return std::max<std::uint64_t>((std::uint64_t{random()} << 32 | random()) & largest, 1);
+}
+
 void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     add_quality(command, options);
     for (const auto& option : option_list())
@@ -238,6 +251,11 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     return out;
 }
 
+bool is_given(const EncodingOptions& options, std::string_view name) {
+    return std::any_of(options.given.begin(), options.given.end(),
+                       [&](const auto& given) { return given.first->name == name; });
+}
+
 std::string options_in_markdown() {
     std::string out =
         "# Options of the encoder\n\n"
@@ -268,6 +286,8 @@ std::string options_in_markdown() {
         "| `runner` | | the caller's own threads (`htvm_encoder_options_set_run_tasks` in C) |\n"
         "| `skeleton` | `--skeleton` | the capture's joints and bones; none: one bone that spans the mesh is used |\n"
         "| `radii` | `--radii` | radii of the bones, from `calibrate()` or `htvm calibrate` |\n"
+        "| `floor` | | height of the floor: its coordinate on the `up` axis, mm |\n"
+        "| `metadata` | | title, rights and other pairs of texts (`htvm_encoder_options_add_metadata` in C) |\n"
         "| `intra_coder` | `--intra` | a coder of I-frames other than TFAN |\n"
         "| `rate.first_pass` | `--passes 2` | the size of every frame in a first run |\n"
         "| `fps_numerator`, `fps_denominator` | `--fps` | default: as in the skeleton file |\n"

@@ -1,7 +1,9 @@
 // The encoder's options on the command line: those of the library's list (htvm/option_list.hpp), and a quality.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -31,8 +33,14 @@ struct EncodingOptions {
 
 void add_encoding_options(CLI::App& command, EncodingOptions& options);
 
+// A different number each time, for streams that may be live.
+std::uint64_t random_session();
+
 // Ends with a usage error (CLI::ValidationError) if options contradict each other or have no effect in the profile.
 void check_together(const EncodingOptions& options);
+
+// Whether the user set this option of the library's list.
+bool is_given(const EncodingOptions& options, std::string_view name);
 
 // The library's options for a capture; reads the file of radii if one is given.
 Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture);

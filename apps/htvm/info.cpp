@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +10,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "htvm/decoder.hpp"
+#include "htvm/frame_numbers.hpp"
 #include "rate_report.h"
 #include "stream_file.h"
 
@@ -42,9 +44,20 @@ void print_frame(const FrameInfo& f) {
         bpv(b[Layer::distance_orders]), bpv(b.total()));
 }
 
+const char* axis_name(UpAxis up) {
+    constexpr std::array names = {"unknown", "x", "-x", "y", "-y", "z", "-z"};
+    return names[static_cast<std::size_t>(up)];
+}
+
 void print_sequence(const SequenceInfo& s, const std::string& input) {
-    fmt::print("{}: {:g} frames/s, positions on a lattice of {:g} mm, captured in units of {:g} mm\n", input,
-               static_cast<double>(s.fps_numerator) / s.fps_denominator, s.lattice_step, s.unit_micrometres / 1000.0);
+    fmt::print(
+        "{}: {:g} frames/s, positions on a lattice of {:g} mm, captured in units of {:g} mm; stream version {}\n",
+        input, static_cast<double>(s.fps_numerator) / s.fps_denominator, s.lattice_step, s.unit_micrometres / 1000.0,
+        s.version);
+    if (s.session != 0) fmt::print("session: {}\n", s.session);
+    if (s.up != UpAxis::unknown)
+        fmt::print("up: {}{}\n", axis_name(s.up), s.floor ? fmt::format(", the floor at {:g} mm", *s.floor) : "");
+    for (const auto& [key, value] : s.metadata) fmt::print("{}: {}\n", key, value);
     if (!s.skeleton_tracked) {
         fmt::print("no skeleton: one bone stands in, radius {:.0f} mm\n", s.radii[0]);
         return;
@@ -57,7 +70,14 @@ void print_sequence(const SequenceInfo& s, const std::string& input) {
 nlohmann::json sequence_json(const SequenceInfo& s) {
     nlohmann::json bones = nlohmann::json::array();
     for (const auto& bone : s.skeleton.bones) bones.push_back({bone.first, bone.second});
-    return {{"fps", static_cast<double>(s.fps_numerator) / s.fps_denominator},
+    nlohmann::json metadata = nlohmann::json::array();
+    for (const auto& [key, value] : s.metadata) metadata.push_back({{"key", key}, {"value", value}});
+    return {{"version", s.version},
+            {"session", s.session},
+            {"up", axis_name(s.up)},
+            {"floor_mm", s.floor ? nlohmann::json(*s.floor) : nlohmann::json()},
+            {"metadata", metadata},
+            {"fps", static_cast<double>(s.fps_numerator) / s.fps_denominator},
             {"lattice_step_mm", s.lattice_step},
             {"unit_mm", s.unit_micrometres / 1000.0},
             {"skeleton_tracked", s.skeleton_tracked},
@@ -85,6 +105,32 @@ nlohmann::json buffer_json(const Options& options, const BufferModel& buffer) {
             {"seconds_needed", buffer.seconds_needed()}, {"overflows", buffer.overflows()}};
 }
 
+// How long the frames of a stream last: each of its sequences from its first frame to its last, and a mean frame more.
+class Duration {
+public:
+    void add(std::int64_t timestamp_us, bool begins_sequence) {
+        if (begins_sequence) end_sequence();
+        if (count_++ == 0) first_us_ = timestamp_us;
+        last_us_ = timestamp_us;
+    }
+    double seconds(double seconds_of_one_frame) {
+        end_sequence();
+        return seconds_ + static_cast<double>(single_frames_) * seconds_of_one_frame;
+    }
+
+private:
+    void end_sequence() {
+        if (count_ > 1)
+            seconds_ += (static_cast<double>(last_us_) - static_cast<double>(first_us_)) / 1e6 *
+                        static_cast<double>(count_) / static_cast<double>(count_ - 1);
+        single_frames_ += count_ == 1;
+        count_ = 0;
+    }
+    std::int64_t first_us_ = 0, last_us_ = 0;
+    std::size_t count_ = 0, single_frames_ = 0;
+    double seconds_ = 0;
+};
+
 Result<void> info(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
@@ -95,11 +141,15 @@ Result<void> info(const Options& options) {
     nlohmann::json frames = nlohmann::json::array();
     std::uint64_t bytes = 0;
     bool index = false;
-    std::int64_t first_us = 0, last_us = 0;
+    FrameNumbers numbers;
+    Duration duration;
+    nlohmann::json sequences = nlohmann::json::array();
+    std::optional<SequenceInfo> first;
     std::optional<BufferModel> buffer;
     if (options.megabits > 0) buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
     while (auto packet = input->next()) {
         if (buffer) buffer->add(*packet);
+        numbers.take(*packet);
         bytes += packet->payload.size() + packet_overhead;
         if (packet->kind == PacketKind::sequence) {
             const bool first = !headers.sequence();
@@ -112,14 +162,23 @@ Result<void> info(const Options& options) {
                     "attribs", "mapping", "fans", "d.order", "bpv");
         }
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
-        if (packet->kind == PacketKind::index) index = true;
+        if (packet->kind == PacketKind::index || packet->kind == PacketKind::front_index) index = true;
         if (!frame_type(packet->kind)) continue;
         auto frame = inspect(*packet);
         if (!frame) return tl::unexpected(frame.error());
         frame->bytes += codebooks;
         codebooks = {};
-        if (count++ == 0) first_us = frame->timestamp_us;
-        last_us = frame->timestamp_us;
+        frame->frame = numbers.of(frame->frame);
+        frame->reference = numbers.of(frame->reference);
+        if (numbers.begins_sequence() && headers.sequence()) {
+            if (!options.json && count > 0)
+                print_sequence(*headers.sequence(), fmt::format("from frame {} on, another sequence", frame->frame));
+            if (!first) first = headers.sequence();
+            sequences.push_back(sequence_json(*headers.sequence()));
+            sequences.back()["first_frame"] = frame->frame;
+        }
+        ++count;
+        duration.add(frame->timestamp_us, numbers.begins_sequence());
         add(totals, *frame);
         if (options.json) frames.push_back(frame_json(*frame));
         if (!options.json && !options.summary) print_frame(*frame);
@@ -129,12 +188,12 @@ Result<void> info(const Options& options) {
     if (!headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
     const auto& s = *headers.sequence();
-    const double seconds = count > 1 ? static_cast<double>(last_us - first_us) / 1e6 * static_cast<double>(count) /
-                                           static_cast<double>(count - 1)
-                                     : static_cast<double>(s.fps_denominator) / s.fps_numerator;
+    const double one_frame = static_cast<double>(s.fps_denominator) / s.fps_numerator;
+    const double seconds = count > 0 ? duration.seconds(one_frame) : one_frame;
     const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
     if (options.json) {
-        nlohmann::json out{{"sequence", sequence_json(s)},
+        nlohmann::json out{{"sequence", sequence_json(first ? *first : s)},
+                           {"sequences", sequences},
                            {"frames", frames},
                            {"bytes", bytes},
                            {"index", index},

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "htvm/decoder.hpp"
+#include "htvm/frame_numbers.hpp"
 #include "io/mesh_file.h"
 #include "io/sequence.h"
 #include "stream_file.h"
@@ -27,19 +28,21 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
     source.name = path;
     options.intra_coder = draco_intra_coder();
     source.next = [input = std::make_shared<StreamInput>(std::move(*input)),
-                   decoder = std::make_shared<Decoder>(options),
+                   decoder = std::make_shared<Decoder>(options), numbers = FrameNumbers(),
                    expected = std::uint32_t{0}](MeshSource& self) mutable -> Result<std::optional<Mesh>> {
         while (const auto packet = input->next()) {
+            numbers.take(*packet);
             auto frame = decoder->push(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (decoder->sequence()) self.millimetres_per_unit = decoder->sequence()->unit_micrometres / 1000.0;
             if (!*frame) continue;
             // Without this, every frame after a lost one would be compared with its neighbour.
-            if (packet->frame != expected)
+            const auto number = numbers.of(packet->frame);
+            if (number != expected)
                 return fail(ErrorKind::corrupt_stream,
                             fmt::format("{} has frame {} where frame {} is due: frames were lost; decode it, and give "
                                         "the same frames on both sides",
-                                        self.name, packet->frame, expected));
+                                        self.name, number, expected));
             ++expected;
             return std::optional(std::move((*frame)->mesh));
         }

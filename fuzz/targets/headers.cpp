@@ -3,6 +3,7 @@
 #include "codec/stream/frame_payload.h"
 #include "codec/stream/sequence.h"
 #include "fuzz_input.h"
+#include "htvm/stream_index.hpp"
 
 namespace {
 
@@ -31,6 +32,18 @@ void check_index(std::span<const std::uint8_t> bytes) {
     require(again && *again == *index, "an index comes back");
 }
 
+void check_front_index(std::span<const std::uint8_t> bytes) {
+    Packet packet;
+    packet.kind = PacketKind::front_index;
+    packet.payload.assign(bytes.begin(), bytes.end());
+    const auto index = read_index(packet);
+    if (!index) return;
+    require(index->points.size() + index->sequences.size() <= bytes.size(), "no more entries than bytes");
+    const auto again = read_index(write_index(*index));
+    require(again && *again == *index, "an index in front comes back");
+    for (const auto& point : index->points) require(point_before(*index, point.frame), "every entry is found");
+}
+
 void check_payload(std::span<const std::uint8_t> bytes) {
     const auto payload = read_frame_payload(bytes);
     if (!payload) return;
@@ -46,9 +59,10 @@ void check_payload(std::span<const std::uint8_t> bytes) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     fuzz::FuzzInput input(data, size);
-    const std::uint8_t what = input.u8() % 3;
+    const std::uint8_t what = input.u8() % 4;
     if (what == 0) check_header(input.rest());
     if (what == 1) check_index(input.rest());
     if (what == 2) check_payload(input.rest());
+    if (what == 3) check_front_index(input.rest());
     return 0;
 }

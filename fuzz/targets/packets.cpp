@@ -7,8 +7,8 @@ using namespace htvm;
 using fuzz::require;
 
 bool same(const Packet& a, const Packet& b) {
-    return a.kind == b.kind && a.frame == b.frame && a.reference == b.reference && a.timestamp_us == b.timestamp_us &&
-           a.payload == b.payload;
+    return a.kind == b.kind && a.flags == b.flags && a.reference_version == b.reference_version && a.frame == b.frame &&
+           a.reference == b.reference && a.timestamp_us == b.timestamp_us && a.payload == b.payload;
 }
 
 bool same(const std::vector<Packet>& a, const std::vector<Packet>& b) {

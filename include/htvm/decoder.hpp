@@ -7,10 +7,10 @@
 // decode() lends the frame: its arrays belong to the decoder, which reuses them for the next frame. push() returns a
 // copy.
 //
-// EP- and P-frames refer only to I-frames (and to codebook packets), so any of them may be left out; a lost codebook
-// costs the frames that use it, until the next one. T-frames refer to the I-frame or, by default, to the previous
-// T-frame: then a lost one costs those up to the next frame that refers to an I-frame, or is one. A decoder may start
-// at any I-frame once it has the sequence header.
+// What a frame needs, and what may be left out, is in dependency.hpp: EP- and P-frames refer only to I-frames (and to
+// codebook packets), so any of them may be left out; a lost codebook costs the frames that use it, until the next one.
+// T-frames refer to the I-frame or, by default, to the previous T-frame: then a lost one costs those up to the next
+// frame that refers to an I-frame, or is one. A decoder may start at any I-frame once it has the sequence header.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +23,7 @@
 #include "htvm/mesh.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
 #include "htvm/threads.hpp"
 
@@ -46,13 +47,21 @@ struct DecoderOptions {
 
 // The contents of the sequence header.
 struct SequenceInfo {
-    double lattice_step = 0;  // mm: decoded positions are the origin plus multiples of this
+    std::uint16_t version = 2;  // of the stream
+    // Number of this sequence in the stream, from 0. A different header begins another sequence; in joined files, so
+    // does a header at which the frame numbers start again.
+    std::uint32_t ordinal = 0;
+    std::uint64_t session = 0;  // of the live publisher; 0: none
+    double lattice_step = 0;    // mm: decoded positions are the origin plus multiples of this
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
     std::uint32_t unit_micrometres = 1000;  // the unit in which the capture was given
     bool skeleton_tracked = true;           // false: the capture has no skeleton, and one bone stands in for it
     Skeleton skeleton;
     std::vector<double> radii;  // mm, one per bone
     int nearest_vertices = 16;  // m of the distance order
+    UpAxis up = UpAxis::unknown;
+    std::optional<double> floor;  // mm, coordinate on the axis that is up; none: not known
+    std::vector<MetadataEntry> metadata;
 };
 
 // A frame on loan: valid until the next non-const call on the decoder, or until the decoder is moved or destroyed.
@@ -92,8 +101,8 @@ public:
     // loan ends.
     Result<std::optional<FrameView>> decode(const Packet& packet);
     // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh, moved as this frame says
-    // if that much of it could be read, else as the last frame; after T-frames, the last of them again. Nothing before
-    // an I-frame, or if memory ran out.
+    // if that much of it could be read, else as the last frame; after T-frames, the last of them again; after an
+    // I-frame that nothing refers to, that one. Nothing before an I-frame, or if memory ran out.
     std::optional<FrameView> stand_in(std::uint32_t frame, std::int64_t timestamp_us);
     // Like decode() and stand_in(), but with a copy.
     Result<std::optional<DecodedFrame>> push(const Packet& packet);

@@ -8,6 +8,7 @@
 
 #include "htvm/frame.hpp"
 #include "htvm/intra_coder.hpp"
+#include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
 #include "htvm/threads.hpp"
 
@@ -98,6 +99,13 @@ struct EncoderOptions {
     TaskRunner runner;           // provides the threads; empty: the encoder has a pool of its own
     std::uint32_t fps_numerator = 30, fps_denominator = 1;  // frames per second, for players
     std::uint32_t unit_micrometres = 1000;  // the capture's own unit, kept so that a decoder can restore it
+    // A live publisher sets it to a new random number each time it starts, so that viewers do not mistake its packets
+    // for those of an earlier run. 0: none, for files that are the same each time. At most 2^53 - 1, which JSON can
+    // hold.
+    std::uint64_t session = 0;
+    UpAxis up = UpAxis::unknown;          // the direction of the subject's head
+    std::optional<double> floor;          // mm: the floor's coordinate on the axis that is up, which must be known
+    std::vector<MetadataEntry> metadata;  // sent with every sequence header: keep it short in live streams
     Skeleton skeleton;          // without bones: the capture has no skeleton, and one bone that spans the mesh is used
     std::vector<double> radii;  // mm, one per bone, from calibrate(); empty: calibrated on the first frame
     std::optional<ExternalIntraCoder> intra_coder;  // codes I-frames; none: TFAN

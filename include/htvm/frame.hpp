@@ -93,6 +93,7 @@ struct FrameInfo {
     FrameType type = FrameType::intra;
     std::uint32_t frame = 0;
     std::uint32_t reference = 0;    // number of the frame it refers to; for a T-frame the I-frame or the previous frame
+    std::uint32_t sequence = 0;     // of a decoded frame: SequenceInfo::ordinal
     std::int64_t timestamp_us = 0;  // microseconds
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
     std::uint32_t vertices = 0, triangles = 0;                // of the decoded mesh

@@ -129,7 +129,7 @@ typedef struct htvm_frame_info {
     uint64_t bytes;                             /* of its packet */
     uint32_t topology; /* frames of a decoder with the same number have the same triangles and texture coordinates; 0
                           from an encoder */
-    uint32_t reserved; /* 0 */
+    uint32_t sequence; /* which sequence of the stream it belongs to, as in htvm_sequence_info; 0 from an encoder */
 } htvm_frame_info;
 
 /* ---- decoder -------------------------------------------------------------------------------------------------- */
@@ -225,6 +225,17 @@ htvm_status htvm_decoder_copy_texcoords(htvm_decoder* decoder, float* texcoords,
 htvm_status htvm_decoder_copy_joints(htvm_decoder* decoder, double* joints, size_t capacity);       /* 3 per joint */
 htvm_status htvm_decoder_copy_orientations(htvm_decoder* decoder, double* rotations, size_t capacity); /* 9 per bone */
 
+/* where the subject's head is */
+enum {
+    HTVM_UP_UNKNOWN = 0,
+    HTVM_UP_X = 1,
+    HTVM_UP_MINUS_X = 2,
+    HTVM_UP_Y = 3,
+    HTVM_UP_MINUS_Y = 4,
+    HTVM_UP_Z = 5,
+    HTVM_UP_MINUS_Z = 6
+};
+
 typedef struct htvm_sequence_info {
     uint32_t struct_size; /* number of bytes of this struct that were filled in */
     uint32_t joints, bones;
@@ -233,6 +244,14 @@ typedef struct htvm_sequence_info {
     uint32_t unit_micrometres;               /* the unit in which the capture was given */
     uint32_t nearest_vertices;               /* m of the distance order */
     double lattice_step;                     /* mm: decoded positions are the origin plus multiples of this */
+    uint64_t session;                        /* of the live publisher, drawn anew for each run; 0: none */
+    uint32_t sequence;                       /* which sequence of the stream it is, from 0: joined files are several */
+    uint32_t stream_version;                 /* of the stream, as htvm_stream_version() is of the library */
+    uint32_t up;                             /* HTVM_UP_... */
+    uint32_t floor_known;                    /* 1: floor is */
+    double floor;                            /* mm: the floor's coordinate on the axis that is up */
+    uint32_t metadata;                       /* how many entries htvm_decoder_metadata() has */
+    uint32_t reserved;                       /* 0 */
 } htvm_sequence_info;
 
 /* The contents of the sequence header. HTVM_AGAIN until one was decoded. */
@@ -244,6 +263,12 @@ htvm_status htvm_decoder_joint_name(htvm_decoder* decoder, uint32_t joint, char*
 /* The two joints of the bone, first the one that it turns about, and its radius in mm. Each pointer may be NULL. */
 htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* first, uint32_t* second, double* radius);
 
+/* An entry of the metadata: a key and a value in UTF-8, each terminated by a 0. HTVM_BUFFER_TOO_SMALL below their
+ * lengths
+ * + 1; 256 for keys and 4096 for values is always enough. Players know the keys "title", "rights" and "timecode". */
+htvm_status htvm_decoder_metadata(htvm_decoder* decoder, uint32_t entry, char* key, size_t key_capacity, char* value,
+                                  size_t value_capacity);
+
 /* Where the current frame's bytes went: bytes[0] headers, counts and checksums, bytes[n] the layer of number n
  * (docs/bitstream.md, section 4). HTVM_LAYERS numbers are always enough. HTVM_BAD_INPUT: there is no current frame.
  * HTVM_BUFFER_TOO_SMALL below HTVM_LAYERS. */
@@ -251,6 +276,50 @@ enum { HTVM_LAYERS = 12 };
 htvm_status htvm_decoder_layer_bytes(htvm_decoder* decoder, uint64_t* bytes, size_t capacity);
 /* What people call layer n: "geometry"; "overhead" for 0. NULL where there is no such layer. */
 const char* htvm_layer_name(uint32_t layer);
+
+/* ---- what a frame needs --------------------------------------------------------------------------------------- */
+
+/* flags of a packet: bits */
+enum {
+    HTVM_PACKET_REFERRED = 1,  /* of a frame: later frames may refer to it */
+    HTVM_PACKET_ACCESS = 2,    /* of a frame: it needs no frame but the one it refers to, which needs none */
+    HTVM_PACKET_DROPPABLE = 4, /* of a frame: it may be left out without affecting any other */
+    HTVM_PACKET_COLOUR = 8,    /* of a codebook: of the colours, not of the geometry */
+    HTVM_PACKET_SESSION = 16,  /* of a sequence header: its session is not 0 */
+    HTVM_PACKET_TOLD = 128     /* the other bits are valid */
+};
+
+typedef struct htvm_packet_info {
+    uint32_t struct_size; /* bytes of this struct that were filled */
+    uint32_t kind;        /* of packet: docs/bitstream.md, section 2 */
+    uint32_t flags;       /* HTVM_PACKET_...; for streams of version 1 they are derived */
+    uint32_t frame;       /* number of the frame that it is, or came with */
+    uint32_t reference;   /* number of the frame that it refers to */
+    uint32_t reference_version;
+    int64_t timestamp_us;
+    uint64_t bytes; /* of the whole packet */
+} htvm_packet_info;
+
+/* Reads the header of a whole packet. HTVM_CORRUPT_STREAM: it is not one whole, undamaged packet. */
+htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_info* info, size_t info_size);
+
+/* Determines what frames need, for programs that forward, record or cut a stream without decoding it. */
+typedef struct htvm_dependencies htvm_dependencies;
+
+/* allocator: NULL for malloc and free. *dependencies is set to NULL unless the status is HTVM_OK. */
+htvm_status htvm_dependencies_create(const htvm_allocator* allocator, htvm_dependencies** dependencies);
+void htvm_dependencies_destroy(htvm_dependencies* dependencies);
+
+/* Takes the next packet of a stream, as htvm_packet_read() gives it. *place, which may be NULL, is set to 0 for the
+ * first packet, and so on. */
+htvm_status htvm_dependencies_push(htvm_dependencies* dependencies, const htvm_packet_info* info, uint64_t* place);
+
+/* The places of exactly the packets that the newest frame needs, in the order to decode them, itself last; none if
+ * it cannot be decoded. *count is set to how many; HTVM_BUFFER_TOO_SMALL if capacity is less. */
+htvm_status htvm_dependencies_closure(htvm_dependencies* dependencies, uint64_t* places, size_t capacity,
+                                      size_t* count);
+/* Likewise what later frames may need. All other packets can be forgotten; a viewer that joins late is sent these. */
+htvm_status htvm_dependencies_kept(htvm_dependencies* dependencies, uint64_t* places, size_t capacity, size_t* count);
 
 /* ---- index ---------------------------------------------------------------------------------------------------- */
 
@@ -317,6 +386,14 @@ htvm_status htvm_encoder_options_get_number(htvm_encoder_options* options, const
 
 /* Copies the skeleton. NULL, the default: the capture has none. */
 htvm_status htvm_encoder_options_set_skeleton(htvm_encoder_options* options, const htvm_skeleton* skeleton);
+
+/* Adds an entry to the metadata that every sequence header carries; both in UTF-8. Keys that players know: "title",
+ * "rights", "timecode" (of the first frame, HH:MM:SS:FF). Limits, checked by htvm_encoder_create(): 255 entries, 255
+ * bytes a key, 4095 a value, 16384 in all. */
+htvm_status htvm_encoder_options_add_metadata(htvm_encoder_options* options, const char* key, const char* value);
+
+/* Says where the floor is, mm: its coordinate on the axis that the option "up" names. */
+htvm_status htvm_encoder_options_set_floor(htvm_encoder_options* options, double floor);
 
 /* Provides the encoder's threads, of which it uses at most as many at once as the option "threads" says. NULL, the
  * default: a pool of the encoder's own. user is passed to run_tasks. */

@@ -2,14 +2,17 @@
 #pragma once
 
 #include "htvm/decoder.hpp"          // IWYU pragma: export
+#include "htvm/dependency.hpp"       // IWYU pragma: export
 #include "htvm/encoder.hpp"          // IWYU pragma: export
 #include "htvm/encoder_options.hpp"  // IWYU pragma: export
 #include "htvm/frame.hpp"            // IWYU pragma: export
+#include "htvm/frame_numbers.hpp"    // IWYU pragma: export
 #include "htvm/intra_coder.hpp"      // IWYU pragma: export
 #include "htvm/lattice_mesh.hpp"     // IWYU pragma: export
 #include "htvm/mesh.hpp"             // IWYU pragma: export
 #include "htvm/option_list.hpp"      // IWYU pragma: export
 #include "htvm/packet.hpp"           // IWYU pragma: export
 #include "htvm/result.hpp"           // IWYU pragma: export
+#include "htvm/scene.hpp"            // IWYU pragma: export
 #include "htvm/skeleton.hpp"         // IWYU pragma: export
 #include "htvm/threads.hpp"          // IWYU pragma: export

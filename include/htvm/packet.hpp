@@ -13,24 +13,50 @@
 namespace htvm {
 
 enum class PacketKind : std::uint8_t {
-    sequence = 1,   // sequence header: needed before any frame; may be repeated
-    intra = 2,      // I-frame
-    enhanced = 3,   // EP-frame: refers to an I-frame
-    codebook = 4,   // a codebook that later EP-frames refer to
-    index = 5,      // positions of the I-frames, at the end of a file; optional
-    predicted = 6,  // P-frame: the I-frame's mesh moved
-    tracked = 7,    // T-frame: the I-frame's mesh laid on the captured surface
+    sequence = 1,     // sequence header: needed before any frame; may be repeated
+    intra = 2,        // I-frame
+    enhanced = 3,     // EP-frame: refers to an I-frame
+    codebook = 4,     // a codebook that later EP-frames refer to
+    index = 5,        // positions of the I-frames, at the end of a stream; optional
+    predicted = 6,    // P-frame: the I-frame's mesh moved
+    tracked = 7,      // T-frame: the I-frame's mesh laid on the captured surface
+    front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
+    checkpoint = 9,   // reserved: a reference for viewers who join late; not shown
 };
 
-struct Packet {
+// Bits of PacketHeader::flags (docs/bitstream.md, section 2.1), for programs that do not decode the packet.
+namespace packet_flag {
+inline constexpr std::uint8_t referred = 1;   // frames: later frames may refer to it
+inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but the one it refers to, which needs none
+inline constexpr std::uint8_t droppable = 4;  // frames: it may be left out without affecting any other frame
+inline constexpr std::uint8_t colour = 8;     // codebooks: it is for colours, not for geometry
+inline constexpr std::uint8_t session = 16;   // sequence headers: the session is not 0
+inline constexpr std::uint8_t told = 128;     // the other bits are valid; encoders of version 1 wrote 0
+}  // namespace packet_flag
+
+// A packet without its payload: what dependency.hpp works on.
+struct PacketHeader {
     PacketKind kind = PacketKind::sequence;
-    std::uint32_t frame = 0;        // number of the frame that it holds, or came with
-    std::uint32_t reference = 0;    // number of the I-frame that it refers to; for an I-frame, its own
-    std::int64_t timestamp_us = 0;  // of the frame, microseconds
+    std::uint8_t flags = 0;               // of packet_flag
+    std::uint16_t reference_version = 0;  // version of the reference; 0 for now
+    std::uint32_t frame = 0;              // number of the frame that it holds, or came with
+    std::uint32_t reference = 0;          // number of the frame that it refers to; for an I-frame, its own; for a
+                                          // sequence header, the CRC-32 of its payload
+    std::int64_t timestamp_us = 0;        // of the frame, microseconds
+    bool has(std::uint8_t flag) const { return (flags & flag) != 0; }
+};
+
+struct Packet : PacketHeader {
     std::vector<std::uint8_t> payload;
 };
 
 inline constexpr std::size_t packet_overhead = 36;  // bytes around the payload: a header of 32 and a CRC of 4
+
+inline constexpr std::size_t packet_header_bytes = 32;
+
+// The header at the beginning of the bytes, or nothing if there is none or its checksum is wrong. payload_bytes: set to
+// the size of the payload, which is followed by a CRC of four bytes.
+std::optional<PacketHeader> read_packet_header(std::span<const std::uint8_t> bytes, std::uint32_t& payload_bytes);
 
 // The bytes of the packet, ready to be stored or sent.
 std::vector<std::uint8_t> write_packet(const Packet& packet);

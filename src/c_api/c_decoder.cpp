@@ -9,6 +9,9 @@
 #include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 
+static_assert(HTVM_UP_UNKNOWN == static_cast<int>(htvm::UpAxis::unknown) &&
+              HTVM_UP_MINUS_Z == static_cast<int>(htvm::UpAxis::minus_z));
+
 using htvm::c_api::check_struct;
 using htvm::c_api::guarded;
 using htvm::c_api::LastError;
@@ -306,6 +309,13 @@ htvm_status htvm_decoder_sequence(htvm_decoder* decoder, htvm_sequence_info* inf
     out.unit_micrometres = sequence->unit_micrometres;
     out.nearest_vertices = static_cast<std::uint32_t>(sequence->nearest_vertices);
     out.lattice_step = sequence->lattice_step;
+    out.session = sequence->session;
+    out.sequence = sequence->ordinal;
+    out.stream_version = sequence->version;
+    out.up = static_cast<std::uint32_t>(sequence->up);
+    out.floor_known = sequence->floor.has_value();
+    out.floor = sequence->floor.value_or(0);
+    out.metadata = static_cast<std::uint32_t>(sequence->metadata.size());
     const auto written = htvm::c_api::write_struct(out, info, info_size);
     return written == HTVM_OK ? HTVM_OK : decoder->error.set(written, "info is NULL or info_size not its sizeof");
 }
@@ -319,6 +329,21 @@ htvm_status htvm_decoder_joint_name(htvm_decoder* decoder, uint32_t joint, char*
     if (capacity < names[joint].size() + 1)
         return decoder->error.set(HTVM_BUFFER_TOO_SMALL, "the joint's name is longer than its array");
     std::memcpy(name, names[joint].c_str(), names[joint].size() + 1);
+    return HTVM_OK;
+}
+
+htvm_status htvm_decoder_metadata(htvm_decoder* decoder, uint32_t entry, char* key, size_t key_capacity, char* value,
+                                  size_t value_capacity) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    const auto& sequence = decoder->decoder.sequence();
+    if (!sequence) return HTVM_AGAIN;
+    if (entry >= sequence->metadata.size() || !key || !value)
+        return decoder->error.set(HTVM_BAD_INPUT, "no such entry, or key or value is NULL");
+    const auto& texts = sequence->metadata[entry];
+    if (key_capacity <= texts.key.size() || value_capacity <= texts.value.size())
+        return decoder->error.set(HTVM_BUFFER_TOO_SMALL, "the key or the value is longer than its array");
+    std::memcpy(key, texts.key.c_str(), texts.key.size() + 1);
+    std::memcpy(value, texts.value.c_str(), texts.value.size() + 1);
     return HTVM_OK;
 }
 

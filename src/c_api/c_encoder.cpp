@@ -205,6 +205,21 @@ htvm_status htvm_encoder_options_set_skeleton(htvm_encoder_options* options, con
     });
 }
 
+htvm_status htvm_encoder_options_add_metadata(htvm_encoder_options* options, const char* key, const char* value) {
+    if (!options) return HTVM_BAD_INPUT;
+    return guarded(options->error, [&] {
+        if (!key || !value) return options->error.set(HTVM_BAD_INPUT, "the key or the value is NULL");
+        options->options.metadata.push_back({key, value});
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_encoder_options_set_floor(htvm_encoder_options* options, double floor) {
+    if (!options) return HTVM_BAD_INPUT;
+    options->options.floor = floor;
+    return HTVM_OK;
+}
+
 htvm_status htvm_encoder_options_set_run_tasks(htvm_encoder_options* options, htvm_run_tasks run_tasks, void* user) {
     if (!options) return HTVM_BAD_INPUT;
     return guarded(options->error, [&] {

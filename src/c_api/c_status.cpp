@@ -91,6 +91,7 @@ htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes) {
     out.attributes = attributes;
     out.type = static_cast<std::uint32_t>(info.type);
     out.frame = info.frame;
+    out.sequence = info.sequence;
     out.reference = info.reference;
     out.timestamp_us = info.timestamp_us;
     out.source_vertices = info.source_vertices;

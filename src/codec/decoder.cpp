@@ -1,6 +1,7 @@
 // The decoder: checks a packet, has the decoder of its kind make a mesh of it, and shows that mesh.
 #include "htvm/decoder.hpp"
 
+#include <algorithm>
 #include <new>
 #include <stdexcept>
 
@@ -58,8 +59,15 @@ Result<void> check_reference(const DecoderState& state, const Packet& packet) {
 
 namespace {
 
-SequenceInfo describe(const SequenceHeader& header) {
+SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
     SequenceInfo info;
+    info.version = header.version;
+    info.ordinal = ordinal;
+    info.session = header.session;
+    info.up = header.up;
+    if (header.floor)
+        info.floor = to_millimetres({*header.floor, *header.floor, *header.floor}, header.lattice)[axis_of(header.up)];
+    info.metadata = header.metadata;
     info.lattice_step = header.lattice.step();
     info.fps_numerator = header.fps_numerator;
     info.fps_denominator = header.fps_denominator;
@@ -77,12 +85,16 @@ Result<void> take_header(DecoderState& state, const Packet& packet) {
     if (!header) return tl::unexpected(header.error());
     if (auto ok = check_limits(*header, state.options); !ok) return tl::unexpected(ok.error());
     // A repeated header changes nothing; a different one begins another sequence.
-    if (state.header && state.header_payload == packet.payload) return {};
-    auto info = describe(*header);
+    const bool same = state.header && state.header_payload == packet.payload;
+    if (!begins_sequence(same, header->session != 0, packet.frame, state.highest_frame)) return {};
+    auto info = describe(*header, state.sequences);
     auto payload = packet.payload;
+    ++state.sequences;
+    state.highest_frame.reset();
     state.reference.reset();
     state.bones = {};
     state.tracked = {};
+    state.alone.reset();
     state.info = std::move(info);
     state.header = std::move(*header);
     state.header_payload = std::move(payload);
@@ -108,6 +120,7 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
     const bool nodes = state.reference && state.reference->tracked;
     if (nodes || rules.refers_to == RefersTo::intra_or_before) kept += memory_of_tracking(held);
     if (rules.refers_to == RefersTo::nothing && state.header->node_spacing > 0) kept += memory_of_tracking(coded);
+    if (state.alone) kept += memory_of_reference(counts(state.alone->mesh));
     return kept;
 }
 
@@ -171,10 +184,14 @@ Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet)
     if (auto ok = check_limits(packet, state.options); !ok) return tl::unexpected(ok.error());
     if (const auto type = frame_type(packet.kind)) {
         const auto& rules = rules_of(*type);
+        if (state.header) state.highest_frame = std::max(state.highest_frame.value_or(0), packet.frame);
         const auto payload = read_frame(state, packet, rules);
         if (!payload) return tl::unexpected(payload.error());
         if (auto ok = rules.decode(state, packet, *payload); !ok) return tl::unexpected(ok.error());
-        return Taken{lend(state.shown, describe(packet, *type, *payload))};
+        if (*type != FrameType::intra) state.alone.reset();
+        auto info = describe(packet, *type, *payload);
+        info.sequence = state.sequences - 1;
+        return Taken{lend(state.shown, info)};
     }
     Result<void> taken;
     if (packet.kind == PacketKind::sequence) taken = take_header(state, packet);
@@ -231,11 +248,12 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
 std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) try {
     auto& state = *state_;
     take_back(state.shown);
-    if (!show_last_tracked(state) && !show_moved_by_bones(state)) return std::nullopt;
+    if (!show_intra_alone(state) && !show_last_tracked(state) && !show_moved_by_bones(state)) return std::nullopt;
     FrameInfo info;
+    info.sequence = state.sequences - 1;
     info.type = FrameType::predicted;
     info.frame = frame;
-    info.reference = state.reference->number;
+    info.reference = state.alone ? state.alone->frame : state.reference->number;
     info.timestamp_us = timestamp_us;
     auto out = lend(state.shown, info);
     out.concealed = true;

@@ -1,4 +1,4 @@
-// Decodes I-frames: complete meshes that later frames refer to.
+// Decodes I-frames: complete meshes that later frames refer to unless the packet tells otherwise.
 #include "codec/decoder_state.h"
 #include "codec/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
@@ -9,10 +9,11 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     const auto& header = *state.header;
     auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
     if (!pose) return tl::unexpected(pose.error());
+    const bool referred = is_referred(packet, rules_of(FrameType::intra));
     // What is derived for T-frames takes much memory, so it is freed before the next I-frame is decoded; without this,
     // a stream of many I-frames would need half as much memory again as a stream with one. It can be rebuilt from the
     // mesh: if this frame turns out to be bad, the next T-frame does so.
-    if (state.reference) state.reference->tracked.reset();
+    if (state.reference && referred) state.reference->tracked.reset();
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(payload, external ? &*external : nullptr);
     if (!mesh) return tl::unexpected(mesh.error());
@@ -20,19 +21,32 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     for (const auto joint : pose->joints) shown.joints.push_back(to_millimetres(joint, header.lattice));
     for (const auto& rotation : pose->orientations)
         shown.orientations.push_back(to_rotation(rotation_matrix(rotation)));
+    const auto topology = new_topology(state);
+    if (!referred) {
+        IntraAlone alone{packet.frame, topology, std::move(*mesh), std::move(shown)};
+        show(state, view_of(alone.mesh), topology, alone.pose);
+        state.alone = std::move(alone);
+        return {};
+    }
     // T-frames need the nodes at once; what depends on bones is built when a frame asks for it.
     auto reference = make_reference(header, packet.frame, std::move(*mesh), std::move(*pose),
                                     static_cast<std::int32_t>(payload.header.geometry_step),
                                     {.bones = false, .nodes = true}, state.threads);
     if (!reference) return tl::unexpected(reference.error());
-    const auto topology = new_topology(state);
     show(state, view_of(reference->mesh()), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*reference);
     state.reference_topology = topology;
     state.bones = {};
     state.tracked = {};
+    state.alone.reset();
     return {};
+}
+
+bool show_intra_alone(DecoderState& state) {
+    if (!state.alone) return false;
+    show(state, view_of(state.alone->mesh), state.alone->topology, state.alone->pose);
+    return true;
 }
 
 }  // namespace htvm::internal

@@ -48,11 +48,19 @@ struct DecodedBones {
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
-// State left by the T-frames since the I-frame: the last one's, and arrays for the next, which replaces the previous
-// one.
+// State left by the T-frames since the I-frame: the last one that later ones may refer to, and arrays for the next. A
+// frame that nothing refers to stays in those.
 struct DecodedNodes {
-    std::optional<std::uint32_t> frame;  // number of the last one, if any
+    std::optional<std::uint32_t> frame;  // number of the last one that may be referred to, if any
     DecodedTrackedFrame last, next;
+    enum class Newest : std::uint8_t { none, last, next } newest = Newest::none;
+    Pose pose;  // of the newest
+};
+
+// An I-frame that nothing refers to: kept only to be shown again where the frame behind it is missing.
+struct IntraAlone {
+    std::uint32_t frame = 0, topology = 0;
+    LatticeMesh mesh;
     Pose pose;
 };
 
@@ -63,11 +71,14 @@ struct DecoderState {
     std::optional<SequenceHeader> header;
     std::vector<std::uint8_t> header_payload;
     std::optional<SequenceInfo> info;
+    std::uint32_t sequences = 0;                 // begun so far
+    std::optional<std::uint32_t> highest_frame;  // met in this one, decoded or not
     std::optional<Reference> reference;
     std::uint32_t reference_topology = 0;
     std::uint32_t topologies = 0;  // how many numbers were given out
     DecodedBones bones;
     DecodedNodes tracked;
+    std::optional<IntraAlone> alone;  // where that is the newest frame
     ShownFrame shown;
 };
 
@@ -88,6 +99,7 @@ Rotation to_rotation(const RotationMatrix& matrix);
 Rotation product(const Rotation& a, const Rotation& b);
 
 // Stand-ins for a missing frame, shown as if decoded. False if there is nothing to derive one from.
+bool show_intra_alone(DecoderState& state);
 bool show_last_tracked(DecoderState& state);
 bool show_moved_by_bones(DecoderState& state);
 

@@ -47,21 +47,28 @@ Result<void> decode_tracked(DecoderState& state, const Packet& packet, const Fra
     if (!of_frame_before)
         if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
     if (auto ok = derive_nodes(*state.reference, *state.header, state.threads); !ok) return tl::unexpected(ok.error());
+    using enum DecodedNodes::Newest;
+    if (history.newest == next) history.newest = history.frame ? last : none;  // its arrays are written over
     if (auto ok = decode_tracked_frame(payload, *state.reference->tracked,
                                        of_frame_before ? &history.last.state : nullptr, state.threads, history.next);
         !ok)
         return tl::unexpected(ok.error());
     auto pose = tracked_pose(state, history.next.state.transforms);
     show_tracked(state, history.next, pose);
-    std::swap(history.last, history.next);
-    history.frame = packet.frame;
     history.pose = std::move(pose);
+    history.newest = next;
+    if (!is_referred(packet, rules_of(FrameType::tracked))) return {};
+    std::swap(history.last, history.next);
+    history.newest = last;
+    history.frame = packet.frame;
     return {};
 }
 
 bool show_last_tracked(DecoderState& state) {
-    if (!state.tracked.frame) return false;
-    show_tracked(state, state.tracked.last, state.tracked.pose);
+    const auto& history = state.tracked;
+    using enum DecodedNodes::Newest;
+    if (history.newest == none) return false;
+    show_tracked(state, history.newest == last ? history.last : history.next, history.pose);
     return true;
 }
 

@@ -115,6 +115,16 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
     header.fps_numerator = options.fps_numerator;
     header.fps_denominator = options.fps_denominator;
     header.unit_micrometres = options.unit_micrometres;
+    header.session = options.session;
+    header.up = options.up;
+    header.metadata = options.metadata;
+    if (options.floor) {
+        const auto origin_up = static_cast<double>(header.lattice.origin[axis_of(options.up)]);
+        const double floor = std::round((*options.floor - origin_up) * units);
+        if (!(std::abs(floor) <= lattice_limit))
+            return fail(ErrorKind::bad_input, "the floor is too far from the first frame's mesh");
+        header.floor = static_cast<std::int32_t>(floor);
+    }
     header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
     header.weight_width = on_lattice(options.topology.weight_width * units);
     if (configuration.tracked()) {
@@ -147,11 +157,15 @@ void send(Output& output, Packet packet) {
 }
 
 void send_header(State& state, std::int64_t timestamp_us) {
-    Packet header;
-    header.payload = write_sequence_header(state.configuration.header);
+    auto header = sequence_packet(state.configuration.header);
     header.frame = state.output.header_sent = state.sequence.next_frame;
     header.timestamp_us = timestamp_us;
     send(state.output, std::move(header));
+}
+
+std::uint8_t flags_of(const Candidate& candidate) {
+    using namespace packet_flag;
+    return static_cast<std::uint8_t>((candidate.referred ? referred : droppable) | (candidate.access ? access : 0));
 }
 
 // Numbers and queues a frame's packets, and counts their bytes by layer.
@@ -161,17 +175,20 @@ void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us) {
         packet.frame = state.sequence.next_frame;
         packet.reference = candidate.reference;
         packet.timestamp_us = timestamp_us;
+        packet.flags |= packet_flag::told;
         if (packet.kind == PacketKind::codebook) {
             codebooks.overhead += packet_overhead;
             codebooks[packet.payload[0] == codebook_for_geometry ? Layer::geometry : Layer::colour] +=
                 packet.payload.size();
             continue;
         }
+        packet.flags |= flags_of(candidate);
         state.info = *inspect(packet);
         state.info.vertices = static_cast<std::uint32_t>(candidate.decoded.positions.size());
         state.info.triangles = static_cast<std::uint32_t>(candidate.decoded.triangles.size());
         state.info.bytes += codebooks;
-        if (packet.kind == PacketKind::intra)
+        // Where nothing refers to it while others are referred to, it is no place to start from.
+        if (packet.kind == PacketKind::intra && (candidate.referred || state.configuration.intra_alone()))
             state.output.index.push_back({packet.frame, packet.timestamp_us, state.output.stream_bytes});
     }
     for (auto& packet : candidate.packets) send(state.output, std::move(packet));
@@ -292,6 +309,7 @@ void Encoder::finish() try {
     state.finished = true;
     Packet packet;
     packet.kind = PacketKind::index;
+    packet.flags = packet_flag::told;
     packet.frame = state.sequence.next_frame;
     packet.timestamp_us = *state.last_timestamp;
     packet.payload = write_sequence_index(state.output.index);

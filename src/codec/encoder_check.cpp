@@ -1,8 +1,10 @@
 #include "codec/encoder_check.h"
 
+#include <cmath>
 #include <string>
 
 #include "codec/stream/frame_payload.h"
+#include "codec/stream/sequence.h"
 #include "htvm/option_list.hpp"
 
 namespace htvm::internal {
@@ -36,6 +38,14 @@ Result<void> check_that_options_go_together(const EncoderOptions& o) {
     return {};
 }
 
+Result<void> check_scene(const EncoderOptions& o) {
+    constexpr std::uint64_t largest_session = (std::uint64_t{1} << 53) - 1;
+    if (o.session > largest_session) return bad("session must be at most 2^53 - 1");
+    if (o.floor && o.up == UpAxis::unknown) return bad("the floor is known, but not what is up: set up too");
+    if (o.floor && !std::isfinite(*o.floor)) return bad("the floor must be a finite number of millimetres");
+    return check_metadata(o.metadata);
+}
+
 Result<void> check_skeleton(const EncoderOptions& o) {
     const auto& skeleton = o.skeleton;
     if (skeleton.joint_names.size() > 1024 || skeleton.bones.size() > 1024)
@@ -59,6 +69,7 @@ Result<void> check(const EncoderOptions& o) {
     if (o.intra_coder &&
         (o.intra_coder->number == intra_coder_tfan || !o.intra_coder->encode || !o.intra_coder->decode))
         return bad("the intra coder must have a number above 0, encode and decode");
+    if (auto fine = check_scene(o); !fine) return fine;
     return check_skeleton(o);
 }
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::array<const char*, 2> tracked_references = {"intra", "previous"};
 constexpr std::array<const char*, 4> frame_choices = {"fixed", "motion", "rd", "cheaper"};
+constexpr std::array<const char*, 7> up_axes = {"unknown", "x", "-x", "y", "-y", "z", "-z"};
 constexpr std::array<const char*, 2> reference_vertices = {"bone", "any"};
 constexpr std::array<const char*, 2> bone_registrations = {"point", "plane"};
 
@@ -127,6 +128,24 @@ constexpr Option list[] = {
      .meaning = "the capture's own unit, kept so that a decoder can restore it; meshes are passed in mm in any case",
      .get = [](const EncoderOptions& o) -> double { return o.unit_micrometres; },
      .set = [](EncoderOptions& o, double value) { o.unit_micrometres = static_cast<std::uint32_t>(value); }},
+    {.name = "session",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .least = 1,
+     .most = 9007199254740991,  // 2^53 - 1: what a double and JSON hold
+     .zero = "none, which makes files that are the same each time",
+     .meaning = "random number in the sequence header, new each time a live publisher starts, so that viewers do not "
+                "mistake its packets for those of an earlier run",
+     .get = [](const EncoderOptions& o) -> double { return static_cast<double>(o.session); },
+     .set = [](EncoderOptions& o, double value) { o.session = static_cast<std::uint64_t>(value); },
+     .flag = "--session"},
+    {.name = "up",
+     .group = OptionGroup::common,
+     .kind = OptionKind::word,
+     .meaning = "the direction of the subject's head, for players",
+     .words = up_axes,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.up); },
+     .set = [](EncoderOptions& o, double value) { o.up = static_cast<UpAxis>(value); }},
 
     {.name = "rate.bits_per_second",
      .group = OptionGroup::rate,

@@ -85,6 +85,7 @@ void send_codebook(std::uint32_t frame, std::uint8_t purpose, CodebookInUse& use
     use.sent = frame;
     Packet packet;
     packet.kind = PacketKind::codebook;
+    packet.flags = purpose == codebook_for_colour ? packet_flag::colour : 0;
     packet.payload = write_codebook_payload(purpose, use.number, *use.codebook);
     packets.push_back(std::move(packet));
 }
@@ -142,7 +143,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     const auto& configuration = work.configuration;
     const bool tracked = configuration.tracked(), referred_to = use == IntraUse::reference;
     const auto asked = tracked ? tracked_steps(steps) : steps;
-    const bool simplify = tracked && configuration.options.tracked.simplify > 0;
+    const bool simplify = tracked && configuration.options.tracked.simplify > 0 && work.carries_surface();
     // Without a skeleton EP-frames may never pay off, and then the bits of a finer I-frame would be wasted.
     const bool finer = referred_to && (configuration.header.skeleton_tracked || tracked ||
                                        configuration.options.topology.frame_choice != FrameChoice::cheaper);
@@ -165,6 +166,9 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     out.type = FrameType::intra;
     out.reference = work.sequence.next_frame;
     out.decoded = std::move(*decoded);
+    // Under rate control also what stands in for a frame that does not fit may refer to it.
+    out.referred = work.carries_surface() && !(tracked && out.decoded.triangles.empty()) &&
+                   (!configuration.intra_alone() || configuration.options.rate.bits_per_second > 0);
     out.pose = work.pose;
     out.packets.push_back(frame_packet(PacketKind::intra, payload));
     auto& facts = out.intra.emplace();
@@ -172,7 +176,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     facts.edge = work.edge();
     facts.steps = steps;
     clock.done("intra coding");
-    if (tracked && referred_to) facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
+    if (tracked && referred_to && out.referred) facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
     return out;
 }
 
@@ -217,6 +221,8 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     Candidate out;
     out.type = FrameType::tracked;
     out.reference = from_last ? *nodes.frame : reference.number;
+    out.referred = configuration.options.tracked.references == TrackedReferences::previous;
+    out.access = !from_last;
     out.packets.push_back(frame_packet(PacketKind::tracked, encoded->payload));
     out.decoded = std::move(encoded->mesh);
     auto& history = out.nodes.emplace();

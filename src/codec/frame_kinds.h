@@ -45,6 +45,7 @@ struct FrameRules {
     LayerSet layers;  // the layers that it may have; others are ignored
     RefersTo refers_to;
     bool codebooks;      // whether it names codebooks, which come in packets of their own
+    bool referred;       // whether later frames may refer to it, unless its packet tells otherwise
     bool codes_mesh;     // true: it codes as many vertices and triangles as its header says, so its payload has at
                          // least least_payload() bytes; false: it has the counts of its reference, and its header must
                          // say so
@@ -59,6 +60,11 @@ struct FrameRules {
 extern const std::array<FrameRules, frame_type_count> frame_rules;
 
 inline const FrameRules& rules_of(FrameType type) { return frame_rules[static_cast<std::size_t>(type)]; }
+
+// Whether later frames may refer to this one. Otherwise it leaves what they refer to as it was.
+inline bool is_referred(const PacketHeader& packet, const FrameRules& rules) {
+    return rules.referred && (!packet.has(packet_flag::told) || packet.has(packet_flag::referred));
+}
 
 // The decoders of the rows; each is in decoder_NAME.cpp.
 Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayloadView& payload);

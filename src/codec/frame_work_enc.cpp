@@ -54,7 +54,7 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
     Sequence out;
     out.next_frame = before.next_frame + 1;
     out.trial = sent.trial ? *sent.trial : before.trial;
-    if (!sent.intra) {
+    if (!sent.intra || !sent.referred) {
         out.reference = before.reference;
         out.bones = sent.bones ? std::move(*sent.bones) : before.bones;
         out.nodes = sent.nodes ? std::move(*sent.nodes) : before.nodes;
@@ -73,6 +73,10 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         in_use->search = make_reference_search(in_use->decoded.skinned);
     out.reference = std::move(in_use);
     return out;
+}
+
+bool FrameWork::carries_surface() const {
+    return configuration.tracked() ? !mesh.triangles.empty() : !mesh.positions.empty();
 }
 
 double FrameWork::edge() {

@@ -88,11 +88,13 @@ struct Candidate {
     FrameType type = FrameType::intra;
     std::vector<Packet> packets;  // new codebooks first, the frame last; numbered when sent
     std::uint32_t reference = 0;  // number of the frame that it refers to; of an I-frame, its own
+    bool referred = false;        // whether later frames may refer to it; an I-frame then becomes the reference
+    bool access = true;           // whether it is an I-frame or refers to one
     LatticeMesh decoded;          // the mesh that the decoder will have
     double quality = 50;          // the quality setting used, under rate or error control
     bool stands_in = false;       // a P- or T-frame of motion alone, because nothing better fits the buffer
     // What it leaves for the sequence; one of the first three is set.
-    std::optional<IntraFacts> intra;                   // I
+    std::optional<IntraFacts> intra;                   // I; used only if it is referred to
     std::optional<BoneHistory> bones;                  // P, EP
     std::optional<NodeHistory> nodes;                  // T
     std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
@@ -134,6 +136,9 @@ public:
     // The current reference; there must be one.
     const ReferenceInUse& reference() const { return *sequence.reference; }
     std::int64_t frames_since_intra() const { return std::int64_t{sequence.next_frame} - reference().decoded.number; }
+    // Whether the capture has what later frames need to refer to it: triangles in the tracked profile, else vertices. A
+    // frame without them is an I-frame that nothing refers to, and leaves the reference as it was.
+    bool carries_surface() const;
     double edge();                  // mean edge of the captured mesh
     const SurfaceIndex& surface();  // the captured surface; indexed by direction too if nodes are registered to it
     // The motion of each bone, and of each node, relative to the reference.

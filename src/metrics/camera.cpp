@@ -18,8 +18,9 @@ Axes axes_for(UpAxis up) {
             return {{{0, 1, 0}}, {{1, 0, 0}}};
         case UpAxis::minus_x:
             return {{{0, 1, 0}}, {{-1, 0, 0}}};
+        case UpAxis::unknown:
         case UpAxis::plus_y:
-            return {{{1, 0, 0}}, {{0, 1, 0}}};
+            break;
         case UpAxis::minus_y:
             return {{{1, 0, 0}}, {{0, -1, 0}}};
         case UpAxis::plus_z:

@@ -14,17 +14,16 @@
 #include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 #include "metrics/mesh_measures.h"
 
 namespace htvm {
-
-enum class UpAxis { plus_x, minus_x, plus_y, minus_y, plus_z, minus_z };
 
 // Cameras evenly spaced around the body, on a circle about the vertical axis through the centre of the box.
 struct ViewOptions {
     int views = 10;                   // 1..1000 cameras
     int width = 1280, height = 1024;  // pixels, 1..16384
-    UpAxis up = UpAxis::plus_y;       // the direction of the body's head
+    UpAxis up = UpAxis::plus_y;       // the direction of the body's head; unknown is y
     double first_azimuth = 0;         // degrees, for the first camera; 0 looks along -z where y is up
     double elevation = 0;             // degrees by which the cameras look down, -80..80
     double field_of_view = 30;        // vertical, degrees, 1..120; not used for orthographic cameras

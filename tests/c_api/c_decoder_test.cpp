@@ -7,6 +7,7 @@
 
 #include "c_api/c_test_streams.h"
 #include "codec/enhanced_options.h"
+#include "htvm/dependency.hpp"
 
 namespace htvm {
 namespace {
@@ -38,6 +39,7 @@ void expect_same_frame(htvm_decoder* decoder, const htvm_frame_info& info, const
     EXPECT_EQ(info.bytes, expected.info.bytes.total());
     EXPECT_EQ(info.concealed, expected.concealed ? 1u : 0u);
     EXPECT_EQ(info.topology, expected.topology);
+    EXPECT_EQ(info.sequence, expected.info.sequence);
     expect_same_mesh(copied_mesh(decoder, info), expected.mesh);
     expect_same_mesh(lent_mesh(decoder, info), expected.mesh);
     const auto pose = copied_pose(decoder, info);
@@ -413,7 +415,86 @@ TEST(CInterface, TellsItsVersion) {
     EXPECT_EQ(htvm_version_string(), text);
     EXPECT_EQ(text, HTVM_PROJECT_VERSION);
     EXPECT_EQ(htvm_version(), std::uint32_t{HTVM_VERSION_MAJOR} << 16 | HTVM_VERSION_MINOR << 8 | HTVM_VERSION_PATCH);
-    EXPECT_EQ(htvm_stream_version(), 1u);
+    EXPECT_EQ(htvm_stream_version(), 2u);
+}
+
+TEST(CInterface, TellsWhatFramesNeedAsTheCppOneDoes) {
+    htvm_dependencies* dependencies = nullptr;
+    ASSERT_EQ(htvm_dependencies_create(nullptr, &dependencies), HTVM_OK);
+    Dependencies cpp;
+    std::vector<std::uint64_t> places(10);
+    std::size_t count = 0;
+    for (const auto& packet : coded_person().packets) {
+        const auto bytes = write_packet(packet);
+        htvm_packet_info info;
+        ASSERT_EQ(htvm_packet_read(bytes.data(), bytes.size(), &info, sizeof info), HTVM_OK);
+        EXPECT_EQ(info.kind, static_cast<std::uint32_t>(packet.kind));
+        EXPECT_EQ(info.flags, packet.flags);
+        EXPECT_EQ(info.frame, packet.frame);
+        EXPECT_EQ(info.reference, packet.reference);
+        EXPECT_EQ(info.timestamp_us, packet.timestamp_us);
+        EXPECT_EQ(info.bytes, bytes.size());
+        std::uint64_t place = 99;
+        ASSERT_EQ(htvm_dependencies_push(dependencies, &info, &place), HTVM_OK);
+        EXPECT_EQ(place, cpp.push(packet));
+        ASSERT_EQ(htvm_dependencies_closure(dependencies, places.data(), places.size(), &count), HTVM_OK);
+        EXPECT_EQ(std::vector<std::uint64_t>(places.begin(), places.begin() + count), cpp.closure());
+        ASSERT_EQ(htvm_dependencies_kept(dependencies, places.data(), places.size(), &count), HTVM_OK);
+        EXPECT_EQ(std::vector<std::uint64_t>(places.begin(), places.begin() + count), cpp.kept());
+        EXPECT_EQ(htvm_packet_read(bytes.data(), bytes.size() - 1, &info, sizeof info), HTVM_CORRUPT_STREAM);
+    }
+    EXPECT_EQ(htvm_dependencies_kept(dependencies, nullptr, 0, &count), HTVM_BUFFER_TOO_SMALL);
+    EXPECT_EQ(count, cpp.kept().size());
+    EXPECT_EQ(htvm_dependencies_push(dependencies, nullptr, nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_dependencies_kept(nullptr, places.data(), places.size(), &count), HTVM_BAD_INPUT);
+    htvm_dependencies_destroy(dependencies);
+    htvm_dependencies_destroy(nullptr);
+}
+
+TEST(CInterface, CarriesSessionSceneAndMetadata) {
+    htvm_encoder_options* options = nullptr;
+    ASSERT_EQ(htvm_encoder_options_create(HTVM_PROFILE_TRACKED, nullptr, &options), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_options_set(options, "session", "4711"), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_options_set(options, "up", "-z"), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_options_set_floor(options, 12.5), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_options_add_metadata(options, "title", "a walk"), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_options_add_metadata(options, nullptr, "a walk"), HTVM_BAD_INPUT);
+    htvm_encoder* encoder = nullptr;
+    ASSERT_EQ(htvm_encoder_create(options, &encoder, nullptr, 0), HTVM_OK);
+    const float positions[] = {0, 0, 0, 100, 0, 0, 0, 100, 0};
+    const std::uint32_t indices[] = {0, 1, 2};
+    htvm_mesh mesh;
+    htvm_mesh_init(&mesh, sizeof mesh);
+    mesh.vertices = 3;
+    mesh.triangles = 1;
+    mesh.positions = positions;
+    mesh.indices = indices;
+    ASSERT_EQ(htvm_encoder_send_mesh(encoder, &mesh, nullptr, 0, 0), HTVM_OK);
+    std::vector<std::uint8_t> packet(100000);
+    std::size_t size = 0;
+    ASSERT_EQ(htvm_encoder_receive_packet(encoder, packet.data(), packet.size(), &size), HTVM_OK);
+    const auto decoder = make_decoder();
+    ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), packet.data(), size), HTVM_OK);
+    EXPECT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_AGAIN);
+    htvm_sequence_info info;
+    ASSERT_EQ(htvm_decoder_sequence(decoder.get(), &info, sizeof info), HTVM_OK);
+    EXPECT_EQ(info.session, 4711u);
+    EXPECT_EQ(info.sequence, 0u);
+    EXPECT_EQ(info.stream_version, htvm_stream_version());
+    EXPECT_EQ(info.up, std::uint32_t{HTVM_UP_MINUS_Z});
+    EXPECT_EQ(info.floor_known, 1u);
+    EXPECT_EQ(info.floor, 12.5);
+    ASSERT_EQ(info.metadata, 1u);
+    char key[256], value[4096];
+    ASSERT_EQ(htvm_decoder_metadata(decoder.get(), 0, key, sizeof key, value, sizeof value), HTVM_OK);
+    EXPECT_STREQ(key, "title");
+    EXPECT_STREQ(value, "a walk");
+    EXPECT_EQ(htvm_decoder_metadata(decoder.get(), 0, key, sizeof key, value, 6), HTVM_BUFFER_TOO_SMALL);
+    EXPECT_EQ(htvm_decoder_metadata(decoder.get(), 1, key, sizeof key, value, sizeof value), HTVM_BAD_INPUT);
+    htvm_encoder_destroy(encoder);
+    EXPECT_EQ(htvm_encoder_options_add_metadata(options, "title", "\xff"), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_create(options, &encoder, nullptr, 0), HTVM_BAD_INPUT) << "not UTF-8";
+    htvm_encoder_options_destroy(options);
 }
 
 TEST(CInterface, HasWordsForEveryStatus) {

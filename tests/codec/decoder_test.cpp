@@ -123,6 +123,7 @@ TEST(Independence, ARepeatedHeaderChangesNothing) {
     for (const auto& packet : nine_frames().packets) {
         packets.push_back(packet);
         packets.push_back(nine_frames().packets[0]);
+        packets.back().frame = packet.frame + 1;
     }
     const auto decoded = decode_packets(packets);
     EXPECT_TRUE(decoded.errors.empty());

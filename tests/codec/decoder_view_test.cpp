@@ -10,6 +10,7 @@
 #include "codec/moving_sequences.h"
 #include "codec/tracked_sequences.h"
 #include "htvm/decoder.hpp"
+#include "htvm/dependency.hpp"
 
 namespace htvm {
 namespace {
@@ -95,7 +96,7 @@ TEST(TopologyNumber, ChangesAtFramesThatCodeAMeshAlone) {
             }
             EXPECT_GT((*frame)->topology, most) << packet.frame;
             most = (*frame)->topology;
-            if (type == FrameType::intra) of_intra = most;
+            if (told_header(packet).has(packet_flag::referred)) of_intra = most;
         }
     }
 }

@@ -94,7 +94,9 @@ TEST(ChoiceOfTheCheaper, IsIntraFramesAsTheyAreAloneWhereNoSkeletonHelps) {
     alone.key_interval = 1;
     const auto chosen = encode(sequence, default_options(Profile::topology));
     EXPECT_EQ(types_of(chosen), (std::vector{intra, intra, intra, intra}));
-    EXPECT_EQ(chosen.bytes, encode(sequence, alone).bytes);
+    const auto expected = encode(sequence, alone);
+    for (std::size_t i = 0; i + 1 < chosen.packets.size(); ++i)  // all but the index
+        EXPECT_EQ(chosen.packets[i].payload, expected.packets[i].payload);
 }
 
 TEST(ChoiceOfTheCheaper, TakesNoMoreBitsThanIntraFrames) {

@@ -23,6 +23,12 @@ SequenceHeader full_header() {
     header.radii = {0, 1234, lattice_limit};
     header.nearest_vertices = 64;
     header.weight_width = lattice_limit;
+    header.node_spacing = 1280;
+    header.session = ~0ull;
+    header.up = UpAxis::minus_z;
+    header.floor = -lattice_limit;
+    header.metadata = {
+        {"title", "\xe4\xba\xba \xf0\x9f\x9a\xb6"}, {"rights", ""}, {std::string(255, 'k'), std::string(4095, 'v')}};
     return header;
 }
 
@@ -37,6 +43,11 @@ void expect_equal(const SequenceHeader& a, const SequenceHeader& b) {
     EXPECT_EQ(a.radii, b.radii);
     EXPECT_EQ(a.nearest_vertices, b.nearest_vertices);
     EXPECT_EQ(a.weight_width, b.weight_width);
+    EXPECT_EQ(a.node_spacing, b.node_spacing);
+    EXPECT_EQ(a.session, b.session);
+    EXPECT_EQ(a.up, b.up);
+    EXPECT_EQ(a.floor, b.floor);
+    EXPECT_EQ(a.metadata, b.metadata);
     ASSERT_EQ(a.skeleton.bones.size(), b.skeleton.bones.size());
     for (std::size_t i = 0; i < a.skeleton.bones.size(); ++i) {
         EXPECT_EQ(a.skeleton.bones[i].first, b.skeleton.bones[i].first);
@@ -115,6 +126,65 @@ TEST(SequenceHeader, FieldsOutOfRangeAreRefused) {
     header = full_header();
     header.radii[0] = -1;
     expect_refused(header, "negative radius");
+    header = full_header();
+    header.up = static_cast<UpAxis>(7);
+    expect_refused(header, "an axis that is none");
+    header = full_header();
+    header.floor = lattice_limit + 1;
+    expect_refused(header, "floor");
+    header = full_header();
+    header.up = UpAxis::unknown;
+    expect_refused(header, "a floor, and nothing that is up");
+}
+
+TEST(SequenceHeader, MetadataIsBoundedTextInUtf8) {
+    const auto with = [](std::vector<MetadataEntry> metadata) {
+        auto header = full_header();
+        header.metadata = std::move(metadata);
+        return header;
+    };
+    expect_refused(with({{"", "no key"}}), "no key");
+    expect_refused(with({{"k", std::string(4096, 'v')}}), "a long value");
+    expect_refused(with(std::vector<MetadataEntry>(5, {"k", std::string(4000, 'v')})), "too much of it all");
+    for (const std::string wrong :
+         {"\x80", "\xc3", "\xc0\x80", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xf8\x88\x80\x80\x80"}) {
+        expect_refused(with({{"k", wrong}}), "not UTF-8");
+        expect_refused(with({{wrong, "v"}}), "not UTF-8");
+    }
+    expect_refused(with({{"k", std::string("a\0b", 3)}}), "a zero within");
+    const auto most = with(std::vector<MetadataEntry>(255, {"k", "v"}));
+    expect_equal(*read_sequence_header(write_sequence_header(most)), most);
+}
+
+// A header as version 1 wrote it, which ended with the spacing of the nodes, or before it.
+std::vector<std::uint8_t> header_of_version_1(bool with_spacing) {
+    auto header = full_header();
+    header.floor.reset();
+    header.metadata.clear();
+    auto bytes = write_sequence_header(header);
+    bytes[4] = 1;
+    bytes.resize(bytes.size() - 10 - (with_spacing ? 0 : 4));
+    return bytes;
+}
+
+TEST(SequenceHeader, OfVersion1IsRead) {
+    for (const bool with_spacing : {false, true}) {
+        auto bytes = header_of_version_1(with_spacing);
+        if (!with_spacing) bytes.insert(bytes.end(), 3, 0xFF);  // what is no whole field is ignored
+        const auto read = read_sequence_header(bytes);
+        ASSERT_TRUE(read.has_value()) << read.error().message;
+        EXPECT_EQ(read->version, 1);
+        EXPECT_EQ(read->node_spacing, with_spacing ? 1280 : 0);
+        EXPECT_EQ(read->session, 0u);
+        EXPECT_EQ(read->up, UpAxis::unknown);
+        EXPECT_TRUE(read->metadata.empty());
+    }
+}
+
+TEST(SequenceHeader, BytesBehindTheLastFieldAreIgnored) {
+    auto bytes = write_sequence_header(full_header());
+    bytes.insert(bytes.end(), 5, 0xFF);
+    expect_equal(*read_sequence_header(bytes), full_header());
 }
 
 TEST(SequenceHeader, AnotherVersionIsUnsupported) {
@@ -123,6 +193,10 @@ TEST(SequenceHeader, AnotherVersionIsUnsupported) {
     const auto read = read_sequence_header(bytes);
     ASSERT_FALSE(read.has_value());
     EXPECT_EQ(read.error().kind, ErrorKind::unsupported);
+    EXPECT_NE(read.error().message.find("version 3"), std::string::npos) << read.error().message;
+    EXPECT_NE(read.error().message.find("versions 1 to 2"), std::string::npos) << read.error().message;
+    bytes[4] = 0;
+    EXPECT_EQ(read_sequence_header(bytes).error().kind, ErrorKind::unsupported);
     bytes[0] = 'x';
     EXPECT_EQ(read_sequence_header(bytes).error().kind, ErrorKind::corrupt_stream) << "not this format at all";
 }

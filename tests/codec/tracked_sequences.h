@@ -73,6 +73,7 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
     const auto add = [&](Packet packet, std::uint32_t reference) {
         packet.frame = frame;
         packet.reference = reference;
+        packet.flags = packet_flag::told | packet_flag::referred;
         packet.timestamp_us = std::int64_t{frame++} * 33333;
         out.push_back(std::move(packet));
     };

@@ -54,12 +54,12 @@ build wasm-O2 clang++ "$wasi -O2" "--target=wasm32-wasi -Wl,--strip-all" "${deco
 browser="$wasi -O2 -msimd128"
 objects=
 for source in "${decoder[@]}" src/c_api/wasm_traps.cpp src/c_api/wasm_no_system.cpp src/c_api/c_status.cpp \
-    src/c_api/c_decoder.cpp; do
+    src/c_api/c_decoder.cpp src/c_api/c_dependency.cpp; do
     object=$out/wasm-browser/${source//\//_}.o
     objects+=" $object"
     printf 'build %s: compile %s\n  compiler = clang++\n  flags = %s\n' "$object" "$source" "$browser"
 done
-functions='decoder_[a-z_]+|frame_kind_[a-z]+|layer_name|index_read|version|version_string|stream_version|status_text'
+functions='decoder_[a-z_]+|packet_read|dependencies_[a-z]+|frame_kind_[a-z]+|layer_name|index_read|version|version_string|stream_version|status_text'
 exports=$(grep -oE "\bhtvm_($functions) ?\(" include/htvm/htvm.h |
     tr -d ' (' | sort -u | sed 's/^/-Wl,--export=/' | tr '\n' ' ')
 printf 'build build/wasm/htvm_decoder.wasm: link%s\n  compiler = clang++\n  flags = %s\n' "$objects" \

@@ -43,8 +43,9 @@ class Group:
         before = self.state if self.last == packet.reference else None
         check(before or self.frame == packet.reference, "its reference is not there")
         self.reference = self.reference or TrackedReference(self.mesh, self.geometry_step, spacing)
-        mesh, self.state = decode_tracked_mesh(read_frame_payload(packet.payload), self.reference, before)
-        self.last = packet.frame
+        mesh, state = decode_tracked_mesh(read_frame_payload(packet.payload), self.reference, before)
+        if packet.referred():
+            self.state, self.last = state, packet.frame
         return mesh
 
 
@@ -52,12 +53,16 @@ def decode_stream(data):
     """Yields (packet, header, mesh) for each frame, or (packet, None, error) for a packet that is wrong."""
     header = reference = group = None
     books = [None, None]
+    highest = -1  # number of a frame since the sequence began
     for packet in packets(data):
+        if packet.kind in (INTRA, ENHANCED, PREDICTED, TRACKED):
+            highest = max(highest, packet.frame)
         try:
             if packet.kind == SEQUENCE:
                 new = read_sequence_header(packet.payload)
-                if header is None or packet.payload != header.bytes:
-                    reference, group, books = None, None, [None, None]
+                repeated = header is not None and packet.payload == header.bytes
+                if not repeated or (new.session == 0 and packet.frame <= highest):
+                    reference, group, books, highest = None, None, [None, None], -1
                 header = new
             elif packet.kind == CODEBOOK:
                 book = read_codebook(packet.payload)
@@ -68,6 +73,9 @@ def decode_stream(data):
                 frame = read_coded_frame(packet)
                 joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
                 mesh = decode_intra_mesh(frame)
+                if not packet.referred():
+                    yield packet, header, mesh
+                    continue
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
                 group = Group(mesh, frame.geometry_step, packet.frame)
                 yield packet, header, mesh

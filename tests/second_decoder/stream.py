@@ -9,10 +9,13 @@ from conventions import Bytes, L, Unsupported, check
 # ---------------------------------------------------------------------------------------------- 2. packets
 
 SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED = 1, 2, 3, 4, 5, 6, 7
+REFERRED, TOLD = 1, 128  # flags
 
 
 class Packet:
-    pass
+    def referred(self):
+        """Whether later frames may refer to this I- or T-frame (2.1)."""
+        return not self.flags & TOLD or self.flags & REFERRED != 0
 
 
 def packets(data, max_payload=1 << 28):
@@ -23,8 +26,8 @@ def packets(data, max_payload=1 << 28):
         if at < 0 or at + 32 > len(data):
             return
         packet = Packet()
-        (packet.kind, packet.frame, packet.reference, packet.timestamp, size, crc) = struct.unpack(
-            "<B3xIIqII", data[at + 4 : at + 32]
+        (packet.kind, packet.flags, packet.frame, packet.reference, packet.timestamp, size, crc) = struct.unpack(
+            "<BB2xIIqII", data[at + 4 : at + 32]
         )
         if zlib.crc32(data[at + 4 : at + 28]) != crc or size > max_payload:
             at += 1
@@ -51,8 +54,8 @@ def read_sequence_header(payload):
     header = Header()
     check(read.take(4) == b"htvm", "this is no htvm stream")
     version = read.field("H")
-    if version != 1:
-        raise Unsupported("version %d" % version)
+    if version not in (1, 2):
+        raise Unsupported("version %d; this decoder reads 1 and 2" % version)
     header.bits = read.field("B")
     header.origin = [read.field("i") for _ in range(3)]
     header.fps = (read.field("I"), read.field("I"))
@@ -74,10 +77,37 @@ def read_sequence_header(payload):
         check(max(bone) < joints and radius <= L, "a bone is out of range")
         header.bones.append(bone)
         header.radii.append(radius)
-    header.node_spacing = read.field("I") if len(read.data) - read.at >= 4 else 0
+    header.node_spacing = read.field("I") if version > 1 or len(read.data) - read.at >= 4 else 0
     check(header.node_spacing <= L, "the nodes' spacing is out of range")
+    header.session, header.metadata = 0, []
+    if version > 1:
+        header.session = read.field("Q")
+        header.up, optional = read.field("B"), read.field("B")
+        check(header.up <= 6, "there is no such axis")
+        if optional & 1:
+            header.floor = read.field("i")
+            check(abs(header.floor) <= L and header.up > 0, "the floor is out of range")
+        if optional & 2:
+            header.metadata = read_metadata(read)
     header.bytes = payload
     return header
+
+
+def read_metadata(read):
+    entries = []
+    for _ in range(read.field("B")):
+        key = read.take(read.field("B"))
+        value = read.take(read.field("H"))
+        check(key and len(value) <= 4095, "a key without bytes, or a value of too many")
+        for text in (key, value):
+            try:
+                text.decode("utf-8")
+            except UnicodeDecodeError:
+                check(False, "metadata is not UTF-8")
+            check(b"\0" not in text, "metadata has a zero in it")
+        entries.append((key, value))
+    check(sum(len(key) + len(value) for key, value in entries) <= 16384, "there is too much metadata")
+    return entries
 
 
 # ---------------------------------------------------------------------------------------------- 4. frame payload

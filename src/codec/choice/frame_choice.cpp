@@ -30,7 +30,7 @@ bool can_be_moved(const FrameWork& work) {
     if (!work.sequence.reference) return false;
     const auto& reference = work.reference().decoded;
     const bool derived = work.configuration.tracked() ? reference.tracked.has_value() : reference.has_bones;
-    return derived && !reference.mesh().positions.empty() && !work.mesh.positions.empty() &&
+    return derived && !reference.mesh().positions.empty() && work.carries_surface() &&
            same_attributes(work.mesh, reference.mesh());
 }
 
@@ -267,6 +267,7 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps) {
 Result<Candidate> choose(FrameWork& work, const FrameSteps& steps, bool force_intra) {
     const auto& options = work.configuration.options;
     const auto choice = options.topology.frame_choice;
+    if (!work.carries_surface()) return code_lone_intra(work, steps);
     if (force_intra || is_due(work) || is_scene_change(work)) {
         if (options.profile != Profile::tracked && choice == FrameChoice::rate_distortion)
             return code_measured_intra(work, steps);
@@ -335,7 +336,7 @@ Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, cons
         if (!candidate) return candidate;
         candidate->quality = quality;
         bits = bits_of(*candidate);
-        if (trials-- > 0 && rate.is_guess(candidate->type)) {
+        if (trials-- > 0 && rate.is_guess(rate_type(*candidate))) {
             // Without the codebooks that come with the first frame, as later frames do not need them.
             const auto own = static_cast<double>(candidate->packets.back().payload.size() + packet_overhead);
             rate.tried(candidate->type, quality, 8 * own);
@@ -385,7 +386,11 @@ Result<Candidate> code_to_error(FrameWork& work, ErrorController& control, bool 
 
 }  // namespace
 
-FrameType rate_type(const Candidate& candidate) { return candidate.stands_in ? FrameType::predicted : candidate.type; }
+// A frame without a surface says nothing of what others take.
+FrameType rate_type(const Candidate& candidate) {
+    const bool bare = candidate.type == FrameType::intra && candidate.decoded.triangles.empty();
+    return candidate.stands_in || bare ? FrameType::predicted : candidate.type;
+}
 
 Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra) {
     if (control.rate) return code_within_buffer(work, *control.rate, bits_of, force_intra);

@@ -12,15 +12,30 @@ using namespace internal;
 namespace {
 
 constexpr std::array<std::uint8_t, 4> sync = {'H', 'T', 'V', 'P'};
-constexpr std::size_t header_size = 32;
+constexpr std::size_t header_size = packet_header_bytes;
 
 }  // namespace
+
+std::optional<PacketHeader> read_packet_header(std::span<const std::uint8_t> bytes, std::uint32_t& payload_bytes) {
+    if (bytes.size() < header_size || !std::equal(sync.begin(), sync.end(), bytes.begin())) return std::nullopt;
+    ByteReader in(bytes.subspan(sync.size()));
+    PacketHeader out;
+    out.kind = static_cast<PacketKind>(in.u8());
+    out.flags = in.u8();
+    out.reference_version = in.u16();
+    out.frame = in.u32();
+    out.reference = in.u32();
+    out.timestamp_us = static_cast<std::int64_t>(in.u64());
+    payload_bytes = in.u32();
+    if (in.u32() != crc32(bytes.subspan(sync.size(), header_size - 8))) return std::nullopt;
+    return out;
+}
 
 std::vector<std::uint8_t> write_packet(const Packet& packet) {
     ByteWriter header;
     header.u8(static_cast<std::uint8_t>(packet.kind));
-    header.u8(0);
-    header.u16(0);
+    header.u8(packet.flags);
+    header.u16(packet.reference_version);
     header.u32(packet.frame);
     header.u32(packet.reference);
     header.u64(static_cast<std::uint64_t>(packet.timestamp_us));
@@ -76,18 +91,11 @@ std::optional<Packet> PacketReader::pull() {
         skip(static_cast<std::size_t>(found - begin));
         if (pending_bytes() < header_size) return std::nullopt;
         const auto bytes = std::span<const std::uint8_t>(buffer_).subspan(position_);
-        ByteReader reader(bytes.subspan(sync.size()));
-        Packet packet;
-        packet.kind = static_cast<PacketKind>(reader.u8());
-        reader.u8();
-        reader.u16();
-        packet.frame = reader.u32();
-        packet.reference = reader.u32();
-        packet.timestamp_us = static_cast<std::int64_t>(reader.u64());
-        const std::size_t size = reader.u32();
-        const bool sound = reader.u32() == crc32(bytes.subspan(4, header_size - 8));
-        if (!sound || size > max_payload_) {
-            oversized_ += sound;
+        std::uint32_t payload_bytes = 0;
+        const auto header = read_packet_header(bytes, payload_bytes);
+        const std::size_t size = payload_bytes;
+        if (!header || size > max_payload_) {
+            oversized_ += header.has_value();
             skip(1);
             continue;
         }
@@ -98,7 +106,7 @@ std::optional<Packet> PacketReader::pull() {
             skip_damaged(size);
             continue;
         }
-        packet.payload.assign(payload.begin(), payload.end());
+        Packet packet{*header, {payload.begin(), payload.end()}};
         position_ += packet_overhead + size;
         return packet;
     }

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
+#include <string_view>
 
 #include "core/bytes.h"
+#include "core/crc32.h"
 
 namespace htvm::internal {
 namespace {
@@ -12,7 +15,104 @@ constexpr std::array<std::uint8_t, 4> magic = {'h', 't', 'v', 'm'};
 constexpr std::size_t max_name = 255;
 constexpr std::size_t max_joints = 1024;
 
+// Bits that say which optional fields follow.
+constexpr std::uint8_t has_floor = 1, has_metadata = 2;
+
+std::span<const std::uint8_t> bytes_of(const std::string& text) {
+    return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+std::string text_of(std::span<const std::uint8_t> bytes) { return {bytes.begin(), bytes.end()}; }
+
+// The shortest form of each code point, none of the surrogates, none beyond U+10FFFF, and no zero.
+bool is_utf8(std::string_view text) {
+    for (std::size_t at = 0; at < text.size();) {
+        const auto byte = [&](std::size_t i) -> std::uint32_t {
+            return at + i < text.size() ? static_cast<std::uint8_t>(text[at + i]) : 0;
+        };
+        const std::uint32_t first = byte(0);
+        const std::size_t length = first < 0x80       ? 1
+                                   : first >> 5 == 6  ? 2
+                                   : first >> 4 == 14 ? 3
+                                   : first >> 3 == 30 ? 4
+                                                      : 0;
+        if (length == 0 || first == 0) return false;
+        std::uint32_t point = length == 1 ? first : first & (0x7Fu >> length);
+        for (std::size_t i = 1; i < length; ++i) {
+            if (byte(i) >> 6 != 2) return false;
+            point = point << 6 | (byte(i) & 0x3F);
+        }
+        constexpr std::array<std::uint32_t, 5> least = {0, 0, 0x80, 0x800, 0x10000};
+        if (point < least[length] || point > 0x10FFFF || (point >= 0xD800 && point < 0xE000)) return false;
+        at += length;
+    }
+    return true;
+}
+
+void write_metadata(ByteWriter& out, std::span<const MetadataEntry> metadata) {
+    out.u8(static_cast<std::uint8_t>(metadata.size()));
+    for (const auto& entry : metadata) {
+        out.u8(static_cast<std::uint8_t>(entry.key.size()));
+        out.bytes(bytes_of(entry.key));
+        out.u16(static_cast<std::uint16_t>(entry.value.size()));
+        out.bytes(bytes_of(entry.value));
+    }
+}
+
+Result<std::vector<MetadataEntry>> read_metadata(ByteReader& in) {
+    std::vector<MetadataEntry> out;
+    for (std::size_t left = in.u8(); left > 0 && in.ok(); --left) {
+        MetadataEntry entry;
+        entry.key = text_of(in.bytes(in.u8()));
+        entry.value = text_of(in.bytes(in.u16()));
+        out.push_back(std::move(entry));
+    }
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
+    if (auto fine = check_metadata(out); !fine)
+        return fail(ErrorKind::corrupt_stream, "sequence header: " + fine.error().message);
+    return out;
+}
+
+// What version 2 has behind the spacing of the nodes.
+Result<void> read_what_version_2_added(ByteReader& in, SequenceHeader& out) {
+    out.session = in.u64();
+    const auto up = in.u8(), has = in.u8();
+    if (up > static_cast<std::uint8_t>(UpAxis::minus_z))
+        return fail(ErrorKind::corrupt_stream, "sequence header: there is no such axis");
+    out.up = static_cast<UpAxis>(up);
+    if (has & has_floor) {
+        out.floor = static_cast<std::int32_t>(in.u32());
+        if (std::abs(std::int64_t{*out.floor}) > lattice_limit || out.up == UpAxis::unknown)
+            return fail(ErrorKind::corrupt_stream, "sequence header: the floor is out of range");
+    }
+    if (has & has_metadata) {
+        auto metadata = read_metadata(in);
+        if (!metadata) return tl::unexpected(metadata.error());
+        out.metadata = std::move(*metadata);
+    }
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
+    return {};
+}
+
 }  // namespace
+
+Result<void> check_metadata(std::span<const MetadataEntry> metadata) {
+    const auto refuse = [](const std::string& what) { return fail(ErrorKind::bad_input, "metadata: " + what); };
+    if (metadata.size() > most_metadata)
+        return refuse("there are more than " + std::to_string(most_metadata) + " entries");
+    std::size_t all = 0;
+    for (const auto& [key, value] : metadata) {
+        if (key.empty() || key.size() > most_key_bytes)
+            return refuse("a key has 1 to " + std::to_string(most_key_bytes) + " bytes");
+        if (!is_utf8(key)) return refuse("a key is not UTF-8");
+        if (value.size() > most_value_bytes)
+            return refuse("'" + key + "' has more than " + std::to_string(most_value_bytes) + " bytes");
+        if (!is_utf8(value)) return refuse("'" + key + "' is not UTF-8");
+        all += key.size() + value.size();
+    }
+    if (all > most_metadata_bytes) return refuse("it has more than " + std::to_string(most_metadata_bytes) + " bytes");
+    return {};
+}
 
 std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
     ByteWriter out;
@@ -38,8 +138,22 @@ std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
         out.u16(header.skeleton.bones[i].second);
         out.u32(static_cast<std::uint32_t>(header.radii[i]));
     }
-    if (header.node_spacing > 0) out.u32(static_cast<std::uint32_t>(header.node_spacing));
+    out.u32(static_cast<std::uint32_t>(header.node_spacing));
+    out.u64(header.session);
+    out.u8(static_cast<std::uint8_t>(header.up));
+    out.u8(static_cast<std::uint8_t>((header.floor ? has_floor : 0) | (header.metadata.empty() ? 0 : has_metadata)));
+    if (header.floor) out.u32(static_cast<std::uint32_t>(*header.floor));
+    if (!header.metadata.empty()) write_metadata(out, header.metadata);
     return out.take();
+}
+
+Packet sequence_packet(const SequenceHeader& header) {
+    Packet out;
+    out.payload = write_sequence_header(header);
+    out.reference = crc32(out.payload);
+    out.flags = packet_flag::told;
+    if (header.session != 0) out.flags |= packet_flag::session;
+    return out;
 }
 
 Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payload) {
@@ -48,10 +162,12 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
     if (!in.ok() || !std::equal(bytes.begin(), bytes.end(), magic.begin()))
         return fail(ErrorKind::corrupt_stream, "sequence header: this is not an htvm stream");
     const auto version = in.u16();
-    if (version != stream_version)
+    if (version < oldest_version || version > stream_version)
         return fail(ErrorKind::unsupported, "the stream has version " + std::to_string(version) +
-                                                ", this decoder reads version " + std::to_string(stream_version));
+                                                ", this decoder reads versions " + std::to_string(oldest_version) +
+                                                " to " + std::to_string(stream_version));
     SequenceHeader out;
+    out.version = version;
     out.lattice.bits = in.u8();
     for (auto& c : out.lattice.origin) c = static_cast<std::int32_t>(in.u32());
     out.fps_numerator = in.u32();
@@ -84,12 +200,14 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
         out.radii.push_back(static_cast<std::int32_t>(radius));
     }
     if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
-    if (in.remaining() >= 4) {
+    if (version > 1 || in.remaining() >= 4) {
         const std::uint32_t spacing = in.u32();
         if (spacing > static_cast<std::uint32_t>(lattice_limit))
             return fail(ErrorKind::corrupt_stream, "sequence header: the nodes' spacing is out of range");
         out.node_spacing = static_cast<std::int32_t>(spacing);
     }
+    if (version > 1)
+        if (auto read = read_what_version_2_added(in, out); !read) return tl::unexpected(read.error());
     return out;
 }
 

@@ -3,23 +3,33 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/lattice.h"
+#include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
 
 namespace htvm::internal {
 
-inline constexpr std::uint16_t stream_version = 1;
+// Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version on are
+// read.
+inline constexpr std::uint16_t stream_version = 2;
+inline constexpr std::uint16_t oldest_version = 1;
 
 // The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (paper/mtfan.h). The
 // paper's are 8, 16 and 32.
 inline constexpr int mtfan_max_nearest = 64;
 
+// 0, 1, 2 for x, y, z. The direction must be known.
+inline std::size_t axis_of(UpAxis up) { return (static_cast<std::size_t>(up) - 1) / 2; }
+
 struct SequenceHeader {
+    std::uint16_t version = stream_version;  // as read; always written in the newest
     Lattice lattice;
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
     std::uint32_t unit_micrometres = 1000;  // the unit that the capture came in, so that a decoder can give it back
@@ -29,10 +39,29 @@ struct SequenceHeader {
     std::int32_t node_spacing = 0;          // of T-frames' deformation nodes, lattice units; 0: no T-frames
     std::uint8_t nearest_vertices = 16;     // m of the distance order
     std::int32_t weight_width = 0;          // of smooth_weights(), lattice units; 0: rigid skinning, as in the paper
+    std::uint64_t session = 0;              // a new random number each time a live publisher starts; 0: none
+    UpAxis up = UpAxis::unknown;
+    std::optional<std::int32_t> floor;  // coordinate of the floor on the axis that is up, lattice units
+    std::vector<MetadataEntry> metadata;
 };
+
+// Limits of the metadata: bytes of a key (at least 1), of a value, and in total; number of entries.
+inline constexpr std::size_t most_key_bytes = 255, most_value_bytes = 4095, most_metadata_bytes = 16384;
+inline constexpr std::size_t most_metadata = 255;
+// bad_input if a limit is exceeded, a key is empty, or a text is not UTF-8 or contains a zero.
+Result<void> check_metadata(std::span<const MetadataEntry> metadata);
 
 std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header);
 Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payload);
+Packet sequence_packet(const SequenceHeader& header);
+
+// Whether a sequence header begins a new sequence; otherwise it repeats the one in force. same: its payload is that of
+// the one in force; frame: the number in its packet; highest: the highest frame number since the sequence began. With a
+// session, a publisher may repeat the header together with old frames, for viewers that join. Without one, frame
+// numbers that start again mean that another file was joined to the previous one.
+inline bool begins_sequence(bool same, bool has_session, std::uint32_t frame, std::optional<std::uint32_t> highest) {
+    return !same || (!has_session && highest && frame <= *highest);
+}
 
 // Where an I-frame's packet begins: bytes from the start of the stream. Seek there, once the sequence header is known.
 struct IndexEntry {

@@ -1,0 +1,96 @@
+// What a frame needs to be decoded, determined from packet headers alone: for programs that handle loss, seek, cut,
+// join late, forward or record a stream without decoding it. The rule is docs/bitstream.md, section 2.2: a frame needs
+// the sequence header, the packet that `reference` in its header names, what that one needs, and, for an EP-frame, the
+// codebooks in force.
+//
+//   htvm::Dependencies dependencies;
+//   for each packet of a live stream:
+//       store[dependencies.push(packet)] = bytes;
+//       remove from the store what is not in dependencies.kept();
+//   when a viewer joins: send store[place] for each place in dependencies.kept(), then each packet as it comes
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "htvm/packet.hpp"
+
+namespace htvm {
+
+// The header of the packet with all flags set. Streams of version 1 do not have them; there they are derived from the
+// kind of packet and the payload.
+PacketHeader told_header(const Packet& packet);
+
+// Takes the headers of a stream's packets one at a time, in order, and knows at any time what the newest frame needs
+// and what later frames may need. Memory is bounded, since an I-frame makes all before it obsolete.
+class Dependencies {
+public:
+    // most: packets held. If a frame would need more, no frame is known to be decodable until the next I-frame.
+    explicit Dependencies(std::size_t most = std::size_t{1} << 16) : most_(most) {}
+
+    // Returns the place of the packet: 0 for the first, and so on. Do not push packets that were lost. A header of
+    // version 1 alone, without its payload, does not tell a repeated sequence header from a different one, so a new
+    // sequence is recognised only by frame numbers that start again; nor does it tell codebooks apart, so all since the
+    // I-frame count.
+    std::uint64_t push(const PacketHeader& header);
+    std::uint64_t push(const Packet& packet) { return push(told_header(packet)); }
+
+    // Number of sequences that have begun; the last packet belongs to the last of them.
+    std::uint32_t sequences() const { return sequences_; }
+    // The places of exactly the packets that the newest frame needs, in the order in which to decode them: the sequence
+    // header first, the frame last. Empty if it cannot be decoded from what was pushed, and before any frame.
+    std::vector<std::uint64_t> closure() const;
+    // The places of the packets that later frames may need, in the same order; all others can be forgotten. A viewer
+    // that joins late must be sent these.
+    std::vector<std::uint64_t> kept() const;
+
+private:
+    struct Frame {
+        std::uint32_t number;
+        std::uint64_t place;
+    };
+    struct Codebooks {
+        std::array<std::optional<std::uint64_t>, 2> told;  // in force: of geometry, of colours
+        std::size_t untold = 0;                            // of untold_codebooks_, as many as there were
+    };
+    // What the newest frame needs of the packets held.
+    struct Newest {
+        std::uint64_t place = 0;
+        bool intra = false;
+        Codebooks codebooks = {};
+        std::size_t chained = 0;  // frames of chain_ that it needs
+        bool known = false;
+    };
+    void begin_sequence();
+    void take_header(const PacketHeader& header, std::uint64_t place);
+    void take_codebook(const PacketHeader& header, std::uint64_t place);
+    void take_frame(const PacketHeader& header, std::uint64_t place);
+    void forget_reference();
+    std::vector<std::uint64_t> places(bool intra, const Codebooks& codebooks, std::size_t chained) const;
+
+    std::size_t most_;
+    std::uint64_t pushed_ = 0;
+    std::uint32_t sequences_ = 0;
+    struct HeaderInForce {
+        std::uint64_t place;
+        std::optional<std::uint32_t> crc;  // none: not told by the header
+        bool session;
+    };
+    std::optional<HeaderInForce> header_;
+    std::optional<std::uint32_t> highest_frame_;
+    std::optional<Frame> intra_;                   // the reference in force
+    std::vector<Frame> chain_;                     // T-frames since, each referring to the one before
+    Codebooks codebooks_;                          // since the I-frame
+    std::vector<std::uint64_t> untold_codebooks_;  // of either purpose, all since the I-frame
+    Newest newest_;
+};
+
+// The same for a list: the places in `packets` of exactly what packets[frame] needs, itself last. Empty if it cannot be
+// decoded from these, or is not a frame.
+std::vector<std::size_t> closure(std::span<const PacketHeader> packets, std::size_t frame);
+
+}  // namespace htvm

@@ -1,0 +1,34 @@
+// Numbers the frames of a whole stream. Each of its sequences has its own numbers; where these start again, the frames
+// are numbered on from the sequence before.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "htvm/dependency.hpp"
+#include "htvm/packet.hpp"
+
+namespace htvm {
+
+class FrameNumbers {
+public:
+    // Takes every packet of the stream, in order.
+    void take(const Packet& packet) { take_told(told_header(packet)); }
+    void take_told(const PacketHeader& header);
+    // To begin in the middle of a stream: the next frame, with its own number `frame`, has the number `number`.
+    void begin(std::uint32_t frame, std::uint32_t number) { offset_ = number - frame; }
+
+    // The number in the stream of a frame, given its own number in the sequence of the last packet.
+    std::uint32_t of(std::uint32_t frame) const { return offset_ + frame; }
+    // Whether the last packet is the first frame of a sequence.
+    bool begins_sequence() const { return begins_; }
+    const Dependencies& dependencies() const { return dependencies_; }
+
+private:
+    Dependencies dependencies_;
+    std::uint32_t in_force_ = 0;  // Dependencies::sequences() at the last frame
+    std::uint32_t offset_ = 0, highest_ = 0;
+    bool any_ = false, begins_ = false;
+};
+
+}  // namespace htvm

@@ -1,0 +1,101 @@
+// Packet headers and what frames need in the C interface, over htvm::Dependencies.
+#include <algorithm>
+#include <vector>
+
+#include "c_api/c_status.h"
+#include "htvm/dependency.hpp"
+
+using htvm::c_api::guarded;
+using htvm::c_api::LastError;
+
+struct htvm_dependencies {
+    htvm_allocator allocator;
+    htvm::Dependencies dependencies;
+    explicit htvm_dependencies(const htvm_allocator& memory) : allocator(memory) {}
+};
+
+static_assert(HTVM_PACKET_REFERRED == htvm::packet_flag::referred && HTVM_PACKET_ACCESS == htvm::packet_flag::access &&
+              HTVM_PACKET_DROPPABLE == htvm::packet_flag::droppable &&
+              HTVM_PACKET_COLOUR == htvm::packet_flag::colour && HTVM_PACKET_SESSION == htvm::packet_flag::session &&
+              HTVM_PACKET_TOLD == htvm::packet_flag::told);
+
+namespace {
+
+htvm_status give(const std::vector<std::uint64_t>& all, std::uint64_t* places, std::size_t capacity,
+                 std::size_t* count) {
+    if (!count) return HTVM_BAD_INPUT;
+    *count = all.size();
+    if (capacity < all.size()) return HTVM_BUFFER_TOO_SMALL;
+    if (!places && !all.empty()) return HTVM_BAD_INPUT;
+    std::copy(all.begin(), all.end(), places);
+    return HTVM_OK;
+}
+
+}  // namespace
+
+htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_info* info, size_t info_size) {
+    if (!packet) return HTVM_BAD_INPUT;
+    LastError unused;  // there is no handle to keep it in
+    return guarded(unused, [&] {
+        htvm::PacketReader one(size);
+        one.push({packet, size});
+        const auto whole = one.pull();
+        if (!whole || one.damaged_bytes() > 0 || one.pending_bytes() > 0) return htvm_status{HTVM_CORRUPT_STREAM};
+        const auto header = htvm::told_header(*whole);
+        htvm_packet_info out{};
+        out.kind = static_cast<std::uint32_t>(header.kind);
+        out.flags = header.flags;
+        out.frame = header.frame;
+        out.reference = header.reference;
+        out.reference_version = header.reference_version;
+        out.timestamp_us = header.timestamp_us;
+        out.bytes = size;
+        return htvm::c_api::write_struct(out, info, info_size);
+    });
+}
+
+htvm_status htvm_dependencies_create(const htvm_allocator* allocator, htvm_dependencies** dependencies) {
+    if (!dependencies) return HTVM_BAD_INPUT;
+    *dependencies = nullptr;
+    htvm_allocator memory = allocator ? *allocator : htvm_allocator{};
+    if (!htvm::c_api::complete(memory)) return HTVM_BAD_INPUT;
+    *dependencies = htvm::c_api::make_handle<htvm_dependencies>(memory, memory);
+    return *dependencies ? HTVM_OK : HTVM_OUT_OF_MEMORY;
+}
+
+void htvm_dependencies_destroy(htvm_dependencies* dependencies) {
+    if (dependencies) htvm::c_api::destroy_handle(dependencies, dependencies->allocator);
+}
+
+htvm_status htvm_dependencies_push(htvm_dependencies* dependencies, const htvm_packet_info* info, uint64_t* place) {
+    if (!dependencies || !info) return HTVM_BAD_INPUT;
+    LastError unused;
+    return guarded(unused, [&] {
+        htvm_packet_info given{};
+        const auto read = htvm::c_api::check_struct(unused, htvm::c_api::read_struct(info, given), "htvm_packet_info");
+        if (read != HTVM_OK) return read;
+        htvm::PacketHeader header;
+        header.kind = static_cast<htvm::PacketKind>(given.kind);
+        header.flags = static_cast<std::uint8_t>(given.flags);
+        header.reference_version = static_cast<std::uint16_t>(given.reference_version);
+        header.frame = given.frame;
+        header.reference = given.reference;
+        header.timestamp_us = given.timestamp_us;
+        const auto taken = dependencies->dependencies.push(header);
+        if (place) *place = taken;
+        return htvm_status{HTVM_OK};
+    });
+}
+
+htvm_status htvm_dependencies_closure(htvm_dependencies* dependencies, uint64_t* places, size_t capacity,
+                                      size_t* count) {
+    if (!dependencies) return HTVM_BAD_INPUT;
+    LastError unused;
+    return guarded(unused, [&] { return give(dependencies->dependencies.closure(), places, capacity, count); });
+}
+
+htvm_status htvm_dependencies_kept(htvm_dependencies* dependencies, uint64_t* places, size_t capacity, size_t* count) {
+    if (!dependencies) return HTVM_BAD_INPUT;
+    LastError unused;
+    return guarded(unused, [&] { return give(dependencies->dependencies.kept(), places, capacity, count); });
+}

@@ -1,0 +1,132 @@
+#include "htvm/dependency.hpp"
+
+#include <algorithm>
+
+#include "codec/frame_kinds.h"
+#include "codec/paper/codebook.h"
+#include "codec/stream/sequence.h"
+#include "core/crc32.h"
+
+namespace htvm {
+
+using namespace internal;
+
+PacketHeader told_header(const Packet& packet) {
+    PacketHeader out = packet;
+    if (out.has(packet_flag::told)) return out;
+    out.flags = packet_flag::told;
+    if (packet.kind == PacketKind::sequence) out.reference = crc32(packet.payload);
+    if (packet.kind == PacketKind::codebook && !packet.payload.empty() && packet.payload[0] == codebook_for_colour)
+        out.flags |= packet_flag::colour;
+    if (const auto type = frame_type(packet.kind)) {
+        const auto& rules = rules_of(*type);
+        out.flags |= rules.referred ? packet_flag::referred : packet_flag::droppable;
+        // Of a T-frame the frames before would have to tell.
+        if (rules.refers_to != RefersTo::intra_or_before) out.flags |= packet_flag::access;
+    }
+    return out;
+}
+
+std::uint64_t Dependencies::push(const PacketHeader& header) {
+    const auto place = pushed_++;
+    if (header.kind == PacketKind::sequence) take_header(header, place);
+    if (header.kind == PacketKind::codebook) take_codebook(header, place);
+    if (frame_type(header.kind)) take_frame(header, place);
+    return place;
+}
+
+void Dependencies::begin_sequence() {
+    ++sequences_;
+    highest_frame_.reset();
+    forget_reference();
+    newest_ = {};
+}
+
+void Dependencies::forget_reference() {
+    intra_.reset();
+    chain_.clear();
+    codebooks_ = {};
+    untold_codebooks_.clear();
+}
+
+void Dependencies::take_header(const PacketHeader& header, std::uint64_t place) {
+    HeaderInForce taken{place, {}, header.has(packet_flag::told) && header.has(packet_flag::session)};
+    if (header.has(packet_flag::told)) taken.crc = header.reference;
+    const bool same = header_ && header_->crc == taken.crc;
+    if (begins_sequence(same, taken.session, header.frame, highest_frame_)) begin_sequence();
+    header_ = taken;
+}
+
+void Dependencies::take_codebook(const PacketHeader& header, std::uint64_t place) {
+    if (!intra_ || intra_->number != header.reference) return;
+    if (header.has(packet_flag::told)) {
+        codebooks_.told[header.has(packet_flag::colour)] = place;
+        return;
+    }
+    untold_codebooks_.push_back(place);
+    codebooks_.untold = untold_codebooks_.size();
+    if (untold_codebooks_.size() <= most_) return;
+    forget_reference();
+    newest_ = {};
+}
+
+void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
+    newest_ = {};
+    if (!header_) return;
+    highest_frame_ = std::max(highest_frame_.value_or(0), header.frame);
+    const auto& rules = rules_of(*frame_type(header.kind));
+    const bool referred = is_referred(header, rules);
+    if (rules.refers_to == RefersTo::nothing) {
+        newest_ = {.place = place, .known = true};
+        if (!referred) return;
+        forget_reference();
+        intra_ = {header.frame, place};
+        return;
+    }
+    const bool of_frame_before =
+        rules.refers_to == RefersTo::intra_or_before && !chain_.empty() && chain_.back().number == header.reference;
+    if (!intra_ || (!of_frame_before && intra_->number != header.reference)) return;
+    newest_ = {.place = place,
+               .intra = true,
+               .codebooks = rules.codebooks ? codebooks_ : Codebooks{},
+               .chained = of_frame_before ? chain_.size() : 0,
+               .known = true};
+    if (!referred) return;
+    if (!of_frame_before) chain_.clear();
+    // The newest frame itself is the chain's last now; what it needs is what comes before it there.
+    chain_.push_back({header.frame, place});
+    if (chain_.size() <= most_) return;
+    forget_reference();
+    newest_ = {};
+}
+
+std::vector<std::uint64_t> Dependencies::places(bool intra, const Codebooks& codebooks, std::size_t chained) const {
+    std::vector<std::uint64_t> out;
+    if (intra) out.push_back(intra_->place);
+    for (const auto& place : codebooks.told)
+        if (place) out.push_back(*place);
+    for (std::size_t i = 0; i < codebooks.untold; ++i) out.push_back(untold_codebooks_[i]);
+    for (std::size_t i = 0; i < chained; ++i) out.push_back(chain_[i].place);
+    std::sort(out.begin(), out.end());
+    if (header_) out.insert(out.begin(), header_->place);
+    return out;
+}
+
+std::vector<std::uint64_t> Dependencies::closure() const {
+    if (!newest_.known) return {};
+    auto out = places(newest_.intra, newest_.codebooks, newest_.chained);
+    out.push_back(newest_.place);
+    return out;
+}
+
+std::vector<std::uint64_t> Dependencies::kept() const { return places(intra_.has_value(), codebooks_, chain_.size()); }
+
+std::vector<std::size_t> closure(std::span<const PacketHeader> packets, std::size_t frame) {
+    if (frame >= packets.size() || !frame_type(packets[frame].kind)) return {};
+    Dependencies dependencies;
+    for (const auto& packet : packets.first(frame + 1)) dependencies.push(packet);
+    const auto places = dependencies.closure();
+    return {places.begin(), places.end()};
+}
+
+}  // namespace htvm
