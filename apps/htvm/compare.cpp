@@ -99,6 +99,7 @@ std::vector<Column> columns(const FrameComparison& frame, const CompareOptions& 
              {"m2_forward_mm", s.m2_forward.rms},
              {"m2_backward_mm", s.m2_backward.rms},
              {"hausdorff_mm", s.hausdorff_mm}});
+    if (options.texcoords) add({{"texcoord_rms", s.texcoord_rms}, {"texcoord_elsewhere", s.texcoord_elsewhere}});
     if (options.cloud) add({{"d1_db", s.d1_db}, {"d2_db", s.d2_db}});
     if (options.pictures) add({{"m3_foreground_db", s.m3_foreground_db}, {"m3_full_db", s.m3_full_db}});
     if (options.topology)
@@ -138,6 +139,10 @@ std::string comparison_table(const SequenceComparison& sums, const CompareOption
         out += row("  mean, mm", f.mean, b.mean, std::max(f.mean, b.mean), 4);
         out += row("  largest (Hausdorff), mm", f.largest, b.largest, s.hausdorff_mm, 3);
         out += single("  worst frame, RMS mm", s.m2_worst_frame_mm, 4);
+    }
+    if (options.texcoords && s.has_texcoords) {
+        out += single("texture coordinates, RMS", s.texcoord_rms, 5);
+        out += single("  elsewhere in the atlas, %", 100 * s.texcoord_elsewhere, 3);
     }
     if (options.cloud) {
         out += fmt::format("\n  D1, D2 with peak {:.3f} mm ({})\n", s.peak_mm,
@@ -188,6 +193,8 @@ nlohmann::json summary_json(const ComparisonSummary& s, const CompareOptions& op
                      {"worst_frame_mm", s.m2_worst_frame_mm},
                      {"forward", distances_json(s.m2_forward)},
                      {"backward", distances_json(s.m2_backward)}};
+    if (options.texcoords && s.has_texcoords)
+        out["texcoords"] = {{"rms", s.texcoord_rms}, {"elsewhere_share", s.texcoord_elsewhere}};
     if (options.cloud) out["cloud"] = {{"peak_mm", s.peak_mm}, {"d1_db", s.d1_db}, {"d2_db", s.d2_db}};
     if (options.pictures)
         out["m3"] = {{"foreground_db", s.m3_foreground_db},
@@ -245,6 +252,7 @@ void choose_metrics(Options& options) {
     const std::set<std::string> only(options.only.begin(), options.only.end());
     c.points = only.contains("m1");
     c.surface = only.contains("m2");
+    c.texcoords = only.contains("texcoords");
     c.cloud = only.contains("d1") || only.contains("d2");
     c.pictures = c.pictures && only.contains("m3");
     c.topology = only.contains("topology");
@@ -486,6 +494,9 @@ void add_compare(CLI::App& app, Run& run) {
         "the order of their names if they have none:\n"
         "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
         "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
+        "  texture coordinates, at closest points of the surface; where they differ by more than 1/16 of the atlas "
+        "they\n"
+        "      are elsewhere in it, and counted by themselves\n"
         "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
         "  M3  PSNR of pictures from all sides\n"
         "  topology  components, boundaries, cracks, flaps");
@@ -496,9 +507,11 @@ void add_compare(CLI::App& app, Run& run) {
         ->type_name("FILE")
         ->required();
     command->add_option("--frames", o.frames, "Compare at most this many frames");
-    command->add_option("--only", o.only, "Measure only some of m1, m2, d1, d2, m3, topology, separated by commas")
+    command
+        ->add_option("--only", o.only,
+                     "Measure only some of m1, m2, texcoords, d1, d2, m3, topology, separated by commas")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "d1", "d2", "m3", "topology"}))
+        ->check(CLI::IsMember({"m1", "m2", "texcoords", "d1", "d2", "m3", "topology"}))
         ->option_text("LIST");
     command->add_option("--unit", o.unit, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
         ->check(CLI::IsMember({"auto", "mm", "cm", "m"}))

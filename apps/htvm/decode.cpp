@@ -13,6 +13,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "command_line/capture.h"
 #include "command_line/layer_table.h"
@@ -111,6 +112,13 @@ Result<double> output_unit(const Options& options, const SequenceInfo& info) {
     return millimetres_per(*length_unit(options.unit));
 }
 
+// Frames in a row that came, but cannot be decoded: told in one line, as most of them are lost with the first.
+struct LostFrames {
+    std::uint32_t first = 0, count = 0;
+    std::uint32_t concealed = 0;
+    std::string why;  // of the first
+};
+
 // The data that the steps of decoding work on.
 struct Decoding {
     const Options& options;
@@ -120,6 +128,8 @@ struct Decoding {
     Summary& summary;
     Progress& progress;
     FrameNumbers numbers = {};
+    LostFrames lost = {};
+    std::uint32_t begins_with = 0;  // number of the first frame of a stream that begins in the middle, until told
 };
 
 bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.written() >= d.options.frames; }
@@ -154,6 +164,32 @@ Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_u
     return true;
 }
 
+std::string frames_text(std::uint32_t first, std::uint32_t count) {
+    return count == 1 ? fmt::format("frame {}", first) : fmt::format("frames {} to {}", first, first + (count - 1));
+}
+
+// Of `count` frames: what stands in for those that are concealed.
+std::string stand_in_text(std::uint32_t concealed, std::uint32_t count) {
+    if (concealed == 0) return {};
+    const std::string whom = concealed < count ? fmt::format("{} of them", concealed) : count == 1 ? "it" : "them";
+    return "; the I-frame's mesh, moved, stands in for " + whom;
+}
+
+// What was lost up to now, once it is known how much.
+void tell_lost(Decoding& d) {
+    const auto lost = std::exchange(d.lost, {});
+    const auto begins_with = std::exchange(d.begins_with, 0);
+    const auto frames = frames_text(lost.first, lost.count);
+    if (begins_with > 0 && lost.count > 0)
+        warn(fmt::format("the stream begins in the middle, with frame {}: {} cannot be shown without those before",
+                         begins_with, frames));
+    else if (begins_with > 0)
+        note(fmt::format("the stream begins with frame {}", begins_with));
+    else if (lost.count > 0)
+        warn(fmt::format("{} {} lost: {}{}", frames, lost.count == 1 ? "is" : "are", lost.why,
+                         stand_in_text(lost.concealed, lost.count)));
+}
+
 // Frames that were lost in transmission leave no damage behind, only a gap in the numbers.
 Result<void> fill_gap(Decoding& d, const Packet& next) {
     auto& summary = d.summary;
@@ -171,15 +207,16 @@ Result<void> fill_gap(Decoding& d, const Packet& next) {
         if (!*done) break;
         ++shown;
     }
-    if (summary.timestamp_us) summary.missing += gap;
-    const std::string what =
-        gap == 1 ? fmt::format("frame {} is", first) : fmt::format("frames {} to {} are", first, first + (gap - 1));
-    std::string instead;
-    if (shown > 0) {
-        const std::string whom = shown < gap ? fmt::format("the first {}", shown) : gap == 1 ? "it" : "them";
-        instead = "; the I-frame's mesh, moved, stands in for " + whom;
+    if (!summary.timestamp_us) {
+        if (frame_type(next.kind)) d.begins_with = first + gap;
+        return {};
     }
-    warn(what + " not in the stream" + instead);
+    summary.missing += gap;
+    tell_lost(d);
+    std::string instead = stand_in_text(shown, gap);
+    if (shown > 0 && shown < gap)
+        instead = fmt::format("; the I-frame's mesh, moved, stands in for the first {}", shown);
+    warn(frames_text(first, gap) + (gap == 1 ? " is" : " are") + " not in the stream" + instead);
     return {};
 }
 
@@ -195,8 +232,11 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
     const auto number = d.numbers.of(packet.frame);
     const auto done = conceal(d, number, packet.timestamp_us);
     if (!done) return tl::unexpected(done.error());
-    warn(fmt::format("frame {} is lost: {}{}", number, error.message,
-                     *done ? "; the I-frame's mesh, moved, stands in for it" : ""));
+    if (d.lost.count++ == 0) {
+        d.lost.first = number;
+        d.lost.why = error.message;
+    }
+    d.lost.concealed += *done ? 1 : 0;
     ++d.summary.undecodable;
     if (is_refused && !d.summary.refused) d.summary.refused = error;
     return {};
@@ -226,6 +266,7 @@ Result<bool> decode_next(Decoding& d) {
     if (!*frame) return true;
     d.summary.decode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     d.summary.concealed_in_a_row = 0;
+    tell_lost(d);
     auto& info = (**frame).info;
     info.frame = d.numbers.of(info.frame);
     info.reference = d.numbers.of(info.reference);
@@ -304,6 +345,7 @@ Result<void> decode(const Options& options) {
             if (!more) return tl::unexpected(more.error());
             if (!*more) break;
         }
+        tell_lost(decoding);
     }
     if (!options.timestamps.empty())
         if (auto ok = write_file(options.timestamps, frame_times_csv(summary.times)); !ok) return ok;

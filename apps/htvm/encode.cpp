@@ -13,6 +13,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "encoder_options.h"
+#include "rate_passes.h"
 #include "rate_report.h"
 #include "stream_file.h"
 
@@ -52,12 +53,13 @@ struct Pass {
     Summary& summary;
     Progress progress{name, capture.frames()};
     std::optional<Mesh> last = {};  // coded last, where it may have to stand in for others
+    bool is_first_to_write = true;  // of several passes that do: says what is wrong with the capture
 };
 
 // Of hundreds the first few tell enough.
 void warn_of_frame(const Pass& pass, std::size_t how_many_so_far, const std::string& line) {
     constexpr std::size_t most = 10;
-    if (!pass.output || how_many_so_far > most) return;
+    if (!pass.output || !pass.is_first_to_write || how_many_so_far > most) return;
     warn(how_many_so_far < most ? line : line + "; others like it follow");
 }
 
@@ -194,27 +196,19 @@ Result<void> encode_frames(Pass& pass) {
     return drain(pass);
 }
 
-// The first of two passes: what each frame costs.
-Result<void> first_pass(const Options& options, Capture& capture, EncoderOptions& settings) {
-    auto encoder = Encoder::create(settings);
-    if (!encoder) return tl::unexpected(encoder.error());
-    RateReport rate(settings);
-    Summary unused;
-    Pass pass{options, capture, *encoder, nullptr, rate, "pass 1 of 2", unused};
-    if (auto ok = encode_frames(pass); !ok) return ok;
-    settings.rate.first_pass = std::move(rate.costs);
-    capture.rewind();
-    return {};
+// How long the capture's frames last.
+double seconds_of(const Summary& summary, double fps) {
+    const auto frames = static_cast<double>(summary.frames);
+    return summary.frames > 1 ? static_cast<double>(summary.last_us - summary.first_us) / 1e6 * frames / (frames - 1)
+                              : 1 / fps;
 }
 
 // ---- What is said of it ---------------------------------------------------------------------------------------------
 
-void report(const Options& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes, double fps) {
+void report(const Options& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes, double fps,
+            std::size_t dropped_late) {
     const auto frames = summary.totals.all().frames;
-    const auto captured = static_cast<double>(summary.frames);
-    const double seconds =
-        summary.frames > 1 ? static_cast<double>(summary.last_us - summary.first_us) / 1e6 * captured / (captured - 1)
-                           : 1 / fps;
+    const double seconds = seconds_of(summary, fps);
     const double megabits = 8e-6 * static_cast<double>(bytes);
     if (options.json) {
         nlohmann::json out = {{"output", options.output},
@@ -224,6 +218,7 @@ void report(const Options& options, const Summary& summary, const RateReport& ra
                               {"repeated_frames", summary.repeated},
                               {"missing_frames", summary.missing},
                               {"filled_frames", summary.filled},
+                              {"late_frames", dropped_late},
                               {"megabits_per_second", megabits / seconds},
                               {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
         if (rate.controlled()) out["control"] = rate_json(rate, bytes, seconds);
@@ -235,6 +230,11 @@ void report(const Options& options, const Summary& summary, const RateReport& ra
                          static_cast<double>(frames) / summary.encode_seconds));
         if (rate.controlled()) note(rate_summary(rate, bytes, seconds));
     }
+    if (dropped_late > 0)
+        warn(fmt::format(
+            "{} of {} came faster than they were encoded, and were dropped; a lower -q or --bitrate is faster",
+            dropped_late, counted(summary.frames + dropped_late, "frame")));
+    if (const auto strain = rate_warning(rate); !strain.empty()) warn(strain);
     if (summary.without_triangles > 0)
         warn(fmt::format("{} of {} no triangles; see that the files hold meshes", summary.without_triangles,
                          counted(frames, "frame") + (summary.without_triangles == 1 ? " has" : " have")));
@@ -267,6 +267,23 @@ bool may_be_live(const std::string& output) {
            (std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error));
 }
 
+// ---- The passes -----------------------------------------------------------------------------------------------------
+
+int fewest_passes(const Options& options, const EncoderOptions& settings) {
+    if (!(settings.rate.bits_per_second > 0)) return 1;
+    if (options.encoding.passes > 0) return options.encoding.passes;
+    return options.capture.input == "-" ? 1 : 2;
+}
+
+// Whether another pass can come nearer to the rate.
+bool is_off(const RateReport& rate, double bits, double seconds) {
+    const double error = bits / seconds / rate.bits_per_second - 1;
+    const auto quality = quality_range(rate);
+    if (error > 0) return error > rate_tolerance && quality.highest > 0;
+    constexpr double full = 85;  // percent: then it is the buffer that keeps the rate down
+    return error < -rate_tolerance && quality.lowest < 100 && rate.buffer.peak_percent() < full;
+}
+
 Result<void> encode(const Options& options) {
     watch_for_interruption();
     auto capture = Capture::open(options.capture);
@@ -274,30 +291,43 @@ Result<void> encode(const Options& options) {
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
     if (!is_given(options.encoding, "session") && may_be_live(options.output)) settings->session = random_session();
-    const bool two_passes = options.encoding.passes == 2;
-    // Before the first pass, so that a place that cannot be written to does not cost one.
-    auto output = StreamOutput::open(options.output);
-    if (!output) return tl::unexpected(output.error());
-    if (two_passes)
-        if (auto ok = first_pass(options, *capture, *settings); !ok) return ok;
-    auto encoder = Encoder::create(*settings);
-    if (!encoder) return tl::unexpected(encoder.error());
-    Summary summary;
-    RateReport rate(*settings);
-    {
-        Pass pass{options, *capture, *encoder, &*output, rate, two_passes ? "pass 2 of 2" : "encoding", summary};
-        if (auto ok = encode_frames(pass); !ok) return ended_early(pass, ok.error());
-    }
-    if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
-    if (auto finished = output->finish(); !finished) return finished;
-    report(options, summary, rate, output->bytes(), capture->fps());
-    if (!rate.dropped.empty())
+    const int fewest = fewest_passes(options, *settings);
+    // What went to a pipe cannot be taken back.
+    const int most = options.encoding.passes == 0 && fewest == 2 && !may_be_live(options.output) ? most_passes : fewest;
+    std::optional<RatePasses> passes;
+    for (int number = 1;; ++number) {
+        // Before the first pass, so that a place that cannot be written to does not cost one.
+        auto output = StreamOutput::open(options.output);
+        if (!output) return tl::unexpected(output.error());
+        auto encoder = Encoder::create(*settings);
+        if (!encoder) return tl::unexpected(encoder.error());
+        Summary summary;
+        RateReport rate(*settings);
+        const bool writes = number >= fewest;
+        {
+            const auto name = most == 1 ? std::string("encoding") : fmt::format("pass {}", number);
+            Pass pass{options, *capture, *encoder, writes ? &*output : nullptr, rate, name, summary};
+            pass.is_first_to_write = number == fewest;
+            if (auto ok = encode_frames(pass); !ok) return writes ? ended_early(pass, ok.error()) : ok;
+        }
+        const double seconds = seconds_of(summary, capture->fps());
+        if (!writes || (number < most && is_off(rate, 8.0 * static_cast<double>(output->bytes()), seconds))) {
+            if (!passes) passes.emplace(rate.bits_per_second * seconds);
+            passes->add(std::move(rate.costs));
+            settings->rate.first_pass = passes->expected();
+            capture->rewind();
+            continue;
+        }
+        if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
+        if (auto finished = output->finish(); !finished) return finished;
+        report(options, summary, rate, output->bytes(), capture->fps(), capture->dropped());
+        if (rate.dropped.empty()) return {};
         return fail(
             ErrorKind::limit,
             fmt::format("{} is complete but for {} of {} frames, which did not fit into the buffer; give a higher "
                         "--bitrate or a larger --buffer",
                         options.output, rate.dropped.size(), rate.costs.size()));
-    return {};
+    }
 }
 
 }  // namespace
@@ -319,6 +349,9 @@ void add_encode(CLI::App& app, Run& run) {
     command->add_flag(
         "--fill", options->fill,
         "Where the numbers of the files leave some out, repeat the frame before (default: a gap in time)");
+    command->add_flag("--drop-late", options->capture.drop_late,
+                      "Of meshes on standard input that come faster than they are encoded, drop the oldest that wait,\n"
+                      "so that a camera never has to (default: the sender waits)");
     command->add_flag("--json", options->json, "Print sizes by frame and layer as JSON on standard output");
     command->add_flag_callback(
         "--help-options",
@@ -332,7 +365,7 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --skeleton capture/skeleton.json -o person.htvm\n"
         "  htvm encode 'scan_%05d.obj' -q 60 --keyint 60 -o person.htvm\n"
         "  htvm encode capture/ --profile topology -s capture/skeleton.json -o exact.htvm\n"
-        "  htvm encode capture/ --bitrate 6 --buffer 0.5 --passes 2 -o person.htvm\n"
+        "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
     show_first(*command, {"--skeleton", "--output", "--fps", "--unit", "--height", "--frames", "--first", "--quality",
                           "--profile", "--bitrate", "--keyint", "--on-bad-frame", "--threads", "--json"});
@@ -340,6 +373,8 @@ void add_encode(CLI::App& app, Run& run) {
         check_together(options->encoding);
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
+        if (options->capture.drop_late && options->capture.input != "-")
+            throw CLI::ValidationError("--drop-late", "is for meshes on standard input: files can wait");
         if (options->encoding.passes == 2 && options->capture.input == "-")
             throw CLI::ValidationError(
                 "--passes",

@@ -58,7 +58,10 @@ RateReport::RateReport(const EncoderOptions& options)
     : bits_per_second(options.rate.bits_per_second),
       buffer_seconds(options.rate.bits_per_second > 0 ? options.rate.buffer_seconds : 0),
       target_error(options.rate.target_error),
-      buffer(options.rate.bits_per_second > 0 ? options.rate.bits_per_second : 1, options.rate.buffer_seconds) {}
+      buffer(options.rate.bits_per_second > 0 ? options.rate.bits_per_second : 1, options.rate.buffer_seconds),
+      moved_by_choice(options.profile != Profile::tracked &&
+                      (options.topology.frame_choice == FrameChoice::motion ||
+                       options.topology.frame_choice == FrameChoice::rate_distortion)) {}
 
 void add_coded(RateReport& report, const FrameCost& cost) { report.costs.push_back(cost); }
 
@@ -81,6 +84,33 @@ QualityRange quality_range(const RateReport& report) {
     return out;
 }
 
+RateStrain rate_strain(const RateReport& report) {
+    RateStrain out;
+    if (!report.rate_controlled()) return out;
+    for (const auto& cost : report.costs) {
+        const bool moved = cost.type == FrameType::predicted;
+        if (!moved && cost.quality <= 0) ++out.lowest_quality;
+        if (moved && cost.bits > 0 && !report.moved_by_choice) ++out.moved_alone;
+    }
+    out.dropped = report.dropped.size();
+    return out;
+}
+
+std::string rate_warning(const RateReport& report) {
+    const auto strain = rate_strain(report);
+    if (!strain.any()) return {};
+    std::string what;
+    const auto add = [&](std::size_t frames, const char* how) {
+        if (frames > 0) what += fmt::format("{}{} {}", what.empty() ? "" : ", ", frames, how);
+    };
+    add(strain.lowest_quality, "at the lowest quality");
+    add(strain.moved_alone, "as motion alone");
+    add(strain.dropped, "dropped");
+    return fmt::format("{:g} Mbit/s is little for this capture: of {} frames {}; a higher --bitrate{} helps",
+                       report.bits_per_second / 1e6, report.costs.size(), what,
+                       strain.moved_alone + strain.dropped > 0 ? " or a larger --buffer" : "");
+}
+
 std::string rate_summary(const RateReport& report, std::uint64_t bytes, double seconds) {
     const auto quality = quality_range(report);
     const std::string qualities =
@@ -91,6 +121,7 @@ std::string rate_summary(const RateReport& report, std::uint64_t bytes, double s
     std::string out = fmt::format("target {:g} Mbit/s: {:+.1f} %; buffer of {:g} s at most {:.0f} % full; {}",
                                   report.bits_per_second / 1e6, error_percent(report, bytes, seconds),
                                   report.buffer_seconds, report.buffer.peak_percent(), qualities);
+    if (quality.lowest >= 100) out += ", the highest there is";
     if (!report.dropped.empty())
         out += fmt::format("; {} of {} frames dropped", report.dropped.size(), report.costs.size());
     return out;
@@ -109,6 +140,9 @@ nlohmann::json rate_json(const RateReport& report, std::uint64_t bytes, double s
     out["error_percent"] = error_percent(report, bytes, seconds);
     out["buffer_seconds"] = report.buffer_seconds;
     out["buffer_peak_percent"] = report.buffer.peak_percent();
+    const auto strain = rate_strain(report);
+    out["lowest_quality_frames"] = strain.lowest_quality;
+    out["moved_alone_frames"] = strain.moved_alone;
     out["dropped_frames"] = report.dropped;
     return out;
 }

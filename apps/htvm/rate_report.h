@@ -56,6 +56,7 @@ struct RateReport {
     BufferModel buffer;
     std::vector<FrameCost> costs;      // one per frame of the capture, with 0 bits if it was dropped
     std::vector<std::size_t> dropped;  // indices of frames of the capture
+    bool moved_by_choice = false;      // P-frames are chosen where they fit, not only where nothing else does
 };
 
 void add_coded(RateReport& report, const FrameCost& cost);
@@ -66,6 +67,17 @@ struct QualityRange {
 };
 // Over the frames whose size depends on quality: all except P-frames and dropped ones.
 QualityRange quality_range(const RateReport& report);
+
+// What the rate does to the frames, beyond a lower quality.
+struct RateStrain {
+    std::size_t lowest_quality = 0;  // frames at the lowest quality there is
+    std::size_t moved_alone = 0;     // frames for which the motion alone is sent: P-frames, T-frames without the rest
+    std::size_t dropped = 0;
+    bool any() const { return lowest_quality + moved_alone + dropped > 0; }
+};
+RateStrain rate_strain(const RateReport& report);
+// A sentence with the numbers and what helps; empty if there is no strain.
+std::string rate_warning(const RateReport& report);
 
 // bytes: of the stream; seconds: of the capture, including dropped frames.
 std::string rate_summary(const RateReport& report, std::uint64_t bytes, double seconds);

@@ -65,6 +65,11 @@ Result<FrameComparison> compare_frame(const Mesh& original, const Mesh& decoded,
         if (!error) return tl::unexpected(error.error());
         out.surface = *error;
     }
+    if (options.texcoords) {
+        const auto error = texcoord_error(original, decoded, options.threads);
+        if (!error) return tl::unexpected(error.error());
+        out.texcoords = *error;
+    }
     if (options.pictures)
         if (const auto done = compare_pictures(original, decoded, options, out); !done)
             return tl::unexpected(done.error());
@@ -88,6 +93,7 @@ SequenceComparison& operator+=(SequenceComparison& sums, const FrameComparison& 
     extend(sums.original_box, frame.original_box);
     sums.points += frame.points;
     sums.surface += frame.surface;
+    sums.texcoords += frame.texcoords;
     sums.cloud += frame.cloud;
     sums.pictures += frame.pictures;
     sums.original_topology += frame.original_topology;
@@ -116,6 +122,9 @@ ComparisonSummary summarise(const SequenceComparison& sums, double peak_mm) {
     out.m2_backward = sequence_backward(sums.surface);
     out.m2_mm = m2(sums.surface);
     out.m2_worst_frame_mm = sums.surface.worst_frame_rms;
+    out.has_texcoords = sums.texcoords.area > 0;
+    out.texcoord_rms = rms_texcoord(sums.texcoords);
+    out.texcoord_elsewhere = share_elsewhere(sums.texcoords);
     out.hausdorff_mm = std::max(out.m2_forward.largest, out.m2_backward.largest);
     out.peak_mm = peak_mm > 0 ? peak_mm : diagonal(sums.original_box);
     out.d1_db = d1_psnr(sums.cloud, out.peak_mm);

@@ -13,16 +13,18 @@
 #include "metrics/picture_error.h"
 #include "metrics/point_error.h"
 #include "metrics/surface_error.h"
+#include "metrics/texcoord_error.h"
 #include "metrics/topology.h"
 
 namespace htvm {
 
 struct CompareOptions {
-    bool points = true;    // M1, geometry and colour
-    bool surface = true;   // M2
-    bool cloud = true;     // D1 and D2
-    bool pictures = true;  // M3
-    bool topology = true;  // counts
+    bool points = true;     // M1, geometry and colour
+    bool surface = true;    // M2
+    bool texcoords = true;  // if both meshes have them
+    bool cloud = true;      // D1 and D2
+    bool pictures = true;   // M3
+    bool topology = true;   // counts
     SurfaceErrorOptions surface_options;
     TopologyMeasureOptions topology_options;
     ViewOptions views;
@@ -39,6 +41,7 @@ struct FrameComparison {
     Box original_box;
     PointError points;
     SurfaceError surface;
+    TexcoordError texcoords;
     CloudError cloud;
     PictureErrorSums pictures;
     Topology original_topology, decoded_topology;
@@ -56,6 +59,7 @@ struct SequenceComparison {
     Box original_box;  // around all frames
     PointError points;
     SurfaceErrorSums surface;
+    TexcoordError texcoords;
     CloudError cloud;
     PictureErrorSums pictures;
     Topology original_topology, decoded_topology;  // sums over the frames
@@ -71,8 +75,10 @@ struct ComparisonSummary {
     double m1_colour = 0, m1_colour_forward = 0, m1_colour_backward = 0;  // levels
     double m2_mm = 0, m2_worst_frame_mm = 0;
     SurfaceDistances m2_forward, m2_backward;
-    double hausdorff_mm = 0;  // the largest distance in both directions and all frames
-    double peak_mm = 0;       // for D1 and D2
+    bool has_texcoords = false;                       // likewise
+    double texcoord_rms = 0, texcoord_elsewhere = 0;  // see texcoord_error.h; 0..1
+    double hausdorff_mm = 0;                          // the largest distance in both directions and all frames
+    double peak_mm = 0;                               // for D1 and D2
     double d1_db = 0, d2_db = 0;
     double m3_foreground_db = 0, m3_full_db = 0;
     double foreground_share = 0;  // of the pixels

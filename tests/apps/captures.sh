@@ -100,6 +100,15 @@ has_times ntsc.htvm 0 33 67 100 133 167
 expect 0 "29.97 frames/s" "$htvm" info ntsc.htvm
 expect 2 "write it as 30, 29.97 or 30000/1001" "$htvm" encode capture --fps 30/0 -o x.htvm
 
+# Meshes that come faster than they are encoded are dropped where that is asked for; the others keep their times.
+for k in $(seq 10); do cat capture/*.ply; done >burst.ply
+"$htvm" encode - --drop-late --json -o burst.htvm <burst.ply >burst.json 2>said || fail "--drop-late: $(tail -1 said)"
+grep -q "of 60 frames came faster than they were encoded, and were dropped" said || fail "late frames are not told"
+late=$(awk -F'[:,]' '/"late_frames"/ { print $2 }' burst.json)
+[ $(($(times burst.htvm | wc -w) + late)) -eq 60 ] || fail "$late frames are late, and $(times burst.htvm | wc -w) in the stream"
+[ "$(times burst.htvm | awk '{ print $NF }')" = 1967 ] || fail "late frames change the times of others"
+expect 2 "--drop-late" "$htvm" encode capture --drop-late -o x.htvm
+
 # Points without a surface.
 mkdir points
 for k in 0 1; do

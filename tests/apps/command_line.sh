@@ -48,6 +48,18 @@ expect 0 "a buffer of 0.5 s is at most" "$htvm" info rate.htvm --bitrate 2 --buf
 expect 5 "overfills the buffer" "$htvm" info rate.htvm --bitrate 0.05 --buffer 0.1
 expect 0 '"buffer_peak_percent"' "$htvm" encode capture --bitrate 2 --passes 2 --json -o rate.htvm
 expect 5 "give a bitrate of at least" "$htvm" encode capture --bitrate 0.005 -o rate.htvm
+expect 0 "of 3 frames 3 at the lowest quality; a higher --bitrate helps" \
+    "$htvm" encode capture --bitrate 0.05 --keyint 1 --profile topology -o rate.htvm
+expect 0 '"lowest_quality_frames": 3' "$htvm" encode capture --bitrate 0.05 --keyint 1 --profile topology --json -o rate.htvm
+# By default files are encoded as often as the rate needs.
+"$htvm" synth short --frames 8 --vertices 3000 --quiet
+for bitrate in 0.4 0.7 1.2; do
+    "$htvm" encode short --bitrate $bitrate --json -o rate.htvm 2>/dev/null >rate.json
+    awk -F'[:,]' '/"error_percent"/ { exit !($2 < 5 && $2 > -5) }' rate.json ||
+        fail "8 frames at $bitrate Mbit/s are $(grep -o '"error_percent": [-0-9.]*' rate.json)"
+done
+expect 0 "target 1.2 Mbit/s" "$htvm" encode short --bitrate 1.2 --passes 1 -o once.htvm
+cmp -s once.htvm rate.htvm && fail "--passes 1 encodes several times"
 expect 2 "standard input" "$htvm" encode - --bitrate 2 --passes 2 -o rate.htvm
 expect 2 "excludes" "$htvm" encode capture --bitrate 2 -q 50 -o rate.htvm
 expect 2 "excludes" "$htvm" encode capture --bitrate 2 --target-error 1 -o rate.htvm
@@ -181,6 +193,21 @@ rm -rf x
 expect 3 "frames 5 to 1056964607 are not in the stream; the I-frame's mesh, moved, stands in for the first 300" \
     "$htvm" decode far.htvm -o x --conceal animate
 [ "$(find x -name '*.ply' | wc -l)" -eq 306 ] || { echo "FAILED: a false frame number fills the disk"; failures=$((failures + 1)); }
+
+# A stream that is joined in the middle: one line, and on from the next I-frame.
+place=($(packet 2 4))
+{ head -c "$(awk '$3 == 2 { print $1; exit }' walk.packets)" walk.htvm; tail -c +$((place[0] + place[1] + 1)) walk.htvm; } >late.htvm
+said=$("$htvm" decode late.htvm -o x 2>&1 | grep -c warning)
+[ "$said" -eq 1 ] || fail "a late join takes $said warnings"
+place=($(packet 2 4))
+{ head -c "$(awk '$3 == 2 { print $1; exit }' walk.packets)" walk.htvm; tail -c +$((place[0] + 1)) walk.htvm; } >late.htvm
+expect 0 "the stream begins with frame 4" "$htvm" decode late.htvm -o x
+# Frames lost in a row are told in one line.
+"$htvm" encode walk --keyint 4 -o tracked.htvm --quiet
+cp walk.packets topology.packets; cp walk.htvm topology.htvm; cp tracked.htvm walk.htvm; packets >walk.packets
+without 7 1 >unfollowed.htvm
+cp topology.htvm walk.htvm; cp topology.packets walk.packets
+expect 3 "frames 2 to 3 are lost: " "$htvm" decode unfollowed.htvm -o x
 
 # Files are compared by their numbers, so a missing file does not shift the others.
 without 3 2 >without.htvm
