@@ -52,22 +52,26 @@ void check_pose(fuzz::FuzzInput& input) {
 }
 
 void check_node_motion(const std::vector<QuantisedTransform>& wanted, fuzz::FuzzInput& input) {
-    std::vector<std::uint32_t> parents;
-    std::vector<LatticePoint> pivots;
+    NodeGraph graph;
     std::vector<QuantisedTransform> before;
     const bool temporal = input.flag();
     for (std::uint32_t n = 0; n < wanted.size(); ++n) {
-        parents.push_back(n > 0 && input.flag() ? input.below(n) : no_parent);
-        pivots.push_back(fuzz::any_point(input));
+        auto& lower = graph.lower.emplace_back();
+        for (std::uint32_t other = 0; other < n; ++other)
+            if (input.below(4) == 0) lower.push_back(other);
+        graph.pivots.push_back(fuzz::any_point(input));
+        constexpr std::array<Vector3d, 4> normals = {{{0, 0, 0}, {0, 0, 1}, {0.6, 0, -0.8}, {-0.48, 0.6, 0.64}}};
+        graph.normals.push_back(normals[input.below(normals.size())]);
         if (temporal) before.push_back(any_transform(input));
     }
     NodeMotionOptions options;
     options.rotation_exponent = static_cast<int>(input.below(11));
     options.shift_exponent = static_cast<int>(input.below(21));
-    const auto encoded = encode_node_motion(wanted, parents, pivots, before, options);
-    const auto again = decode_node_motion(encoded.bytes, parents, pivots, before);
+    options.still_along = input.below(100);
+    const auto encoded = encode_node_motion(wanted, graph, before, options);
+    const auto again = decode_node_motion(encoded.bytes, graph, before);
     require(again && *again == encoded.transforms, "the motion that the encoder promised");
-    const auto bad = decode_node_motion(fuzz::damaged(encoded.bytes, input), parents, pivots, before);
+    const auto bad = decode_node_motion(fuzz::damaged(encoded.bytes, input), graph, before);
     if (!bad) return;
     for (const auto& transform : *bad) {
         for (const auto c : transform.rotation.others)

@@ -8,7 +8,7 @@ namespace {
 // The I-frame's joints, each moved like the node nearest to it.
 Pose tracked_pose(const DecoderState& state, std::span<const QuantisedTransform> transforms) {
     const auto& reference = state.reference->skinned;
-    const auto& pivots = state.reference->tracked->pivots;
+    const auto& pivots = state.reference->tracked->graph.pivots;
     const auto& bones = state.header->skeleton.bones;
     std::vector<std::size_t> node_of_joint;
     Pose pose;

@@ -213,9 +213,9 @@ TEST(TrackedFrames, ThatMoveBeyondTheLatticeEndAtItsEdge) {
     auto payload = copy_of(read_frame_payload(whole).value());
     NodeMotionOptions steps;
     steps.shift_exponent = 20;
-    const std::vector<QuantisedTransform> far(reference.pivots.size(),
+    const std::vector<QuantisedTransform> far(reference.graph.pivots.size(),
                                               {{}, {2 * lattice_limit, -2 * lattice_limit, 0}});
-    payload.set(Layer::transforms, encode_node_motion(far, reference.parents, reference.pivots, {}, steps).bytes);
+    payload.set(Layer::transforms, encode_node_motion(far, reference.graph, {}, steps).bytes);
     DecodedTrackedFrame frame;
     ASSERT_TRUE(decode_tracked_frame(view_of(payload), reference, nullptr, {}, frame).has_value());
     expect_on_lattice(frame, reference);
@@ -252,13 +252,34 @@ TEST(SmoothedWithinCells, TakesAVertexHalfwayToItsNeighbours) {
     EXPECT_EQ(smoothed_within_cells(positions, triangles, 10)[0], (LatticePoint{0, 0, 35}));
 }
 
-TEST(NodeMotion, ComesBackWithinHalfAStepForAnyParents) {
+// Each node has some of the lower ones as neighbours; some surfaces have no normal.
+NodeGraph any_graph(std::mt19937& random, std::size_t nodes) {
+    NodeGraph out;
+    for (std::uint32_t i = 0; i < nodes; ++i) {
+        out.pivots.push_back(
+            {between(random, -9999, 9999), between(random, -9999, 9999), between(random, -9999, 9999)});
+        auto& lower = out.lower.emplace_back();
+        for (std::uint32_t other = 0; other < i; ++other)
+            if (below(random, i) < 3) lower.push_back(other);
+        Vector3d normal{};
+        for (auto& c : normal) c = between(random, -1, 1);
+        const double length = std::hypot(normal[0], normal[1], normal[2]);
+        for (auto& c : normal) c = length > 0 ? c / length : 0;
+        out.normals.push_back(normal);
+    }
+    return out;
+}
+
+double distance(LatticePoint a, LatticePoint b) {
+    return std::hypot(1.0 * a.x - b.x, 1.0 * a.y - b.y, 1.0 * a.z - b.z);
+}
+
+TEST(NodeMotion, ComesBackWithinAStepForAnyGraph) {
     for (unsigned seed = 0; seed < 20; ++seed) {
         std::mt19937 random(seed);
         const std::size_t nodes = below(random, 40);
+        const auto graph = any_graph(random, nodes);
         std::vector<QuantisedTransform> wanted, before;
-        std::vector<std::uint32_t> parents;
-        std::vector<LatticePoint> pivots;
         const auto transform = [&] {
             QuantisedTransform out;
             out.rotation.largest = static_cast<std::uint8_t>(below(random, 4));
@@ -269,37 +290,67 @@ TEST(NodeMotion, ComesBackWithinHalfAStepForAnyParents) {
         for (std::uint32_t i = 0; i < nodes; ++i) {
             wanted.push_back(transform());
             before.push_back(transform());
-            parents.push_back(i == 0 || below(random, 5) == 0 ? no_parent : below(random, i));
-            pivots.push_back(
-                {between(random, -9999, 9999), between(random, -9999, 9999), between(random, -9999, 9999)});
         }
         for (const bool temporal : {false, true}) {
             const auto of_before =
                 temporal ? std::span<const QuantisedTransform>(before) : std::span<const QuantisedTransform>{};
             const NodeMotionOptions options{3, 2};
-            const auto encoded = encode_node_motion(wanted, parents, pivots, of_before, options);
-            const auto decoded = decode_node_motion(encoded.bytes, parents, pivots, before);
+            const auto encoded = encode_node_motion(wanted, graph, of_before, options);
+            const auto decoded = decode_node_motion(encoded.bytes, graph, before);
             ASSERT_TRUE(decoded.has_value());
             EXPECT_EQ(*decoded, encoded.transforms);
             for (std::size_t i = 0; i < nodes; ++i) {
                 EXPECT_EQ((*decoded)[i].rotation.largest, wanted[i].rotation.largest);
                 for (std::size_t c = 0; c < 3; ++c)
                     EXPECT_LE(std::abs((*decoded)[i].rotation.others[c] - wanted[i].rotation.others[c]), 8);
-                EXPECT_LE(std::abs((*decoded)[i].shift.x - wanted[i].shift.x), 4);
-                EXPECT_LE(std::abs((*decoded)[i].shift.y - wanted[i].shift.y), 4);
+                // 0.6 steps of 4 along each of three axes, and the rounding to the lattice.
+                EXPECT_LE(distance((*decoded)[i].shift, wanted[i].shift), 0.6 * 4 * std::sqrt(3.0) + 0.9);
             }
             if (temporal && nodes > 0) {
-                EXPECT_FALSE(decode_node_motion(encoded.bytes, parents, pivots, {}).has_value());
+                EXPECT_FALSE(decode_node_motion(encoded.bytes, graph, {}).has_value());
             }
         }
     }
 }
 
+// Three nodes in a row on a floor whose normal is up.
+NodeGraph floor_graph() {
+    NodeGraph out;
+    out.pivots = {{0, 0, 0}, {1000, 0, 0}, {2000, 0, 0}};
+    out.lower = {{}, {0}, {0, 1}};
+    out.normals.assign(3, {0, 0, 1});
+    return out;
+}
+
+TEST(NodeMotion, IsPredictedByTheMeanStepOfAllLowerNeighbours) {
+    const auto graph = floor_graph();
+    const std::vector<QuantisedTransform> before(3);
+    // The third moves by the mean of the others' steps: three numbers that are zero instead of two that are 60.
+    const std::vector<QuantisedTransform> mean = {{{}, {400, 0, 80}}, {{}, {800, 0, 160}}, {{}, {600, 0, 120}}};
+    const std::vector<QuantisedTransform> as_one = {{{}, {400, 0, 80}}, {{}, {800, 0, 160}}, {{}, {400, 0, 80}}};
+    const NodeMotionOptions options{0, 0};
+    EXPECT_LT(encode_node_motion(mean, graph, before, options).bytes.size(),
+              encode_node_motion(as_one, graph, before, options).bytes.size());
+}
+
+TEST(NodeMotion, OfSmallResidualsAlongTheSurfaceIsNotSentButThatAcrossIs) {
+    const auto graph = floor_graph();
+    const std::vector<QuantisedTransform> wanted = {{{}, {20, -20, 24}}, {{}, {20, -20, 24}}, {{}, {200, 0, 24}}};
+    const std::vector<QuantisedTransform> before(3);
+    const NodeMotionOptions options{.rotation_exponent = 0, .shift_exponent = 3, .still_along = 32};
+    const auto coded = encode_node_motion(wanted, graph, before, options).transforms;
+    EXPECT_EQ(coded[0].shift, (LatticePoint{0, 0, 24}));
+    EXPECT_EQ(coded[1].shift, (LatticePoint{0, 0, 24}));
+    EXPECT_EQ(coded[2].shift, (LatticePoint{200, 0, 24}));
+}
+
 TEST(NodeMotion, ThatIsAsBeforeTakesNextToNothing) {
     const std::vector<QuantisedTransform> before(300, {{0, {40, -3, 7}}, {100, 200, -300}});
-    const std::vector<std::uint32_t> parents(300, no_parent);
-    const std::vector<LatticePoint> pivots(300);
-    EXPECT_LT(encode_node_motion(before, parents, pivots, before, {}).bytes.size(), 20u);
+    NodeGraph graph;
+    graph.pivots.resize(300);
+    graph.lower.resize(300);
+    graph.normals.resize(300);
+    EXPECT_LT(encode_node_motion(before, graph, before, {}).bytes.size(), 20u);
 }
 
 }  // namespace

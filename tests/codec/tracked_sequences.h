@@ -28,7 +28,7 @@ inline FramePayload tracked_by_chance(const TrackedReference& reference, const T
         return static_cast<std::int32_t>(any(random));
     };
     std::vector<QuantisedTransform> wanted;
-    for (std::size_t n = 0; n < reference.pivots.size(); ++n) {
+    for (std::size_t n = 0; n < reference.graph.pivots.size(); ++n) {
         QuantisedTransform transform;
         if (random() % 16 == 0) transform.rotation.largest = static_cast<std::uint8_t>(random() % 4);
         for (auto& c : transform.rotation.others)
@@ -44,8 +44,7 @@ inline FramePayload tracked_by_chance(const TrackedReference& reference, const T
     out.header.triangles = static_cast<std::uint32_t>(reference.mesh.triangles.size());
     const std::span<const QuantisedTransform> transforms_before =
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{};
-    out.set(Layer::transforms,
-            encode_node_motion(wanted, reference.parents, reference.pivots, transforms_before, steps).bytes);
+    out.set(Layer::transforms, encode_node_motion(wanted, reference.graph, transforms_before, steps).bytes);
     std::vector<std::int32_t> displacement, colour;
     for (std::size_t v = 0; v < reference.mesh.positions.size(); ++v) {
         displacement.push_back(number(motion.displacement) + 30);

@@ -1,7 +1,11 @@
 """Chapter 8.13 of docs/bitstream.md: the transforms of a T-frame's nodes."""
+import math
+
 from arithmetic import Decoder, Model, SignedModel
-from conventions import L, add, check, clamp, sub
+from conventions import L, add, check, clamp, rdiv, sub
 from reference import matrix, rotate
+
+SPACE = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class Transform:
@@ -9,40 +13,79 @@ class Transform:
         self.largest, self.others, self.shift = largest, list(others), list(shift)
 
 
-def predicted(n, parent, transforms, pivots, before):
-    if parent is None:
-        return before[n] if before else Transform()
-    of_parent = transforms[parent]
-    if not before:
-        M = matrix(of_parent.largest, of_parent.others)
-        moved = add(rotate(M, sub(pivots[n], pivots[parent])), add(pivots[parent], of_parent.shift))
-        return Transform(of_parent.largest, of_parent.others, sub((clamp(x, -L, L) for x in moved), pivots[n]))
-    own, parent_before = before[n], before[parent]
-    step = sub(of_parent.shift, parent_before.shift)
-    shift = [clamp(x, -2 * L, 2 * L) for x in add(own.shift, step)]
-    others = own.others
-    if of_parent.largest == parent_before.largest == own.largest:
-        turn = sub(of_parent.others, parent_before.others)
-        others = [clamp(x, -8192, 8192) for x in add(own.others, turn)]
-    return Transform(own.largest, others, shift)
+def mean(vectors):
+    """Componentwise, rounded; zero of none."""
+    return [rdiv(sum(x), len(vectors)) for x in zip(*vectors)] if vectors else [0, 0, 0]
 
 
-def decode_node_motion(data, parents, pivots, before):
-    """The transforms. before: those of the previous frame, or None."""
-    check(len(data) >= 3 and data[0] <= 1 and data[1] <= 10 and data[2] <= 20, "the steps of a motion are out of range")
-    check(data[0] == 0 or before is not None or not parents, "a motion needs the previous frame")
+def shift_with(n, k, transforms, pivots):
+    M = matrix(transforms[k].largest, transforms[k].others)
+    moved = add(rotate(M, sub(pivots[n], pivots[k])), add(pivots[k], transforms[k].shift))
+    return sub((clamp(x, -L, L) for x in moved), pivots[n])
+
+
+def from_reference(n, lower, transforms, pivots):
+    if not lower:
+        return Transform()
+    largest = transforms[lower[0]].largest
+    others = mean([transforms[k].others for k in lower if transforms[k].largest == largest])
+    shift = mean([shift_with(n, k, transforms, pivots) for k in lower])
+    return Transform(largest, others, [clamp(x, -2 * L, 2 * L) for x in shift])
+
+
+def from_before(n, lower, transforms, before):
+    own = before[n]
+    step = mean([sub(transforms[k].shift, before[k].shift) for k in lower])
+    turn = mean([sub(transforms[k].others, before[k].others) for k in lower
+                 if transforms[k].largest == before[k].largest == own.largest])
+    return Transform(own.largest, [clamp(x, -8192, 8192) for x in add(own.others, turn)],
+                     [clamp(x, -2 * L, 2 * L) for x in add(own.shift, step)])
+
+
+def unit_product(a, b):
+    out = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    length = math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
+    return tuple(x / length for x in out)
+
+
+def surface_axes(normal, transform):
+    M = matrix(transform.largest, transform.others)
+    across = [float(M[3 * i]) * normal[0] + float(M[3 * i + 1]) * normal[1] + float(M[3 * i + 2]) * normal[2]
+              for i in range(3)]
+    length = math.sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
+    if not length > 0:
+        return SPACE
+    across = tuple(x / length for x in across)
+    least = min(range(3), key=lambda i: abs(across[i]))
+    along = unit_product(across, SPACE[least])
+    return across, along, unit_product(across, along)
+
+
+def decode_node_motion(data, nodes, normals, before):
+    """The transforms. normals: one per node. before: the frame before's transforms, or None."""
+    check(len(data) >= 3 and data[0] <= 3 and data[1] <= 10 and data[2] <= 20, "the flags or steps of a motion are wrong")
+    history, surface = data[0] & 1, data[0] & 2
+    check(not history or before is not None or not nodes.pivots, "a motion needs the previous frame")
     decoder = Decoder(data[3:])
-    same, rotation, shift = Model(), SignedModel(), SignedModel()
+    same, rotation, across = Model(), SignedModel(), SignedModel()
+    along = SignedModel() if surface else across
     transforms = []
-    for n, parent in enumerate(parents):
-        p = predicted(n, parent, transforms, pivots, before if data[0] else None)
-        transform = Transform(p.largest, p.others, p.shift)
+    for n, lower in enumerate(nodes.lower):
+        if not surface:
+            lower = lower[:1]
+        if history:
+            transform = from_before(n, lower, transforms, before)
+        else:
+            transform = from_reference(n, lower, transforms, nodes.pivots)
+        axes = surface_axes(normals[n], transform) if surface else SPACE
         if not decoder.bit(same):
             transform.largest, transform.others = decoder.raw(2), [0, 0, 0]
         for i in range(3):
             transform.others[i] = clamp(transform.others[i] + (decoder.signed(rotation) << data[1]), -8192, 8192)
+        s = [float(decoder.signed(model)) * float(1 << data[2]) for model in (across, along, along)]
         for i in range(3):
-            transform.shift[i] = clamp(transform.shift[i] + (decoder.signed(shift) << data[2]), -2 * L, 2 * L)
+            by = axes[0][i] * s[0] + axes[1][i] * s[1] + axes[2][i] * s[2]
+            transform.shift[i] = clamp(transform.shift[i] + math.floor(by + 0.5), -2 * L, 2 * L)
         transforms.append(transform)
         decoder.check_end()
     return transforms

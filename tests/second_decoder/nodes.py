@@ -1,5 +1,5 @@
 """Chapter 8.12 of docs/bitstream.md: the reference mesh's smoothed positions, the nodes that move a T-frame, their
-weights and parents."""
+weights and neighbours."""
 import heapq
 import math
 from collections import defaultdict
@@ -129,7 +129,7 @@ def weights_of(near, spacing):
     return [(w, n) for w, (_, n) in zip(weight, near)]
 
 
-def parents_of(steps, owner, pivots):
+def lower_neighbours(steps, owner, pivots):
     count = len(pivots)
     pairs = {(owner[v], owner[u]) for v in range(len(steps)) for u in steps[v] if owner[v] < owner[u]}
     group = pieces(count, pairs)
@@ -150,14 +150,14 @@ def parents_of(steps, owner, pivots):
         o = min((nearest[o], o) for o in range(count) if not inside[o])[1]
         pairs.add((min(o, tie[o]), max(o, tie[o])))
         take(group[o])
-    return [min((a for a, b in pairs if b == n), default=None) for n in range(count)]
+    return [sorted(a for a, b in pairs if b == n) for n in range(count)]
 
 
 class Nodes:
-    """pivots and parents by node; weights by vertex."""
+    """vertices, pivots and lower neighbours by node; weights by vertex."""
 
     def __init__(self, positions, triangles, spacing):
-        self.pivots, self.parents, self.weights = [], [], []
+        self.vertices, self.pivots, self.lower, self.weights = [], [], [], []
         if not positions:
             return
         steps = steps_between(positions, triangles, spacing)
@@ -167,6 +167,7 @@ class Nodes:
                 spacing = min(spacing + spacing // 2 + 1, 2 * L)
                 nodes, covered = find_nodes(steps, spacing)
         near = find_near(steps, positions, nodes)
+        self.vertices = nodes
         self.pivots = [positions[v] for v in nodes]
         self.weights = [weights_of(entries, spacing) for entries in near]
-        self.parents = parents_of(steps, [entries[0][1] for entries in near], self.pivots)
+        self.lower = lower_neighbours(steps, [entries[0][1] for entries in near], self.pivots)

@@ -19,6 +19,8 @@ class TrackedReference:
         self.mesh = mesh
         self.positions = smoothed(mesh.positions, mesh.triangles, geometry_step)
         self.nodes = Nodes(self.positions, mesh.triangles, spacing)
+        normals = normals_of(self.positions, mesh.triangles)
+        self.node_normals = [normals[v] for v in self.nodes.vertices]
         self.levels = vertex_hierarchy(self.positions, mesh.triangles)
 
 
@@ -58,7 +60,7 @@ def decode_tracked_mesh(frame, reference, before):
     check(frame.vertices == vertices and frame.triangles == len(source.triangles), "its counts are not the I-frame's")
     state = TrackedState()
     state.transforms = decode_node_motion(
-        frame.layer(TRANSFORMS), reference.nodes.parents, reference.nodes.pivots, before and before.transforms)
+        frame.layer(TRANSFORMS), reference.nodes, reference.node_normals, before and before.transforms)
     state.displacement = decode_field(
         frame.layer(GEOMETRY), vertices, reference.levels, 1, before and before.displacement)
     mesh = Mesh()

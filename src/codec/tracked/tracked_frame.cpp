@@ -9,10 +9,15 @@
 namespace htvm::internal {
 namespace {
 
-std::vector<std::uint32_t> parents_of(const DeformationNodes& nodes) {
-    std::vector<std::uint32_t> out(nodes.vertex.size(), no_parent);
-    for (const auto& pair : nodes.neighbours)
-        if (out[pair.second] == no_parent || pair.first < out[pair.second]) out[pair.second] = pair.first;
+NodeGraph graph_of(const DeformationNodes& nodes, const LatticeMesh& mesh) {
+    NodeGraph out;
+    out.lower.resize(nodes.vertex.size());
+    for (const auto& pair : nodes.neighbours) out.lower[pair.second].push_back(pair.first);  // the pairs ascend
+    const auto normals = vertex_normals(mesh.positions, mesh.triangles);
+    for (const auto v : nodes.vertex) {
+        out.pivots.push_back(mesh.positions[v]);
+        out.normals.push_back(normals[v]);
+    }
     return out;
 }
 
@@ -60,8 +65,7 @@ Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::in
     parallel_invoke(
         threads, [&] { hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles); },
         [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options); });
-    for (const auto v : out.nodes.vertex) out.pivots.push_back(out.mesh.positions[v]);
-    out.parents = parents_of(out.nodes);
+    out.graph = graph_of(out.nodes, out.mesh);
     if (!hierarchy) return tl::unexpected(hierarchy.error());
     out.hierarchy = std::move(*hierarchy);
     return out;
@@ -73,8 +77,8 @@ std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
     std::vector<LatticePoint> out(reference.mesh.positions.size());
     parallel_for(out.size(), threads, 8192, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v)
-            out[v] = blended_move(reference.mesh.positions[v], reference.nodes.weights[v], rotation, reference.pivots,
-                                  transforms);
+            out[v] = blended_move(reference.mesh.positions[v], reference.nodes.weights[v], rotation,
+                                  reference.graph.pivots, transforms);
     });
     return out;
 }
@@ -116,7 +120,7 @@ Result<void> decode_tracked_frame(const FramePayloadView& payload, const Tracked
     if (payload.header.vertices != mesh.positions.size() || payload.header.triangles != mesh.triangles.size())
         return fail(ErrorKind::corrupt_stream, "tracked frame: it has other counts than its I-frame");
     auto transforms = decode_node_motion(
-        payload.of(Layer::transforms), reference.parents, reference.pivots,
+        payload.of(Layer::transforms), reference.graph,
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{});
     if (!transforms) return tl::unexpected(transforms.error());
     out.state.transforms = std::move(*transforms);

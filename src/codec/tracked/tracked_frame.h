@@ -25,8 +25,7 @@ namespace htvm::internal {
 struct TrackedReference {
     LatticeMesh mesh;  // as decoded, with positions smoothed within their quantiser cells
     DeformationNodes nodes;
-    std::vector<LatticePoint> pivots;    // the positions of the nodes
-    std::vector<std::uint32_t> parents;  // the lowest neighbour of each node, if lower than the node itself
+    NodeGraph graph;
     VertexHierarchy hierarchy;
 };
 // node_spacing: lattice units, > 0. quantiser_step: that of the I-frame's positions, in lattice units. threads: uses

@@ -13,7 +13,7 @@ namespace {
 std::vector<HandlePair> pairs_of(const TrackedReference& reference) {
     std::vector<HandlePair> out;
     for (const auto& pair : reference.nodes.neighbours) {
-        const auto a = point_of(reference.pivots[pair.first]), b = point_of(reference.pivots[pair.second]);
+        const auto a = point_of(reference.graph.pivots[pair.first]), b = point_of(reference.graph.pivots[pair.second]);
         HandlePair handles;
         handles.first = pair.first;
         handles.second = pair.second;
@@ -32,9 +32,11 @@ std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, s
 // For shifts, half the step of the displacement; for turns, steps so coarse that most stay as predicted: measured, see
 // docs/algorithm.md.
 NodeMotionOptions motion_options(double geometry_step) {
+    constexpr double still_along = 1.3;
     NodeMotionOptions out;
     out.shift_exponent = std::clamp(static_cast<int>(std::lround(std::log2(std::max(geometry_step, 1.0)))) - 1, 0, 8);
     out.rotation_exponent = std::clamp(out.shift_exponent + 4, 0, 10);
+    out.still_along = still_along * geometry_step;
     return out;
 }
 
@@ -42,7 +44,7 @@ NodeMotionOptions motion_options(double geometry_step) {
 
 DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options) {
     std::vector<Eigen::Vector3d> handles;
-    for (const auto pivot : reference.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
+    for (const auto pivot : reference.graph.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
     return make_deformable(points_of(reference.mesh.positions), reference.mesh.triangles, reference.nodes.weights,
                            handles, pairs_of(reference), options);
 }
@@ -75,7 +77,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     const auto& triangles = reference.mesh.triangles;
     EncodedTrackedFrame out;
     auto coded_motion = encode_node_motion(
-        quantised(motion, reference.pivots), reference.parents, reference.pivots,
+        quantised(motion, reference.graph.pivots), reference.graph,
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
         motion_options(options.geometry_step));
     const auto moved = moved_by_nodes(reference, coded_motion.transforms, options.threads);
