@@ -40,6 +40,7 @@ target_compile_definitions(test_c_api PRIVATE HTVM_PROJECT_VERSION="${PROJECT_VE
 htvm_tests(io htvm_io)
 htvm_tests(synth htvm_synth)
 htvm_tests(metrics htvm_metrics)
+htvm_tests(live htvm_live)
 htvm_tests(apps htvm_app)
 htvm_tests(lab htvm_laboratory htvm_synth)
 foreach(name command_line captures outputs editing)

@@ -40,3 +40,10 @@ const licence = async (title, path) => `${title}\n${'='.repeat(title.length)}\n\
 await writeFile(
     'packages/player/dist/htvm-player.LICENSES.txt',
     `${await licence('three.js (in htvm-player.js)', 'node_modules/three/LICENSE')}\n${await licence('htvm', '../LICENSE')}`);
+
+// What the program's own web server carries inside: cmake/live.cmake.
+await rm('dist', { recursive: true, force: true });
+await mkdir('dist');
+for (const name of ['htvm-player.js', 'htvm-worker.js', 'htvm_decoder.wasm', 'htvm-player.LICENSES.txt'])
+    await copyFile(`packages/player/dist/${name}`, `dist/${name}`);
+for (const name of ['index.html', 'page.js', 'page.css']) await copyFile(`site/${name}`, `dist/${name}`);

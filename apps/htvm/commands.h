@@ -10,6 +10,8 @@ void add_compare(CLI::App& app, Run& run);
 void add_decode(CLI::App& app, Run& run);
 void add_encode(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
+void add_play(CLI::App& app, Run& run);
+void add_serve(CLI::App& app, Run& run);
 void add_synth(CLI::App& app, Run& run);
 
 }  // namespace htvm::app

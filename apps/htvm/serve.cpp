@@ -1,0 +1,60 @@
+// htvm serve: a folder of streams for others to watch, with a page that plays them.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "command_line/terminal.h"
+#include "commands.h"
+#include "live/file_server.h"
+
+namespace htvm::app {
+namespace {
+
+struct Options {
+    std::string folder, address = "127.0.0.1";
+    std::uint16_t port = 8080;
+    bool other_sites = true;
+    unsigned connections = live::FileServerOptions{}.connections;
+};
+
+Result<void> serve(const Options& options) {
+    live::FileServerOptions server;
+    server.folder = options.folder;
+    server.address = options.address;
+    server.port = options.port;
+    server.other_sites = options.other_sites;
+    server.connections = options.connections;
+    auto opened = live::FileServer::open(server);
+    if (!opened) return tl::unexpected(opened.error());
+    if (!live::has_player()) warn("this htvm was built without the web player: it serves files, but has no pages");
+    const bool six = options.address.find(':') != std::string::npos;
+    fmt::print("http://{}{}{}:{}/\n", six ? "[" : "", options.address, six ? "]" : "", opened->port());
+    std::fflush(stdout);
+    opened->run();
+    return {};
+}
+
+}  // namespace
+
+void add_serve(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto* command = app.add_subcommand("serve", "Serve a folder of streams, with a page that plays them");
+    command->add_option("--files", options->folder, "The folder: its .htvm, .png and .jpg files can be read by anyone")
+        ->type_name("FOLDER")
+        ->required();
+    command->add_option("--address", options->address,
+                        "Address to listen on (default 127.0.0.1: this machine alone; 0.0.0.0 or ::: all networks)");
+    command->add_option("--port", options->port, "Port to listen on; 0: a free one (default 8080)");
+    command->add_flag("!--same-site", options->other_sites, "Do not allow pages of other sites to read the streams");
+    command->add_option("--connections", options->connections, "Connections at once (default 512)")
+        ->check(CLI::Range(1, 100000));
+    command->footer(
+        "Runs until Ctrl-C. Symbolic links and hidden files are not served. It speaks HTTP without TLS: put a web\n"
+        "server such as nginx in front where strangers' networks are between (examples/nginx).\n"
+        "Example:\n"
+        "  htvm serve --files streams/ --address 0.0.0.0");
+    command->callback([options, &run] { run = [options] { return serve(*options); }; });
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,50 @@
+# src/live: the web server of `htvm play` and `htvm serve`, and the player's files, which it carries inside.
+find_package(Boost 1.81 REQUIRED)
+
+set(HTVM_PLAYER "" CACHE STRING
+    "Folder with the built web player to carry inside the program, or OFF; empty: web/dist, if ./dev web has built it")
+set(player "${HTVM_PLAYER}")
+if(player STREQUAL "" AND EXISTS ${PROJECT_SOURCE_DIR}/web/dist/index.html)
+  set(player ${PROJECT_SOURCE_DIR}/web/dist)
+endif()
+set(player_list "")
+set(player_blobs "")
+set(player_paths "")
+if(player)
+  file(GLOB player_paths CONFIGURE_DEPENDS ${player}/*)
+  if(NOT EXISTS ${player}/index.html)
+    message(FATAL_ERROR "HTVM_PLAYER: there is no player in ${player}; ./dev web builds one in web/dist")
+  endif()
+else()
+  message(STATUS "Without the web player: htvm play and htvm serve have no pages. ./dev web builds it.")
+endif()
+set(number 0)
+foreach(path ${player_paths})
+  cmake_path(GET path FILENAME name)
+  string(APPEND player_blobs "extern \"C\" const char player_file_${number}[], player_file_${number}_end[];\n"
+    "__asm__(\".section .rodata\\n.global player_file_${number}, player_file_${number}_end\\n\"\n"
+    "        \"player_file_${number}:\\n.incbin \\\"${path}\\\"\\nplayer_file_${number}_end:\\n.byte 0\\n.previous\");\n")
+  string(APPEND player_list
+    "    {\"${name}\", {player_file_${number}, static_cast<std::size_t>(player_file_${number}_end - player_file_${number})}},\n")
+  math(EXPR number "${number} + 1")
+endforeach()
+set(player_cpp ${PROJECT_BINARY_DIR}/live/player_files.cpp)
+file(CONFIGURE OUTPUT ${player_cpp} CONTENT "// Written by cmake/live.cmake.
+#include \"live/player_files.h\"
+
+#include <vector>
+
+@player_blobs@
+namespace htvm::live {
+
+std::span<const PlayerFile> player_files() {
+    static const std::vector<PlayerFile> files = {
+@player_list@    };
+    return files;
+}
+
+}  // namespace htvm::live
+" @ONLY)
+set_source_files_properties(${player_cpp} PROPERTIES OBJECT_DEPENDS "${player_paths}")
+htvm_floor(live SOURCES src/live/http_request.cpp src/live/served_folder.cpp src/live/file_server.cpp ${player_cpp}
+           LINKS htvm_core Boost::headers nlohmann_json::nlohmann_json)

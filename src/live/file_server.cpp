@@ -1,0 +1,362 @@
+#include "live/file_server.h"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/zlib/deflate_stream.hpp>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "core/crc32.h"
+#include "live/http_request.h"
+#include "live/player_files.h"
+#include "live/served_folder.h"
+
+namespace htvm::live {
+namespace {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using tcp = net::ip::tcp;
+
+constexpr std::size_t header_limit = 8192, piece_bytes = 65536;
+constexpr auto awaited = net::as_tuple(net::use_awaitable);
+
+// What the player's pages may do; inline scripts and other sites' are forbidden.
+constexpr const char* page_policy =
+    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src 'self'; connect-src "
+    "'self'; "
+    "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+std::string_view media_type(std::string_view name) {
+    const std::pair<std::string_view, std::string_view> types[] = {
+        {".html", "text/html; charset=utf-8"},
+        {".js", "text/javascript; charset=utf-8"},
+        {".css", "text/css; charset=utf-8"},
+        {".txt", "text/plain; charset=utf-8"},
+        {".wasm", "application/wasm"},
+        {".json", "application/json"},
+        {".png", "image/png"},
+        {".jpg", "image/jpeg"},
+    };
+    for (const auto& [ending, type] : types)
+        if (name.ends_with(ending)) return type;
+    return "application/octet-stream";
+}
+
+std::string gzipped(std::string_view content) {
+    std::string out = {'\x1f', '\x8b', 8, 0, 0, 0, 0, 0, 0, 3};
+    beast::zlib::deflate_stream deflate;
+    deflate.reset(6, 15, 8, beast::zlib::Strategy::normal);
+    const std::size_t begin = out.size();
+    out.resize(begin + deflate.upper_bound(content.size()) + 16);
+    beast::zlib::z_params params;
+    params.next_in = content.data();
+    params.avail_in = content.size();
+    params.next_out = out.data() + begin;
+    params.avail_out = out.size() - begin;
+    beast::error_code error;
+    deflate.write(params, beast::zlib::Flush::finish, error);
+    out.resize(begin + params.total_out);
+    const auto crc = internal::crc32({reinterpret_cast<const std::uint8_t*>(content.data()), content.size()});
+    for (const auto value : {crc, static_cast<std::uint32_t>(content.size())})
+        for (int shift = 0; shift < 32; shift += 8) out.push_back(static_cast<char>(value >> shift));
+    return out;
+}
+
+// A file of the player, or a text made for a request.
+struct Text {
+    std::string_view type;
+    std::string content, compressed, tag;
+};
+
+Text make_text(std::string_view name, std::string content) {
+    Text out{media_type(name), std::move(content), {}, {}};
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(out.content.data());
+    out.tag = '"' + std::to_string(internal::crc32({bytes, out.content.size()})) + '"';
+    out.compressed = gzipped(out.content);
+    return out;
+}
+
+using Request = http::request<http::empty_body>;
+using Header = http::response<http::empty_body>;
+
+struct Response {
+    Header header;
+    std::string own;           // a text made for this response,
+    std::string_view content;  // or one that outlives it,
+    ServedFile file;           // or a part of a file
+    std::uint64_t first = 0, count = 0;
+};
+
+}  // namespace
+
+struct FileServer::State {
+    FileServerOptions options;
+    ServedFolder folder;
+    net::io_context context{1};
+    tcp::acceptor acceptor{context};
+    std::map<std::string, Text, std::less<>> player;
+    std::map<std::string, unsigned> by_address;
+    unsigned connections = 0;
+
+    State(const FileServerOptions& given, ServedFolder served) : options(given), folder(std::move(served)) {}
+
+    Response answer(const Request& request);
+    Response answer_file(const Request& request, std::vector<std::string> segments, Header header);
+    Response answer_text(const Request& request, const Text& text, Header header);
+    std::string listing() const;
+    bool is_served(const std::string& path) const;
+    bool host_is_loopback(std::string_view host) const;
+
+    net::awaitable<void> accept();
+    net::awaitable<void> serve(beast::tcp_stream stream, std::string address);
+    net::awaitable<bool> send(beast::tcp_stream& stream, Response& response, bool with_body);
+};
+
+bool FileServer::State::is_served(const std::string& path) const {
+    const auto& only = options.only;
+    return only.empty() ? path.ends_with(".htvm") || path.ends_with(".png") || path.ends_with(".jpg")
+                        : std::find(only.begin(), only.end(), path) != only.end();
+}
+
+// A page of another site whose name was made to point here (DNS rebinding) sends that name.
+bool FileServer::State::host_is_loopback(std::string_view host) const {
+    const auto port = ':' + std::to_string(acceptor.local_endpoint().port());
+    if (host.ends_with(port)) host.remove_suffix(port.size());
+    return host == "127.0.0.1" || host == "localhost" || host == "[::1]";
+}
+
+std::string FileServer::State::listing() const {
+    nlohmann::json list = nlohmann::json::array();
+    for (const auto& [path, size] : folder.files(".htvm"))
+        if (is_served(path)) list.push_back({{"path", path}, {"bytes", size}});
+    // File names may be any bytes.
+    return list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+Response FileServer::State::answer_text(const Request& request, const Text& text, Header header) {
+    Response out;
+    out.header = std::move(header);
+    out.header.set(http::field::etag, text.tag);
+    out.header.set(http::field::cache_control, "no-cache");
+    out.header.set(http::field::vary, "Accept-Encoding");
+    if (text.type.starts_with("text/html")) out.header.set("Content-Security-Policy", page_policy);
+    if (names_tag(request[http::field::if_none_match], text.tag)) {
+        out.header.result(http::status::not_modified);
+        return out;
+    }
+    const bool gzip = accepts_gzip(request[http::field::accept_encoding]);
+    if (gzip) out.header.set(http::field::content_encoding, "gzip");
+    out.header.set(http::field::content_type, text.type);
+    out.content = gzip ? text.compressed : text.content;
+    return out;
+}
+
+Response FileServer::State::answer_file(const Request& request, std::vector<std::string> segments, Header header) {
+    Response out;
+    out.header = std::move(header);
+    segments.erase(segments.begin());
+    std::string path;
+    for (const auto& segment : segments) path += (path.empty() ? "" : "/") + segment;
+    auto file = is_served(path) ? folder.file(segments) : fail(ErrorKind::bad_input, "not served");
+    if (!file) {
+        out.header.result(http::status::not_found);
+        return out;
+    }
+    if (options.other_sites) {
+        out.header.set(http::field::access_control_allow_origin, "*");
+        out.header.set(http::field::access_control_expose_headers, "Content-Range, ETag");
+    }
+    out.header.set(http::field::etag, file->tag);
+    out.header.set(http::field::accept_ranges, "bytes");
+    out.header.set(http::field::cache_control, "no-cache");  // kept, but asked for again whether it is still the same
+    if (names_tag(request[http::field::if_none_match], file->tag)) {
+        out.header.result(http::status::not_modified);
+        return out;
+    }
+    const auto condition = request[http::field::if_range];
+    const bool ranges = condition.empty() || condition == file->tag;
+    const auto part = requested_part(ranges ? request[http::field::range] : "", file->size);
+    if (part.kind == FilePart::Kind::beyond) {
+        out.header.result(http::status::range_not_satisfiable);
+        out.header.set(http::field::content_range, "bytes */" + std::to_string(file->size));
+        return out;
+    }
+    if (part.kind == FilePart::Kind::part) {
+        out.header.result(http::status::partial_content);
+        out.header.set(http::field::content_range, "bytes " + std::to_string(part.first) + '-' +
+                                                       std::to_string(part.first + part.count - 1) + '/' +
+                                                       std::to_string(file->size));
+    }
+    out.header.set(http::field::content_type, media_type(path));
+    out.file = std::move(*file);
+    out.first = part.first;
+    out.count = part.count;
+    return out;
+}
+
+Response FileServer::State::answer(const Request& request) {
+    Header header{http::status::ok, 11};
+    header.set("X-Content-Type-Options", "nosniff");
+    header.set("Referrer-Policy", "no-referrer");
+    header.set("Cross-Origin-Resource-Policy", options.other_sites ? "cross-origin" : "same-origin");
+    const auto refuse = [&](http::status status) {
+        header.result(status);
+        Response out;
+        out.header = header;
+        return out;
+    };
+    if (options.loopback_names && !host_is_loopback(request[http::field::host]))
+        return refuse(http::status::misdirected_request);
+    if (request.method() != http::verb::get && request.method() != http::verb::head) {
+        header.set(http::field::allow, "GET, HEAD");
+        return refuse(http::status::method_not_allowed);
+    }
+    auto segments = path_segments(request.target());
+    if (!segments) return refuse(http::status::bad_request);
+    const auto& path = *segments;
+    if (path.size() > 1 && path[0] == "files") return answer_file(request, std::move(*segments), header);
+    if (path.size() == 2 && path[0] == "api" && path[1] == "files") {
+        Response out;
+        out.header = header;
+        out.own = listing();
+        out.header.set(http::field::content_type, "application/json");
+        out.header.set(http::field::cache_control, "no-store");
+        return out;
+    }
+    const bool page = path.empty(), script = path.size() == 2 && path[0] == "player";
+    const auto found = player.find(page ? "index.html" : script ? path[1] : "");
+    if (found == player.end()) return refuse(http::status::not_found);
+    return answer_text(request, found->second, header);
+}
+
+// False if the connection is of no use any more.
+net::awaitable<bool> FileServer::State::send(beast::tcp_stream& stream, Response& response, bool with_body) {
+    auto& header = response.header;
+    if (!response.own.empty()) response.content = response.own;
+    const bool text = response.file.file.descriptor() < 0;
+    const auto count = text ? response.content.size() : response.count;
+    if (header.result() != http::status::not_modified) header.set(http::field::content_length, std::to_string(count));
+    http::response_serializer<http::empty_body> serializer(header);
+    stream.expires_after(options.stall_time);
+    if (const auto [error, bytes] = co_await http::async_write_header(stream, serializer, awaited); error)
+        co_return false;
+    if (!with_body) co_return true;
+    std::vector<char> piece(text ? 0 : std::min<std::uint64_t>(piece_bytes, count));
+    for (std::uint64_t sent = 0; sent < count;) {
+        std::string_view next;
+        if (text) {
+            next = response.content.substr(sent, piece_bytes);
+        } else {
+            const auto wanted = std::min<std::uint64_t>(piece.size(), count - sent);
+            next = {piece.data(), response.file.file.read(response.first + sent, {piece.data(), wanted})};
+        }
+        if (next.empty()) co_return false;  // the file has become shorter than was promised
+        stream.expires_after(options.stall_time);
+        const auto [error, bytes] = co_await net::async_write(stream, net::buffer(next), awaited);
+        if (error) co_return false;
+        sent += bytes;
+    }
+    co_return true;
+}
+
+net::awaitable<void> FileServer::State::serve(beast::tcp_stream stream, std::string address) {
+    beast::flat_buffer buffer(header_limit);
+    for (bool alive = true; alive;) {
+        http::request_parser<http::empty_body> parser;
+        parser.header_limit(header_limit);
+        stream.expires_after(options.header_time);
+        const auto [error, bytes] = co_await http::async_read_header(stream, buffer, parser, awaited);
+        if (error) break;
+        // No request here has a body; one that does would be read as the next request.
+        const bool body = !parser.is_done();
+        const auto& request = parser.get();
+        Response response;
+        if (body)
+            response.header.result(http::status::bad_request);
+        else
+            response = answer(request);
+        alive = request.keep_alive() && !body;
+        response.header.keep_alive(alive);
+        const bool sent = co_await send(stream, response, request.method() != http::verb::head);
+        alive = alive && sent;
+    }
+    beast::error_code ignored;
+    stream.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    --connections;
+    if (--by_address[address] == 0) by_address.erase(address);
+}
+
+net::awaitable<void> FileServer::State::accept() {
+    for (;;) {
+        auto [error, socket] = co_await acceptor.async_accept(awaited);
+        if (error == net::error::operation_aborted) co_return;
+        if (error) {
+            // Out of file descriptors, most likely: others have to end first.
+            net::steady_timer pause(context, std::chrono::milliseconds(100));
+            co_await pause.async_wait(awaited);
+            continue;
+        }
+        beast::error_code unknown;
+        const auto address = socket.remote_endpoint(unknown).address().to_string();
+        const auto found = by_address.find(address);
+        const unsigned same = found == by_address.end() ? 0 : found->second;
+        if (unknown || connections >= options.connections || same >= options.connections_per_address) continue;
+        ++connections;
+        by_address[address] = same + 1;
+        net::co_spawn(context, serve(beast::tcp_stream(std::move(socket)), address), net::detached);
+    }
+}
+
+FileServer::FileServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+FileServer::FileServer(FileServer&&) noexcept = default;
+FileServer& FileServer::operator=(FileServer&&) noexcept = default;
+FileServer::~FileServer() = default;
+
+Result<FileServer> FileServer::open(const FileServerOptions& options) {
+    auto folder = ServedFolder::open(options.folder);
+    if (!folder) return tl::unexpected(folder.error());
+    auto state = std::make_unique<State>(options, std::move(*folder));
+    for (const auto& file : player_files())
+        state->player.emplace(file.name, make_text(file.name, std::string(file.content)));
+    beast::error_code error;
+    const auto address = net::ip::make_address(options.address, error);
+    if (error) return fail(ErrorKind::bad_input, options.address + " is not an IP address");
+    const tcp::endpoint endpoint(address, options.port);
+    auto& acceptor = state->acceptor;
+    acceptor.open(endpoint.protocol(), error);
+    if (!error) acceptor.set_option(net::socket_base::reuse_address(true), error);
+    if (!error) acceptor.bind(endpoint, error);
+    if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
+    if (error)
+        return fail(ErrorKind::bad_input, "cannot listen on " + options.address + " port " +
+                                              std::to_string(options.port) + ": " + error.message());
+    return FileServer(std::move(state));
+}
+
+std::uint16_t FileServer::port() const { return state_->acceptor.local_endpoint().port(); }
+
+void FileServer::run() {
+    net::signal_set signals(state_->context, SIGINT, SIGTERM);
+    signals.async_wait([this](const beast::error_code&, int) { state_->context.stop(); });
+    net::co_spawn(state_->context, state_->accept(), net::detached);
+    state_->context.run();
+}
+
+void FileServer::stop() { state_->context.stop(); }
+
+bool has_player() { return !player_files().empty(); }
+
+}  // namespace htvm::live

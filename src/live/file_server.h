@@ -1,0 +1,57 @@
+// A web server for streams and the player: for a person's own browser on the loopback address, and for a folder that
+// others may watch.
+//
+//   /                the player's page; it lists the streams, or plays one: /?file=NAME
+//   /player/NAME     the player's scripts, kept in the program
+//   /api/files       the streams as JSON: [{"path": ..., "bytes": ...}, ...]
+//   /files/PATH      the streams themselves, by ranges too
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace htvm::live {
+
+struct FileServerOptions {
+    std::string address = "127.0.0.1";  // to listen on
+    std::uint16_t port = 0;             // 0: a free one
+    std::string folder;                 // what is below /files/
+    std::vector<std::string> only;      // if there are any, just these files of the folder
+    bool other_sites = false;           // whether pages of other sites may read the streams (CORS)
+    bool loopback_names = false;        // refuse requests whose Host is not this machine's loopback address
+    unsigned connections = 512;         // at once; more are closed
+    unsigned connections_per_address = 64;
+    std::chrono::seconds header_time{10};  // for a whole request header, from the end of the response before
+    std::chrono::seconds stall_time{30};   // for a client to take the next 64 KB
+};
+
+class FileServer {
+public:
+    struct State;  // opaque
+
+    // Listens; answers nothing before run(). bad_input if the folder cannot be read or the address is taken.
+    static Result<FileServer> open(const FileServerOptions& options);
+    FileServer(FileServer&&) noexcept;
+    FileServer& operator=(FileServer&&) noexcept;
+    ~FileServer();
+
+    std::uint16_t port() const;
+    // Serves until stop() is called or the process is sent SIGINT or SIGTERM.
+    void run();
+    // From any thread; only between open() and the end of run().
+    void stop();
+
+private:
+    explicit FileServer(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+// Whether the player was built into this program.
+bool has_player();
+
+}  // namespace htvm::live

@@ -1,0 +1,34 @@
+// The parts of a request that are parsed here rather than by Boost.Beast: which file it names, and which part of it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace htvm::live {
+
+// The decoded segments of a request target's path; the query is dropped. Nothing if a segment is empty (except after a
+// final slash), begins with a dot, or holds a slash, backslash or control character, if an escape is wrong, or if the
+// path is longer than 1,024 bytes or has more than 16 segments. So the segments never lead upwards or to hidden files.
+std::optional<std::vector<std::string>> path_segments(std::string_view target);
+
+// Which bytes of a file to send.
+struct FilePart {
+    enum class Kind { whole, part, beyond };  // answered by 200, 206, 416
+    Kind kind = Kind::whole;
+    std::uint64_t first = 0, count = 0;  // of a part: at least one byte
+};
+
+// From a Range header, "" if there is none. Headers that are malformed, in other units or name several ranges are
+// ignored, as RFC 9110 allows.
+FilePart requested_part(std::string_view range, std::uint64_t size);
+
+// Whether a list of entity tags, as in If-None-Match, has this one or is "*". Weak tags match too.
+bool names_tag(std::string_view list, std::string_view tag);
+
+// Whether an Accept-Encoding header allows gzip.
+bool accepts_gzip(std::string_view header);
+
+}  // namespace htvm::live

@@ -1,0 +1,258 @@
+// The server as clients see it, who are not always polite, on this machine's loopback address.
+#include "live/file_server.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <boost/asio.hpp>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <thread>
+
+namespace htvm::live {
+namespace {
+
+namespace fs = std::filesystem;
+namespace net = boost::asio;
+using tcp = net::ip::tcp;
+
+class FileServerTest : public testing::Test {
+protected:
+    void SetUp() override {
+        auto name = (fs::temp_directory_path() / "htvm-server-XXXXXX").string();
+        ASSERT_TRUE(mkdtemp(name.data()));
+        root = name;
+        fs::create_directories(root / "served" / "inner");
+        write("secret.htvm", "secret");
+        write("served/person.htvm", content);
+        write("served/inner/a b.htvm", "inner");
+        write("served/.hidden.htvm", "hidden");
+        write("served/notes.txt", "notes");
+        fs::create_symlink(root / "secret.htvm", root / "served" / "link.htvm");
+        fs::create_directory_symlink(root, root / "served" / "up");
+        options.folder = (root / "served").string();
+    }
+
+    void TearDown() override {
+        if (server) server->stop();
+        if (thread.joinable()) thread.join();
+        fs::remove_all(root);
+    }
+
+    void start() {
+        auto opened = FileServer::open(options);
+        ASSERT_TRUE(opened) << opened.error().message;
+        server.emplace(std::move(*opened));
+        thread = std::thread([this] { server->run(); });
+    }
+
+    void write(const std::string& name, const std::string& text) const { std::ofstream(root / name) << text; }
+
+    tcp::socket connect() {
+        tcp::socket socket(context);
+        socket.connect({net::ip::make_address("127.0.0.1"), server->port()});
+        return socket;
+    }
+
+    // All that the server sends until it closes the connection.
+    static std::string read_all(tcp::socket& socket) {
+        std::string out;
+        boost::system::error_code error;
+        net::read(socket, net::dynamic_buffer(out), error);
+        return out;
+    }
+
+    // The response to one request; headers end in \r\n each.
+    std::string get(const std::string& target, const std::string& headers = "", const std::string& method = "GET") {
+        auto socket = connect();
+        net::write(socket, net::buffer(method + ' ' + target + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n" +
+                                       headers + "\r\n"));
+        return read_all(socket);
+    }
+
+    static int status(const std::string& response) {
+        return response.size() > 12 ? std::atoi(response.c_str() + 9) : 0;
+    }
+    static std::string body(const std::string& response) { return response.substr(response.find("\r\n\r\n") + 4); }
+    static std::string header(const std::string& response, const std::string& name) {
+        const auto at = response.find("\r\n" + name + ": ");
+        if (at == std::string::npos || at > response.find("\r\n\r\n")) return "";
+        const auto begin = at + name.size() + 4;
+        return response.substr(begin, response.find("\r\n", begin) - begin);
+    }
+
+    fs::path root;
+    const std::string content = "0123456789abcdefghij";
+    FileServerOptions options;
+    std::optional<FileServer> server;
+    std::thread thread;
+    net::io_context context;
+};
+
+TEST_F(FileServerTest, GivesFilesWholeAndInParts) {
+    start();
+    const auto whole = get("/files/person.htvm");
+    EXPECT_EQ(status(whole), 200);
+    EXPECT_EQ(body(whole), content);
+    EXPECT_EQ(header(whole, "Accept-Ranges"), "bytes");
+    const auto part = get("/files/person.htvm", "Range: bytes=5-9\r\n");
+    EXPECT_EQ(status(part), 206);
+    EXPECT_EQ(body(part), "56789");
+    EXPECT_EQ(header(part, "Content-Range"), "bytes 5-9/20");
+    EXPECT_EQ(header(part, "Content-Length"), "5");
+    const auto beyond = get("/files/person.htvm", "Range: bytes=20-\r\n");
+    EXPECT_EQ(status(beyond), 416);
+    EXPECT_EQ(header(beyond, "Content-Range"), "bytes */20");
+    EXPECT_EQ(body(get("/files/inner/a%20b.htvm")), "inner");
+    const auto head = get("/files/person.htvm", "", "HEAD");
+    EXPECT_EQ(header(head, "Content-Length"), "20");
+    EXPECT_EQ(body(head), "");
+}
+
+TEST_F(FileServerTest, TagsTellWhetherAFileIsStillTheSame) {
+    start();
+    const auto tag = header(get("/files/person.htvm"), "ETag");
+    ASSERT_FALSE(tag.empty());
+    EXPECT_EQ(status(get("/files/person.htvm", "If-None-Match: " + tag + "\r\n")), 304);
+    EXPECT_EQ(status(get("/files/person.htvm", "Range: bytes=0-4\r\nIf-Range: " + tag + "\r\n")), 206);
+    write("served/person.htvm", "another, longer content");
+    EXPECT_EQ(status(get("/files/person.htvm", "If-None-Match: " + tag + "\r\n")), 200);
+    EXPECT_EQ(status(get("/files/person.htvm", "Range: bytes=0-4\r\nIf-Range: " + tag + "\r\n")), 200);
+}
+
+TEST_F(FileServerTest, NothingOutsideTheFolderIsReached) {
+    ASSERT_EQ(mkfifo((root / "served" / "pipe.htvm").c_str(), 0600), 0);
+    start();
+    for (const char* target : {"/files/../secret.htvm", "/files/%2e%2e/secret.htvm", "/files/up/secret.htvm",
+                               "/files/link.htvm", "/files/.hidden.htvm", "/files/notes.txt", "/files/inner", "/files/",
+                               "/files//etc/passwd", "/files/pipe.htvm", "/files/..%2fsecret.htvm",
+                               "/player/../../secret.htvm", "/secret.htvm", "/files/nowhere.htvm"}) {
+        const auto answer = get(target);
+        EXPECT_TRUE(status(answer) == 404 || status(answer) == 400) << target << ": " << answer;
+        EXPECT_EQ(answer.find("secret"), std::string::npos) << target;
+    }
+}
+
+TEST_F(FileServerTest, ListsTheStreams) {
+    start();
+    EXPECT_EQ(body(get("/api/files")), R"([{"bytes":5,"path":"inner/a b.htvm"},{"bytes":20,"path":"person.htvm"}])");
+}
+
+TEST_F(FileServerTest, OneFileAloneIsServedIfAskedTo) {
+    options.only = {"person.htvm"};
+    start();
+    EXPECT_EQ(status(get("/files/person.htvm")), 200);
+    EXPECT_EQ(status(get("/files/inner/a%20b.htvm")), 404);
+    EXPECT_EQ(body(get("/api/files")), R"([{"bytes":20,"path":"person.htvm"}])");
+}
+
+TEST_F(FileServerTest, OtherSitesMayReadOnlyIfAllowed) {
+    start();
+    EXPECT_EQ(header(get("/files/person.htvm"), "Access-Control-Allow-Origin"), "");
+    server->stop();
+    thread.join();
+    options.other_sites = true;
+    start();
+    EXPECT_EQ(header(get("/files/person.htvm"), "Access-Control-Allow-Origin"), "*");
+    EXPECT_EQ(header(get("/api/files"), "Access-Control-Allow-Origin"), "");
+}
+
+TEST_F(FileServerTest, HostsOfOtherNamesAreRefusedOnTheLoopback) {
+    options.loopback_names = true;
+    start();
+    EXPECT_EQ(status(get("/files/person.htvm")), 200);
+    auto socket = connect();
+    net::write(
+        socket,
+        net::buffer(std::string("GET /files/person.htvm HTTP/1.1\r\nHost: evil.example\r\nConnection: close\r\n\r\n")));
+    EXPECT_EQ(status(read_all(socket)), 421);
+}
+
+TEST_F(FileServerTest, ConnectionsAreKeptForMoreRequests) {
+    start();
+    auto socket = connect();
+    const std::string request = "GET /files/person.htvm HTTP/1.1\r\nHost: x\r\n";
+    net::write(socket, net::buffer(request + "\r\n" + request + "Connection: close\r\n\r\n"));
+    const auto both = read_all(socket);
+    EXPECT_NE(both.find(content), both.rfind(content));
+}
+
+TEST_F(FileServerTest, WhatIsNoRequestIsRefused) {
+    start();
+    EXPECT_EQ(status(get("/files/person.htvm", "", "POST")), 405);
+    EXPECT_EQ(status(get("/files/person.htvm", "Content-Length: 5\r\n")), 400);
+    for (const auto& noise : {std::string("\x16\x03\x01\x00\xff", 5), std::string("GET\r\n\r\n"),
+                              "GET / HTTP/1.1\r\nX: " + std::string(20000, 'x')}) {
+        auto socket = connect();
+        boost::system::error_code error;
+        net::write(socket, net::buffer(noise), error);
+        socket.shutdown(tcp::socket::shutdown_send, error);
+        EXPECT_EQ(read_all(socket).find(" 200 "), std::string::npos);
+    }
+    EXPECT_EQ(status(get("/files/person.htvm")), 200);
+}
+
+TEST_F(FileServerTest, ClientsThatDoNotFinishTheirRequestAreCutOff) {
+    options.header_time = std::chrono::seconds(1);
+    start();
+    auto socket = connect();
+    net::write(socket, net::buffer(std::string("GET /files/person.htvm HTTP/1.1\r\nHost")));
+    EXPECT_EQ(read_all(socket), "");  // returns because the server closes the connection
+    EXPECT_EQ(status(get("/files/person.htvm")), 200);
+}
+
+TEST_F(FileServerTest, ClientsThatTakeNothingAreCutOffAndHoldUpNobody) {
+    write("served/large.htvm", std::string(64 << 20, 'x'));
+    options.stall_time = std::chrono::seconds(1);
+    options.connections_per_address = 2;
+    start();
+    auto socket = connect();
+    net::write(socket, net::buffer(std::string("GET /files/large.htvm HTTP/1.1\r\nHost: x\r\n\r\n")));
+    EXPECT_EQ(status(get("/files/person.htvm")), 200);  // meanwhile
+    // With a second such client no more connections are allowed, until the server gives both up.
+    auto other = connect();
+    net::write(other, net::buffer(std::string("GET /files/large.htvm HTTP/1.1\r\nHost: x\r\n\r\n")));
+    while (status(get("/files/person.htvm")) != 200) std::this_thread::yield();
+    EXPECT_LT(read_all(socket).size(), std::size_t{64} << 20);
+}
+
+TEST_F(FileServerTest, ConnectionsAreFew) {
+    options.connections_per_address = 3;
+    start();
+    std::vector<tcp::socket> held;
+    for (int i = 0; i < 3; ++i) {
+        held.push_back(connect());
+        net::write(held.back(), net::buffer(std::string("GET /files/person.htvm HTTP/1.1\r\nHost: x\r\n\r\n")));
+        std::string answer(12, ' ');
+        net::read(held.back(), net::buffer(answer));
+        EXPECT_EQ(answer, "HTTP/1.1 200");
+    }
+    EXPECT_EQ(get("/files/person.htvm"), "");
+    held.clear();
+    while (status(get("/files/person.htvm")) != 200) std::this_thread::yield();  // once the server has noticed
+}
+
+TEST_F(FileServerTest, ThePageForbidsWhatItDoesNotNeed) {
+    if (!has_player()) GTEST_SKIP() << "built without the player";
+    start();
+    const auto page = get("/", "Accept-Encoding: identity\r\n");
+    EXPECT_NE(page.find("<!doctype html>"), std::string::npos);
+    EXPECT_NE(header(page, "Content-Security-Policy").find("script-src 'self' 'wasm-unsafe-eval'"), std::string::npos);
+    const auto script = get("/player/htvm-player.js", "Accept-Encoding: gzip\r\n");
+    EXPECT_EQ(header(script, "Content-Encoding"), "gzip");
+    EXPECT_EQ(body(script).substr(0, 2), "\x1f\x8b");
+    EXPECT_EQ(header(get("/player/htvm_decoder.wasm"), "Content-Type"), "application/wasm");
+    EXPECT_EQ(status(get("/", "If-None-Match: " + header(page, "ETag") + "\r\n")), 304);
+}
+
+TEST_F(FileServerTest, AFolderThatIsNotThereIsAnError) {
+    options.folder = (root / "nowhere").string();
+    EXPECT_FALSE(FileServer::open(options));
+    options.folder = root.string();
+    options.address = "not an address";
+    EXPECT_FALSE(FileServer::open(options));
+}
+
+}  // namespace
+}  // namespace htvm::live
