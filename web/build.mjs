@@ -4,7 +4,8 @@ import { copyFile, mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
 
-process.chdir(fileURLToPath(new URL('.', import.meta.url)));
+const folder = fileURLToPath(new URL('.', import.meta.url));
+process.chdir(folder);
 const wasm = '../build/wasm/htvm_decoder.wasm';
 const packages = ['decoder', 'three', 'player'];
 
@@ -17,7 +18,7 @@ execFileSync('node', ['layouts.mjs', '../include/htvm/htvm.h', wasm, 'packages/d
 execFileSync('node', ['node_modules/typescript/bin/tsc', '-b'], { stdio: 'inherit' });
 for (const name of packages) await rm(`packages/${name}/dist/.tsbuildinfo`);
 
-const common = { bundle: true, format: 'esm', target: 'es2022', sourcemap: true, logLevel: 'warning' };
+const common = { absWorkingDir: folder, bundle: true, format: 'esm', target: 'es2022', sourcemap: true, logLevel: 'warning' };
 const from = (name, file) => [`packages/${name}/src/${file}.ts`];
 const to = (name, file) => `packages/${name}/dist/${file}.js`;
 const needed = { external: ['three', '@htvm/*'] };

@@ -50,8 +50,8 @@ void add_serve(CLI::App& app, Run& run) {
     command->add_option("--connections", options->connections, "Connections at once (default 512)")
         ->check(CLI::Range(1, 100000));
     command->footer(
-        "Runs until Ctrl-C. Symbolic links and hidden files are not served. It speaks HTTP without TLS: put a web\n"
-        "server such as nginx in front where strangers' networks are between (examples/nginx).\n"
+        "Runs until Ctrl-C. Symbolic links and hidden files are not served. It speaks HTTP without TLS: across other\n"
+        "people's networks put a web server with TLS in front of it.\n"
         "Example:\n"
         "  htvm serve --files streams/ --address 0.0.0.0");
     command->callback([options, &run] { run = [options] { return serve(*options); }; });

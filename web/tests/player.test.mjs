@@ -4,7 +4,8 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { chromium } from 'playwright-core';
+import { build } from 'esbuild';
+import { launch } from './browser.mjs';
 import { TestServer } from './server.mjs';
 import { conformance, digests, firstSequence, folder, packet, packetsOf, padded, withLittleMemory } from './streams.mjs';
 
@@ -20,13 +21,7 @@ before(async () => {
     server = await new TestServer(roots).start();
     server.pageHeaders = { 'Content-Security-Policy': policy };
     other = await new TestServer(roots).start();
-    browser = await chromium.launch({
-        executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
-        args: [
-            '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-            '--enable-precise-memory-info', '--js-flags=--expose-gc', '--disable-features=DisallowDocWrite',
-        ],
-    });
+    browser = await launch();
     const stream = firstSequence(await conformance('tracked_by_chance'));
     for (const index of ['front', 'end', 'none']) server.made.set(`long-${index}.htvm`, padded(stream, 120000, index));
     expected = (await digests('tracked_by_chance')).slice(0, packetsOf(stream).length - 1);
@@ -343,6 +338,25 @@ inPage('the scripts may come from another site', async (page) => {
         scripts.stop();
     }
 }, { bypassCSP: true });
+
+inPage('examples/scene.js shows a stream in a scene of its own', async (page) => {
+    const { outputFiles } = await build({
+        entryPoints: [path('../examples/scene.js')], bundle: true, format: 'esm', write: false, logLevel: 'error',
+        nodePaths: [path('../node_modules')],
+    });
+    server.made.set('scene.js', outputFiles[0].contents);
+    server.streamHeaders = { 'Content-Type': 'text/javascript' };
+    const uploads = await page.evaluate(async () => {
+        const { showStream } = await import('/as-is/scene.js');
+        const canvas = document.createElement('canvas');
+        document.body.append(canvas);
+        const mesh = await showStream(canvas, '/as-is/tracked.htvm', '/player/htvm_decoder.wasm');
+        while (mesh.uploads.positions < 12) await new Promise(requestAnimationFrame);
+        return mesh.uploads;
+    });
+    server.streamHeaders = {};
+    assert.ok(uploads.indices < uploads.positions);
+});
 
 // ---- pictures and people ----------------------------------------------------------------------------------------
 

@@ -1,8 +1,8 @@
-// A file behind an address, read a piece at a time: by range requests where the server answers them, else as one body
-// that is kept as far as it was read. The same serves a body that never ends.
+// A file at a URL, read piece by piece: by range requests if the server answers them, otherwise as one body, which may
+// also be endless.
 //
-// Only what every page may see is relied on. From another site's server a page sees no Content-Range and no ETag, and
-// may not send If-Range, so the size of the file may stay unknown; readers check what they find at an offset.
+// It relies only on what every page can see. From another site's server a page sees no Content-Range and no ETag, and
+// cannot send If-Range, so the file's size may stay unknown, and readers check what they find at an offset.
 import type { FailureCode } from './messages.js';
 
 export class SourceError extends Error {
@@ -16,7 +16,7 @@ export class SourceError extends Error {
 /** Thrown by a read that interrupt() ended. */
 export class Interrupted extends Error {}
 
-/** Thrown where another file is found behind the address than before. */
+/** Thrown when the URL turns out to have another file than before. */
 export class SourceChanged extends Error {}
 
 const blockSize = 1 << 18;
@@ -81,7 +81,7 @@ export class ByteSource {
         }
     }
 
-    /** What is here from `offset` on, without asking for more; null where nothing is. */
+    /** The bytes from `offset` on that were fetched already; null if there are none. */
     peek(offset: number): Uint8Array | null {
         const within = offset % blockSize;
         const block = this.#blocks.get(Math.floor(offset / blockSize));
@@ -94,7 +94,7 @@ export class ByteSource {
         this.#wake();
     }
 
-    /** The last bytes of the file, where ranges are answered and its size is known. Nothing of it is kept. */
+    /** The last bytes of the file, if ranges are answered and its size is known. They are not kept. */
     async readEnd(count: number): Promise<{ offset: number; bytes: Uint8Array } | null> {
         if (!this.ranges || this.size === null) return null;
         const offset = Math.max(0, this.size - count);
@@ -104,7 +104,7 @@ export class ByteSource {
         return { offset, bytes: new Uint8Array(await response.arrayBuffer()) };
     }
 
-    /** Finds out how long the file is, where the server tells; a second request. */
+    /** Finds out the file's size by a second request, if the server says it. */
     async findSize(): Promise<number | null> {
         if (this.size !== null || !this.ranges) return this.size;
         try {
@@ -122,7 +122,7 @@ export class ByteSource {
         for (const resolve of this.#waiting.splice(0)) resolve();
     }
 
-    // The first byte from the reader's position on that is not here, or -1 where enough is.
+    // The first byte from the reader's position on that was not fetched, or -1 if enough was.
     #missing(): number {
         for (let at = this.#position; at <= this.#position + this.#ahead; ) {
             const number = Math.floor(at / blockSize);
@@ -195,7 +195,7 @@ export class ByteSource {
                 signal: abort.signal,
             });
         } catch (error) {
-            // Where a server of another site forbids even this header, without it.
+            // A server of another site may forbid even this header: without it.
             if (abort.signal.aborted || !first) throw error;
             ++this.requests;
             response = await fetch(this.#url, { signal: abort.signal });
@@ -257,7 +257,7 @@ export class ByteSource {
             const count = Math.min(bytes.length, blockSize - within);
             const old = this.#blocks.get(number);
             const have = old?.length ?? 0;
-            // What begins beyond the end of a block would leave a hole; what is there already stays.
+            // Bytes beyond the block's end would leave a hole; bytes that it has already stay.
             if (within <= have && within + count > have) {
                 const room = new Uint8Array(old ? old.buffer : new ArrayBuffer(blockSize), 0, within + count);
                 room.set(bytes.subarray(have - within, count), have);

@@ -58,14 +58,14 @@ export class FilePackets {
         return this.#splitter.pendingBytes;
     }
 
-    /** True where no place after the ones seen so far can be reached without reading all before it. */
+    /** Whether places beyond those read can be reached without reading everything before them. */
     get seekable(): boolean {
         return this.indexed || this.durationUs !== null;
     }
 
     /**
-     * Goes to the last place known where decoding can start for a frame at `timeUs`. Gives the sequence header in force
-     * there, to be sent to the decoder first, or null where it is the first packet to come.
+     * Goes to the last known place where decoding can start for a frame at `timeUs`. Returns the sequence header in force
+     * there, to be sent to the decoder first, or null if it is the next packet.
      */
     seek(timeUs: number): Uint8Array | null {
         let point: AccessPoint | null = null;
@@ -109,8 +109,8 @@ export class FilePackets {
     }
 
     /**
-     * Finds out what there is beyond what was read, so that it can be reached: by an index at the end of the file, else
-     * by going through the file where all of it is here. True where there is nothing more to be found out.
+     * Finds places to start beyond what was read: by an index at the end of the file, or by going through the whole file
+     * if it is small and was fetched. True if there is nothing more to find out.
      */
     async survey(source: ByteSource): Promise<boolean> {
         if (this.seekable) return true;
@@ -139,7 +139,7 @@ export class FilePackets {
         return true;
     }
 
-    // A file that has something else where its index says that a frame is has been replaced, or its index is another's.
+    // If something else is at an index's offset, the file was replaced, or the index belongs to another file.
     #isAsExpected(packet: Packet): boolean {
         const point = this.#expected!;
         this.#expected = null;

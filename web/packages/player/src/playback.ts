@@ -261,7 +261,7 @@ export class Playback {
         }
     }
 
-    // A frame that is not shown, since the next is due already: what the next one needs of it is handed on.
+    // Skips a frame because the next is due already; the next takes over its triangles if it needs them.
     #passOver(frame: FrameReport, next: FrameReport): void {
         if (frame.indices && !next.indices && next.topology === frame.topology) {
             next.indices = frame.indices;
@@ -354,7 +354,7 @@ export class Playback {
             case 'ended':
                 if (report.serial !== this.#serial) break;
                 this.#endedSerial = report.serial;
-                // Sought beyond the last frame that can be decoded: what is shown stays.
+                // After a seek beyond the last frame, the picture stays.
                 this.#awaiting = false;
                 this.#stalled = false;
                 this.#listener.arrived();

@@ -77,7 +77,7 @@ export class StageScene {
 
     setTheme(dark: boolean): void {
         this.#grid.material.uniforms['colour']!.value = new Color(dark ? 0xaab4c4 : 0x55606e);
-        this.#shadow.setStrength(dark ? 0.75 : 0.5);
+        this.#shadow.setStrength(dark ? 0.8 : 0.62);
     }
 
     /** The next stream brings a first frame again. */

@@ -1,0 +1,128 @@
+// The pages of `htvm play` and `htvm serve` in Chromium, from the program's own server: HTVM names the program.
+import assert from 'node:assert/strict';
+import { execFileSync, spawn } from 'node:child_process';
+import { cp, mkdir, mkdtemp, readFile, rm, symlink, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { fileURLToPath } from 'node:url';
+import { launch } from './browser.mjs';
+import { TestServer } from './server.mjs';
+import { folder } from './streams.mjs';
+
+const program = process.env.HTVM;
+const options = { skip: program ? false : 'HTVM names no program', timeout: 60000 };
+
+let browser, work;
+
+before(async () => {
+    if (!program) return;
+    browser = await launch();
+    work = await mkdtemp(join(tmpdir(), 'htvm-program-'));
+    await mkdir(join(work, 'streams', 'more'), { recursive: true });
+    await cp(join(folder, 'tracked.htvm'), join(work, 'streams', 'tracked.htvm'));
+    await cp(join(folder, 'person.htvm'), join(work, 'streams', 'more', 'a person.htvm'));
+    await writeFile(join(work, 'streams', 'broken.htvm'), 'this is no stream');
+});
+
+after(async () => {
+    await browser?.close();
+    if (work) await rm(work, { recursive: true });
+});
+
+// Runs the program, and the body with the address that it prints; Ctrl-C must end it.
+async function running(words, body) {
+    const child = spawn(program, words, { stdio: ['ignore', 'pipe', 'inherit'] });
+    const exited = new Promise((resolve) => child.on('exit', (code, signal) => resolve({ code, signal })));
+    const address = new Promise((resolve, reject) => {
+        let text = '';
+        child.stdout.on('data', (piece) => {
+            text += piece;
+            if (text.includes('\n')) resolve(text.trim());
+        });
+        exited.then(() => reject(new Error('the program ended')));
+    });
+    const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
+    const faults = [];
+    page.on('pageerror', (error) => faults.push(error.message));
+    page.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
+    try {
+        await body(page, await address);
+        assert.deepEqual(faults, []);
+    } finally {
+        await page.close();
+        child.kill('SIGINT');
+    }
+    assert.deepEqual(await exited, { code: 0, signal: null });
+}
+
+test('htvm play shows a stream, in a loop, in the whole window', options, () =>
+    running(['play', '--no-open', join(work, 'streams', 'tracked.htvm')], async (page, address) => {
+        assert.match(address, /^http:\/\/127\.0\.0\.1:\d+\/$/);
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 8);
+        assert.equal(await page.title(), 'tracked – htvm');
+        assert.deepEqual(await page.evaluate(() => [document.querySelector('htvm-player').clientWidth, innerWidth]), [640, 640]);
+    }));
+
+async function makeCapture(capture) {
+    await mkdir(capture);
+    for (let frame = 0; frame < 3; ++frame) {
+        const lines = ['v 0 0 0', `v 400 ${frame} 0`, 'v 0 900 0', 'v 0 0 300', 'f 1 3 2', 'f 1 2 4', 'f 1 4 3', 'f 2 3 4'];
+        await writeFile(join(capture, `${frame}.obj`), `${lines.join('\n')}\n`);
+    }
+}
+
+test('htvm play encodes a capture first', options, async () => {
+    const capture = join(work, 'capture');
+    await makeCapture(capture);
+    await running(['play', '--no-open', capture], async (page, address) => {
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 3);
+        assert.equal(await page.title(), 'capture – htvm');
+    });
+});
+
+test('htvm serve lists a folder with stills, and plays what is chosen', options, () =>
+    running(['serve', '--files', join(work, 'streams'), '--port', '0'], async (page, address) => {
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelectorAll('small').length === 3 && !document.querySelector('htvm-player'));
+        const items = await page.evaluate(() =>
+            [...document.querySelectorAll('li')].map((item) => [
+                item.querySelector('span').textContent, item.querySelector('small').textContent, item.querySelector('img').src.slice(0, 5),
+            ]));
+        assert.deepEqual(items, [
+            ['broken', '1 KB, cannot be played', 'data:'],
+            ['more/a person', '15 KB, 0.2 s', 'blob:'],
+            ['tracked', '11 KB, 0.2 s', 'blob:'],
+        ]);
+        await page.getByRole('link', { name: 'a person' }).click();
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 3);
+        await page.getByRole('link', { name: 'All streams' }).click();
+        await page.waitForFunction(() => document.querySelectorAll('li').length === 3);
+    }));
+
+test('the five steps of docs/player.md lead to a page that plays', options, async () => {
+    const project = fileURLToPath(new URL('../..', import.meta.url));
+    const manual = await readFile(join(project, 'docs', 'player.md'), 'utf8');
+    const steps = /```sh\n([^]*?)```/.exec(manual)[1];
+    assert.equal(steps.match(/#\s*\d\./g).length, 5);
+    const place = join(work, 'steps');
+    await mkdir(place);
+    await makeCapture(join(place, 'capture'));
+    await symlink(join(project, 'web'), join(place, 'web'));
+    // The player is built, and the server is the tests' own.
+    const lines = steps.split('\n').filter((line) => !/^(\.\/dev web|python3 -m http\.server) /.test(line));
+    assert.equal(lines.length, steps.split('\n').length - 2);
+    const script = `set -e; htvm() { '${program}' "$@"; }\n${lines.join('\n')}`;
+    execFileSync('bash', ['-c', script], { cwd: place, stdio: ['ignore', 'ignore', 'pipe'] });
+    const server = await new TestServer({ '': join(place, 'site') }).start();
+    const page = await browser.newPage({ viewport: { width: 640, height: 480 } });
+    try {
+        await page.goto(`${server.origin}/index.html`);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 3);
+    } finally {
+        await page.close();
+        server.stop();
+    }
+});
