@@ -25,6 +25,9 @@ export interface DecoderOptions {
     maxMemory?: number;
 }
 
+export type Axis = 'x' | '-x' | 'y' | '-y' | 'z' | '-z';
+const axes: readonly (Axis | null)[] = [null, 'x', '-x', 'y', '-y', 'z', '-z']; // HTVM_UP_...
+
 /** What a stream's header says. */
 export interface SequenceInfo {
     joints: number;
@@ -37,6 +40,12 @@ export interface SequenceInfo {
     unitMicrometres: number;
     /** Millimetres. */
     latticeStep: number;
+    /** Where the subject's head is; null if the stream does not say. */
+    up: Axis | null;
+    /** The floor's coordinate on that axis, millimetres; null if the stream does not say. */
+    floor: number | null;
+    /** Version of the stream. */
+    streamVersion: number;
 }
 
 /**
@@ -329,6 +338,9 @@ export class Decoder {
             framesPerSecond: info.fps_numerator / info.fps_denominator,
             unitMicrometres: info.unit_micrometres,
             latticeStep: info.lattice_step,
+            up: axes[info.up] ?? null,
+            floor: info.floor_known ? info.floor : null,
+            streamVersion: info.stream_version,
         };
     }
 

@@ -2,7 +2,12 @@
 // them is the decoder's.
 import { crc32 } from './crc32.js';
 
-export const packetKind = { sequence: 1, intra: 2, enhanced: 3, codebook: 4, index: 5, predicted: 6, tracked: 7 } as const;
+export const packetKind = {
+    sequence: 1, intra: 2, enhanced: 3, codebook: 4, index: 5, predicted: 6, tracked: 7, frontIndex: 8,
+} as const;
+
+// Bits of the flags; without `told` the others are not valid.
+const flag = { referred: 1, told: 128 } as const;
 
 const headerSize = 32;
 const closingSize = 4; // the payload's CRC
@@ -10,6 +15,8 @@ const syncWord = 0x50565448; // "HTVP", least significant byte first
 
 export interface PacketHeader {
     kind: number;
+    /** docs/bitstream.md, section 2.1. */
+    flags: number;
     frame: number;
     reference: number;
     timestampUs: number;
@@ -32,6 +39,7 @@ export function readPacketHeader(bytes: Uint8Array, at = 0): PacketHeader | null
     if (view.getUint32(28, true) !== crc32(bytes.subarray(at + 4, at + 28))) return null;
     return {
         kind: view.getUint8(4),
+        flags: view.getUint8(5),
         frame: view.getUint32(8, true),
         reference: view.getUint32(12, true),
         timestampUs: Number(view.getBigInt64(16, true)),
@@ -47,6 +55,11 @@ export function isFrame(kind: number): boolean {
         kind === packetKind.predicted ||
         kind === packetKind.tracked
     );
+}
+
+/** True for I-frames from which decoding can start: all but those that later frames may not refer to. */
+export function isStart({ kind, flags }: PacketHeader): boolean {
+    return kind === packetKind.intra && ((flags & flag.told) === 0 || (flags & flag.referred) !== 0);
 }
 
 /**

@@ -1,11 +1,11 @@
 // <htvm-player src="person.htvm" autoplay loop controls>: the element that pages use. docs/player.md is its manual.
-import { crc32, type SequenceInfo } from '@htvm/decoder';
+import { crc32, type Axis, type SequenceInfo } from '@htvm/decoder';
 import { browserClock, type Clock } from './clock.js';
 import { Controls, make, styles, type ControlActions } from './controls.js';
 import type { FailureCode, FrameReport } from './messages.js';
 import { Orbit } from './orbit.js';
 import { Playback } from './playback.js';
-import { StageScene, type Axis } from './scene.js';
+import { StageScene } from './scene.js';
 import { Statistics, type StatisticsSummary } from './statistics.js';
 import { startWorker } from './worker_start.js';
 
@@ -45,7 +45,7 @@ export interface PlayerErrorDetail {
 
 const keepNoticeMs = 6000;
 const restAfterMs = 2500;
-const yAxes: readonly string[] = ['x', 'y', 'z', '-x', '-y', '-z'];
+const axes: readonly string[] = ['x', 'y', 'z', '-x', '-y', '-z'];
 
 /**
  * Events: loadedmetadata, durationchange, play, pause, seeking, seeked, waiting, ended, timeupdate, error (its detail a
@@ -105,6 +105,7 @@ export class HtvmPlayerElement extends HTMLElement {
                 opened: (sequence, layerNames) => {
                     this.#sequence = sequence;
                     this.#statistics.reset(layerNames);
+                    this.#setUp();
                     this.#send('loadedmetadata');
                 },
                 extent: () => {
@@ -329,7 +330,7 @@ export class HtvmPlayerElement extends HTMLElement {
                 this.#invalidate();
                 break;
             case 'up':
-                this.#scene?.setUp(this.#up());
+                this.#setUp();
                 break;
             case 'theme':
                 this.#applyTheme();
@@ -351,9 +352,12 @@ export class HtvmPlayerElement extends HTMLElement {
         }
     }
 
-    #up(): Axis {
-        const axis = this.getAttribute('up') ?? 'y';
-        return (yAxes.includes(axis) ? axis : 'y') as Axis;
+    // The attribute says it, else the stream, else it is y.
+    #setUp(): void {
+        const given = this.getAttribute('up') ?? '';
+        const { up = null, floor = null } = this.#sequence ?? {};
+        const axis = axes.includes(given) ? (given as Axis) : (up ?? 'y');
+        this.#scene?.setUp(axis, axis === up ? floor : null);
     }
 
     #load(): void {
@@ -385,12 +389,12 @@ export class HtvmPlayerElement extends HTMLElement {
     #stage(): StageScene {
         if (this.#scene) return this.#scene;
         const scene = new StageScene(this.#canvas);
-        scene.setUp(this.#up());
         scene.setLit(this.lit);
         scene.floorVisible = this.getAttribute('floor') !== 'none';
         scene.below = this.hasAttribute('controls') ? 0.1 : 0;
         this.#orbit = new Orbit(this.#canvas, scene.view, () => this.#invalidate(), () => this.resetView());
         this.#scene = scene;
+        this.#setUp();
         this.#applyTheme();
         this.#resize();
         return scene;

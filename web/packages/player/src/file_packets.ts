@@ -1,5 +1,5 @@
 // The packets of a file in order, from any place where decoding can start.
-import { isFrame, packetKind, PacketSplitter, type DecoderModule, type Packet } from '@htvm/decoder';
+import { isFrame, isStart, packetKind, PacketSplitter, type DecoderModule, type Packet } from '@htvm/decoder';
 import { SourceError, type ByteSource } from './byte_source.js';
 
 // What packets are read from.
@@ -9,6 +9,8 @@ type Bytes = Pick<ByteSource, 'read' | 'size' | 'contentType'>;
 export interface TimedPacket extends Packet {
     timeUs: number;
 }
+
+const isIndex = ({ kind }: Packet): boolean => kind === packetKind.index || kind === packetKind.frontIndex;
 
 interface AccessPoint {
     timeUs: number;
@@ -27,8 +29,6 @@ const largestSurvey = 1 << 24; // of a file without an index
 export class FilePackets {
     /** Of a frame, as the stream's header tells it; set by whoever decodes that. */
     frameUs = 1e6 / 30;
-    /** Of the whole, or null while it is not known. */
-    durationUs: number | null = null;
     /** Whether an index told the places to start. */
     indexed = false;
     #source: Bytes;
@@ -41,11 +41,18 @@ export class FilePackets {
     #sequence: Uint8Array | null = null;
     #expected: AccessPoint | null = null; // what the next packet must be
     #packets = 0;
-    #framesInIndex: number | null = null;
+    #framesInIndex = 0;
+    #measuredUs: number | null = null; // duration, once the end was read
 
     constructor(source: Bytes, module: DecoderModule) {
         this.#source = source;
         this.#module = module;
+    }
+
+    /** Duration of the whole, or null while it is not known. Until the end was read, by the index's number of frames. */
+    get durationUs(): number | null {
+        if (this.#measuredUs !== null || !this.indexed) return this.#measuredUs;
+        return Math.max(this.#framesInIndex * this.frameUs, this.#points.at(-1)!.timeUs + this.frameUs);
     }
 
     /** Bytes that are no packets, or damaged ones, in what was read. */
@@ -96,13 +103,13 @@ export class FilePackets {
                     continue;
                 }
                 this.#checkThatItIsAStream(true);
-                if (this.#end > 0 || this.#points.length > 0) this.durationUs = this.#end + this.frameUs;
+                if (this.#end > 0 || this.#points.length > 0) this.#measuredUs = this.#end + this.frameUs;
                 return null;
             }
             ++this.#packets;
             if (this.#expected && !this.#isAsExpected(packet)) continue;
             if (packet.kind === packetKind.sequence) this.#sequence = packet.bytes.slice();
-            if (packet.kind === packetKind.index) this.#takeIndex(packet);
+            if (isIndex(packet)) this.#takeIndex(packet);
             if (isFrame(packet.kind)) return this.#timed(packet);
             return { ...packet, timeUs: 0 };
         }
@@ -119,7 +126,7 @@ export class FilePackets {
             const splitter = new PacketSplitter(end?.offset);
             if (end) splitter.push(end.bytes);
             for (let packet = splitter.next(); packet; packet = splitter.next())
-                if (packet.kind === packetKind.index) this.#takeIndex(packet);
+                if (isIndex(packet)) this.#takeIndex(packet);
             if (this.indexed) return true;
         }
         const { size, contentType } = source;
@@ -135,7 +142,7 @@ export class FilePackets {
         while (await other.next());
         if (!whole) return false;
         for (const point of other.#points) this.#add(point);
-        this.durationUs = other.durationUs;
+        this.#measuredUs = other.#measuredUs;
         return true;
     }
 
@@ -143,7 +150,7 @@ export class FilePackets {
     #isAsExpected(packet: Packet): boolean {
         const point = this.#expected!;
         this.#expected = null;
-        if (packet.offset === point.offset && packet.frame === point.frame && packet.kind === packetKind.intra) {
+        if (packet.offset === point.offset && packet.frame === point.frame && isStart(packet)) {
             point.fromIndex = false;
             point.sequence = this.#sequence;
             return true;
@@ -164,7 +171,7 @@ export class FilePackets {
         this.#lastTimestamp = packet.timestampUs;
         const timeUs = packet.timestampUs - this.#base;
         this.#end = Math.max(this.#end, timeUs);
-        if (packet.kind === packetKind.intra)
+        if (isStart(packet))
             this.#add({
                 timeUs, offset: packet.offset, frame: packet.frame, base: this.#base, sequence: this.#sequence,
                 fromIndex: false,
@@ -189,9 +196,6 @@ export class FilePackets {
         }
         this.indexed = true;
         this.#framesInIndex = packet.frame;
-        const last = this.#points.at(-1)!.timeUs;
-        // The index counts frames; how long they take is known from those read, or the stream's header.
-        this.durationUs ??= Math.max(this.#framesInIndex * this.frameUs, last + this.frameUs);
     }
 
     #add(point: AccessPoint): void {

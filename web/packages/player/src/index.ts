@@ -2,8 +2,7 @@ export { browserClock, ManualClock } from './clock.js';
 export type { Clock } from './clock.js';
 export { HtvmPlayerElement } from './element.js';
 export type { FramePresentedDetail, PlayerErrorDetail, PlayerStatistics } from './element.js';
-export type { Axis } from './scene.js';
-export { streamVersion } from '@htvm/decoder';
+export { streamVersion, type Axis } from '@htvm/decoder';
 import { HtvmPlayerElement } from './element.js';
 
 if (!customElements.get('htvm-player')) customElements.define('htvm-player', HtvmPlayerElement);

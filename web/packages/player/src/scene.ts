@@ -7,9 +7,8 @@ import {
     WebGLRenderer, WebGLRenderTarget,
 } from 'three';
 import type { Material } from 'three';
+import type { Axis } from '@htvm/decoder';
 import type { FrameReport } from './messages.js';
-
-export type Axis = 'x' | 'y' | 'z' | '-x' | '-y' | '-z';
 
 const axes: Record<Axis, [number, number, number]> = {
     x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], '-x': [-1, 0, 0], '-y': [0, -1, 0], '-z': [0, 0, -1],
@@ -44,6 +43,7 @@ export class StageScene {
     #litMaterial: Material = srgbVertexColours(new MeshLambertMaterial({ vertexColors: true }));
     #clayMaterial: Material = new MeshLambertMaterial({ color: 0xb9b2a8 });
     #bounds: Box3 | null = null; // of the first frame, upright, metres, not yet moved onto the floor
+    #floor: number | null = null; // height of the floor in the upright mesh, metres
     #home: { distance: number; target: Vector3 } | null = null;
     #shadowIsOld = true;
 
@@ -69,7 +69,9 @@ export class StageScene {
         this.renderer.dispose();
     }
 
-    setUp(axis: Axis): void {
+    /** floor: its coordinate on the axis of the stream that `axis` names, millimetres; null: below the first frame. */
+    setUp(axis: Axis, floor: number | null = null): void {
+        this.#floor = floor === null ? null : ((axis.startsWith('-') ? -1 : 1) * floor) / 1000;
         const up = new Vector3(...axes[axis]);
         this.#upright.quaternion.copy(new Quaternion().setFromUnitVectors(up, new Vector3(0, 1, 0)));
         this.#bounds = null;
@@ -163,11 +165,12 @@ export class StageScene {
         this.#bounds = box.clone();
         const middle = box.getCenter(new Vector3());
         const size = box.getSize(new Vector3());
-        this.#stage.position.set(-middle.x, -box.min.y, -middle.z);
+        const floor = this.#floor ?? box.min.y;
+        this.#stage.position.set(-middle.x, -floor, -middle.z);
         // Whatever way it is turned, with some room to move in.
         const radius = (Math.max(0.5 * Math.hypot(size.x, size.z), 0.5 * size.y) * 1.14) / (1 - this.below);
         const distance = radius / Math.sin((this.camera.fov * Math.PI) / 360);
-        this.#home = { distance, target: new Vector3(0, 0.5 * size.y - this.below * radius, 0) };
+        this.#home = { distance, target: new Vector3(0, middle.y - floor - this.below * radius, 0) };
         this.view.distance = distance;
         this.view.target.copy(this.#home.target);
         // Lines half a metre apart for what is as large as a person, and so on by tens.

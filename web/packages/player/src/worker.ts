@@ -1,5 +1,5 @@
 // The player's worker: fetches, decodes, makes normals, and hands frames over as far as the player has room for them.
-import { Decoder, DecoderError, DecoderModule, isFrame, packetKind, type Frame } from '@htvm/decoder';
+import { Decoder, DecoderError, DecoderModule, isFrame, isStart, packetKind, type Frame } from '@htvm/decoder';
 import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
 import { FilePackets, type TimedPacket } from './file_packets.js';
 import type { FrameReport, Report, Request } from './messages.js';
@@ -172,7 +172,7 @@ class Session {
             const packet = await this.#file.next();
             if (this.#serial !== serial) return 'superseded';
             if (!packet) break;
-            if (packet.kind === packetKind.intra && packet.timeUs <= timeUs) {
+            if (isStart(packet) && packet.timeUs <= timeUs) {
                 group = group.filter(({ kind }) => kind === packetKind.sequence);
                 bytes = 0;
             }
@@ -209,7 +209,7 @@ class Session {
     }
 
     #decode(packet: TimedPacket): { frame: Frame; decodeMs: number } | null {
-        if (packet.kind === packetKind.index) {
+        if (packet.kind === packetKind.index || packet.kind === packetKind.frontIndex) {
             this.#tellExtent();
             return null;
         }
@@ -241,6 +241,7 @@ class Session {
         const sequence = this.#decoder.sequence();
         if (!sequence) return;
         this.#file.frameUs = 1e6 / sequence.framesPerSecond;
+        this.#tellExtent();
         if (this.#opened) return;
         this.#opened = true;
         post({ type: 'opened', sequence, layerNames: this.#module.layerNames, version: this.#module.version });
