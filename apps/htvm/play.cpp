@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -27,8 +28,8 @@ struct PlayOptions {
     bool no_open = false;
 };
 
-// Runs a program; its exit code, or 127 if it cannot be started. quiet: without its output.
-int run_program_and_wait(std::vector<std::string> words, bool quiet) {
+// Starts a program, which Ctrl-C ends even if this one ignores it; 0 if it cannot be started. quiet: without output.
+pid_t start_program(std::vector<std::string> words, bool quiet) {
     std::vector<char*> arguments;
     for (auto& word : words) arguments.push_back(word.data());
     arguments.push_back(nullptr);
@@ -37,12 +38,28 @@ int run_program_and_wait(std::vector<std::string> words, bool quiet) {
     if (quiet)
         for (const int stream : {STDOUT_FILENO, STDERR_FILENO})
             posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_WRONLY, 0);
+    posix_spawnattr_t attributes;
+    posix_spawnattr_init(&attributes);
+    sigset_t interrupts;
+    sigemptyset(&interrupts);
+    sigaddset(&interrupts, SIGINT);
+    posix_spawnattr_setsigdefault(&attributes, &interrupts);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
     pid_t child = 0;
-    const int error = posix_spawnp(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+    const int error = posix_spawnp(&child, arguments[0], &actions, &attributes, arguments.data(), environ);
+    posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
+    return error == 0 ? child : 0;
+}
+
+// Whether the program ended, and without an error. Ctrl-C meanwhile ends it, but not this one, which has to clean up.
+bool succeeds(const std::vector<std::string>& words) {
+    const auto before = std::signal(SIGINT, SIG_IGN);
+    const pid_t child = start_program(words, false);
     int status = 0;
-    if (error != 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status)) return 127;
-    return WEXITSTATUS(status);
+    const bool waited = child != 0 && waitpid(child, &status, 0) == child;
+    std::signal(SIGINT, before);
+    return waited && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 // A folder of its own for what is encoded only to be played; removed at the end.
@@ -74,8 +91,8 @@ Result<fs::path> encode_capture(const fs::path& input, TemporaryFolder& folder) 
     const auto self = fs::read_symlink("/proc/self/exe", error).string();
     if (error) return fail(ErrorKind::bad_input, "cannot find this program; encode the capture with htvm encode first");
     note(fmt::format("{} is not a stream: encoding it first", input.string()));
-    const int code = run_program_and_wait({self, "encode", input.string(), "-o", stream.string()}, false);
-    if (code != 0) return fail(ErrorKind::bad_input, fmt::format("{} could not be encoded", input.string()));
+    if (!succeeds({self, "encode", input.string(), "-o", stream.string()}))
+        return fail(ErrorKind::bad_input, fmt::format("{} could not be encoded", input.string()));
     return stream;
 }
 
@@ -88,7 +105,7 @@ bool holds_streams(const fs::path& folder) {
 
 void open_browser(const std::string& url) {
     const bool screen = std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY") || std::getenv("BROWSER");
-    if (screen) run_program_and_wait({"xdg-open", url}, true);
+    if (screen) start_program({"xdg-open", url}, true);  // it may run as long as the browser
 }
 
 Result<void> play(const PlayOptions& options) {
@@ -105,13 +122,14 @@ Result<void> play(const PlayOptions& options) {
         server.folder = input.string();
     } else {
         fs::path stream = input;
-        if (!fs::exists(input, error) || input.extension() != ".htvm") {
+        if (input.extension() != ".htvm") {
             auto encoded = encode_capture(input, temporary);
             if (!encoded) return tl::unexpected(encoded.error());
             stream = *encoded;
         }
         // The link itself may be a symbolic one: the server follows none.
         stream = fs::canonical(stream, error);
+        if (error) return fail(ErrorKind::bad_input, fmt::format("there is no file {}", input.string()));
         server.folder = stream.parent_path().string();
         server.only = {stream.filename().string()};
     }

@@ -170,14 +170,14 @@ Response FileServer::State::answer_file(const Request& request, std::vector<std:
     segments.erase(segments.begin());
     std::string path;
     for (const auto& segment : segments) path += (path.empty() ? "" : "/") + segment;
+    if (options.other_sites) {
+        out.header.set(http::field::access_control_allow_origin, "*");
+        out.header.set(http::field::access_control_expose_headers, "Content-Range, ETag");
+    }
     auto file = is_served(path) ? folder.file(segments) : fail(ErrorKind::bad_input, "not served");
     if (!file) {
         out.header.result(http::status::not_found);
         return out;
-    }
-    if (options.other_sites) {
-        out.header.set(http::field::access_control_allow_origin, "*");
-        out.header.set(http::field::access_control_expose_headers, "Content-Range, ETag");
     }
     out.header.set(http::field::etag, file->tag);
     out.header.set(http::field::accept_ranges, "bytes");

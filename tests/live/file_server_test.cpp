@@ -155,6 +155,7 @@ TEST_F(FileServerTest, OtherSitesMayReadOnlyIfAllowed) {
     options.other_sites = true;
     start();
     EXPECT_EQ(header(get("/files/person.htvm"), "Access-Control-Allow-Origin"), "*");
+    EXPECT_EQ(header(get("/files/nowhere.htvm"), "Access-Control-Allow-Origin"), "*");  // so that they learn why
     EXPECT_EQ(header(get("/api/files"), "Access-Control-Allow-Origin"), "");
 }
 
