@@ -278,10 +278,24 @@ Result<void> Capture::find_unit() {
             note(looks + " (see --unit)");
     }
     if (auto ok = scale_positions(*peeked_, millimetres_per_unit_); !ok) return ok;
+    find_floor();
     // From files all is read again but what is kept.
     if (!pipe_) next_ = options_.first;
     at_.reset();
     return {};
+}
+
+// Of --up: which axis it is, and where the first mesh ends on it.
+void Capture::find_floor() {
+    if (options_.up.empty()) return;
+    const auto axis = static_cast<std::size_t>(options_.up.back() - 'x');
+    const bool down = options_.up.front() == '-';
+    up_ = static_cast<UpAxis>(1 + 2 * axis + (down ? 1 : 0));
+    bool any = false;
+    for (const auto& p : peeked_->positions) {
+        const double c = static_cast<double>(p[axis]);
+        if (!std::exchange(any, true) || (down ? c > lowest_ : c < lowest_)) lowest_ = c;
+    }
 }
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------

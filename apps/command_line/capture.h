@@ -11,6 +11,7 @@
 #include "command_line/mesh_pipe.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
 #include "io/sequence.h"
 #include "io/timestamps.h"
@@ -66,6 +67,9 @@ public:
     const std::vector<double>& radii() const { return radii_; }  // from the skeleton's file; may be empty
     const FrameRate& frame_rate() const { return rate_; }
     double fps() const { return rate_.per_second(); }
+    UpAxis up() const { return up_; }
+    // Of the first frame's vertices, mm: how far down along the axis that is up one lies. 0 if none is known to be.
+    double lowest() const { return lowest_; }
     double millimetres_per_unit() const { return millimetres_per_unit_; }  // scaling included
 
 private:
@@ -75,6 +79,7 @@ private:
     void find_times_in_files();
     Result<void> find_poses();
     Result<void> find_unit();
+    void find_floor();
     Result<std::optional<Mesh>> read_file();
     Result<std::optional<Mesh>> read_pipe();
     Result<void> find_piped_time(std::size_t place, const std::string& timestamp);
@@ -88,6 +93,8 @@ private:
     std::vector<std::int64_t> file_times_;  // microseconds, of each file, where they are not regular
     FrameRate rate_{30000, 1000};
     double millimetres_per_unit_ = 0;  // 0: not known yet
+    UpAxis up_ = UpAxis::unknown;
+    double lowest_ = 0;
     Skeleton skeleton_;
     std::vector<Pose> poses_;
     std::vector<double> radii_;

@@ -5,10 +5,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 #include <string>
 #include <vector>
@@ -224,7 +226,7 @@ std::string csv_line(std::size_t frame, const FrameComparison& comparison, const
 // ---- The command ----------------------------------------------------------------------------------------------------
 
 struct Options {
-    std::string original, decoded, unit = "auto";
+    std::string original, decoded, unit = "auto", timestamps;
     std::size_t frames = 0;  // 0: all
     std::vector<std::string> only;
     CompareOptions compare;
@@ -258,45 +260,76 @@ void choose_metrics(Options& options) {
     c.topology = only.contains("topology");
 }
 
-// The positions of the frames to compare, matched by the numbers in the files' names. Empty if a side has no numbers (a
-// stream, files without numbers): frames are then compared in order.
-Result<std::vector<FramePair>> pairs_of(const Options& options) {
-    if (options.decoded.ends_with(".htvm") || options.original.ends_with(".htvm")) return std::vector<FramePair>{};
-    const auto originals = find_sequence(options.original), decoded = find_sequence(options.decoded);
-    if (!originals) return tl::unexpected(originals.error());
+struct Sources {
+    MeshSource original, decoded;
+};
+
+Result<Sources> open_sources(const Options& options) {
+    auto original = open_meshes(options.original, {options.unit, options.timestamps, options.limits});
+    if (!original) return tl::unexpected(original.error());
+    auto decoded = open_meshes(options.decoded, {options.unit, "", options.limits});
     if (!decoded) return tl::unexpected(decoded.error());
-    const auto a = numbers_in_names(originals->paths), b = numbers_in_names(decoded->paths);
-    if (a.empty() || b.empty()) return std::vector<FramePair>{};
-    auto pairs = pair_by_number(a, b);
-    if (options.frames > 0 && pairs.size() > options.frames) {
-        pairs.resize(options.frames);
-        return pairs;  // the rest was not asked for
+    // A stream knows what its capture's files are in, however --scale or --height made millimetres of them.
+    if (decoded->is_stream && original->guesses_unit) {
+        original->guesses_unit = false;
+        original->millimetres_per_unit = decoded->millimetres_per_unit;
     }
+    return Sources{std::move(*original), std::move(*decoded)};
+}
+
+// When the frames of a side were captured: as known; else, beside a stream, by their numbers at its frame rate.
+std::vector<std::int64_t> times_of(const MeshSource& source, const MeshSource& other) {
+    if (!source.times_us.empty() || source.is_stream || !other.is_stream) return source.times_us;
+    std::vector<std::int64_t> out;
+    for (const auto place : places_in_time({std::vector<std::filesystem::path>(source.frames), source.numbers}))
+        out.push_back(std::llround(static_cast<double>(place) / other.rate.per_second() * 1e6));
+    return out;
+}
+
+// The positions of the frames to compare: of files by the numbers in their names, of a stream by time; in order where
+// that pairs none, or fewer than there are though both sides have as many.
+std::vector<FramePair> pairs_of(const Sources& sources) {
+    const auto& [original, decoded] = sources;
+    const bool of_files = !original.is_stream && !decoded.is_stream;
+    auto pairs = of_files ? pair_by_number(original.numbers, decoded.numbers)
+                          : pair_by_time(times_of(original, decoded), times_of(decoded, original));
+    const bool alike = !of_files && original.frames == decoded.frames && pairs.size() < original.frames;
+    if (!pairs.empty() && !alike) return pairs;
+    pairs.clear();
+    for (std::size_t k = 0; k < std::min(original.frames, decoded.frames); ++k) pairs.push_back({k, k});
+    return pairs;
+}
+
+void warn_of_frames_left_out(const Sources& sources, const std::vector<FramePair>& pairs) {
     std::vector<std::size_t> of_original, of_decoded;
     for (const auto& pair : pairs) {
         of_original.push_back(pair.original);
         of_decoded.push_back(pair.decoded);
     }
-    const auto tell = [](const std::string& frames, const std::string& name, const std::string& other) {
-        if (!frames.empty()) warn(fmt::format("{} of {} left out: {} has no such", frames, name, other));
+    const auto tell = [](const MeshSource& source, const MeshSource& other, const std::vector<std::size_t>& paired) {
+        auto numbers = source.numbers;
+        if (numbers.empty()) {
+            numbers.resize(source.frames);
+            std::iota(numbers.begin(), numbers.end(), std::uint64_t{0});
+        }
+        const auto frames = frames_left_out(numbers, paired);
+        if (!frames.empty()) warn(fmt::format("{} of {} left out: {} has no such", frames, source.name, other.name));
     };
-    tell(frames_left_out(a, of_original), options.original, options.decoded);
-    tell(frames_left_out(b, of_decoded), options.decoded, options.original);
-    return pairs;
+    tell(sources.original, sources.decoded, of_original);
+    tell(sources.decoded, sources.original, of_decoded);
 }
 
 // The box around all originals, for cameras that stand still.
-Result<Box> sequence_box(const Options& options) {
-    auto source = open_meshes(options.original, options.unit, options.limits);
-    if (!source) return tl::unexpected(source.error());
+Result<Box> sequence_box(const Options& options, const std::vector<FramePair>& pairs) {
+    auto sources = open_sources(options);
+    if (!sources) return tl::unexpected(sources.error());
     Box box;
-    Progress progress("bounding box", options.frames > 0 ? std::min(options.frames, source->frames) : source->frames);
-    for (std::size_t frame = 0; options.frames == 0 || frame < options.frames; ++frame) {
-        auto mesh = source->next(*source);
+    Progress progress("bounding box", pairs.size());
+    for (const auto& pair : pairs) {
+        const auto mesh = sources->original.mesh_at(sources->original, pair.original);
         if (!mesh) return tl::unexpected(mesh.error());
-        if (!*mesh) break;
-        if (const auto ok = check_measurable(**mesh, "original"); !ok) return tl::unexpected(ok.error());
-        extend(box, bounding_box(**mesh));
+        if (const auto ok = check_measurable(*mesh, "original"); !ok) return tl::unexpected(ok.error());
+        extend(box, bounding_box(*mesh));
         progress.step();
     }
     return box;
@@ -329,70 +362,30 @@ struct Measured {
     std::vector<std::size_t> places;  // the position of each among the originals
 };
 
-void warn_of_length(const MeshSource& original, const MeshSource& decoded, const Options& options) {
-    auto wanted = [&](std::size_t n) { return options.frames > 0 ? std::min(n, options.frames) : n; };
-    if (original.frames == 0 || decoded.frames == 0 || wanted(original.frames) == wanted(decoded.frames)) return;
-    warn(fmt::format("{} has {} frames and {} has {}: only the first {} are compared", original.name, original.frames,
-                     decoded.name, decoded.frames, std::min(wanted(original.frames), wanted(decoded.frames))));
-}
-
-// The length of a stream is known only once it has ended.
-void warn_of_ends(const MeshSource& original, const MeshSource& decoded, bool original_ended, bool decoded_ended,
-                  std::size_t compared) {
-    if (decoded.frames > 0 && original.frames > 0) return;
-    if (original_ended && decoded_ended) return;
-    const auto& longer = original_ended ? decoded : original;
-    const auto& shorter = original_ended ? original : decoded;
-    warn(fmt::format("{} has {} frames and {} has more: only the first {} are compared", shorter.name, compared,
-                     longer.name, compared));
-}
-
-// The mesh at a position of the sequence; `at` is the position that comes next.
-Result<std::optional<Mesh>> mesh_at(MeshSource& source, std::size_t place, std::size_t& at) {
-    for (;;) {
-        auto mesh = source.next(source);
-        if (!mesh || !*mesh || at++ == place) return mesh;
-    }
-}
-
-Result<Measured> measure(const Options& options) {
-    auto original = open_meshes(options.original, options.unit, options.limits);
-    if (!original) return tl::unexpected(original.error());
-    auto decoded = open_meshes(options.decoded, options.unit, options.limits);
-    if (!decoded) return tl::unexpected(decoded.error());
-    const auto pairs = pairs_of(options);
-    if (!pairs) return tl::unexpected(pairs.error());
-    if (pairs->empty()) warn_of_length(*original, *decoded, options);
-    std::size_t total = decoded->frames > 0 ? std::min(original->frames, decoded->frames) : original->frames;
-    if (options.frames > 0) total = std::min(total, options.frames);
-    if (!pairs->empty()) total = pairs->size();
+Result<Measured> measure(const Options& options, Sources& sources, const std::vector<FramePair>& pairs) {
+    auto& [original, decoded] = sources;
     Measured out;
-    Progress progress("compare", total);
-    std::size_t next_original = 0, next_decoded = 0;
-    for (std::size_t k = 0; pairs->empty() ? options.frames == 0 || k < options.frames : k < pairs->size(); ++k) {
-        const auto [frame, counterpart] = pairs->empty() ? FramePair{k, k} : (*pairs)[k];
-        auto first = mesh_at(*original, frame, next_original);
+    Progress progress("compare", pairs.size());
+    for (const auto& pair : pairs) {
+        const auto first = original.mesh_at(original, pair.original);
         if (!first) return tl::unexpected(first.error());
-        auto second = mesh_at(*decoded, counterpart, next_decoded);
+        const auto second = decoded.mesh_at(decoded, pair.decoded);
         if (!second) return tl::unexpected(second.error());
-        if (!*first || !*second) {
-            warn_of_ends(*original, *decoded, !*first, !*second, k);
-            break;
-        }
-        auto comparison = compare_frame(**first, **second, options.compare);
+        auto comparison = compare_frame(*first, *second, options.compare);
         if (!comparison)
-            return fail(comparison.error().kind, fmt::format("Frame {}: {}", frame, comparison.error().message));
+            return fail(comparison.error().kind,
+                        fmt::format("Frame {}: {}", pair.original, comparison.error().message));
         out.sums += *comparison;
         out.frames.push_back(*comparison);
-        out.places.push_back(frame);
+        out.places.push_back(pair.original);
         if (!options.pictures.empty())
-            if (const auto ok = write_pictures(options, **first, **second, frame); !ok)
+            if (const auto ok = write_pictures(options, *first, *second, pair.original); !ok)
                 return tl::unexpected(ok.error());
         progress.step();
     }
-    if (original->millimetres_per_unit != decoded->millimetres_per_unit)
+    if (original.millimetres_per_unit != decoded.millimetres_per_unit)
         note(fmt::format("took the original's unit for {:g} mm and the decoded's for {:g} mm; --unit says otherwise",
-                         original->millimetres_per_unit, decoded->millimetres_per_unit));
+                         original.millimetres_per_unit, decoded.millimetres_per_unit));
     if (out.frames.empty()) return fail(ErrorKind::bad_input, "There was no frame to compare.");
     return out;
 }
@@ -434,14 +427,21 @@ Result<void> compare(Options options) {
         std::filesystem::create_directories(options.pictures, error);
         if (error) return fail(ErrorKind::bad_input, options.pictures + " cannot be made: " + error.message());
     }
+    auto sources = open_sources(options);
+    if (!sources) return tl::unexpected(sources.error());
+    auto pairs = pairs_of(*sources);
+    if (options.frames > 0 && pairs.size() > options.frames)
+        pairs.resize(options.frames);  // frames behind these were not asked for
+    else
+        warn_of_frames_left_out(*sources, pairs);
     if (options.follow_sequence) {
-        const auto box = sequence_box(options);
+        const auto box = sequence_box(options, pairs);
         if (!box) return tl::unexpected(box.error());
         options.compare.view_box = *box;
     }
     const internal::ThreadPool pool(options.threads);
     options.compare.threads = pool.threads();
-    const auto measured = measure(options);
+    const auto measured = measure(options, *sources, pairs);
     if (!measured) return tl::unexpected(measured.error());
     // The PSNR of each frame uses the peak of the sequence, so that frames can be compared with each other.
     const double peak_mm = summarise(measured->sums, options.peak_mm).peak_mm;
@@ -516,6 +516,11 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("--unit", o.unit, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
         ->check(CLI::IsMember({"auto", "mm", "cm", "m"}))
         ->capture_default_str();
+    command
+        ->add_option(
+            "--timestamps", o.timestamps,
+            "When each original was captured, as for 'htvm encode', if frames of a stream are to find theirs by it")
+        ->type_name("FILE");
     command->add_option("--samples", o.compare.surface_options.samples,
                         "Samples for M2, in each direction (default: 10 times the triangles, like METRO)");
     command->add_option("--seed", o.compare.surface_options.seed, "Seed of M2's samples")->capture_default_str();

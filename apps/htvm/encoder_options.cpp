@@ -13,6 +13,7 @@
 
 #include "command_line/terminal.h"
 #include "io/mesh_file.h"
+#include "io/number_text.h"
 
 namespace htvm::app {
 namespace {
@@ -183,6 +184,48 @@ void add_what_is_beside_the_list(CLI::App& command, EncodingOptions& options) {
         ->needs(command.get_option("--bitrate"));
 }
 
+// What a player may want to know, and what people want to keep with a capture.
+void add_scene_options(CLI::App& command, EncodingOptions& options) {
+    constexpr const char* scene = "What the stream says of the capture";
+    command
+        .add_option("--floor", options.floor,
+                    wrapped("Height of the floor on the axis of --up, metres, or lowest: of the first frame's vertices "
+                            "(default: not known)"))
+        ->type_name("NUMBER")
+        ->needs(command.get_option("--up"))
+        ->group(scene);
+    const auto add_text = [&](const std::string& flag, const std::string& key, const std::string& help) {
+        command
+            .add_option_function<std::string>(
+                flag,
+                [&options, key](const std::string& text) {
+                    options.metadata.push_back({key, text});
+                },
+                help)
+            ->type_name("TEXT")
+            ->group(scene);
+    };
+    add_text("--title", "title", "What it is, for people");
+    add_text("--rights", "rights", "Whose it is, and what may be done with it");
+    command
+        .add_option_function<std::vector<std::string>>(
+            "--meta",
+            [&options](const std::vector<std::string>& pairs) {
+                for (const auto& pair : pairs) {
+                    const auto end = pair.find('=');
+                    if (end == 0 || end == std::string::npos)
+                        throw CLI::ValidationError("--meta", "'" + pair + "' is not KEY=VALUE");
+                    options.metadata.push_back({pair.substr(0, end), pair.substr(end + 1)});
+                }
+            },
+            wrapped("Anything else, KEY=VALUE; may be given several times. Players know timecode=HH:MM:SS:FF, of the "
+                    "first frame"))
+        ->type_name("KEY=VALUE")
+        ->expected(1)
+        ->take_all()
+        ->group(scene);
+}
+
 // All options except those that depend on the capture.
 EncoderOptions without_capture(const EncodingOptions& options) {
     auto out = default_options(profile_by(options.profile));
@@ -219,6 +262,7 @@ void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     for (const auto& option : option_list())
         if (*option.flag) add_option(command, options, option);
     add_what_is_beside_the_list(command, options);
+    add_scene_options(command, options);
     command.get_option("--buffer")->needs(command.get_option("--bitrate"));
     // With a bitrate or a target error, quality follows from it, so options that set the steps directly contradict it.
     command.get_option("--bitrate")->excludes(command.get_option("--target-error"));
@@ -242,6 +286,17 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     out.fps_denominator = capture.frame_rate().denominator;
     out.unit_micrometres =
         static_cast<std::uint32_t>(std::clamp(std::round(capture.millimetres_per_unit() * 1000), 1.0, 4294967295.0));
+    out.up = capture.up();
+    if (options.floor == "lowest") {
+        out.floor = capture.lowest();
+    } else if (!options.floor.empty()) {
+        const auto metres = parse_number(options.floor);
+        if (!metres || !std::isfinite(*metres))
+            return fail(ErrorKind::bad_input,
+                        "--floor must be a number of metres or lowest, not '" + options.floor + "'");
+        out.floor = 1000 * *metres;
+    }
+    out.metadata = options.metadata;
     out.skeleton = capture.skeleton();
     out.radii = capture.radii();
     if (!options.radii_file.empty()) {
@@ -292,8 +347,9 @@ std::string options_in_markdown() {
         "| `runner` | | the caller's own threads (`htvm_encoder_options_set_run_tasks` in C) |\n"
         "| `skeleton` | `--skeleton` | the capture's joints and bones; none: one bone that spans the mesh is used |\n"
         "| `radii` | `--radii` | radii of the bones, from `calibrate()` or `htvm calibrate` |\n"
-        "| `floor` | | height of the floor: its coordinate on the `up` axis, mm |\n"
-        "| `metadata` | | title, rights and other pairs of texts (`htvm_encoder_options_add_metadata` in C) |\n"
+        "| `floor` | `--floor` | height of the floor: its coordinate on the `up` axis, mm |\n"
+        "| `metadata` | `--title`, `--rights`, `--meta` | title, rights and other pairs of texts "
+        "(`htvm_encoder_options_add_metadata` in C) |\n"
         "| `intra_coder` | `--intra` | a coder of I-frames other than TFAN |\n"
         "| `rate.first_pass` | `--passes` | the size of every frame in a first run |\n"
         "| `fps_numerator`, `fps_denominator` | `--fps` | default: as in the skeleton file |\n"

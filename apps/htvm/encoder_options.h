@@ -25,8 +25,10 @@ struct EncodingOptions {
     std::string profile = "tracked";
     std::string intra = "tfan";
     std::string radii_file;
-    int passes = 0;                                       // for rate control: 2 means that the caller runs a first pass
-                                                          // before
+    std::string floor;                    // metres, or "lowest": of the first frame's vertices; empty: not known
+    std::vector<MetadataEntry> metadata;  // in the order given
+    int passes = 0;                       // for rate control: 2 means that the caller runs a first pass
+                                          // before
     std::vector<std::pair<const Option*, double>> given;  // options of the library's list that were given, in the
                                                           // library's units
 };

@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
@@ -21,49 +22,88 @@ namespace htvm::app {
 
 namespace {
 
-Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) {
-    auto input = StreamInput::open(path, options.max_packet_bytes);
+// What the packets' headers say of all frames, and the sequence header.
+Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
+    auto input = StreamInput::open(source.name, options.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
+    Decoder headers(options);
+    FrameNumbers numbers;
+    bool ascends = true;
+    while (const auto packet = input->next()) {
+        numbers.take(*packet);
+        if (packet->kind == PacketKind::sequence)
+            if (auto ok = headers.push(*packet); !ok)
+                return fail(ok.error().kind, source.name + ": " + ok.error().message);
+        if (!frame_type(packet->kind)) continue;
+        ascends = ascends && (source.times_us.empty() || source.times_us.back() < packet->timestamp_us);
+        source.numbers.push_back(numbers.of(packet->frame));
+        source.times_us.push_back(packet->timestamp_us);
+    }
+    if (input->oversized_packets() > 0)
+        return fail(ErrorKind::limit, source.name + " has packets larger than --max-packet");
+    if (input->damaged_bytes() > 0 || input->cut_short_bytes() > 0 || !headers.sequence())
+        return fail(ErrorKind::corrupt_stream,
+                    source.name + " is damaged, cut short, or not an htvm stream; 'htvm info' tells more");
+    if (!ascends) source.times_us.clear();  // of sequences one after the other
+    source.frames = source.numbers.size();
+    source.rate = {headers.sequence()->fps_numerator, headers.sequence()->fps_denominator};
+    source.millimetres_per_unit = headers.sequence()->unit_micrometres / 1000.0;
+    return {};
+}
+
+Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) {
     MeshSource source;
     source.name = path;
+    source.is_stream = true;
     options.intra_coder = draco_intra_coder();
-    source.next = [input = std::make_shared<StreamInput>(std::move(*input)),
-                   decoder = std::make_shared<Decoder>(options), numbers = FrameNumbers(),
-                   expected = std::uint32_t{0}](MeshSource& self) mutable -> Result<std::optional<Mesh>> {
+    if (auto scanned = scan_stream(source, options); !scanned) return tl::unexpected(scanned.error());
+    auto input = StreamInput::open(path, options.max_packet_bytes);
+    if (!input) return tl::unexpected(input.error());
+    source.mesh_at = [input = std::make_shared<StreamInput>(std::move(*input)),
+                      decoder = std::make_shared<Decoder>(options),
+                      next = std::size_t{0}](MeshSource& self, std::size_t position) mutable -> Result<Mesh> {
         while (const auto packet = input->next()) {
-            numbers.take(*packet);
             auto frame = decoder->push(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
-            if (decoder->sequence()) self.millimetres_per_unit = decoder->sequence()->unit_micrometres / 1000.0;
-            if (!*frame) continue;
-            // Without this, every frame after a lost one would be compared with its neighbour.
-            const auto number = numbers.of(packet->frame);
-            if (number != expected)
-                return fail(ErrorKind::corrupt_stream,
-                            fmt::format("{} has frame {} where frame {} is due: frames were lost; decode it, and give "
-                                        "the same frames on both sides",
-                                        self.name, number, expected));
-            ++expected;
-            return std::optional(std::move((*frame)->mesh));
+            if (*frame && next++ == position) return std::move((*frame)->mesh);
         }
-        if (input->oversized_packets() > 0)
-            return fail(ErrorKind::limit, self.name + " has packets larger than --max-packet");
-        if (input->damaged_bytes() > 0 || input->cut_short_bytes() > 0 || !decoder->sequence())
-            return fail(ErrorKind::corrupt_stream,
-                        self.name + " is damaged, cut short, or not an htvm stream; 'htvm info' tells more");
-        return std::optional<Mesh>{};
+        return fail(ErrorKind::corrupt_stream, self.name + " changed while it was read");
     };
     return source;
 }
 
+// Of files: as listed, or as the PLY files say.
+Result<void> find_times(MeshSource& source, const SequenceFiles& files, const std::string& listed) {
+    if (!listed.empty()) {
+        auto times = read_frame_times(listed, {});
+        if (!times) return tl::unexpected(times.error());
+        if (times->microseconds.size() != files.paths.size())
+            return fail(ErrorKind::bad_input, fmt::format("{} has {} times, but there are {} frames", listed,
+                                                          times->microseconds.size(), files.paths.size()));
+        source.times_us = std::move(times->microseconds);
+        return {};
+    }
+    for (const auto& path : files.paths) {
+        const auto text = timestamp_in_file(path);
+        const auto time = text.empty() ? Result<std::int64_t>(0) : parse_time(text, {});
+        const bool serves = !text.empty() && time && (source.times_us.empty() || source.times_us.back() < *time);
+        if (!serves) {
+            source.times_us.clear();
+            return {};
+        }
+        source.times_us.push_back(*time);
+    }
+    return {};
+}
+
 }  // namespace
 
-Result<MeshSource> open_meshes(const std::string& name, const std::string& unit, const DecoderOptions& limits) {
+Result<MeshSource> open_meshes(const std::string& name, const MeshSourceOptions& options) {
     if (name == "-")
         return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
-    if (name.ends_with(".htvm")) return open_stream(name, limits);
-    const bool guess = unit == "auto";
-    const auto chosen = guess ? LengthUnit::millimetre : length_unit(unit);
+    if (name.ends_with(".htvm")) return open_stream(name, options.limits);
+    const bool guess = options.unit == "auto";
+    const auto chosen = guess ? LengthUnit::millimetre : length_unit(options.unit);
     if (!chosen) return tl::unexpected(chosen.error());
     const auto files = find_sequence(name);
     if (!files) return tl::unexpected(files.error());
@@ -72,15 +112,14 @@ Result<MeshSource> open_meshes(const std::string& name, const std::string& unit,
     source.frames = files->paths.size();
     source.numbers = files->numbers;
     source.millimetres_per_unit = millimetres_per(*chosen);
-    source.next = [paths = files->paths, guess,
-                   given = std::size_t{0}](MeshSource& self) mutable -> Result<std::optional<Mesh>> {
-        if (given == paths.size()) return std::optional<Mesh>{};
-        auto mesh = read_mesh(paths[given]);
+    source.guesses_unit = guess;
+    if (auto found = find_times(source, *files, options.timestamps); !found) return tl::unexpected(found.error());
+    source.mesh_at = [paths = files->paths](MeshSource& self, std::size_t position) -> Result<Mesh> {
+        auto mesh = read_mesh(paths[position]);
         if (!mesh) return tl::unexpected(mesh.error());
-        if (given == 0 && guess) self.millimetres_per_unit = millimetres_per(guess_unit(*mesh));
+        if (std::exchange(self.guesses_unit, false)) self.millimetres_per_unit = millimetres_per(guess_unit(*mesh));
         if (const auto ok = scale_positions(*mesh, self.millimetres_per_unit); !ok) return tl::unexpected(ok.error());
-        ++given;
-        return std::optional(std::move(*mesh));
+        return std::move(*mesh);
     };
     return source;
 }
@@ -115,6 +154,21 @@ std::vector<FramePair> pair_by_number(std::span<const std::uint64_t> original, s
         if (pairs.size() > best.size()) best = std::move(pairs);
     }
     return best;
+}
+
+std::vector<FramePair> pair_by_time(std::span<const std::int64_t> original, std::span<const std::int64_t> decoded) {
+    constexpr std::int64_t tolerance = 500;
+    std::vector<FramePair> pairs;
+    for (std::size_t i = 0, k = 0; i < original.size() && k < decoded.size();) {
+        if (original[i] + tolerance < decoded[k]) {
+            ++i;
+        } else if (decoded[k] + tolerance < original[i]) {
+            ++k;
+        } else {
+            pairs.push_back({i++, k++});
+        }
+    }
+    return pairs;
 }
 
 std::string frames_left_out(std::span<const std::uint64_t> numbers, std::span<const std::size_t> paired) {

@@ -14,21 +14,31 @@
 #include "htvm/decoder.hpp"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "io/timestamps.h"
 
 namespace htvm::app {
 
 struct MeshSource {
     std::string name;
-    std::size_t frames = 0;              // 0: not known in advance
-    std::vector<std::uint64_t> numbers;  // the numbers of the frames, if their names contain any
-    double millimetres_per_unit = 1;     // the unit that was assumed for the files; known after the first frame
-    // The next frame's mesh in mm; nothing at the end.
-    std::function<Result<std::optional<Mesh>>(MeshSource&)> next;
+    std::size_t frames = 0;
+    std::vector<std::uint64_t> numbers;  // of the frames, ascending; empty if the files' names have none
+    std::vector<std::int64_t> times_us;  // of the frames, ascending; empty if they are known for none
+    bool is_stream = false;
+    FrameRate rate;                   // of a stream
+    double millimetres_per_unit = 1;  // the unit that files are in, or that a stream's capture was in
+    bool guesses_unit = false;        // of files: from the first one that is read
+    // The mesh in mm of the frame at this position of the sequence. Positions must ascend from call to call.
+    std::function<Result<Mesh>(MeshSource&, std::size_t position)> mesh_at;
 };
 
-// An .htvm stream, decoded frame by frame, or the files that `name` refers to (io/sequence.h). unit, for files: mm, cm,
-// m, or auto, which guesses from the size of the first frame. limits: for streams.
-Result<MeshSource> open_meshes(const std::string& name, const std::string& unit, const DecoderOptions& limits = {});
+struct MeshSourceOptions {
+    std::string unit = "auto";  // of files: one of length_units, or auto, which guesses from the first one
+    std::string timestamps;     // of files: a file of times (io/timestamps.h); empty: as PLY files say
+    DecoderOptions limits;      // of streams
+};
+
+// An .htvm stream, or the files that `name` refers to (io/sequence.h).
+Result<MeshSource> open_meshes(const std::string& name, const MeshSourceOptions& options);
 
 // ---- Which frames belong together -----------------------------------------------------------------------------------
 
@@ -40,6 +50,9 @@ struct FramePair {
 // decode` counts from 0), or count on from the first pair: of these three readings, the first that pairs the most
 // frames is taken. Frames without a counterpart are left out. Pairs ascend on both sides.
 std::vector<FramePair> pair_by_number(std::span<const std::uint64_t> original, std::span<const std::uint64_t> decoded);
+
+// Times ascend on both sides, in microseconds: frames within half a millisecond of each other are pairs.
+std::vector<FramePair> pair_by_time(std::span<const std::int64_t> original, std::span<const std::int64_t> decoded);
 
 // "frame 3", "frames 3, 5 to 9": the positions 0..count-1 that are not in `paired` (ascending), each given by its
 // number; empty if all are.

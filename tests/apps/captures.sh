@@ -39,6 +39,16 @@ expect 0 "frame_00002.ply has no triangles; the frame before is repeated" "$htvm
 # From standard input there is no way to the next one.
 expect 1 "mesh 1 of the stream" bash -c "cat capture/frame_00000.ply bad/frame_00003.ply | '$htvm' encode - --on-bad-frame skip -o x.htvm"
 
+# Each frame is compared with its own original: as far off as the others, not by the motion between two.
+"$htvm" encode capture -q 60 --keyint 1 -o whole.htvm --quiet
+"$htvm" compare capture whole.htvm --only m2 --samples 3000 --csv - 2>/dev/null | grep -v '^3,' >whole.csv
+cp -r capture holey && echo nonsense >holey/frame_00003.ply
+"$htvm" encode holey --on-bad-frame skip -q 60 --keyint 1 -o holey.htvm --quiet 2>/dev/null
+"$htvm" compare holey holey.htvm --only m2 --samples 3000 --csv - 2>/dev/null >holey.csv
+[ "$(cut -d, -f1 whole.csv)" = "$(cut -d, -f1 holey.csv)" ] || fail "a frame that is left out moves others"
+awk -F, 'NR > 1 && $6 > 1 { exit 1 }' holey.csv || fail "frames are compared with others' originals"
+expect 0 "frame 3 of holey left out: holey.htvm has no such" "$htvm" compare holey holey.htvm --only m1
+
 # A number that is missing.
 cp -r capture gap
 rm gap/frame_00002.ply gap/frame_00003.ply
@@ -69,6 +79,16 @@ heights() { # of the first mesh in a folder, as the guess of its unit tells
 }
 [ "$(heights tall)" = "subject 1.80 m tall" ] || fail "--height 1.8 makes the $(heights tall)"
 expect 2 "excludes" "$htvm" encode doll --height 1.8 --scale 2 -o x.htvm
+
+# What the stream says of the capture.
+"$htvm" encode capture --title "A walk" --rights "All reserved" --meta take=3 --meta 'note=a=b' --up y --floor lowest -o said.htvm --quiet
+for words in "title: A walk" "rights: All reserved" "take: 3" "note: a=b" "up: y, the floor at "; do
+    expect 0 "$words" "$htvm" info said.htvm
+done
+expect 0 "up: -z, the floor at 250 mm" bash -c "'$htvm' encode capture --up=-z --floor 0.25 -o x.htvm --quiet && '$htvm' info x.htvm"
+expect 2 "KEY=VALUE" "$htvm" encode capture --meta nothing -o x.htvm
+expect 2 "--up" "$htvm" encode capture --floor 1 -o x.htvm
+expect 1 "--floor must be" "$htvm" encode capture --up y --floor low -o x.htvm
 
 # Times: of a file, in any of its forms; of the PLY files themselves; frame rates as fractions.
 printf '%s\n' 0 0.05 0.0833 0.2 0.25 1 >times.csv

@@ -56,6 +56,17 @@ TEST(FramePairs, NumbersAtTheEndOfTheirRangePairWithThemselves) {
     EXPECT_EQ(pairs_of({most - 1, most}, {0, 1, 2}), (Pairs{{0, 0}, {1, 1}}));
 }
 
+TEST(FramePairs, OfStreamsGoByTime) {
+    const auto pairs = [](std::vector<std::int64_t> original, std::vector<std::int64_t> decoded) {
+        Pairs out;
+        for (const auto& pair : pair_by_time(original, decoded)) out.emplace_back(pair.original, pair.decoded);
+        return out;
+    };
+    EXPECT_EQ(pairs({0, 33333, 66667, 100000}, {0, 66667, 100000}), (Pairs{{0, 0}, {2, 1}, {3, 2}}));
+    EXPECT_EQ(pairs({66667, 100000}, {0, 33333, 66666, 100001}), (Pairs{{0, 2}, {1, 3}})) << "rounded otherwise";
+    EXPECT_EQ(pairs({0, 40000}, {1000, 41000}), Pairs{}) << "another millisecond";
+}
+
 TEST(FramePairs, WithoutFramesThereAreNoPairs) {
     EXPECT_EQ(pairs_of({}, {0, 1}), Pairs{});
     EXPECT_EQ(pairs_of({0, 1}, {}), Pairs{});
