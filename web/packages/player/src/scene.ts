@@ -22,7 +22,8 @@ export interface View {
     target: Vector3;
 }
 
-const shadowPixels = 256;
+const shadowPixels = 128; // it is blurred anyway, and weak graphics cards have to draw it too
+const blurReach = 6; // pixels
 
 export class StageScene {
     readonly renderer: WebGLRenderer;
@@ -168,7 +169,7 @@ export class StageScene {
         const floor = this.#floor ?? box.min.y;
         this.#stage.position.set(-middle.x, -floor, -middle.z);
         // Whatever way it is turned, with some room to move in.
-        const radius = (Math.max(0.5 * Math.hypot(size.x, size.z), 0.5 * size.y) * 1.14) / (1 - this.below);
+        const radius = (Math.max(0.5 * Math.hypot(size.x, size.z), 0.5 * size.y) * 1.22) / (1 - this.below);
         const distance = radius / Math.sin((this.camera.fov * Math.PI) / 360);
         this.#home = { distance, target: new Vector3(0, middle.y - floor - this.below * radius, 0) };
         this.view.distance = distance;
@@ -205,6 +206,16 @@ function gridPlane(): Mesh<PlaneGeometry, ShaderMaterial> {
     const plane = new Mesh(new PlaneGeometry(1, 1).rotateX(-Math.PI / 2), material);
     plane.renderOrder = -2;
     return plane;
+}
+
+// The weighted sum of the pixels along a line, as GLSL.
+function blurSum(): string {
+    const offsets = Array.from({ length: 2 * blurReach + 1 }, (_, i) => i - blurReach);
+    const weights = offsets.map((offset) => Math.exp(-0.08 * offset * offset));
+    const total = weights.reduce((sum, weight) => sum + weight);
+    return offsets
+        .map((offset, i) => `${(weights[i]! / total).toFixed(6)} * texture2D(picture, place + step.xy * ${offset.toFixed(1)}).r`)
+        .join(' + ');
 }
 
 // The mesh seen from below, the nearer to the floor the darker, blurred.
@@ -260,13 +271,7 @@ class ContactShadow {
                 uniform vec3 step;
                 varying vec2 place;
                 void main() {
-                    float sum = 0.0, weights = 0.0;
-                    for (int i = -4; i <= 4; ++i) {
-                        float weight = exp(-0.12 * float(i * i));
-                        sum += weight * texture2D(picture, place + step.xy * float(i)).r;
-                        weights += weight;
-                    }
-                    gl_FragColor = vec4(sum / weights);
+                    gl_FragColor = vec4(${blurSum()});
                 }`,
         });
         this.#blur = new Mesh(new PlaneGeometry(1, 1), blurMaterial);
@@ -319,13 +324,11 @@ class ContactShadow {
         renderer.clear();
         renderer.render(this.#scene, this.#camera);
         const { uniforms } = this.#blur.material;
-        for (const radius of [1.0, 2.2]) {
-            for (const [from, to, x, y] of [[first, second, radius, 0], [second, first, 0, radius]] as const) {
-                uniforms['picture']!.value = from.texture;
-                uniforms['step']!.value.set(x / shadowPixels, y / shadowPixels, 0);
-                renderer.setRenderTarget(to);
-                renderer.render(this.#blurScene, this.#blurCamera);
-            }
+        for (const [from, to, x, y] of [[first, second, 1, 0], [second, first, 0, 1]] as const) {
+            uniforms['picture']!.value = from.texture;
+            uniforms['step']!.value.set(x / shadowPixels, y / shadowPixels, 0);
+            renderer.setRenderTarget(to);
+            renderer.render(this.#blurScene, this.#blurCamera);
         }
         renderer.setRenderTarget(null);
         renderer.xr.enabled = xr;
