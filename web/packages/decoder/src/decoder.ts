@@ -124,7 +124,8 @@ export class DecoderModule {
         let bytes: BufferSource | WebAssembly.Module;
         if (typeof Response !== 'undefined' && source instanceof Response) {
             if (!source.ok) throw new Error(`the decoder could not be loaded: ${source.status} ${source.url}`);
-            bytes = await source.arrayBuffer();
+            const typed = source.headers.get('Content-Type') === 'application/wasm'; // else it is no stream of code
+            bytes = typed ? await WebAssembly.compileStreaming(source) : await source.arrayBuffer();
         } else {
             bytes = source as BufferSource | WebAssembly.Module;
         }

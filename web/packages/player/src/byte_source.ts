@@ -88,6 +88,11 @@ export class ByteSource {
         return block && block.length > within ? block.subarray(within) : null;
     }
 
+    /** Asks for the beginning of the file before anybody reads it. */
+    prefetch(): void {
+        this.#fetchOn();
+    }
+
     /** Ends a read that waits. */
     interrupt(): void {
         ++this.#interrupts;

@@ -43,15 +43,15 @@ class Session {
     #reportedExtent = '';
     #at = 0; // time of the packet being decoded
 
-    constructor(request: Request & { type: 'open' }, module: DecoderModule) {
+    constructor(request: Request & { type: 'open' }, module: DecoderModule, source: ByteSource) {
         this.#url = request.url;
         this.#module = module;
         this.#serial = request.serial;
         this.#timeUs = request.timeUs;
         this.#traps = request.traps;
         this.#loop = request.loop;
-        this.#source = new ByteSource(this.#url);
-        this.#file = new FilePackets(this.#source, module);
+        this.#source = source;
+        this.#file = new FilePackets(source, module);
         this.#decoder = module.createDecoder();
     }
 
@@ -380,8 +380,10 @@ let session: Promise<Session> | null = null;
 
 async function open(request: Request & { type: 'open' }): Promise<Session> {
     let opened: Session;
+    const source = new ByteSource(request.url);
+    source.prefetch(); // while the decoder is loaded
     try {
-        opened = new Session(request, await DecoderModule.load(await fetch(request.wasmUrl)));
+        opened = new Session(request, await DecoderModule.load(await fetch(request.wasmUrl)), source);
     } catch (error) {
         const csp = error instanceof WebAssembly.CompileError && String(error).includes('Content Security Policy');
         const why = csp
