@@ -50,6 +50,7 @@ tiny="$work/tiny/skeleton.json"
 stream() {
     local name=$1 capture=$2
     shift 2
+    [[ " $* " == *" --profile "* ]] || set -- --profile topology "$@"
     "$htvm" encode "$work/$capture" -o "$work/$name.htvm" "$@" >/dev/null 2>&1
     cp "$work/$name.htvm" "$out/decode_file/$name"
     { printf '\x00' && cat "$work/$name.htvm"; } >"$out/decode_stream/$name"

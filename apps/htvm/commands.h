@@ -7,11 +7,15 @@ namespace htvm::app {
 
 void add_calibrate(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
+void add_cut(CLI::App& app, Run& run);
 void add_decode(CLI::App& app, Run& run);
 void add_encode(CLI::App& app, Run& run);
+void add_index(CLI::App& app, Run& run);
 void add_info(CLI::App& app, Run& run);
+void add_join(CLI::App& app, Run& run);
 void add_play(CLI::App& app, Run& run);
 void add_serve(CLI::App& app, Run& run);
 void add_synth(CLI::App& app, Run& run);
+void add_verify(CLI::App& app, Run& run);
 
 }  // namespace htvm::app

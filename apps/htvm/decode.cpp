@@ -27,12 +27,14 @@
 #include "io/sequence.h"
 #include "io/timestamps.h"
 #include "stream_file.h"
+#include "stream_seek.h"
 
 namespace htvm::app {
 namespace {
 
 struct Options {
     std::string input, output, timestamps, format = "ply", unit = "capture", conceal = "gap";
+    std::uint64_t first = 0;
     std::size_t frames = 0;
     unsigned threads = 0;
     bool json = false;
@@ -130,6 +132,8 @@ struct Decoding {
     FrameNumbers numbers = {};
     LostFrames lost = {};
     std::uint32_t begins_with = 0;  // number of the first frame of a stream that begins in the middle, until told
+    std::uint64_t promised = 0;     // frames of the stream, by indices in front
+    std::uint32_t next_number = 0;  // of the frame after the last
 };
 
 bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.written() >= d.options.frames; }
@@ -191,15 +195,16 @@ void tell_lost(Decoding& d) {
 }
 
 // Frames that were lost in transmission leave no damage behind, only a gap in the numbers.
-Result<void> fill_gap(Decoding& d, const Packet& next) {
+// number, timestamp_us: of what comes next, a frame or the end.
+Result<void> fill_gap(Decoding& d, std::uint32_t number, std::int64_t timestamp_us, bool is_frame) {
     auto& summary = d.summary;
-    const std::uint32_t first = summary.due, number = d.numbers.of(next.frame);
+    const std::uint32_t first = summary.due;
     if (number <= first) return {};
     const std::uint32_t gap = number - first;
-    const auto before = static_cast<std::uint64_t>(summary.timestamp_us.value_or(next.timestamp_us));
-    const bool ascends = summary.timestamp_us && *summary.timestamp_us < next.timestamp_us;
+    const auto before = static_cast<std::uint64_t>(summary.timestamp_us.value_or(timestamp_us));
+    const bool ascends = summary.timestamp_us && *summary.timestamp_us < timestamp_us;
     const std::uint64_t interval =
-        ascends ? (static_cast<std::uint64_t>(next.timestamp_us) - before) / (std::uint64_t{gap} + 1) : 0;
+        ascends ? (static_cast<std::uint64_t>(timestamp_us) - before) / (std::uint64_t{gap} + 1) : 0;
     std::uint32_t shown = 0;
     while (shown < gap && !is_enough(d)) {
         const auto done = conceal(d, first + shown, static_cast<std::int64_t>(before + interval * (shown + 1)));
@@ -208,7 +213,7 @@ Result<void> fill_gap(Decoding& d, const Packet& next) {
         ++shown;
     }
     if (!summary.timestamp_us) {
-        if (frame_type(next.kind)) d.begins_with = first + gap;
+        if (is_frame) d.begins_with = first + gap;
         return {};
     }
     summary.missing += gap;
@@ -246,19 +251,33 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
 Result<bool> decode_next(Decoding& d) {
     if (is_enough(d)) return false;
     const auto packet = d.input.next();
-    if (!packet) return false;
+    if (!packet) {
+        const auto promised = static_cast<std::uint32_t>(std::min<std::uint64_t>(d.promised, 0xFFFFFFFF));
+        if (auto ok = fill_gap(d, promised, d.summary.timestamp_us.value_or(0), false); !ok)
+            return tl::unexpected(ok.error());
+        return false;
+    }
     const bool is_frame = frame_type(packet->kind).has_value();
     d.numbers.take(*packet);
     if (d.numbers.begins_sequence()) d.summary.timestamp_us.reset();  // frames before its first one never existed
     if (is_frame || packet->kind == PacketKind::index) {              // the index gives the number of frames
         // Before decoding the packet, because it may be an I-frame, which the lost frames did not refer to.
-        if (auto ok = fill_gap(d, *packet); !ok) return tl::unexpected(ok.error());
+        if (auto ok = fill_gap(d, d.numbers.of(packet->frame), packet->timestamp_us, is_frame); !ok)
+            return tl::unexpected(ok.error());
         if (is_enough(d)) return false;
     }
-    if (is_frame) d.summary.due = d.numbers.of(packet->frame) + 1;
+    if (packet->kind == PacketKind::front_index)
+        if (const auto index = read_index(*packet)) d.promised = d.next_number + index->frames;
+    // A frame before the first one asked for: decoded because that one, or one after it, needs it.
+    const bool is_earlier = is_frame && d.numbers.of(packet->frame) < d.options.first;
+    if (is_frame) {
+        d.next_number = d.numbers.of(packet->frame) + 1;
+        d.summary.due = std::max(d.summary.due, d.next_number);
+    }
     const auto start = std::chrono::steady_clock::now();
     auto frame = d.decoder.push(*packet);
     if (is_frame) d.summary.timestamp_us = packet->timestamp_us;
+    if (is_earlier) return true;
     if (!frame) {
         if (auto ok = take_failure(d, *packet, frame.error()); !ok) return tl::unexpected(ok.error());
         return true;
@@ -327,6 +346,24 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
                             summary.undecodable, summary.missing));
 }
 
+// Skips what the frames asked for do not need, if the stream is an undamaged file; otherwise all of it is read.
+void begin_at_first(Decoding& d) {
+    auto stream = SeekableStream::open(d.options.input, d.options.limits.max_packet_bytes);
+    if (!stream) return;
+    const auto start = find_start(*stream, d.options.first);
+    if (!start) return;
+    std::vector<Packet> needed;
+    for (const auto offset : start->needed) {
+        const auto place = stream->at(offset);
+        auto packet = place ? stream->read(*place) : std::nullopt;
+        if (!packet) return;
+        needed.push_back(std::move(*packet));
+    }
+    d.numbers.begin(start->first_needed_frame, start->first_needed_number);
+    d.promised = start->promised;
+    d.input.go_on_with(std::move(needed), start->go_on);
+}
+
 Result<void> decode(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
@@ -337,9 +374,11 @@ Result<void> decode(const Options& options) {
     settings.intra_coder = draco_intra_coder();
     Decoder decoder(settings);
     Summary summary;
+    summary.due = static_cast<std::uint32_t>(options.first);
     {
         Progress progress("decoding", options.frames);
         Decoding decoding{options, *input, *output, decoder, summary, progress};
+        if (options.first > 0) begin_at_first(decoding);
         for (;;) {
             const auto more = decode_next(decoding);
             if (!more) return tl::unexpected(more.error());
@@ -352,6 +391,8 @@ Result<void> decode(const Options& options) {
     if (options.json) print_json(summary, *input);
     if (!decoder.sequence() && input->oversized_packets() == 0)
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
+    if (summary.written() == 0 && options.first > 0 && summary.undecodable + summary.missing == 0)
+        return fail(ErrorKind::bad_input, fmt::format("{} has no frame {}", options.input, options.first));
     tell_what_was_written(options, *output, summary);
     return judge(options, *output, *input, summary);
 }
@@ -388,6 +429,8 @@ void add_decode(CLI::App& app, Run& run) {
                      "What to write for a lost frame: gap (default), nothing, and the numbers continue; or animate,\n"
                      "the I-frame's mesh moved as in the last known frame, for up to 300 in a row")
         ->check(CLI::IsMember({"gap", "animate"}));
+    command->add_option("--first", options->first, "First frame to decode, counted from 0 (default: 0)")
+        ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{0xFFFFFFFF}));
     command->add_option("--frames", options->frames, "Decode at most this many frames (default: all)");
     command->add_option("--threads", options->threads,
                         "Threads (default: one per core); the meshes do not depend on it");

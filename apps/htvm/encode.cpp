@@ -110,6 +110,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         if (pass.rate.controlled()) summary.list.back()["quality"] = pass.encoder.last_cost().quality;
     }
     if (auto written = drain(pass); !written) return tl::unexpected(written.error());
+    if (const auto bounds = pass.encoder.bounds(); bounds && pass.output) pass.output->add_bounds(*bounds);
     pass.progress.step(progress_text(pass, info));
     return Coded::yes;
 }

@@ -12,6 +12,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "rate_report.h"
+#include "running_time.h"
 #include "stream_file.h"
 
 namespace htvm::app {
@@ -105,31 +106,20 @@ nlohmann::json buffer_json(const Options& options, const BufferModel& buffer) {
             {"seconds_needed", buffer.seconds_needed()}, {"overflows", buffer.overflows()}};
 }
 
-// How long the frames of a stream last: each of its sequences from its first frame to its last, and a mean frame more.
-class Duration {
-public:
-    void add(std::int64_t timestamp_us, bool begins_sequence) {
-        if (begins_sequence) end_sequence();
-        if (count_++ == 0) first_us_ = timestamp_us;
-        last_us_ = timestamp_us;
-    }
-    double seconds(double seconds_of_one_frame) {
-        end_sequence();
-        return seconds_ + static_cast<double>(single_frames_) * seconds_of_one_frame;
-    }
+nlohmann::json index_json(const StreamIndex& index) {
+    nlohmann::json out = {{"frames", index.frames}, {"seconds", static_cast<double>(index.duration_us) / 1e6}};
+    if (index.bounds) out["bounds_mm"] = {index.bounds->low, index.bounds->high};
+    return out;
+}
 
-private:
-    void end_sequence() {
-        if (count_ > 1)
-            seconds_ += (static_cast<double>(last_us_) - static_cast<double>(first_us_)) / 1e6 *
-                        static_cast<double>(count_) / static_cast<double>(count_ - 1);
-        single_frames_ += count_ == 1;
-        count_ = 0;
-    }
-    std::int64_t first_us_ = 0, last_us_ = 0;
-    std::size_t count_ = 0, single_frames_ = 0;
-    double seconds_ = 0;
-};
+void print_index(const StreamIndex& index) {
+    fmt::print("index: {} frames, {:.2f} s, {} places to start", index.frames,
+               static_cast<double>(index.duration_us) / 1e6, index.points.size());
+    if (const auto& b = index.bounds)
+        fmt::print(", within {:.0f} {:.0f} {:.0f} to {:.0f} {:.0f} {:.0f} mm", b->low[0], b->low[1], b->low[2],
+                   b->high[0], b->high[1], b->high[2]);
+    fmt::print("\n");
+}
 
 Result<void> info(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
@@ -142,9 +132,10 @@ Result<void> info(const Options& options) {
     std::uint64_t bytes = 0;
     bool index = false;
     FrameNumbers numbers;
-    Duration duration;
+    RunningTime time;
+    std::optional<StreamIndex> front;
     nlohmann::json sequences = nlohmann::json::array();
-    std::optional<SequenceInfo> first;
+    std::optional<SequenceInfo> first_sequence;
     std::optional<BufferModel> buffer;
     if (options.megabits > 0) buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
     while (auto packet = input->next()) {
@@ -162,6 +153,12 @@ Result<void> info(const Options& options) {
                     "attribs", "mapping", "fans", "d.order", "bpv");
         }
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
+        if (packet->kind == PacketKind::front_index && !front) {
+            auto read = read_index(*packet);
+            if (!read) return fail(read.error().kind, options.input + ": " + read.error().message);
+            front = std::move(*read);
+            if (!options.json) print_index(*front);
+        }
         if (packet->kind == PacketKind::index || packet->kind == PacketKind::front_index) index = true;
         if (!frame_type(packet->kind)) continue;
         auto frame = inspect(*packet);
@@ -173,12 +170,14 @@ Result<void> info(const Options& options) {
         if (numbers.begins_sequence() && headers.sequence()) {
             if (!options.json && count > 0)
                 print_sequence(*headers.sequence(), fmt::format("from frame {} on, another sequence", frame->frame));
-            if (!first) first = headers.sequence();
+            if (!first_sequence) first_sequence = headers.sequence();
             sequences.push_back(sequence_json(*headers.sequence()));
             sequences.back()["first_frame"] = frame->frame;
         }
         ++count;
-        duration.add(frame->timestamp_us, numbers.begins_sequence());
+        const auto& rate = headers.sequence();
+        time.take(frame->timestamp_us, numbers.begins_sequence(),
+                  rate ? static_cast<double>(rate->fps_denominator) / rate->fps_numerator : 0);
         add(totals, *frame);
         if (options.json) frames.push_back(frame_json(*frame));
         if (!options.json && !options.summary) print_frame(*frame);
@@ -188,15 +187,15 @@ Result<void> info(const Options& options) {
     if (!headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
     const auto& s = *headers.sequence();
-    const double one_frame = static_cast<double>(s.fps_denominator) / s.fps_numerator;
-    const double seconds = count > 0 ? duration.seconds(one_frame) : one_frame;
+    const double seconds = count > 0 ? time.total() : static_cast<double>(s.fps_denominator) / s.fps_numerator;
     const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
     if (options.json) {
-        nlohmann::json out{{"sequence", sequence_json(first ? *first : s)},
+        nlohmann::json out{{"sequence", sequence_json(first_sequence ? *first_sequence : s)},
                            {"sequences", sequences},
                            {"frames", frames},
                            {"bytes", bytes},
                            {"index", index},
+                           {"front_index", front ? index_json(*front) : nlohmann::json()},
                            {"damaged_bytes", input->damaged_bytes()},
                            {"megabits_per_second", megabits}};
         if (buffer) out["buffer"] = buffer_json(options, *buffer);

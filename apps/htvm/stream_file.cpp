@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <limits>
 
 #include "io/mesh_file.h"
@@ -30,7 +31,18 @@ Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max
     return input;
 }
 
+void StreamInput::go_on_with(std::vector<Packet> first, std::uint64_t offset) {
+    first_.assign(std::make_move_iterator(first.begin()), std::make_move_iterator(first.end()));
+    file_.clear();
+    file_.seekg(static_cast<std::streamoff>(offset));
+}
+
 std::optional<Packet> StreamInput::next() {
+    if (!first_.empty()) {
+        auto packet = std::move(first_.front());
+        first_.pop_front();
+        return packet;
+    }
     std::istream& in = standard_ ? std::cin : file_;
     std::array<char, 65536> buffer;
     for (;;) {
@@ -48,6 +60,15 @@ std::optional<Packet> StreamInput::next() {
     }
 }
 
+Result<void> check_whole(const StreamInput& input, const std::string& path) {
+    if (input.oversized_packets() > 0) return fail(ErrorKind::limit, path + " has packets larger than --max-packet");
+    if (input.damaged_bytes() > 0)
+        return fail(ErrorKind::corrupt_stream, path + " is damaged; 'htvm verify' tells more");
+    if (input.cut_short_bytes() > 0)
+        return fail(ErrorKind::corrupt_stream, path + " ends in the middle of a packet; 'htvm verify' tells more");
+    return {};
+}
+
 Result<StreamOutput> StreamOutput::open(const std::string& path) {
     StreamOutput output;
     if (path == "-") return output;
@@ -61,6 +82,10 @@ Result<StreamOutput> StreamOutput::open(const std::string& path) {
 }
 
 Result<void> StreamOutput::write(const Packet& packet) {
+    if (is_indexed()) {
+        if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return {};
+        indexer_.add(packet, bytes_);
+    }
     const auto bytes = write_packet(packet);
     if (file_) {
         if (auto written = file_->write(bytes); !written) return written;
@@ -71,7 +96,17 @@ Result<void> StreamOutput::write(const Packet& packet) {
     return {};
 }
 
-Result<void> StreamOutput::finish() { return file_ ? file_->finish() : Result<void>(); }
+Result<void> StreamOutput::finish() {
+    if (!file_) return {};
+    if (!is_indexed()) return file_->finish();
+    const auto index = indexer_.finish(bytes_);
+    if (index.frames == 0) return file_->finish();
+    const auto front = write_packet(write_index(index));
+    // Without an index, as where the disk has no room for a second copy, the stream is complete all the same.
+    if (!file_->finish_behind(front)) return file_->finish();
+    bytes_ += front.size();
+    return {};
+}
 
 std::string StreamOutput::keep() { return file_ ? file_->keep().string() : std::string(); }
 

@@ -3,13 +3,16 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <fstream>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+#include "htvm/stream_index.hpp"
 #include "io/output_file.h"
 
 namespace CLI {
@@ -26,26 +29,38 @@ public:
     std::optional<Packet> next();
     std::uint64_t damaged_bytes() const { return reader_.damaged_bytes(); }
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
-    std::size_t cut_short_bytes() const { return reader_.pending_bytes(); }  // at the end: bytes of a truncated packet
+    // At the end: bytes of a truncated packet.
+    std::size_t cut_short_bytes() const { return at_end_ ? reader_.pending_bytes() : 0; }
+    // From now on these packets come first, then those of the file from this place on.
+    void go_on_with(std::vector<Packet> first, std::uint64_t offset);
 
 private:
     std::ifstream file_;
     bool standard_ = false, at_end_ = false;
     PacketReader reader_;
+    std::deque<Packet> first_;
 };
 
+// An error if the input, as far as it was read, was not whole.
+Result<void> check_whole(const StreamInput& input, const std::string& path);
+
 // A file is there once it is finished: until then its packets are in a file beside it, and what was there before stays.
+// It then begins with an index; those at the end of streams are left out of it.
 class StreamOutput {
 public:
     static Result<StreamOutput> open(const std::string& path);  // "-" is standard output
     Result<void> write(const Packet& packet);
+    // Of the last frame, for the index.
+    void add_bounds(const SpaceBounds& bounds) { indexer_.add(bounds); }
     Result<void> finish();
     // Where a stream that ends early is left, beside its place; empty where it went to a pipe.
     std::string keep();
     std::uint64_t bytes() const { return bytes_; }
 
 private:
+    bool is_indexed() const { return file_ && file_->is_file(); }
     std::optional<OutputFile> file_;  // none: standard output
+    StreamIndexer indexer_;
     std::uint64_t bytes_ = 0;
 };
 

@@ -19,6 +19,7 @@
 #include "htvm/mesh.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
 
 namespace htvm {
@@ -60,6 +61,7 @@ public:
     const FrameInfo& last_frame() const;
     FrameCost last_cost() const;
     Mesh reconstruction() const;
+    std::optional<SpaceBounds> bounds() const;  // of the reconstruction; nothing if it has no vertices
     const std::vector<StageTime>& stage_times() const;
     // About the last EP-frame: how often each distance order was coded, the escapes last (paper, Fig. 23).
     const std::vector<std::uint32_t>& distance_order_counts() const;

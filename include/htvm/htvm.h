@@ -331,10 +331,11 @@ typedef struct htvm_index_entry {
     uint32_t reserved; /* 0 */
 } htvm_index_entry;
 
-/* What an index packet (kind 5), header and checksums included, says; for players that seek. *count is set to its
- * number of entries; HTVM_BUFFER_TOO_SMALL where capacity is less, and nothing is written (so a capacity of 0 asks for
- * the number). HTVM_CORRUPT_STREAM: not one whole, undamaged index packet. Frames and timestamps are what the stream
- * says: check them against the packets found there. */
+/* What an index packet, header and checksums included, says; for players that seek. Of kind 5, at the end of a stream,
+ * or of kind 8, in front: then it must be the first packet of the stream. *count is set to its number of entries;
+ * HTVM_BUFFER_TOO_SMALL where capacity is less, and nothing is written (so a capacity of 0 asks for the number).
+ * HTVM_CORRUPT_STREAM: not one whole, undamaged index packet. Frames and timestamps are what the stream says: check
+ * them against the packets found there. */
 htvm_status htvm_index_read(const uint8_t* packet, size_t size, htvm_index_entry* entries, size_t capacity,
                             size_t* count);
 

@@ -1,8 +1,13 @@
-// What a stream says about its capture besides the meshes: the up axis, and texts.
+// What a stream says about its capture besides the meshes: the up axis, bounds, and texts.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <string>
+
+#include "htvm/mesh.hpp"
 
 namespace htvm {
 
@@ -15,5 +20,14 @@ struct MetadataEntry {
     std::string key, value;
     bool operator==(const MetadataEntry&) const = default;
 };
+
+// The smallest and the largest x, y, z, mm.
+struct SpaceBounds {
+    std::array<float, 3> low, high;
+    bool operator==(const SpaceBounds&) const = default;
+};
+SpaceBounds united(const SpaceBounds& a, const SpaceBounds& b);
+// Nothing if there are no positions.
+std::optional<SpaceBounds> bounds_of(std::span<const Vector3f> positions);
 
 }  // namespace htvm

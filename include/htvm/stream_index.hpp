@@ -2,7 +2,6 @@
 // A live stream has none. docs/bitstream.md, section 9.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -10,15 +9,9 @@
 #include "htvm/frame_numbers.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 
 namespace htvm {
-
-// The least and the largest x, y, z, mm.
-struct SpaceBounds {
-    std::array<float, 3> low, high;
-    bool operator==(const SpaceBounds&) const = default;
-};
-SpaceBounds united(const SpaceBounds& a, const SpaceBounds& b);
 
 // A frame at which decoding can start. Frames are numbered through the whole file (frame_numbers.hpp).
 struct AccessPoint {

@@ -8,6 +8,7 @@
 #include "c_api/c_status.h"
 #include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
+#include "htvm/stream_index.hpp"
 
 static_assert(HTVM_UP_UNKNOWN == static_cast<int>(htvm::UpAxis::unknown) &&
               HTVM_UP_MINUS_Z == static_cast<int>(htvm::UpAxis::minus_z));
@@ -138,6 +139,23 @@ htvm_status copy_pose(htvm_decoder* decoder, std::vector<Element> htvm::Pose::*p
         if (!decoder->current) return no_frame(decoder->error);
         return copy(decoder->error, std::span<const Element>(decoder->current->pose->*part), name, out, capacity);
     });
+}
+
+// The entries of an index of either kind. Of the one in front: those from which all later frames follow, if there are
+// any, as if its packet began the stream.
+htvm::Result<std::vector<htvm::internal::IndexEntry>> index_of(const htvm::Packet& packet, std::size_t size) {
+    if (packet.kind == htvm::PacketKind::index) return htvm::internal::read_sequence_index(packet.payload);
+    const auto front = htvm::read_index(packet);
+    if (!front) return tl::unexpected(front.error());
+    const auto is_referred = [](const htvm::AccessPoint& point) {
+        return (point.flags & htvm::packet_flag::referred) != 0;
+    };
+    const bool some = std::any_of(front->points.begin(), front->points.end(), is_referred);
+    std::vector<htvm::internal::IndexEntry> out;
+    for (const auto& point : front->points)
+        if (point.back == 0 && (!some || is_referred(point)))
+            out.push_back({static_cast<std::uint32_t>(point.frame), point.timestamp_us, size + point.offset});
+    return out;
 }
 
 // Refuses to mix the two ways of sending.
@@ -386,10 +404,8 @@ htvm_status htvm_index_read(const uint8_t* packet, size_t size, htvm_index_entry
         htvm::PacketReader reader;
         reader.push({packet, size});
         const auto whole = reader.pull();
-        if (!whole || reader.damaged_bytes() > 0 || reader.pending_bytes() > 0 ||
-            whole->kind != htvm::PacketKind::index)
-            return htvm_status{HTVM_CORRUPT_STREAM};
-        const auto index = htvm::internal::read_sequence_index(whole->payload);
+        if (!whole || reader.damaged_bytes() > 0 || reader.pending_bytes() > 0) return htvm_status{HTVM_CORRUPT_STREAM};
+        const auto index = index_of(*whole, size);
         if (!index) return error.set(index.error());
         *count = index->size();
         if (capacity < index->size()) return htvm_status{HTVM_BUFFER_TOO_SMALL};

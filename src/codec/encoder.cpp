@@ -328,6 +328,20 @@ std::optional<Packet> Encoder::pull() {
 
 const FrameInfo& Encoder::last_frame() const { return state_->info; }
 FrameCost Encoder::last_cost() const { return state_->cost; }
+std::optional<SpaceBounds> Encoder::bounds() const {
+    const auto& positions = state_->decoded.positions;
+    if (positions.empty()) return std::nullopt;
+    // Rounding to single precision keeps the order, so the corners can be found on the lattice.
+    std::vector<LatticePoint> corners(2, positions[0]);
+    for (const auto& p : positions) {
+        corners[0] = {std::min(corners[0].x, p.x), std::min(corners[0].y, p.y), std::min(corners[0].z, p.z)};
+        corners[1] = {std::max(corners[1].x, p.x), std::max(corners[1].y, p.y), std::max(corners[1].z, p.z)};
+    }
+    std::vector<Vector3f> in_millimetres;
+    to_millimetres(corners, state_->configuration.header.lattice, in_millimetres);
+    return bounds_of(in_millimetres);
+}
+
 Mesh Encoder::reconstruction() const { return to_mesh(state_->decoded, state_->configuration.header.lattice); }
 const std::vector<StageTime>& Encoder::stage_times() const { return state_->stages; }
 const std::vector<std::uint32_t>& Encoder::distance_order_counts() const { return state_->distance_order_counts; }

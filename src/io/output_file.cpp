@@ -5,6 +5,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 namespace htvm {
 namespace {
@@ -70,6 +71,39 @@ Result<void> OutputFile::finish() {
     if (!partial_.empty() && std::rename(partial_.c_str(), path_.c_str()) != 0)
         return tl::unexpected(write_error(path_.string(), errno));
     file_.reset();
+    return {};
+}
+
+Result<void> OutputFile::finish_behind(std::span<const std::uint8_t> front) {
+    if (std::fflush(file_.get()) != 0) return tl::unexpected(write_error(path_.string(), errno));
+    const std::unique_ptr<std::FILE, Close> written(std::fopen(partial_.c_str(), "rb"));
+    if (!written) return tl::unexpected(write_error(path_.string(), errno));
+    const fs::path whole = partial_.string() + ".whole";
+    std::error_code ignored;
+    const auto join = [&]() -> Result<void> {
+        const std::unique_ptr<std::FILE, Close> out(std::fopen(whole.c_str(), "wb"));
+        if (!out) return tl::unexpected(write_error(path_.string(), errno));
+        fs::permissions(whole, fs::status(partial_, ignored).permissions(), ignored);
+        std::vector<std::uint8_t> piece(front.begin(), front.end());
+        while (!piece.empty()) {
+            if (std::fwrite(piece.data(), 1, piece.size(), out.get()) != piece.size())
+                return tl::unexpected(write_error(path_.string(), errno));
+            piece.resize(std::size_t{1} << 20);
+            piece.resize(std::fread(piece.data(), 1, piece.size(), written.get()));
+        }
+        if (std::ferror(written.get()) != 0 || std::fflush(out.get()) != 0)
+            return tl::unexpected(write_error(path_.string(), errno));
+        return {};
+    };
+    auto joined = join();
+    if (joined && std::rename(whole.c_str(), path_.c_str()) != 0)
+        joined = tl::unexpected(write_error(path_.string(), errno));
+    if (!joined) {
+        fs::remove(whole, ignored);
+        return joined;
+    }
+    file_.reset();
+    fs::remove(partial_, ignored);
     return {};
 }
 

@@ -25,6 +25,10 @@ public:
     Result<void> write(std::span<const std::uint8_t> bytes);
     // Puts the file in its place.
     Result<void> finish();
+    // The same with these bytes in front of what was written. Only for files. If it fails, finish() may still succeed.
+    Result<void> finish_behind(std::span<const std::uint8_t> front);
+    // Whether it is a file, not a pipe or a device.
+    bool is_file() const { return !partial_.empty(); }
     // Leaves what was written so far beside its place and gives its name; an empty one where all went to a pipe or a
     // device.
     std::filesystem::path keep();

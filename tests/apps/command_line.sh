@@ -32,7 +32,8 @@ expect 0 "3 frames to out" "$htvm" decode a.htvm -o 'out/%03d.obj'
 # Through pipes, with meshes in and meshes out: the same bytes as through files.
 cat capture/frame_*.ply | "$htvm" encode - --fps 30 --session 0 -o - 2>/dev/null >piped.htvm
 "$htvm" encode capture -o file.htvm 2>/dev/null
-cmp -s piped.htvm file.htvm || { echo "FAILED: a piped stream differs from a stream made from files"; failures=$((failures + 1)); }
+"$htvm" index piped.htvm --bounds -o indexed.htvm 2>/dev/null
+cmp -s indexed.htvm file.htvm || { echo "FAILED: a piped stream differs from a stream made from files"; failures=$((failures + 1)); }
 "$htvm" decode - -o - <piped.htvm 2>/dev/null >piped.ply
 "$htvm" decode file.htvm -o files 2>/dev/null
 cat files/*.ply | cmp -s - piped.ply || { echo "FAILED: piped meshes differ from files"; failures=$((failures + 1)); }

@@ -8,6 +8,7 @@
 #include "c_api/c_test_streams.h"
 #include "codec/enhanced_options.h"
 #include "htvm/dependency.hpp"
+#include "htvm/stream_index.hpp"
 
 namespace htvm {
 namespace {
@@ -301,6 +302,35 @@ TEST(CInterface, ReadsAnIndex) {
     EXPECT_EQ(htvm_index_read(index.data(), index.size() - 1, entries.data(), count, &count), HTVM_CORRUPT_STREAM);
     EXPECT_EQ(htvm_index_read(stream.data(), stream.size(), entries.data(), count, &count), HTVM_CORRUPT_STREAM);
     EXPECT_EQ(htvm_index_read(nullptr, 0, nullptr, 0, &count), HTVM_BAD_INPUT);
+}
+
+TEST(CInterface, ReadsAnIndexInFront) {
+    PacketReader reader;
+    reader.push(coded_person().bytes);
+    StreamIndexer indexer;
+    std::vector<std::uint8_t> body;
+    std::vector<std::uint64_t> intra;  // offsets
+    while (const auto packet = reader.pull()) {
+        if (packet->kind == PacketKind::intra) intra.push_back(body.size());
+        indexer.add(*packet, body.size());
+        const auto bytes = write_packet(*packet);
+        body.insert(body.end(), bytes.begin(), bytes.end());
+    }
+    auto index = indexer.finish(body.size());
+    const auto packet = write_packet(write_index(index));
+    std::vector<htvm_index_entry> entries(intra.size());
+    std::size_t count = 0;
+    ASSERT_EQ(htvm_index_read(packet.data(), packet.size(), entries.data(), entries.size(), &count), HTVM_OK);
+    ASSERT_EQ(count, intra.size());
+    for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_EQ(entries[i].frame, index.points[i].frame);
+        EXPECT_EQ(entries[i].timestamp_us, index.points[i].timestamp_us);
+        EXPECT_EQ(entries[i].offset, packet.size() + intra[i]);
+    }
+    index.points[0].flags = packet_flag::told | packet_flag::droppable;  // nothing follows from it
+    const auto other = write_packet(write_index(index));
+    EXPECT_EQ(htvm_index_read(other.data(), other.size(), entries.data(), entries.size(), &count), HTVM_OK);
+    EXPECT_EQ(count, intra.size() - 1);
 }
 
 TEST(CDecoder, DiscardForgetsWhatWasSent) {

@@ -59,6 +59,7 @@ Packet write_index(const StreamIndex& index) {
     Packet packet;
     packet.kind = PacketKind::front_index;
     packet.flags = packet_flag::told;
+    packet.frame = static_cast<std::uint32_t>(index.frames);
     packet.timestamp_us = index.first_timestamp_us;
     packet.payload = out.take();
     return packet;
@@ -102,15 +103,6 @@ Result<StreamIndex> read_index(const Packet& packet) {
         if (in.ok()) out.points.push_back(point);
     }
     if (!in.ok()) return corrupt("it ends too early");
-    return out;
-}
-
-SpaceBounds united(const SpaceBounds& a, const SpaceBounds& b) {
-    SpaceBounds out = a;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        out.low[axis] = std::min(a.low[axis], b.low[axis]);
-        out.high[axis] = std::max(a.high[axis], b.high[axis]);
-    }
     return out;
 }
 

@@ -1,0 +1,182 @@
+// htvm cut: a part of a stream as a stream of its own, without encoding anything again.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <deque>
+#include <memory>
+#include <optional>
+
+#include "command_line/terminal.h"
+#include "commands.h"
+#include "htvm/decoder.hpp"
+#include "htvm/frame_numbers.hpp"
+#include "running_time.h"
+#include "stream_file.h"
+
+namespace htvm::app {
+namespace {
+
+struct Options {
+    std::string input, output;
+    std::uint64_t first = 0, frames = 0;  // frames 0: all
+    double from = 0, to = -1;             // seconds; to < 0: up to the end
+    DecoderOptions limits;
+};
+
+// Numbers the frames of the first sequence from 0; those of later sequences keep their numbers.
+struct Renumbering {
+    std::uint32_t sequence = 0, first = 0;
+    void apply(Packet& packet, std::uint32_t sequence_of_packet) const {
+        if (sequence_of_packet != sequence) return;
+        packet.frame -= std::min(packet.frame, first);
+        if (packet.kind != PacketKind::sequence) packet.reference -= std::min(packet.reference, first);
+    }
+};
+
+struct Cut {
+    const Options& options;
+    StreamOutput& output;
+    Decoder headers;  // for the sequence headers alone
+    FrameNumbers numbers = {};
+    RunningTime time = {};
+    std::optional<Packet> header = {};  // in force
+    std::deque<Packet> waiting = {};    // since the last frame at which decoding can start
+    std::uint32_t start_number = 0;     // the number of that frame in the input
+    bool started = false;
+    Renumbering renumbering = {};
+    std::uint64_t frames = 0;  // written
+    std::uint32_t first_asked = 0, last_number = 0;
+};
+
+bool is_before(const Cut& cut, std::uint32_t number) {
+    return number < cut.options.first || cut.time.seconds() < cut.options.from;
+}
+
+bool is_behind(const Cut& cut, std::uint32_t number) {
+    const auto& options = cut.options;
+    return (options.frames > 0 && number >= options.first + options.frames) ||
+           (options.to >= 0 && cut.time.seconds() >= options.to);
+}
+
+Result<void> write(Cut& cut, Packet packet) {
+    cut.renumbering.apply(packet, cut.numbers.dependencies().sequences());
+    return cut.output.write(packet);
+}
+
+// No later frame needs anything before this one.
+bool can_start_at(const Cut& cut, const Packet& packet) {
+    if (packet.kind != PacketKind::intra) return false;
+    const auto& dependencies = cut.numbers.dependencies();
+    const auto kept = dependencies.kept();
+    return kept.size() < 2 || (kept.size() == 2 && kept == dependencies.closure());
+}
+
+Result<void> start(Cut& cut) {
+    cut.started = true;
+    cut.renumbering = {cut.numbers.dependencies().sequences(), cut.waiting.front().frame};
+    auto header = *cut.header;
+    header.frame = cut.waiting.front().frame;
+    header.timestamp_us = cut.waiting.front().timestamp_us;
+    if (auto ok = write(cut, header); !ok) return ok;
+    for (auto& packet : cut.waiting) {
+        if (frame_type(packet.kind)) ++cut.frames;
+        if (auto ok = write(cut, std::move(packet)); !ok) return ok;
+    }
+    cut.waiting.clear();
+    return {};
+}
+
+// False once the end of the part is reached.
+Result<bool> take(Cut& cut, Packet packet) {
+    cut.numbers.take(packet);
+    if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) {
+        if (const auto index = read_index(packet); index && index->bounds) cut.output.add_bounds(*index->bounds);
+        return true;
+    }
+    if (packet.kind == PacketKind::sequence) {
+        if (auto ok = cut.headers.push(packet); !ok) return tl::unexpected(ok.error());
+        cut.header = packet;
+    }
+    if (!frame_type(packet.kind)) {
+        if (cut.started)
+            if (auto ok = write(cut, std::move(packet)); !ok) return tl::unexpected(ok.error());
+        if (!cut.started && packet.kind != PacketKind::sequence && !cut.waiting.empty())
+            cut.waiting.push_back(std::move(packet));
+        return true;
+    }
+    const auto number = cut.numbers.of(packet.frame);
+    const auto& rate = cut.headers.sequence();
+    cut.time.take(packet.timestamp_us, cut.numbers.begins_sequence(),
+                  rate ? static_cast<double>(rate->fps_denominator) / rate->fps_numerator : 0);
+    if (is_behind(cut, number)) return false;
+    cut.last_number = number;
+    if (cut.started) {
+        ++cut.frames;
+        if (auto ok = write(cut, std::move(packet)); !ok) return tl::unexpected(ok.error());
+        return true;
+    }
+    if (can_start_at(cut, packet)) {
+        cut.waiting.clear();
+        cut.start_number = number;
+    } else if (cut.waiting.empty()) {
+        return true;  // it needs what is not there
+    }
+    cut.waiting.push_back(std::move(packet));
+    if (is_before(cut, number)) return true;
+    cut.first_asked = number;
+    if (auto ok = start(cut); !ok) return tl::unexpected(ok.error());
+    return true;
+}
+
+Result<void> run_cut(const Options& options) {
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
+    if (!input) return tl::unexpected(input.error());
+    auto output = StreamOutput::open(options.output);
+    if (!output) return tl::unexpected(output.error());
+    Cut cut{options, *output, Decoder(options.limits)};
+    while (auto packet = input->next()) {
+        const auto more = take(cut, std::move(*packet));
+        if (!more) return tl::unexpected(more.error());
+        if (!*more) break;
+    }
+    if (auto fine = check_whole(*input, options.input); !fine) return fine;
+    if (!cut.started)
+        return fail(ErrorKind::bad_input,
+                    cut.header ? fmt::format("{} has no such frames; 'htvm info' tells which it has", options.input)
+                               : options.input + " is not an htvm stream: no sequence header was found");
+    if (auto finished = output->finish(); !finished) return finished;
+    const bool widened = cut.first_asked > cut.start_number;
+    note(fmt::format(
+        "{}: {}, numbers {} to {} of {}{}", options.output, counted(cut.frames, "frame"), cut.start_number,
+        cut.last_number, options.input,
+        widened ? fmt::format(", from frame {} on because decoding can start there", cut.start_number) : ""));
+    return {};
+}
+
+}  // namespace
+
+void add_cut(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto* command = app.add_subcommand("cut", "Copy some frames of an .htvm stream, without encoding them again");
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
+    command->add_option("-o,--output", options->output, "The new stream: a file, or - for standard output")->required();
+    auto* first = command->add_option("--first", options->first, "First frame, counted from 0 (default: 0)");
+    auto* frames =
+        command->add_option("--frames", options->frames, "At most this many frames from there (default: all)");
+    auto* from = command->add_option("--from", options->from, "Instead of --first: seconds from the first frame");
+    auto* to =
+        command->add_option("--to", options->to, "Instead of --frames: up to this many seconds from the first frame");
+    from->check(CLI::NonNegativeNumber)->excludes(first)->excludes(frames);
+    to->check(CLI::NonNegativeNumber)->excludes(first)->excludes(frames);
+    add_packet_limits(*command, options->limits);
+    command->footer(
+        "The part begins at the last I-frame at or before the first frame that decoding can start at; the command "
+        "says\n"
+        "which that is. Its frames are numbered from 0 and keep their timestamps.\n"
+        "Examples:\n"
+        "  htvm cut person.htvm --first 300 --frames 150 -o part.htvm\n"
+        "  htvm cut person.htvm --from 10 --to 15 -o part.htvm");
+    command->callback([options, &run] { run = [options] { return run_cut(*options); }; });
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,180 @@
+// htvm verify: whether a stream is sound: checksums, order, what frames need, the index, and whether they decode.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "command_line/terminal.h"
+#include "commands.h"
+#include "htvm/decoder.hpp"
+#include "htvm/frame_numbers.hpp"
+#include "io/mesh_file.h"
+#include "stream_file.h"
+
+namespace htvm::app {
+namespace {
+
+struct Options {
+    std::string input;
+    unsigned threads = 0;
+    bool json = false;
+    DecoderOptions limits;
+};
+
+struct Problem {
+    std::optional<std::uint32_t> frame;  // number in the stream
+    std::string what;
+};
+
+struct Verification {
+    Decoder decoder;
+    FrameNumbers numbers = {};
+    StreamIndexer indexer = {};
+    std::optional<StreamIndex> index = {};  // the one in front
+    std::uint64_t offset = 0;               // behind the index in front
+    std::vector<Problem> problems = {};
+    std::optional<ErrorKind> refused = {};  // by a limit, or this version
+    std::uint64_t frames = 0;
+    // Of the sequence in force.
+    std::optional<std::uint32_t> last_number = {};
+    std::int64_t last_us = 0;
+    std::set<std::uint32_t> droppable = {};  // own numbers of frames since the I-frame
+};
+
+void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
+    const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
+    if (v.numbers.begins_sequence()) {
+        v.last_number.reset();
+        v.droppable.clear();
+    }
+    if (v.last_number && number <= *v.last_number) problem(fmt::format("comes after frame {}", *v.last_number));
+    if (v.last_number && number > *v.last_number + 1)
+        problem(fmt::format("comes after frame {}: frames are missing between them", *v.last_number));
+    if (v.last_number && packet.timestamp_us <= v.last_us)
+        problem("its timestamp is not above that of the previous frame");
+    v.last_number = number;
+    v.last_us = packet.timestamp_us;
+}
+
+void check_dependencies(Verification& v, const Packet& packet, std::uint32_t number) {
+    const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
+    const auto closure = v.numbers.dependencies().closure();
+    if (closure.empty())
+        problem(fmt::format("it refers to frame {}, which is not there", v.numbers.of(packet.reference)));
+    if (packet.reference != packet.frame && v.droppable.contains(packet.reference))
+        problem(fmt::format("it refers to frame {}, which is marked as droppable", v.numbers.of(packet.reference)));
+    if (!packet.has(packet_flag::told)) return;
+    if (packet.has(packet_flag::droppable) && packet.has(packet_flag::referred))
+        problem("it is marked as droppable, and as one that others may refer to");
+    if (packet.has(packet_flag::droppable)) v.droppable.insert(packet.frame);
+}
+
+void check_decoding(Verification& v, const Packet& packet, std::uint32_t number) {
+    const auto decoded = v.decoder.decode(packet);
+    if (decoded) return;
+    const auto kind = decoded.error().kind;
+    if (kind == ErrorKind::limit || kind == ErrorKind::unsupported) v.refused = kind;
+    const bool is_frame = frame_type(packet.kind).has_value();
+    v.problems.push_back({is_frame ? std::optional(number) : std::nullopt, decoded.error().message});
+}
+
+void take(Verification& v, const Packet& packet) {
+    if (packet.kind == PacketKind::front_index && v.offset == 0 && !v.index) {
+        auto index = read_index(packet);
+        if (index)
+            v.index = std::move(*index);
+        else
+            v.problems.push_back({{}, index.error().message});
+        return;
+    }
+    v.numbers.take(packet);
+    v.indexer.add(packet, v.offset);
+    v.offset += packet.payload.size() + packet_overhead;
+    const auto number = v.numbers.of(packet.frame);
+    if (frame_type(packet.kind)) {
+        ++v.frames;
+        check_order(v, packet, number);
+        check_dependencies(v, packet, number);
+    }
+    check_decoding(v, packet, number);
+}
+
+// An index that covers the whole file must be what its packets give.
+void check_index(Verification& v) {
+    if (!v.index || v.index->bytes < v.offset) return;
+    auto found = v.indexer.finish(v.offset);
+    found.bounds = v.index->bounds;
+    if (*v.index == found) return;
+    if (v.index->frames != found.frames)
+        v.problems.push_back(
+            {{}, fmt::format("the index says {} frames, there are {}", v.index->frames, found.frames)});
+    else
+        v.problems.push_back({{}, "the index does not fit the packets; 'htvm index' writes another"});
+}
+
+Result<void> run_verify(const Options& options) {
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
+    if (!input) return tl::unexpected(input.error());
+    auto settings = options.limits;
+    settings.threads = options.threads;
+    settings.intra_coder = draco_intra_coder();
+    Verification v{Decoder(settings)};
+    {
+        Progress progress("verify", 0);
+        while (const auto packet = input->next()) {
+            take(v, *packet);
+            if (frame_type(packet->kind)) progress.step();
+        }
+    }
+    if (input->damaged_bytes() > 0)
+        v.problems.push_back({{}, counted(input->damaged_bytes(), "byte") + " are not part of an undamaged packet"});
+    if (input->cut_short_bytes() > 0) v.problems.push_back({{}, "the stream ends in the middle of a packet"});
+    if (v.frames == 0) v.problems.push_back({{}, "there is no frame"});
+    if (input->damaged_bytes() == 0) check_index(v);
+    const bool sound = v.problems.empty();
+    if (options.json) {
+        nlohmann::json problems = nlohmann::json::array();
+        for (const auto& [frame, what] : v.problems)
+            problems.push_back({{"frame", frame ? nlohmann::json(*frame) : nlohmann::json()}, {"problem", what}});
+        fmt::print("{}\n", nlohmann::json{{"sound", sound},
+                                          {"frames", v.frames},
+                                          {"sequences", v.numbers.dependencies().sequences()},
+                                          {"index", v.index.has_value()},
+                                          {"damaged_bytes", input->damaged_bytes()},
+                                          {"problems", problems}}
+                               .dump(2));
+    } else {
+        constexpr std::size_t most = 50;
+        for (std::size_t i = 0; i < std::min(v.problems.size(), most); ++i) {
+            const auto& [frame, what] = v.problems[i];
+            fmt::print("{}{}\n", frame ? fmt::format("frame {}: ", *frame) : "", what);
+        }
+        if (v.problems.size() > most) fmt::print("and {} more\n", v.problems.size() - most);
+        if (sound)
+            fmt::print("{}: {} in {}, all sound{}\n", options.input, counted(v.frames, "frame"),
+                       counted(v.numbers.dependencies().sequences(), "sequence"), v.index ? ", with an index" : "");
+    }
+    if (sound) return {};
+    return fail(v.refused.value_or(ErrorKind::corrupt_stream),
+                fmt::format("{} is not sound: {}", options.input, counted(v.problems.size(), "problem")));
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto* command =
+        app.add_subcommand("verify", "Check an .htvm stream: checksums, order, references, index, decoding");
+    command->add_option("input", options->input, "The stream: a file, or - for standard input")->required();
+    command->add_option("--threads", options->threads, "Threads (default: one per core)");
+    command->add_flag("--json", options->json, "Print the result as JSON on standard output");
+    add_decoder_limits(*command, options->limits);
+    command->footer("Exits with 0 if all is sound, otherwise with 3 (4 and 5: unsupported, or beyond a limit).");
+    command->callback([options, &run] { run = [options] { return run_verify(*options); }; });
+}
+
+}  // namespace htvm::app
