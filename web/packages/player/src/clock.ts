@@ -1,4 +1,4 @@
-/** Where the player's time comes from, milliseconds, and who calls it for each picture. */
+/** The player's source of time, in milliseconds, and of calls to draw the next picture. */
 export interface Clock {
     now(): number;
     /** Calls once, when the next picture is due. */
@@ -12,7 +12,7 @@ export const browserClock: Clock = {
     cancel: (request) => cancelAnimationFrame(request),
 };
 
-/** A clock that stands still until it is told: for tests, and for pictures at exact times. */
+/** A clock that stands still until `advance()`: for tests, and for pictures at exact times. */
 export class ManualClock implements Clock {
     #now = 0;
     #next = 1;
@@ -31,7 +31,7 @@ export class ManualClock implements Clock {
         this.#callbacks.delete(request);
     }
 
-    /** Moves on, and makes one picture. */
+    /** Advances the time and draws one picture. */
     advance(milliseconds: number): void {
         this.#now += milliseconds;
         const due = [...this.#callbacks.values()];

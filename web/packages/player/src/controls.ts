@@ -1,4 +1,4 @@
-// The bar at the bottom, what is said on the picture, and the panel with statistics.
+// The bar with the controls, and the styles of the whole element.
 
 export interface ControlActions {
     togglePlay(): void;
@@ -40,7 +40,7 @@ const icons = {
     vr: 'M3 7h18v10h-6l-2-3h-2l-2 3H3zm4.5 3a2 2 0 1 0 0 4 2 2 0 0 0 0-4zm9 0a2 2 0 1 0 0 4 2 2 0 0 0 0-4z',
 };
 
-/** As people write it: 1:02.5. */
+/** Minutes and seconds: 1:02.5. */
 export function timeText(us: number): string {
     const tenths = Math.floor(us / 1e5);
     const minutes = Math.floor(tenths / 600);

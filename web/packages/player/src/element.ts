@@ -245,7 +245,7 @@ export class HtvmPlayerElement extends HTMLElement {
         await this.#drawn();
     }
 
-    /** Resolves when nothing is under way until the clock moves on: what is due is drawn, what fits is decoded. */
+    /** Resolves once nothing more happens until the clock advances: due frames are drawn, and the buffer is full. */
     async idle(): Promise<void> {
         for (;;) {
             await this.#playback.idle();
@@ -271,7 +271,7 @@ export class HtvmPlayerElement extends HTMLElement {
         this.#invalidate();
     }
 
-    /** Where time comes from. For tests; set it before `src`. */
+    /** The source of time. For tests; set it before `src`. */
     get clock(): Clock {
         return this.#clock;
     }
@@ -385,7 +385,7 @@ export class HtvmPlayerElement extends HTMLElement {
         this.#invalidate();
     }
 
-    // Made when there is something to draw: pages may have more players than a browser has graphics contexts.
+    // Created once there is something to draw: a page may have more players than a browser allows graphics contexts.
     #stage(): StageScene {
         if (this.#scene) return this.#scene;
         const scene = new StageScene(this.#canvas);
@@ -440,7 +440,7 @@ export class HtvmPlayerElement extends HTMLElement {
         return new Promise((resolve) => {
             this.#idleWaiting.push(resolve);
             this.#invalidate();
-            // A clock that stands still makes a picture only when told; what is due now is drawn now.
+            // A manual clock draws only when it advances; what is due now is drawn now.
             if (this.#clock !== browserClock && this.#request !== null) {
                 this.#clock.cancel(this.#request);
                 this.#request = null;
@@ -634,7 +634,7 @@ export class HtvmPlayerElement extends HTMLElement {
         }
     }
 
-    // Where a browser gives elements no full screen, as on phones: the whole of the window.
+    // For browsers without full screen for elements, as on some phones: covers the window.
     #setWholeWindow(on: boolean): void {
         this.#wholeWindow = on;
         this.classList.toggle('whole-window', on);

@@ -1,15 +1,15 @@
-// What the player and its worker say to each other.
+// The messages between the player and its worker.
 import type { SequenceInfo } from '@htvm/decoder';
 
 /** To the worker. `serial` counts seeks: frames of older ones are thrown away. */
 export type Request =
-    /** traps: media times of frames that stopped a decoder before, to be passed over. */
+    /** traps: media times of frames that stopped a decoder before, to be left out. */
     | { type: 'open'; url: string; wasmUrl: string; serial: number; timeUs: number; loop: boolean; traps: number[] }
     | { type: 'seek'; serial: number; timeUs: number }
     | { type: 'loop'; on: boolean }
     /** How many frames may be with the player at once. */
     | { type: 'room'; frames: number }
-    /** The player is done with a frame; its memory comes back, to be used again. */
+    /** The player is done with a frame and returns its memory for reuse. */
     | { type: 'done'; buffer: ArrayBuffer }
     /** Stop decoding until the next seek. */
     | { type: 'rest' };
@@ -17,15 +17,15 @@ export type Request =
 /** From the worker. */
 export type Report =
     | { type: 'opened'; sequence: SequenceInfo; layerNames: readonly string[]; version: string }
-    /** What is known of the whole by now. durationUs: null while it is not known. */
+    /** durationUs: null while it is unknown. seekable: whether all of it can be reached directly. */
     | { type: 'extent'; durationUs: number | null; seekable: boolean }
     | FrameReport
     /** All frames of this serial were sent. */
     | { type: 'ended'; serial: number; frames: number; durationUs: number }
-    /** Something is wrong that playing goes on with; in words. */
+    /** Something is wrong, but playing continues; a sentence. */
     | { type: 'notice'; text: string }
     | { type: 'failed'; code: FailureCode; text: string }
-    /** The decoder stopped; this worker is of no use any more. atUs: the time of the packet that did it. */
+    /** The decoder stopped, and this worker with it. atUs: media time of the packet that caused it. */
     | { type: 'trapped'; text: string; atUs: number }
     | { type: 'memory'; wasmBytes: number; heldBytes: number };
 
@@ -40,11 +40,11 @@ export interface FrameReport {
     frame: number;
     /** Media time: 0 is the stream's first frame. */
     timeUs: number;
-    /** The same on a line that goes on through loops. */
+    /** The same, but continuing to grow through loops. */
     presentUs: number;
-    /** Until the next frame, as far as it is known. */
+    /** Until the next frame, by the frame rate. */
     durationUs: number;
-    /** True for what is shown at once while the frame that was sought is still being decoded. */
+    /** An earlier frame, shown at once while the one that a seek asked for is being decoded. */
     preview: boolean;
     topology: number;
     vertices: number;
@@ -59,7 +59,7 @@ export interface FrameReport {
     /** Red, green, blue, 255. */
     colours: Uint8Array | null;
     normals: Float32Array | Int8Array;
-    /** False: made by the worker. */
+    /** Whether the normals are the stream's, not computed by the worker. */
     streamNormals: boolean;
     /** Null where the frame before of the same serial had the same topology. */
     indices: Uint32Array | null;

@@ -1,6 +1,6 @@
-// Vertex normals of a mesh that comes without: those of the triangles around, weighted by their areas.
+// Vertex normals for streams without: the mean of the normals of the triangles around, weighted by area.
 
-/** Writes 4 bytes a vertex, 127 for 1, to `out`. `sums` is room for 3 numbers a vertex. */
+/** Writes 4 bytes per vertex to `out`, 127 for 1. `sums` has room for 3 numbers per vertex. */
 export function vertexNormals(
     positions: Float32Array, indices: Uint32Array, vertices: number, sums: Float32Array, out: Int8Array): void {
     sums.fill(0, 0, 3 * vertices);

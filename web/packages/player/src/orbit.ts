@@ -1,4 +1,4 @@
-// Mouse, touch and keys turn, move and near the view.
+// Turns, moves and zooms the view by mouse, touch and keys.
 import { Vector3 } from 'three';
 import type { View } from './scene.js';
 

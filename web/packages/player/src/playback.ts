@@ -1,7 +1,7 @@
-// What is shown when: frames come from the worker ahead of time, and each is shown from its timestamp on.
+// Decides which frame is shown when. Frames arrive from the worker ahead of time, and each is shown from its timestamp on.
 //
-// There are two times. Media time is the stream's: 0 is its first frame. Present time goes on through loops, and begins
-// anew with each seek; the clock runs in it.
+// There are two times. Media time is the stream's: 0 is its first frame. Present time continues through loops, and starts
+// again at the media time with each seek; the clock runs in it.
 import type { SequenceInfo } from '@htvm/decoder';
 import type { FailureCode, FrameReport, Report, Request } from './messages.js';
 
@@ -16,7 +16,7 @@ export interface PlaybackListener {
     ended(): void;
     notice(text: string): void;
     failed(code: FailureCode, text: string): void;
-    /** The decoder was started anew: topology numbers begin again. */
+    /** The decoder was started again, so topology numbers start again too. */
     restarted(): void;
 }
 
@@ -35,15 +35,15 @@ export class Playback {
     #wasmUrl: string;
     #url = '';
     #worker: Worker | null = null;
-    #opening = 0; // counts open() and close(): what an older one brings is not for us
+    #opening = 0; // counts open() and close(), so that results of earlier ones can be ignored
     #serial = 0;
     #ring: FrameReport[] = [];
     #preview: FrameReport | null = null;
     #current: FrameReport | null = null;
-    #foreign: FrameReport | null = null; // one that is shown still, from a worker that is gone
+    #foreign: FrameReport | null = null; // still shown, but from a worker that has ended
     #room = 3;
     #roomSetFor = 0;
-    #awaiting = false; // the frame that was sought
+    #awaiting = false; // the frame that a seek asked for
     #soughtUs = 0;
     #endedSerial = -1;
     #playing = false;
@@ -165,14 +165,14 @@ export class Playback {
         }
     }
 
-    /** The page cannot be seen: stop decoding; the clock goes on. */
+    /** The page is hidden: stops decoding; the clock continues. */
     hide(): void {
         this.#hidden = true;
         if (this.#playing) this.#send({ type: 'rest' });
         this.#checkIdle();
     }
 
-    /** It can again: to where the clock is by now. */
+    /** It is visible again: seeks to where the clock is now. */
     show(): void {
         if (!this.#hidden) return;
         this.#hidden = false;
@@ -184,7 +184,7 @@ export class Playback {
         this.seek(timeUs);
     }
 
-    /** The frame to show from now on, where it is another than before. Its arrays stay until the next one is taken. */
+    /** The frame to show from now on, or null if it is still the same. Its arrays are valid until the next one is returned. */
     tick(): FrameReport | null {
         let show = this.#preview;
         this.#preview = null;
@@ -210,7 +210,7 @@ export class Playback {
         return !this.#failed && ((this.#playing && !this.#hidden && !this.stalled) || this.#preview !== null || this.#due());
     }
 
-    /** Resolves when nothing is under way: frames are decoded as far ahead as there is room, or all, or it failed. */
+    /** Resolves once frames are decoded as far ahead as there is room for, or to the end, or playing failed. */
     idle(): Promise<void> {
         return new Promise((resolve) => {
             this.#idleWaiting.push(resolve);

@@ -1,5 +1,4 @@
-// What is drawn: the mesh, upright in metres, on a floor with a grid and a contact shadow, seen by a camera that turns
-// about it.
+// Draws the mesh, upright and in metres, on a floor with a grid and a contact shadow.
 import { HtvmMesh, srgbVertexColours } from '@htvm/three';
 import {
     Box3, Color, DirectionalLight, Group, HemisphereLight, LinearFilter, Mesh, MeshBasicMaterial, MeshLambertMaterial,
@@ -30,7 +29,7 @@ export class StageScene {
     readonly mesh = new HtvmMesh();
     readonly camera = new PerspectiveCamera(32, 1, 0.01, 100);
     readonly view: View = { yaw: 0, pitch: 0.12, distance: 3, target: new Vector3(0, 0.9, 0) };
-    /** Without which there is nothing but the mesh. */
+    /** Whether the grid and the shadow are drawn. */
     floorVisible = true;
     /** Share of the picture's height that controls cover at the bottom. */
     below = 0;
@@ -83,7 +82,7 @@ export class StageScene {
         this.#shadow.setStrength(dark ? 0.8 : 0.62);
     }
 
-    /** The next stream brings a first frame again. */
+    /** For another stream: shows nothing, and places its first frame anew. */
     forget(): void {
         this.#bounds = null;
         this.#home = null;
@@ -149,7 +148,7 @@ export class StageScene {
         this.#scene.position.set(0, 0, -distance);
     }
 
-    /** After the graphics context was lost and is back. */
+    /** For a graphics context that was lost and restored. */
     restore(): void {
         this.#shadowIsOld = true;
     }

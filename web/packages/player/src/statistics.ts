@@ -1,4 +1,4 @@
-// What the panel says, from the frames shown last.
+// The panel's numbers, computed from the last frames shown.
 import type { FrameReport } from './messages.js';
 
 const kept = 60; // frames
@@ -14,7 +14,7 @@ interface Shown {
 export interface StatisticsSummary {
     framesPerSecond: number;
     megabitsPerSecond: number;
-    /** Mean and most of the frames kept. */
+    /** Mean and maximum over the last frames. */
     decodeMs: number;
     slowestDecodeMs: number;
     /** Share of each layer, largest first. */

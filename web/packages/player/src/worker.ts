@@ -1,4 +1,4 @@
-// The player's worker: fetches, decodes, makes normals, and hands frames over as far as the player has room for them.
+// The player's worker: fetches, decodes, computes normals, and sends frames as long as the player has room for them.
 import { Decoder, DecoderError, DecoderModule, isFrame, isStart, packetKind, type Frame } from '@htvm/decoder';
 import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
 import { FilePackets, type TimedPacket } from './file_packets.js';
@@ -120,7 +120,7 @@ class Session {
         this.#source = new ByteSource(this.#url);
         this.#file = new FilePackets(this.#source, this.#module);
         this.#surveyAt = 1;
-        // Where decoding went on; what was sought is behind.
+        // Continue where decoding was, if it was beyond what was asked for.
         this.#timeUs = Math.max(this.#timeUs, this.#at);
         this.#notice('The file was replaced while it played; this is the new one.');
     }
@@ -163,8 +163,7 @@ class Session {
         this.#decoder.receive();
     }
 
-    // Reads on to the frame at that time, and decodes what it needs and no more. quietly: as in a loop, where the first
-    // frame is one like all others.
+    // Reads on to the frame at that time and decodes only what it needs. quietly: without a preview, as in a loop.
     async #seekAndShow(serial: number, timeUs: number, quietly: boolean): Promise<'shown' | 'superseded'> {
         let group: TimedPacket[] = [];
         let bytes = 0;
@@ -202,7 +201,7 @@ class Session {
         return 'shown';
     }
 
-    // Waits until the player has room for a frame. False where it wants others by now.
+    // Waits until the player has room for a frame. False if it has asked for another place meanwhile.
     async #haveRoom(serial: number): Promise<boolean> {
         while (this.#serial === serial && (this.#out >= this.#room || this.#resting)) await this.#signal();
         return this.#serial === serial;
@@ -265,7 +264,7 @@ class Session {
         post({ type: 'notice', text });
     }
 
-    // Once something is shown, and again where not all of a small file was there yet.
+    // After the first frame, and again later if a small file was not complete yet.
     #survey(): void {
         if (this.#frames < this.#surveyAt) return;
         this.#surveyAt = Infinity;
@@ -279,7 +278,7 @@ class Session {
         );
     }
 
-    // At the end of the file: what is there to say of the whole.
+    // At the end of the file: what to say about the whole.
     #checkTheEnd(): void {
         if (!this.#decodedAny)
             throw new SourceError(

@@ -2,7 +2,7 @@
 import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, MeshBasicMaterial } from 'three';
 import type { Material, TypedArray } from 'three';
 
-/** A frame to show: what `@htvm/decoder` gives, or the same with what a player has made of it. */
+/** A frame to show: a `Frame` of `@htvm/decoder`, or arrays prepared by a player. */
 export interface MeshFrame {
     vertices: number;
     triangles: number;
@@ -64,7 +64,7 @@ export class HtvmMesh extends Mesh<BufferGeometry, Material> {
         }
     }
 
-    /** Forgets what topology is shown: for another decoder, which numbers them anew. */
+    /** Uploads the next frame's triangles whatever its topology number is: for another decoder. */
     forgetTopology(): void {
         this.#topology = -1;
     }
