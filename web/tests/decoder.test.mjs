@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { before, test } from 'node:test';
 import { readdir } from 'node:fs/promises';
 import { crc32, DecoderError, loadDecoder, packetKind, PacketSplitter, streamVersion } from '../packages/decoder/dist/node.js';
-import { conformance, digests, folder, indexPacket, packet, packetsOf } from './streams.mjs';
+import { conformance, digests, folder, frontIndexPacket, indexPacket, packet, packetsOf } from './streams.mjs';
 
 let module;
 before(async () => {
@@ -68,6 +68,10 @@ test('the header, the layers and the index are told', async () => {
     const index = module.readIndex(packets.find(({ kind }) => kind === packetKind.index).bytes);
     assert.deepEqual(index, intra.map(({ frame, timestampUs, offset }) => ({ frame, timestampUs, offset })));
     assert.deepEqual(module.readIndex(indexPacket(7, index)), index);
+    // Offsets in front count from the end of the index.
+    const front = frontIndexPacket(7, index, 1e6);
+    const shifted = index.map((entry) => ({ ...entry, offset: entry.offset + front.length }));
+    assert.deepEqual(module.readIndex(front), shifted);
 });
 
 test('errors are told in words, by code, and cost one packet', async () => {

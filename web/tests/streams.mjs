@@ -20,11 +20,12 @@ export function packetsOf(stream) {
     return packets;
 }
 
-export function packet(kind, payload, { frame = 0, reference = 0, timestampUs = 0 } = {}) {
+export function packet(kind, payload, { frame = 0, reference = 0, timestampUs = 0, flags = 0 } = {}) {
     const bytes = new Uint8Array(36 + payload.length);
     const view = new DataView(bytes.buffer);
     bytes.set(new TextEncoder().encode('HTVP'));
     bytes[4] = kind;
+    bytes[5] = flags;
     view.setUint32(8, frame, true);
     view.setUint32(12, reference, true);
     view.setBigInt64(16, BigInt(timestampUs), true);
@@ -45,17 +46,35 @@ function varint(value) {
     }
 }
 
-/** docs/bitstream.md, section 9. */
-export function indexPacket(frames, entries) {
+function signedVarint(value) {
+    const wide = BigInt(value);
+    return varint(wide < 0n ? -2n * wide - 1n : 2n * wide);
+}
+
+// Frame, timestamp, offset of each entry, as differences from the one before, and what `rest` has besides.
+function indexEntries(entries, rest = []) {
     const payload = varint(entries.length);
     let last = { frame: 0, timestampUs: 0, offset: 0 };
     for (const entry of entries) {
-        const time = BigInt(entry.timestampUs - last.timestampUs);
-        const folded = time < 0n ? -2n * time - 1n : 2n * time;
-        payload.push(...varint(entry.frame - last.frame), ...varint(folded), ...varint(entry.offset - last.offset));
+        const time = signedVarint(entry.timestampUs - last.timestampUs);
+        payload.push(...varint(entry.frame - last.frame), ...time, ...varint(entry.offset - last.offset), ...rest);
         last = entry;
     }
-    return packet(packetKind.index, Uint8Array.from(payload), { frame: frames });
+    return payload;
+}
+
+/** The index at the end of a stream: docs/bitstream.md, section 9. */
+export function indexPacket(frames, entries) {
+    return packet(packetKind.index, Uint8Array.from(indexEntries(entries)), { frame: frames });
+}
+
+/** The index in front of a stream of one sequence, whose header is the first packet behind it. */
+export function frontIndexPacket(frames, entries, bytes) {
+    const numbers = [varint(frames), signedVarint(entries[0].timestampUs), varint(Math.round((frames * 1e6) / 30)), varint(bytes)];
+    const sequences = [...varint(1), ...varint(0), ...varint(entries[0].frame)];
+    // No bounds; every entry is an I-frame that may be referred to.
+    const payload = [...numbers.flat(), 0, ...sequences, ...indexEntries(entries, [0, 128 + 2 + 1])];
+    return packet(packetKind.frontIndex, Uint8Array.from(payload), { frame: frames, flags: 128 });
 }
 
 /** The packets of a stream up to where another sequence header comes into force. */
@@ -67,32 +86,22 @@ export function firstSequence(stream) {
 
 /**
  * The stream with `padding` bytes, in packets of a kind that players pass over, behind each frame, so that it is long
- * enough for many requests; with an index at its `end`, in `front`, or `none`.
+ * enough for many requests; with an index at its `end`, in `front`, or with `none`.
  */
 export function padded(stream, padding, index) {
     const filler = packet(200, Uint8Array.from({ length: padding }, (_, i) => (i * 2654435761) >>> 24));
     const packets = packetsOf(stream).filter(({ kind }) => kind !== packetKind.index);
-    const layOut = (begin) => {
-        let offset = begin;
-        const entries = [];
-        for (const { kind, frame, timestampUs, bytes } of packets) {
-            if (kind === packetKind.intra) entries.push({ frame, timestampUs, offset });
-            offset += bytes.length + (isFrame(kind) ? filler.length : 0);
-        }
-        return entries;
-    };
-    const frames = packets.filter(({ kind }) => isFrame(kind)).length;
-    const body = packets.slice(1).flatMap(({ kind, bytes }) => (isFrame(kind) ? [bytes, filler] : [bytes]));
-    const header = packets[0].bytes;
-    if (index === 'none') return join([header, ...body]);
-    if (index === 'end') return join([header, ...body, indexPacket(frames, layOut(0))]);
-    // In front its own size moves what it tells of.
-    let inFront = indexPacket(frames, layOut(0));
-    for (let size = 0; size !== inFront.length; ) {
-        size = inFront.length;
-        inFront = indexPacket(frames, layOut(size));
+    let offset = 0;
+    const entries = [];
+    for (const { kind, frame, timestampUs, bytes } of packets) {
+        if (kind === packetKind.intra) entries.push({ frame, timestampUs, offset });
+        offset += bytes.length + (isFrame(kind) ? filler.length : 0);
     }
-    return join([header, inFront, ...body]);
+    const frames = packets.filter(({ kind }) => isFrame(kind)).length;
+    const body = join(packets.flatMap(({ kind, bytes }) => (isFrame(kind) ? [bytes, filler] : [bytes])));
+    if (index === 'none') return body;
+    if (index === 'end') return join([body, indexPacket(frames, entries)]);
+    return join([frontIndexPacket(frames, entries, body.length), body]);
 }
 
 /** The decoder with hardly more memory than it begins with, in pages of 64 KB: what it decodes makes it stop. */
