@@ -14,6 +14,8 @@ std::optional<SeekableStream> SeekableStream::open(const std::string& path, std:
     if (path == "-" || !std::filesystem::is_regular_file(path, error)) return std::nullopt;
     SeekableStream out;
     out.size_ = std::filesystem::file_size(path, error);
+    // Without a buffer, which would read 8 KB behind every header.
+    out.file_.rdbuf()->pubsetbuf(nullptr, 0);
     out.file_.open(path, std::ios::binary);
     out.max_packet_bytes_ = max_packet_bytes;
     if (error || !out.file_) return std::nullopt;
