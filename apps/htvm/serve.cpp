@@ -14,7 +14,7 @@ namespace {
 struct Options {
     std::string folder, address = "127.0.0.1";
     std::uint16_t port = 8080;
-    bool other_sites = true;
+    bool same_site = false;
     unsigned connections = live::FileServerOptions{}.connections;
 };
 
@@ -23,7 +23,7 @@ Result<void> serve(const Options& options) {
     server.folder = options.folder;
     server.address = options.address;
     server.port = options.port;
-    server.other_sites = options.other_sites;
+    server.other_sites = !options.same_site;
     server.connections = options.connections;
     auto opened = live::FileServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
@@ -46,7 +46,7 @@ void add_serve(CLI::App& app, Run& run) {
     command->add_option("--address", options->address,
                         "Address to listen on (default 127.0.0.1: this machine alone; 0.0.0.0 or ::: all networks)");
     command->add_option("--port", options->port, "Port to listen on; 0: a free one (default 8080)");
-    command->add_flag("!--same-site", options->other_sites, "Do not allow pages of other sites to read the streams");
+    command->add_flag("--same-site", options->same_site, "Do not allow pages of other sites to read the streams");
     command->add_option("--connections", options->connections, "Connections at once (default 512)")
         ->check(CLI::Range(1, 100000));
     command->footer(
