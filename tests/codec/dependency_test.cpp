@@ -177,7 +177,9 @@ TEST(Dependencies, WhatIsKeptIsEnoughForAllThatComes) {
             for (std::size_t place = joined + 1; place < std::min(joined + 4, packets.size()); ++place) {
                 const auto frame = decoder.push(packets[place]);
                 ASSERT_TRUE(frame.has_value()) << frame.error().message;
-                if (*frame) EXPECT_TRUE(same_mesh((*frame)->mesh, all.at(place)));
+                if (*frame) {
+                    EXPECT_TRUE(same_mesh((*frame)->mesh, all.at(place)));
+                }
             }
         }
     }
