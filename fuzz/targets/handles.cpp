@@ -72,7 +72,7 @@ void check_tracked(const fuzz::SmallMesh& mesh, fuzz::FuzzInput& input) {
                                                   1 + std::abs(input.number(1 << 24)));
     if (!reference) return;
     require(fuzz::all_on_lattice(reference->mesh.positions), "smoothed vertices are on the lattice");
-    std::vector<QuantisedTransform> transforms(reference->pivots.size());
+    std::vector<QuantisedTransform> transforms(reference->graph.pivots.size());
     for (auto& transform : transforms) {
         for (auto& c : transform.rotation.others) c = static_cast<std::int16_t>(input.number(1 << rotation_bits));
         transform.shift.x = input.number(2 * lattice_limit);
