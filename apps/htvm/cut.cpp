@@ -63,12 +63,12 @@ Result<void> write(Cut& cut, Packet packet) {
     return cut.output.write(packet);
 }
 
-// No later frame needs anything before this one.
-bool can_start_at(const Cut& cut, const Packet& packet) {
-    if (packet.kind != PacketKind::intra) return false;
+// Whether no later frame needs anything before this one but the sequence header.
+bool can_start_here(const Cut& cut) {
     const auto& dependencies = cut.numbers.dependencies();
-    const auto kept = dependencies.kept();
-    return kept.size() < 2 || (kept.size() == 2 && kept == dependencies.closure());
+    const auto needed = dependencies.closure(), kept = dependencies.kept();
+    constexpr std::size_t header_and_frame = 2;
+    return needed.size() == header_and_frame && (kept.size() < header_and_frame || kept == needed);
 }
 
 Result<void> start(Cut& cut) {
@@ -115,7 +115,7 @@ Result<bool> take(Cut& cut, Packet packet) {
         if (auto ok = write(cut, std::move(packet)); !ok) return tl::unexpected(ok.error());
         return true;
     }
-    if (can_start_at(cut, packet)) {
+    if (can_start_here(cut)) {
         cut.waiting.clear();
         cut.start_number = number;
     } else if (cut.waiting.empty()) {

@@ -188,7 +188,7 @@ Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet)
         const auto payload = read_frame(state, packet, rules);
         if (!payload) return tl::unexpected(payload.error());
         if (auto ok = rules.decode(state, packet, *payload); !ok) return tl::unexpected(ok.error());
-        if (*type != FrameType::intra) state.alone.reset();
+        if (!stands_alone(*type)) state.alone.reset();
         auto info = describe(packet, *type, *payload);
         info.sequence = state.sequences - 1;
         return Taken{lend(state.shown, info)};

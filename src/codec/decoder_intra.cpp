@@ -9,7 +9,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     const auto& header = *state.header;
     auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
     if (!pose) return tl::unexpected(pose.error());
-    const bool referred = is_referred(packet, rules_of(FrameType::intra));
+    const bool referred = is_referred(packet, rules_of(*frame_type(packet.kind)));
     // What is derived for T-frames takes much memory, so it is freed before the next I-frame is decoded; without this,
     // a stream of many I-frames would need half as much memory again as a stream with one. It can be rebuilt from the
     // mesh: if this frame turns out to be bad, the next T-frame does so.

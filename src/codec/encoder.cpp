@@ -12,6 +12,7 @@
 #include "codec/choice/frame_choice.h"
 #include "codec/encoder_check.h"
 #include "codec/encoder_pose.h"
+#include "codec/frame_kinds.h"
 #include "codec/frame_work_enc.h"
 #include "codec/stream/sequence.h"
 #include "core/parallel.h"
@@ -140,8 +141,8 @@ Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
 // later, or lost it, can begin there.
 bool brings_header(const State& state, const Candidate& candidate) {
     constexpr std::uint32_t repeated_after = 10;  // frames
-    return !state.begun || (candidate.type == FrameType::intra &&
-                            state.sequence.next_frame - state.output.header_sent >= repeated_after);
+    return !state.begun ||
+           (stands_alone(candidate.type) && state.sequence.next_frame - state.output.header_sent >= repeated_after);
 }
 
 double bits_of(const State& state, const Candidate& candidate) {
@@ -188,7 +189,7 @@ void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us) {
         state.info.triangles = static_cast<std::uint32_t>(candidate.decoded.triangles.size());
         state.info.bytes += codebooks;
         // Where nothing refers to it while others are referred to, it is no place to start from.
-        if (packet.kind == PacketKind::intra && (candidate.referred || state.configuration.intra_alone()))
+        if (stands_alone(candidate.type) && (candidate.referred || state.configuration.intra_alone()))
             state.output.index.push_back({packet.frame, packet.timestamp_us, state.output.stream_bytes});
     }
     for (auto& packet : candidate.packets) send(state.output, std::move(packet));

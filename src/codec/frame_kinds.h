@@ -61,6 +61,9 @@ extern const std::array<FrameRules, frame_type_count> frame_rules;
 
 inline const FrameRules& rules_of(FrameType type) { return frame_rules[static_cast<std::size_t>(type)]; }
 
+// Whether frames of this kind are decoded by themselves.
+inline bool stands_alone(FrameType type) { return rules_of(type).refers_to == RefersTo::nothing; }
+
 // Whether later frames may refer to this one. Otherwise it leaves what they refer to as it was.
 inline bool is_referred(const PacketHeader& packet, const FrameRules& rules) {
     return rules.referred && (!packet.has(packet_flag::told) || packet.has(packet_flag::referred));

@@ -1,6 +1,7 @@
 // The index of a stream, made while its packets go by.
 #include <algorithm>
 
+#include "codec/frame_kinds.h"
 #include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 #include "htvm/stream_index.hpp"
@@ -28,7 +29,7 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
     }
     ++frames_of_sequence_;
     last_us_ = packet.timestamp_us;
-    if (*type != FrameType::intra) return;
+    if (!stands_alone(*type)) return;
     const bool ascends = index_.points.empty() || number > index_.points.back().frame;
     if (ascends) index_.points.push_back({number, packet.timestamp_us, offset, 0, told_header(packet).flags});
 }

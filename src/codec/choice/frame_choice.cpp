@@ -10,6 +10,7 @@
 #include "codec/choice/scene_change_enc.h"
 #include "codec/choice/texcoord_layout_enc.h"
 #include "codec/frame_coders_enc.h"
+#include "codec/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
 
 namespace htvm::internal {
@@ -401,7 +402,7 @@ Result<Candidate> code_to_error(FrameWork& work, ErrorController& control, bool 
 
 // A frame without a surface says nothing of what others take.
 FrameType rate_type(const Candidate& candidate) {
-    const bool bare = candidate.type == FrameType::intra && candidate.decoded.triangles.empty();
+    const bool bare = stands_alone(candidate.type) && candidate.decoded.triangles.empty();
     return candidate.stands_in || bare ? FrameType::predicted : candidate.type;
 }
 
