@@ -119,22 +119,38 @@ void Simplifier::neighbours(std::uint32_t v, std::vector<std::uint32_t>& out) co
     out.erase(std::unique(out.begin(), out.end()), out.end());
 }
 
+// A side of a triangle, from its lower to its higher vertex.
+struct Side {
+    std::uint32_t low, high, triangle;
+};
+
+// By vertices, then by triangle. They are first laid into a row per lower vertex, since sorting many short rows is much
+// faster than sorting all at once.
+std::vector<Side> sorted_sides(std::span<const Triangle> triangles, std::size_t vertices) {
+    const auto over_all = [&](const auto& visit) {
+        for (std::uint32_t t = 0; t < triangles.size(); ++t)
+            for (std::size_t i = 0; i < 3; ++i) {
+                const auto a = triangles[t][i], b = triangles[t][(i + 1) % 3];
+                visit(Side{std::min(a, b), std::max(a, b), t});
+            }
+    };
+    std::vector<std::size_t> row(vertices + 1, 0);
+    over_all([&](const Side& side) { ++row[side.low + std::size_t{1}]; });
+    for (std::size_t v = 0; v < vertices; ++v) row[v + 1] += row[v];
+    std::vector<Side> sides(3 * triangles.size());
+    auto next = row;
+    over_all([&](const Side& side) { sides[next[side.low]++] = side; });
+    for (std::size_t v = 0; v < vertices; ++v)
+        std::sort(sides.begin() + static_cast<std::ptrdiff_t>(row[v]),
+                  sides.begin() + static_cast<std::ptrdiff_t>(row[v + 1]), [](const Side& x, const Side& y) {
+                      return x.high != y.high ? x.high < y.high : x.triangle < y.triangle;
+                  });
+    return sides;
+}
+
 // An edge of one triangle, or of more than two, is a border: a plane perpendicular to the triangle keeps it in place.
 void Simplifier::add_borders() {
-    struct Side {
-        std::uint32_t low, high, triangle;
-    };
-    std::vector<Side> sides;
-    sides.reserve(3 * triangles.size());
-    for (std::uint32_t t = 0; t < triangles.size(); ++t)
-        for (std::size_t i = 0; i < 3; ++i) {
-            const auto a = triangles[t][i], b = triangles[t][(i + 1) % 3];
-            sides.push_back({std::min(a, b), std::max(a, b), t});
-        }
-    std::sort(sides.begin(), sides.end(), [](const Side& x, const Side& y) {
-        if (x.low != y.low) return x.low < y.low;
-        return x.high != y.high ? x.high < y.high : x.triangle < y.triangle;
-    });
+    const auto sides = sorted_sides(triangles, positions.size());
     for (std::size_t i = 0, j = 0; i < sides.size(); i = j) {
         for (j = i + 1; j < sides.size() && sides[j].low == sides[i].low && sides[j].high == sides[i].high; ++j) {
         }
@@ -224,6 +240,7 @@ Vector3d Simplifier::facing(std::uint32_t v) const {
 bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Vector3d& to) const {
     constexpr double least_turn = 0.3, least_facing = 0.2, least_roundness = 0.3;
     const Vector3d around = facing(moving);
+    const double around_size = around.norm();
     looked_at += fans[moving].size();
     for (const auto t : fans[moving]) {
         if (!triangle_lives[t]) continue;
@@ -236,9 +253,10 @@ bool Simplifier::keeps_shape(std::uint32_t moving, std::uint32_t other, const Ve
         }
         const Vector3d was = area_normal(before[0], before[1], before[2]);
         const Vector3d is = area_normal(after[0], after[1], after[2]);
-        if (was.dot(is) < least_turn * was.norm() * is.norm()) return false;
-        const bool faced = was.norm() > 0 && was.dot(around) >= least_facing * was.norm() * around.norm();
-        if ((faced || !(was.norm() > 0)) && is.dot(around) < least_facing * is.norm() * around.norm()) return false;
+        const double was_size = was.norm(), is_size = is.norm();
+        if (was.dot(is) < least_turn * was_size * is_size) return false;
+        const bool faced = was_size > 0 && was.dot(around) >= least_facing * was_size * around_size;
+        if ((faced || !(was_size > 0)) && is.dot(around) < least_facing * is_size * around_size) return false;
         const double round = roundness(is, after);
         if (round < least_roundness && round < roundness(was, before)) return false;
         if (options.longest_edge > 0)
