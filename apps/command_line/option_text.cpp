@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <set>
+#include <sstream>
 #include <string_view>
 
 namespace htvm::app {
@@ -49,6 +50,21 @@ std::string names_of(const std::set<CLI::Option*>& options) {
     return fmt::format("{}", fmt::join(names, ", "));
 }
 
+// What else the parser checks.
+std::string conditions_of(const CLI::Option& option) {
+    std::vector<std::string> out;
+    const std::string type = option.get_type_name();
+    if (const auto range = type.find(" in ["); range != std::string::npos && type.ends_with(']')) {
+        auto limits = type.substr(range + 5, type.size() - range - 6);
+        if (const auto dash = limits.find(" - "); dash != std::string::npos) limits.replace(dash, 3, " to ");
+        out.push_back(limits);
+    }
+    if (!option.get_default_str().empty()) out.push_back("default " + option.get_default_str());
+    if (!option.get_needs().empty()) out.push_back("only with " + names_of(option.get_needs()));
+    if (!option.get_excludes().empty()) out.push_back("not with " + names_of(option.get_excludes()));
+    return fmt::format("{}", fmt::join(out, "; "));
+}
+
 // Indented lines of a description are a table.
 void tell_meaning(const CLI::Option& option, OptionText& text) {
     const auto& description = option.get_description();
@@ -58,18 +74,33 @@ void tell_meaning(const CLI::Option& option, OptionText& text) {
     auto& out = text.meaning;
     out = joined(description.substr(0, table));
     while (out.ends_with(':') || out.ends_with('.')) out.pop_back();
-    const std::string type = option.get_type_name();
-    if (const auto range = type.find(" in ["); range != std::string::npos && type.ends_with(']')) {
-        auto limits = type.substr(range + 5, type.size() - range - 6);
-        if (const auto dash = limits.find(" - "); dash != std::string::npos) limits.replace(dash, 3, " to ");
-        out += "; " + limits;
-    }
-    if (!option.get_default_str().empty()) out += "; default " + option.get_default_str();
-    if (!option.get_needs().empty()) out += "; only with " + names_of(option.get_needs());
-    if (!option.get_excludes().empty()) out += "; not with " + names_of(option.get_excludes());
+    if (const auto conditions = conditions_of(option); !conditions.empty()) out += "; " + conditions;
 }
 
+// The overview names what each command does in a few words; its own help has the rest. Values and conditions of options
+// are named as in the man pages.
+class Help : public CLI::Formatter {
+    std::string make_subcommand(const CLI::App* command) const override {
+        std::ostringstream out;
+        CLI::detail::format_help(out, command->get_name(), summary_of(*command), column_width_);
+        return out.str();
+    }
+    std::string make_option_opts(const CLI::Option* option) const override {
+        OptionText text;
+        tell_value(*option, text);
+        return (text.value.empty() ? "" : " " + text.value) + (option->get_required() ? " (required)" : "");
+    }
+    std::string make_option_desc(const CLI::Option* option) const override {
+        const auto &meaning = option->get_description(), conditions = conditions_of(*option);
+        if (conditions.empty() || meaning.empty()) return meaning + conditions;
+        const auto first_line = meaning.substr(0, meaning.find("\n "));
+        return first_line + " (" + conditions + ")" + meaning.substr(first_line.size());
+    }
+};
+
 }  // namespace
+
+std::shared_ptr<CLI::FormatterBase> help_formatter() { return std::make_shared<Help>(); }
 
 std::vector<OptionText> option_texts(const CLI::App& command) {
     std::vector<OptionText> out;

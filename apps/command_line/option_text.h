@@ -1,12 +1,13 @@
-// The names and values of a parser's options, for man pages and shell completions.
+// The names and values of a parser's options, for help, man pages and shell completions.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 namespace CLI {
 class App;
-class Option;
+class FormatterBase;
 }  // namespace CLI
 
 namespace htvm::app {
@@ -25,6 +26,9 @@ struct OptionText {
 // The options of the program itself or of one of its commands, in the order of the help, without hidden ones.
 std::vector<OptionText> option_texts(const CLI::App& command);
 std::vector<const CLI::App*> commands_of(const CLI::App& program);
+
+// Lays out --help, with the same words for values as the man pages.
+std::shared_ptr<CLI::FormatterBase> help_formatter();
 
 // The first clause of the description: what the command does, in a few words.
 std::string summary_of(const CLI::App& command);

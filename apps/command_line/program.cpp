@@ -182,6 +182,7 @@ int run_program(const Program& program, int argc, char** argv) {
                            program.name, program.footer.empty() ? "" : "\n", program.footer));
     app.set_version_flag("-V,--version", program.name + " " HTVM_VERSION);
     app.failure_message(usage_message);
+    app.formatter(help_formatter());
     app.require_subcommand(1);
     Run run;
     for (const auto add : program.commands) add(app, run);
