@@ -303,6 +303,13 @@ typedef struct htvm_packet_info {
 /* Reads the header of a whole packet. HTVM_CORRUPT_STREAM: it is not one whole, undamaged packet. */
 htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_info* info, size_t info_size);
 
+/* The same from the first HTVM_PACKET_HEADER bytes of a packet alone, for programs that go from packet to packet in a
+ * file. HTVM_AGAIN: there are fewer bytes. HTVM_CORRUPT_STREAM: no undamaged header begins here. Whether what follows
+ * is undamaged is not known. In streams of version 1, flags lack HTVM_PACKET_TOLD: only htvm_packet_read() derives
+ * them. */
+enum { HTVM_PACKET_HEADER = 32 };
+htvm_status htvm_packet_header_read(const uint8_t* bytes, size_t size, htvm_packet_info* info, size_t info_size);
+
 /* Determines what frames need, for programs that forward, record or cut a stream without decoding it. */
 typedef struct htvm_dependencies htvm_dependencies;
 
@@ -320,6 +327,10 @@ htvm_status htvm_dependencies_closure(htvm_dependencies* dependencies, uint64_t*
                                       size_t* count);
 /* Likewise what later frames may need. All other packets can be forgotten; a viewer that joins late is sent these. */
 htvm_status htvm_dependencies_kept(htvm_dependencies* dependencies, uint64_t* places, size_t capacity, size_t* count);
+
+/* The number in the whole stream of the frame that the packet pushed last is. Where the frame numbers of a sequence
+ * start again, its frames are numbered on from the sequence before. HTVM_AGAIN: the packet is no frame. */
+htvm_status htvm_dependencies_frame(htvm_dependencies* dependencies, uint32_t* frame);
 
 /* ---- index ---------------------------------------------------------------------------------------------------- */
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 
+#include "c_api/c_mesh.h"
 #include "c_api/c_status.h"
 #include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
@@ -93,12 +94,6 @@ void discard(htvm_decoder& decoder) {
 std::optional<htvm::Packet> next_packet(htvm_decoder& decoder) {
     if (decoder.sent == htvm_decoder::Sent::bytes) return decoder.reader.pull();
     return std::exchange(decoder.packet, std::nullopt);
-}
-
-// The numbers of an array of points or similar, which are contiguous; null for an empty array.
-template <class Element>
-const typename Element::value_type* numbers(std::span<const Element> elements) {
-    return elements.empty() ? nullptr : elements.front().data();
 }
 
 // Copies elements of N numbers each to the caller's array.
@@ -268,16 +263,7 @@ htvm_status htvm_decoder_unused_bytes(const htvm_decoder* decoder, uint64_t* dam
 htvm_status htvm_decoder_view(htvm_decoder* decoder, htvm_mesh_view* view, size_t view_size) {
     if (!decoder) return HTVM_BAD_INPUT;
     if (!decoder->current) return no_frame(decoder->error);
-    const auto& mesh = decoder->current->mesh;
-    htvm_mesh_view out{};
-    out.vertices = static_cast<std::uint32_t>(mesh.positions.size());
-    out.triangles = static_cast<std::uint32_t>(mesh.triangles.size());
-    out.topology = decoder->current->topology;
-    out.positions = numbers(mesh.positions);
-    out.indices = numbers(mesh.triangles);
-    out.colours = numbers(mesh.colours);
-    out.normals = numbers(mesh.normals);
-    out.texcoords = numbers(mesh.texcoords);
+    const auto out = htvm::c_api::lent(decoder->current->mesh, decoder->current->topology);
     const auto written = htvm::c_api::write_struct(out, view, view_size);
     return written == HTVM_OK ? HTVM_OK : decoder->error.set(written, "view is NULL or view_size not its sizeof");
 }

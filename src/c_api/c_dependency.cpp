@@ -1,16 +1,20 @@
-// Packet headers and what frames need in the C interface, over htvm::Dependencies.
+// Packet headers and what frames need in the C interface, over htvm::FrameNumbers.
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "c_api/c_status.h"
-#include "htvm/dependency.hpp"
+#include "htvm/decoder.hpp"
+#include "htvm/frame_numbers.hpp"
 
 using htvm::c_api::guarded;
 using htvm::c_api::LastError;
 
 struct htvm_dependencies {
     htvm_allocator allocator;
-    htvm::Dependencies dependencies;
+    htvm::FrameNumbers numbers;
+    std::uint64_t pushed = 0;
+    std::optional<std::uint32_t> frame;  // own number of the packet pushed last, if it is a frame
     explicit htvm_dependencies(const htvm_allocator& memory) : allocator(memory) {}
 };
 
@@ -18,6 +22,7 @@ static_assert(HTVM_PACKET_REFERRED == htvm::packet_flag::referred && HTVM_PACKET
               HTVM_PACKET_DROPPABLE == htvm::packet_flag::droppable &&
               HTVM_PACKET_COLOUR == htvm::packet_flag::colour && HTVM_PACKET_SESSION == htvm::packet_flag::session &&
               HTVM_PACKET_TOLD == htvm::packet_flag::told);
+static_assert(HTVM_PACKET_HEADER == htvm::packet_header_bytes);
 
 namespace {
 
@@ -31,6 +36,19 @@ htvm_status give(const std::vector<std::uint64_t>& all, std::uint64_t* places, s
     return HTVM_OK;
 }
 
+htvm_status describe(const htvm::PacketHeader& header, std::uint64_t bytes, htvm_packet_info* info,
+                     std::size_t info_size) {
+    htvm_packet_info out{};
+    out.kind = static_cast<std::uint32_t>(header.kind);
+    out.flags = header.flags;
+    out.frame = header.frame;
+    out.reference = header.reference;
+    out.reference_version = header.reference_version;
+    out.timestamp_us = header.timestamp_us;
+    out.bytes = bytes;
+    return htvm::c_api::write_struct(out, info, info_size);
+}
+
 }  // namespace
 
 htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_info* info, size_t info_size) {
@@ -41,17 +59,17 @@ htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_inf
         one.push({packet, size});
         const auto whole = one.pull();
         if (!whole || one.damaged_bytes() > 0 || one.pending_bytes() > 0) return htvm_status{HTVM_CORRUPT_STREAM};
-        const auto header = htvm::told_header(*whole);
-        htvm_packet_info out{};
-        out.kind = static_cast<std::uint32_t>(header.kind);
-        out.flags = header.flags;
-        out.frame = header.frame;
-        out.reference = header.reference;
-        out.reference_version = header.reference_version;
-        out.timestamp_us = header.timestamp_us;
-        out.bytes = size;
-        return htvm::c_api::write_struct(out, info, info_size);
+        return describe(htvm::told_header(*whole), size, info, info_size);
     });
+}
+
+htvm_status htvm_packet_header_read(const uint8_t* bytes, size_t size, htvm_packet_info* info, size_t info_size) {
+    if (!bytes && size > 0) return HTVM_BAD_INPUT;
+    if (size < htvm::packet_header_bytes) return HTVM_AGAIN;
+    std::uint32_t payload_bytes = 0;
+    const auto header = htvm::read_packet_header({bytes, size}, payload_bytes);
+    if (!header) return HTVM_CORRUPT_STREAM;
+    return describe(*header, std::uint64_t{payload_bytes} + htvm::packet_overhead, info, info_size);
 }
 
 htvm_status htvm_dependencies_create(const htvm_allocator* allocator, htvm_dependencies** dependencies) {
@@ -81,8 +99,11 @@ htvm_status htvm_dependencies_push(htvm_dependencies* dependencies, const htvm_p
         header.frame = given.frame;
         header.reference = given.reference;
         header.timestamp_us = given.timestamp_us;
-        const auto taken = dependencies->dependencies.push(header);
-        if (place) *place = taken;
+        dependencies->numbers.take_told(header);
+        dependencies->frame.reset();
+        if (htvm::frame_type(header.kind)) dependencies->frame = header.frame;
+        if (place) *place = dependencies->pushed;
+        ++dependencies->pushed;
         return htvm_status{HTVM_OK};
     });
 }
@@ -91,11 +112,19 @@ htvm_status htvm_dependencies_closure(htvm_dependencies* dependencies, uint64_t*
                                       size_t* count) {
     if (!dependencies) return HTVM_BAD_INPUT;
     LastError unused;
-    return guarded(unused, [&] { return give(dependencies->dependencies.closure(), places, capacity, count); });
+    return guarded(unused,
+                   [&] { return give(dependencies->numbers.dependencies().closure(), places, capacity, count); });
 }
 
 htvm_status htvm_dependencies_kept(htvm_dependencies* dependencies, uint64_t* places, size_t capacity, size_t* count) {
     if (!dependencies) return HTVM_BAD_INPUT;
     LastError unused;
-    return guarded(unused, [&] { return give(dependencies->dependencies.kept(), places, capacity, count); });
+    return guarded(unused, [&] { return give(dependencies->numbers.dependencies().kept(), places, capacity, count); });
+}
+
+htvm_status htvm_dependencies_frame(htvm_dependencies* dependencies, uint32_t* frame) {
+    if (!dependencies || !frame) return HTVM_BAD_INPUT;
+    if (!dependencies->frame) return HTVM_AGAIN;
+    *frame = dependencies->numbers.of(*dependencies->frame);
+    return HTVM_OK;
 }

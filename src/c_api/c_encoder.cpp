@@ -5,13 +5,16 @@
 #include <utility>
 #include <vector>
 
+#include "c_api/c_mesh.h"
 #include "c_api/c_status.h"
 #include "htvm/encoder.hpp"
 #include "htvm/option_list.hpp"
 
 using htvm::c_api::check_struct;
+using htvm::c_api::elements;
 using htvm::c_api::guarded;
 using htvm::c_api::LastError;
+using htvm::c_api::read_mesh;
 using htvm::c_api::read_struct;
 
 struct htvm_encoder {
@@ -90,31 +93,6 @@ htvm_status read_skeleton(LastError& error, const htvm_skeleton& given, htvm::En
         options.skeleton.bones.push_back({skeleton.bone_joints[2 * b], skeleton.bone_joints[2 * b + 1]});
         if (skeleton.radii) options.radii.push_back(skeleton.radii[b]);
     }
-    return HTVM_OK;
-}
-
-// `count` elements of N numbers each; none if the array is NULL.
-template <class Element>
-std::vector<Element> elements(const typename Element::value_type* numbers, std::size_t count) {
-    std::vector<Element> out;
-    if (!numbers || count == 0) return out;
-    out.resize(count);
-    std::memcpy(out.data(), numbers, count * sizeof(Element));
-    return out;
-}
-
-htvm_status read_mesh(LastError& error, const htvm_mesh* given, htvm::Mesh& out) {
-    if (!given) return error.set(HTVM_BAD_INPUT, "the mesh is NULL");
-    htvm_mesh mesh{};
-    const auto read = check_struct(error, read_struct(given, mesh), "htvm_mesh");
-    if (read != HTVM_OK) return read;
-    if ((mesh.vertices > 0 && !mesh.positions) || (mesh.triangles > 0 && !mesh.indices))
-        return error.set(HTVM_BAD_INPUT, "the mesh has vertices or triangles, but NULL in place of their array");
-    out.positions = elements<htvm::Vector3f>(mesh.positions, mesh.vertices);
-    out.triangles = elements<htvm::Triangle>(mesh.indices, mesh.triangles);
-    out.colours = elements<htvm::Colour>(mesh.colours, mesh.vertices);
-    out.normals = elements<htvm::Vector3f>(mesh.normals, mesh.vertices);
-    out.texcoords = elements<htvm::Vector2f>(mesh.texcoords, mesh.vertices);
     return HTVM_OK;
 }
 

@@ -472,6 +472,12 @@ TEST(CInterface, TellsWhatFramesNeedAsTheCppOneDoes) {
         ASSERT_EQ(htvm_dependencies_kept(dependencies, places.data(), places.size(), &count), HTVM_OK);
         EXPECT_EQ(std::vector<std::uint64_t>(places.begin(), places.begin() + count), cpp.kept());
         EXPECT_EQ(htvm_packet_read(bytes.data(), bytes.size() - 1, &info, sizeof info), HTVM_CORRUPT_STREAM);
+        htvm_packet_info from_header;
+        ASSERT_EQ(htvm_packet_header_read(bytes.data(), HTVM_PACKET_HEADER, &from_header, sizeof from_header), HTVM_OK);
+        EXPECT_EQ(std::memcmp(&from_header, &info, sizeof info), 0);
+        EXPECT_EQ(htvm_packet_header_read(bytes.data(), HTVM_PACKET_HEADER - 1, &info, sizeof info), HTVM_AGAIN);
+        EXPECT_EQ(htvm_packet_header_read(bytes.data() + 1, HTVM_PACKET_HEADER, &info, sizeof info),
+                  HTVM_CORRUPT_STREAM);
     }
     EXPECT_EQ(htvm_dependencies_kept(dependencies, nullptr, 0, &count), HTVM_BUFFER_TOO_SMALL);
     EXPECT_EQ(count, cpp.kept().size());
@@ -525,6 +531,29 @@ TEST(CInterface, CarriesSessionSceneAndMetadata) {
     EXPECT_EQ(htvm_encoder_options_add_metadata(options, "title", "\xff"), HTVM_OK);
     EXPECT_EQ(htvm_encoder_create(options, &encoder, nullptr, 0), HTVM_BAD_INPUT) << "not UTF-8";
     htvm_encoder_options_destroy(options);
+}
+
+// Joined streams: the numbers of the second start again, and are counted on.
+TEST(CInterface, NumbersTheFramesOfAllSequences) {
+    htvm_dependencies* dependencies = nullptr;
+    ASSERT_EQ(htvm_dependencies_create(nullptr, &dependencies), HTVM_OK);
+    std::uint32_t number = 99;
+    EXPECT_EQ(htvm_dependencies_frame(dependencies, &number), HTVM_AGAIN);
+    std::vector<std::uint32_t> numbers;
+    for (const auto* coded : {&coded_grid(), &coded_person()})
+        for (const auto& packet : coded->packets) {
+            const auto bytes = write_packet(packet);
+            htvm_packet_info info;
+            ASSERT_EQ(htvm_packet_read(bytes.data(), bytes.size(), &info, sizeof info), HTVM_OK);
+            ASSERT_EQ(htvm_dependencies_push(dependencies, &info, nullptr), HTVM_OK);
+            const auto status = htvm_dependencies_frame(dependencies, &number);
+            ASSERT_EQ(status, frame_type(packet.kind) ? HTVM_OK : HTVM_AGAIN);
+            if (status == HTVM_OK) numbers.push_back(number);
+        }
+    EXPECT_EQ(numbers, (std::vector<std::uint32_t>{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}));
+    EXPECT_EQ(htvm_dependencies_frame(dependencies, nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_dependencies_frame(nullptr, &number), HTVM_BAD_INPUT);
+    htvm_dependencies_destroy(dependencies);
 }
 
 TEST(CInterface, HasWordsForEveryStatus) {

@@ -1,0 +1,29 @@
+"""The programs in docs/python.md run as they are printed."""
+
+import os
+import re
+import shutil
+
+import pytest
+from conftest import encode, project, sheet
+
+import htvm
+
+
+@pytest.mark.skipif(shutil.which(os.environ.get("HTVM_PROGRAM", "htvm")) is None, reason="the program htvm is not there")
+def test_the_manual_runs(tmp_path, monkeypatch, capsys):
+    (tmp_path / "capture").mkdir()
+    for number in range(6):
+        htvm.write_mesh(tmp_path / "capture" / f"{number:05}.ply", sheet(number))
+    packets = encode(6, unit_micrometres=1000, metadata={"title": "A sheet"})
+    (tmp_path / "person.htvm").write_bytes(b"".join(packets))
+    monkeypatch.chdir(tmp_path)
+    programs = re.findall(r"```python\n(.*?)```", (project / "docs/python.md").read_text(), re.S)
+    assert len(programs) >= 5
+    names = {}
+    for program in programs:
+        exec(program, names)
+    printed = capsys.readouterr().out
+    assert "6 frames at 30.0 per second, A sheet" in printed
+    assert htvm.open("copy.htvm").sequence.metadata == {"title": "A walk"}
+    assert names["last"].number == 5 and names["measured"].value("m2.rms_mm") < 5
