@@ -51,10 +51,12 @@ std::string key_of_rate(const FrameRate& rate) {
 
 void add_capture_options(CLI::App& command, CaptureOptions& options) {
     command
-        .add_option("input", options.input,
+        .add_option("input", options.inputs,
                     "The meshes, one file per frame (.ply, .obj, .drc): a folder, a pattern such as scan_%05d.ply, a\n"
-                    "quoted glob such as 'scan_*.ply', one file, or - for concatenated PLY on standard input")
+                    "quoted glob such as 'scan_*.ply', files in their order, or - for concatenated PLY on standard\n"
+                    "input")
         ->type_name("FILE")
+        ->expected(1, -1)
         ->required();
     command
         .add_option("-s,--skeleton", options.skeleton,
@@ -109,6 +111,14 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
                        "Seconds to add to the skeleton's clock, if it is early or late");
 }
 
+bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
+
+std::string input_name(const CaptureOptions& options) {
+    const std::filesystem::path first{options.inputs[0]};
+    if (options.inputs.size() == 1) return first.string();
+    return first.has_parent_path() ? first.parent_path().string() : ".";
+}
+
 std::string key_of(const CaptureOptions& options) {
     std::string key = fmt::format("first {}, frames {}, fps {}, unit {}, offset {}", options.first, options.frames,
                                   key_of_rate(options.fps), options.unit, options.skeleton_offset);
@@ -121,7 +131,7 @@ std::string key_of(const CaptureOptions& options) {
 Result<Capture> Capture::open(const CaptureOptions& options) {
     Capture capture;
     capture.options_ = options;
-    if (options.input == "-") {
+    if (is_piped(options)) {
         capture.pipe_.emplace(options.drop_late);
     } else if (auto found = capture.find_files(); !found) {
         return tl::unexpected(found.error());
@@ -132,9 +142,17 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
 }
 
 Result<void> Capture::find_files() {
-    auto files = find_sequence(options_.input);
+    auto files = find_sequence(options_.inputs);
     if (!files) return tl::unexpected(files.error());
     files_ = std::move(*files);
+    const auto& paths = files_.paths;
+    const auto back = std::adjacent_find(
+        paths.begin(), paths.end(), [](const auto& a, const auto& b) { return natural_less(b.string(), a.string()); });
+    if (options_.inputs.size() > 1 && back != paths.end())
+        warn(
+            fmt::format("the files are taken in the order given, where {} comes before {}; a folder or a pattern in "
+                        "quotes is taken by number",
+                        back->string(), std::next(back)->string()));
     places_ = places_in_time(files_);
     const std::size_t found = files_.paths.size();
     if (options_.first >= found)
@@ -257,7 +275,7 @@ Result<void> Capture::find_unit() {
         if (pipe_ || (peeked_ && !peeked_->positions.empty()) || next_ == end) break;
     }
     if (!peeked_ && error) return tl::unexpected(*error);
-    if (!peeked_) return fail(ErrorKind::bad_input, "there is no mesh in " + options_.input);
+    if (!peeked_) return fail(ErrorKind::bad_input, "there is no mesh in " + input_name(options_));
     const bool guessed = options_.unit == "auto" && options_.height == 0 && options_.scale == 1;
     const auto unit = options_.unit == "auto" ? guess_unit(*peeked_) : *length_unit(options_.unit);
     millimetres_per_unit_ = options_.scale * millimetres_per(unit);

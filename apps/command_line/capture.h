@@ -23,7 +23,8 @@ class App;
 namespace htvm::app {
 
 struct CaptureOptions {
-    std::string input;           // folder, pattern, glob or file of meshes; - for PLY after PLY on standard input
+    // A folder, pattern, glob or file of meshes; several files; or - for PLY after PLY on standard input.
+    std::vector<std::string> inputs;
     std::string skeleton;        // file; empty: none
     FrameRate fps;               // of the meshes; not given: the skeleton's, else of their timestamps, else 30
     std::string timestamps;      // file; empty: as the PLY files say, else by the files' numbers and the frame rate
@@ -39,6 +40,12 @@ struct CaptureOptions {
 
 // Adds the options above to a command.
 void add_capture_options(CLI::App& command, CaptureOptions& options);
+
+// Whether the meshes come from standard input.
+bool is_piped(const CaptureOptions& options);
+
+// What was named, for people: of several files, their folder.
+std::string input_name(const CaptureOptions& options);
 
 // All that frames depend on besides the files, for names of kept results.
 std::string key_of(const CaptureOptions& options);

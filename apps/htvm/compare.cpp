@@ -18,6 +18,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/thread.h"
+#include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "io/sequence.h"
 #include "sequences.h"
@@ -226,7 +227,11 @@ std::string csv_line(std::size_t frame, const FrameComparison& comparison, const
 // ---- The command ----------------------------------------------------------------------------------------------------
 
 struct Options {
-    std::string original, decoded, unit = "auto", timestamps;
+    std::string first;                   // name on the command line
+    std::vector<std::string> others;     // names behind it
+    std::vector<std::string> originals;  // of these
+    std::string decoded;                 // and the last
+    std::string unit = "auto", timestamps;
     std::size_t frames = 0;  // 0: all
     std::vector<std::string> only;
     CompareOptions compare;
@@ -265,9 +270,9 @@ struct Sources {
 };
 
 Result<Sources> open_sources(const Options& options) {
-    auto original = open_meshes(options.original, {options.unit, options.timestamps, options.limits});
+    auto original = open_meshes(options.originals, {options.unit, options.timestamps, options.limits});
     if (!original) return tl::unexpected(original.error());
-    auto decoded = open_meshes(options.decoded, {options.unit, "", options.limits});
+    auto decoded = open_meshes({options.decoded}, {options.unit, "", options.limits});
     if (!decoded) return tl::unexpected(decoded.error());
     // A stream knows what its capture's files are in, however --scale or --height made millimetres of them.
     if (decoded->is_stream && original->guesses_unit) {
@@ -415,7 +420,8 @@ nlohmann::json as_json(const Options& options, const Measured& measured, double 
         }
         frames.push_back(std::move(line));
     }
-    nlohmann::json out = {{"original", options.original}, {"decoded", options.decoded}, {"frames", std::move(frames)}};
+    nlohmann::json out = {
+        {"original", options.originals.front()}, {"decoded", options.decoded}, {"frames", std::move(frames)}};
     out["sequence"] = summary_json(summarise(measured.sums, peak_mm), options.compare);
     return out;
 }
@@ -453,6 +459,19 @@ Result<void> compare(Options options) {
         fmt::print("{}", comparison_table(measured->sums, options.compare, options.peak_mm));
     }
     return {};
+}
+
+// All names but the last are originals, as a shell makes many of a pattern. It makes them of two patterns as well, and
+// then nobody can tell where the second begins.
+void take_apart(Options& options) {
+    options.originals = {options.first};
+    options.originals.insert(options.originals.end(), options.others.begin(), options.others.end() - 1);
+    options.decoded = options.others.back();
+    std::error_code error;
+    if (options.originals.size() > 1 && std::filesystem::is_regular_file(options.decoded, error) &&
+        is_mesh_file_name(options.decoded))
+        throw CLI::ValidationError(
+            "DECODED", options.decoded + " is one mesh, behind several originals; give patterns in quotes, or folders");
 }
 
 void add_picture_options(CLI::App& command, Options& o) {
@@ -500,11 +519,15 @@ void add_compare(CLI::App& app, Run& run) {
         "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
         "  M3  PSNR of pictures from all sides\n"
         "  topology  components, boundaries, cracks, flaps");
-    command->add_option("ORIGINAL", o.original, "A mesh file, folder, glob or %05d pattern")
+    command->add_option("ORIGINAL", o.first, "A mesh file, folder, glob or %05d pattern; or several files")
         ->type_name("FILE")
         ->required();
-    command->add_option("DECODED", o.decoded, "The same for the decoded meshes, or an .htvm stream")
+    command
+        ->add_option("DECODED", o.others,
+                     "The same for the decoded meshes, or an .htvm stream; behind several originals a stream or a "
+                     "folder")
         ->type_name("FILE")
+        ->expected(1, -1)
         ->required();
     command->add_option("--frames", o.frames, "Compare at most this many frames");
     command
@@ -542,7 +565,10 @@ void add_compare(CLI::App& app, Run& run) {
         "Examples:\n"
         "  htvm compare capture/ person.htvm\n"
         "  htvm compare 'scan_%05d.obj' meshes/ --only m1,m2 --csv errors.csv");
-    command->callback([options, &run] { run = [options] { return compare(*options); }; });
+    command->callback([options, &run] {
+        take_apart(*options);
+        run = [options] { return compare(*options); };
+    });
 }
 
 }  // namespace htvm::app

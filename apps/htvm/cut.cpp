@@ -10,8 +10,9 @@
 #include "commands.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
-#include "running_time.h"
+#include "htvm/running_time.hpp"
 #include "stream_file.h"
+#include "stream_seek.h"
 
 namespace htvm::app {
 namespace {
@@ -48,14 +49,16 @@ struct Cut {
     std::uint32_t first_asked = 0, last_number = 0;
 };
 
+double seconds(const Cut& cut) { return static_cast<double>(cut.time.microseconds()) / 1e6; }
+
 bool is_before(const Cut& cut, std::uint32_t number) {
-    return number < cut.options.first || cut.time.seconds() < cut.options.from;
+    return number < cut.options.first || seconds(cut) < cut.options.from;
 }
 
 bool is_behind(const Cut& cut, std::uint32_t number) {
     const auto& options = cut.options;
     return (options.frames > 0 && number >= options.first + options.frames) ||
-           (options.to >= 0 && cut.time.seconds() >= options.to);
+           (options.to >= 0 && seconds(cut) >= options.to);
 }
 
 Result<void> write(Cut& cut, Packet packet) {
@@ -89,10 +92,9 @@ Result<void> start(Cut& cut) {
 // False once the end of the part is reached.
 Result<bool> take(Cut& cut, Packet packet) {
     cut.numbers.take(packet);
-    if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) {
-        if (const auto index = read_index(packet); index && index->bounds) cut.output.add_bounds(*index->bounds);
-        return true;
-    }
+    cut.time.take(packet, cut.numbers.begins_sequence());
+    cut.output.add_bounds_of(packet);
+    if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return true;
     if (packet.kind == PacketKind::sequence) {
         if (auto ok = cut.headers.push(packet); !ok) return tl::unexpected(ok.error());
         cut.header = packet;
@@ -105,9 +107,6 @@ Result<bool> take(Cut& cut, Packet packet) {
         return true;
     }
     const auto number = cut.numbers.of(packet.frame);
-    const auto& rate = cut.headers.sequence();
-    cut.time.take(packet.timestamp_us, cut.numbers.begins_sequence(),
-                  rate ? static_cast<double>(rate->fps_denominator) / rate->fps_numerator : 0);
     if (is_behind(cut, number)) return false;
     cut.last_number = number;
     if (cut.started) {
@@ -128,12 +127,42 @@ Result<bool> take(Cut& cut, Packet packet) {
     return true;
 }
 
+// The last frame of the index at which the part may begin; null if only reading tells.
+const AccessPoint* point_for(const Options& options, const StreamIndex& index) {
+    if (index.sequences.size() != 1) return nullptr;  // a later one may repeat numbers and times
+    if (!(options.from > 0)) return point_before(index, options.first);
+    const AccessPoint* out = nullptr;
+    for (const auto& point : index.points)
+        if (static_cast<double>(point.timestamp_us) - static_cast<double>(index.first_timestamp_us) <=
+            1e6 * options.from)
+            out = &point;
+    return out ? point_before(index, out->frame) : nullptr;
+}
+
+// Skips what lies before the part, if the stream is a file with an index of all of it; otherwise that is read too.
+void skip_to_part(Cut& cut, StreamInput& input) {
+    auto stream = SeekableStream::open(cut.options.input, cut.options.limits.max_packet_bytes);
+    const auto index = stream ? stream->index_at(0) : std::nullopt;
+    const auto* point = index && index->end() == stream->size() ? point_for(cut.options, index->index) : nullptr;
+    if (!point || point->back > 0) return;
+    const auto first = stream->at(index->begin + point->offset);
+    const auto header_place = stream->at(index->begin + index->index.sequences[0].offset);
+    const auto front_place = stream->at(0);
+    if (!first || !frame_type(first->header.kind) || !header_place || !front_place) return;
+    auto header = stream->read(*header_place), front = stream->read(*front_place);
+    if (!header || !front) return;
+    cut.numbers.begin(first->header.frame, static_cast<std::uint32_t>(point->frame));
+    cut.time.begin(index->index.first_timestamp_us);
+    input.go_on_with({std::move(*front), std::move(*header)}, first->offset);
+}
+
 Result<void> run_cut(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
     auto output = StreamOutput::open(options.output);
     if (!output) return tl::unexpected(output.error());
     Cut cut{options, *output, Decoder(options.limits)};
+    if (options.first > 0 || options.from > 0) skip_to_part(cut, *input);
     while (auto packet = input->next()) {
         const auto more = take(cut, std::move(*packet));
         if (!more) return tl::unexpected(more.error());

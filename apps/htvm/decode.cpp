@@ -320,23 +320,17 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
 // An error if the stream is incomplete.
 Result<void> judge(const Options& options, const MeshOutput& output, const StreamInput& input, const Summary& summary) {
     const auto lost = summary.undecodable + summary.missing;
-    if (input.oversized_packets() > 0)
-        return fail(ErrorKind::limit,
-                    fmt::format("{} has {} packets of more than {} bytes; raise --max-packet to decode them",
-                                options.input, input.oversized_packets(), options.limits.max_packet_bytes));
-    if (summary.refused)
+    if (summary.refused && input.oversized_packets() == 0)
         return fail(summary.refused->kind, fmt::format("{}: {} frames could not be decoded; the first: {}",
                                                        options.input, summary.undecodable, summary.refused->message));
-    if (input.damaged_bytes() > 0)
-        return fail(
-            ErrorKind::corrupt_stream,
-            fmt::format("{} is damaged: {} bytes are not valid packets; {} frames were decoded, {} others are lost",
-                        options.input, input.damaged_bytes(), summary.decoded, lost));
-    const bool all = options.frames == 0 || summary.written() < options.frames;
-    if (all && !output.one_file() && input.cut_short_bytes() > 0)
-        return fail(ErrorKind::corrupt_stream, fmt::format("{} ends in the middle of a packet; the {} complete frames "
-                                                           "before it were decoded",
-                                                           options.input, summary.decoded));
+    const bool all = (options.frames == 0 || summary.written() < options.frames) && !output.one_file();
+    if (all || input.oversized_packets() > 0 || input.damaged_bytes() > 0)
+        if (auto whole = check_whole(
+                input, options.input,
+                fmt::format("{} decoded, {} others are lost",
+                            counted(summary.decoded, "frame") + (summary.decoded == 1 ? " was" : " were"), lost));
+            !whole)
+            return whole;
     if (lost == 0 && summary.damaged_packets == 0) return {};
     if (lost == 0)
         return fail(ErrorKind::corrupt_stream,

@@ -1,4 +1,6 @@
 // htvm encode: meshes and a skeleton in, a stream out.
+#include "encode.h"
+
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -25,6 +27,7 @@ struct Options {
     EncodingOptions encoding;
     std::string output, on_bad_frame = "stop";
     bool fill = false, json = false;
+    bool keep_partial = true;  // of an encoding that ends early
 };
 
 // ---- One run over the capture ---------------------------------------------------------------------------------------
@@ -246,7 +249,7 @@ void report(const Options& options, const Summary& summary, const RateReport& ra
 // Why an encoding ended early, and what is left of it.
 tl::unexpected<Error> ended_early(Pass& pass, const Error& error) {
     const auto frames = pass.summary.totals.all().frames;
-    if (frames == 0) return tl::unexpected(error);
+    if (frames == 0 || !pass.options.keep_partial) return tl::unexpected(error);
     pass.encoder.finish();
     const bool whole = drain(pass).has_value();
     const auto kept = pass.output->keep();
@@ -273,7 +276,7 @@ bool may_be_live(const std::string& output) {
 int fewest_passes(const Options& options, const EncoderOptions& settings) {
     if (!(settings.rate.bits_per_second > 0)) return 1;
     if (options.encoding.passes > 0) return options.encoding.passes;
-    return options.capture.input == "-" ? 1 : 2;
+    return is_piped(options.capture) ? 1 : 2;
 }
 
 // Whether another pass can come nearer to the rate.
@@ -333,6 +336,14 @@ Result<void> encode(const Options& options) {
 
 }  // namespace
 
+Result<void> encode_by_default(const std::vector<std::string>& inputs, const std::string& output) {
+    Options options;
+    options.capture.inputs = inputs;
+    options.output = output;
+    options.keep_partial = false;
+    return encode(options);
+}
+
 void add_encode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("encode", "Compress a sequence of meshes into an .htvm stream");
@@ -364,7 +375,7 @@ void add_encode(CLI::App& app, Run& run) {
     command->footer(
         "Examples:\n"
         "  htvm encode capture/ --skeleton capture/skeleton.json -o person.htvm\n"
-        "  htvm encode 'scan_%05d.obj' -q 60 --keyint 60 -o person.htvm\n"
+        "  htvm encode scan_*.obj -q 60 --keyint 60 -o person.htvm\n"
         "  htvm encode capture/ --profile topology -s capture/skeleton.json -o exact.htvm\n"
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
@@ -374,9 +385,9 @@ void add_encode(CLI::App& app, Run& run) {
         check_together(options->encoding);
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
-        if (options->capture.drop_late && options->capture.input != "-")
+        if (options->capture.drop_late && !is_piped(options->capture))
             throw CLI::ValidationError("--drop-late", "is for meshes on standard input: files can wait");
-        if (options->encoding.passes == 2 && options->capture.input == "-")
+        if (options->encoding.passes == 2 && is_piped(options->capture))
             throw CLI::ValidationError(
                 "--passes",
                 "2 reads the capture twice, which standard input does not allow; give files, or --passes 1");

@@ -32,8 +32,7 @@ Result<void> run_index(const Options& options) {
     Progress progress("index", 0);
     while (const auto packet = input->next()) {
         if (packet->kind == PacketKind::front_index) {
-            const auto index = read_index(*packet);
-            if (index && index->bounds && !options.bounds) output->add_bounds(*index->bounds);
+            if (!options.bounds) output->add_bounds_of(*packet);
             continue;
         }
         if (options.bounds) {
@@ -51,7 +50,10 @@ Result<void> run_index(const Options& options) {
     if (auto fine = check_whole(*input, options.input); !fine) return fine;
     if (frames == 0) return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream, or has no frames");
     if (auto finished = output->finish(); !finished) return finished;
-    note(fmt::format("{}: an index of {} is at its beginning", path, counted(frames, "frame")));
+    if (path == "-") return {};
+    if (!output->has_index()) return fail(ErrorKind::disk_full, path + " could not be given an index");
+    note(fmt::format("{}: an index of {} is at its beginning{}", path, counted(frames, "frame"),
+                     output->has_bounds() ? "" : ", without their bounds, which --bounds finds by decoding them"));
     return {};
 }
 

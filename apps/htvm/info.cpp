@@ -11,8 +11,8 @@
 #include "commands.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
+#include "htvm/running_time.hpp"
 #include "rate_report.h"
-#include "running_time.h"
 #include "stream_file.h"
 
 namespace htvm::app {
@@ -141,6 +141,7 @@ Result<void> info(const Options& options) {
     while (auto packet = input->next()) {
         if (buffer) buffer->add(*packet);
         numbers.take(*packet);
+        time.take(*packet, numbers.begins_sequence());
         bytes += packet->payload.size() + packet_overhead;
         if (packet->kind == PacketKind::sequence) {
             const bool first = !headers.sequence();
@@ -175,19 +176,15 @@ Result<void> info(const Options& options) {
             sequences.back()["first_frame"] = frame->frame;
         }
         ++count;
-        const auto& rate = headers.sequence();
-        time.take(frame->timestamp_us, numbers.begins_sequence(),
-                  rate ? static_cast<double>(rate->fps_denominator) / rate->fps_numerator : 0);
         add(totals, *frame);
         if (options.json) frames.push_back(frame_json(*frame));
         if (!options.json && !options.summary) print_frame(*frame);
     }
-    if (!headers.sequence() && input->oversized_packets() > 0)
-        return fail(ErrorKind::limit, options.input + " has packets larger than --max-packet, its header among them");
+    if (!headers.sequence() && input->oversized_packets() > 0) return check_whole(*input, options.input);
     if (!headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
     const auto& s = *headers.sequence();
-    const double seconds = count > 0 ? time.total() : static_cast<double>(s.fps_denominator) / s.fps_numerator;
+    const double seconds = static_cast<double>(count > 0 ? time.total_us() : time.one_frame_us()) / 1e6;
     const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
     if (options.json) {
         nlohmann::json out{{"sequence", sequence_json(first_sequence ? *first_sequence : s)},
@@ -204,13 +201,7 @@ Result<void> info(const Options& options) {
         fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), count, seconds, bytes,
                    megabits, index ? ", with an index for seeking" : "");
     }
-    if (input->oversized_packets() > 0)
-        return fail(ErrorKind::limit, options.input + " has packets larger than --max-packet");
-    if (input->damaged_bytes() > 0)
-        return fail(ErrorKind::corrupt_stream,
-                    fmt::format("{}: {} bytes are not valid packets", options.input, input->damaged_bytes()));
-    if (input->cut_short_bytes() > 0)
-        return fail(ErrorKind::corrupt_stream, options.input + " ends in the middle of a packet");
+    if (auto whole = check_whole(*input, options.input); !whole) return whole;
     if (buffer) return check_buffer(options, *buffer);
     return {};
 }

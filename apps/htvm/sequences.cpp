@@ -39,11 +39,9 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
         source.numbers.push_back(numbers.of(packet->frame));
         source.times_us.push_back(packet->timestamp_us);
     }
-    if (input->oversized_packets() > 0)
-        return fail(ErrorKind::limit, source.name + " has packets larger than --max-packet");
-    if (input->damaged_bytes() > 0 || input->cut_short_bytes() > 0 || !headers.sequence())
-        return fail(ErrorKind::corrupt_stream,
-                    source.name + " is damaged, cut short, or not an htvm stream; 'htvm info' tells more");
+    if (!headers.sequence() && input->oversized_packets() == 0)
+        return fail(ErrorKind::corrupt_stream, source.name + " is not an htvm stream: no sequence header was found");
+    if (auto whole = check_whole(*input, source.name); !whole) return whole;
     if (!ascends) source.times_us.clear();  // of sequences one after the other
     source.frames = source.numbers.size();
     source.rate = {headers.sequence()->fps_numerator, headers.sequence()->fps_denominator};
@@ -98,17 +96,18 @@ Result<void> find_times(MeshSource& source, const SequenceFiles& files, const st
 
 }  // namespace
 
-Result<MeshSource> open_meshes(const std::string& name, const MeshSourceOptions& options) {
+Result<MeshSource> open_meshes(const std::vector<std::string>& names, const MeshSourceOptions& options) {
+    const auto& name = names.front();
     if (name == "-")
         return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
-    if (name.ends_with(".htvm")) return open_stream(name, options.limits);
+    if (names.size() == 1 && name.ends_with(".htvm")) return open_stream(name, options.limits);
     const bool guess = options.unit == "auto";
     const auto chosen = guess ? LengthUnit::millimetre : length_unit(options.unit);
     if (!chosen) return tl::unexpected(chosen.error());
-    const auto files = find_sequence(name);
+    const auto files = find_sequence(names);
     if (!files) return tl::unexpected(files.error());
     MeshSource source;
-    source.name = name;
+    source.name = names.size() == 1 ? name : "the files";
     source.frames = files->paths.size();
     source.numbers = files->numbers;
     source.millimetres_per_unit = millimetres_per(*chosen);

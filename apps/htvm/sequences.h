@@ -37,8 +37,8 @@ struct MeshSourceOptions {
     DecoderOptions limits;      // of streams
 };
 
-// An .htvm stream, or the files that `name` refers to (io/sequence.h).
-Result<MeshSource> open_meshes(const std::string& name, const MeshSourceOptions& options);
+// An .htvm stream, or the files that the names refer to (io/sequence.h).
+Result<MeshSource> open_meshes(const std::vector<std::string>& names, const MeshSourceOptions& options);
 
 // ---- Which frames belong together -----------------------------------------------------------------------------------
 

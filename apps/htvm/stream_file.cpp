@@ -1,5 +1,7 @@
 #include "stream_file.h"
 
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -12,6 +14,7 @@
 #include <iterator>
 #include <limits>
 
+#include "command_line/terminal.h"
 #include "io/mesh_file.h"
 
 namespace htvm::app {
@@ -60,12 +63,15 @@ std::optional<Packet> StreamInput::next() {
     }
 }
 
-Result<void> check_whole(const StreamInput& input, const std::string& path) {
-    if (input.oversized_packets() > 0) return fail(ErrorKind::limit, path + " has packets larger than --max-packet");
+Result<void> check_whole(const StreamInput& input, const std::string& path, const std::string& advice) {
+    if (input.oversized_packets() > 0)
+        return fail(ErrorKind::limit, fmt::format("{} has {} larger than --max-packet; raise --max-packet to read all",
+                                                  path, counted(input.oversized_packets(), "packet")));
     if (input.damaged_bytes() > 0)
-        return fail(ErrorKind::corrupt_stream, path + " is damaged; 'htvm verify' tells more");
+        return fail(ErrorKind::corrupt_stream, fmt::format("{} is damaged: {} of it are no valid packets; {}", path,
+                                                           counted(input.damaged_bytes(), "byte"), advice));
     if (input.cut_short_bytes() > 0)
-        return fail(ErrorKind::corrupt_stream, path + " ends in the middle of a packet; 'htvm verify' tells more");
+        return fail(ErrorKind::corrupt_stream, fmt::format("{} ends in the middle of a packet; {}", path, advice));
     return {};
 }
 
@@ -96,15 +102,25 @@ Result<void> StreamOutput::write(const Packet& packet) {
     return {};
 }
 
+void StreamOutput::add_bounds_of(const Packet& packet) {
+    if (packet.kind != PacketKind::front_index) return;
+    if (const auto index = read_index(packet); index && index->bounds) indexer_.add(*index->bounds);
+}
+
 Result<void> StreamOutput::finish() {
     if (!file_) return {};
     if (!is_indexed()) return file_->finish();
     const auto index = indexer_.finish(bytes_);
     if (index.frames == 0) return file_->finish();
     const auto front = write_packet(write_index(index));
-    // Without an index, as where the disk has no room for a second copy, the stream is complete all the same.
-    if (!file_->finish_behind(front)) return file_->finish();
+    if (const auto done = file_->finish_behind(front); !done) {
+        warn(fmt::format(
+            "the stream has no index in front, for which all of it is copied once: {}; 'htvm index' adds it",
+            done.error().message));
+        return file_->finish();
+    }
     bytes_ += front.size();
+    has_index_ = true;
     return {};
 }
 

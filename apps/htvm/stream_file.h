@@ -41,8 +41,9 @@ private:
     std::deque<Packet> first_;
 };
 
-// An error if the input, as far as it was read, was not whole.
-Result<void> check_whole(const StreamInput& input, const std::string& path);
+// An error if the input, as far as it was read, was not whole. advice: the end of its sentence.
+Result<void> check_whole(const StreamInput& input, const std::string& path,
+                         const std::string& advice = "'htvm verify' tells more");
 
 // A file is there once it is finished: until then its packets are in a file beside it, and what was there before stays.
 // It then begins with an index; those at the end of streams are left out of it.
@@ -52,7 +53,13 @@ public:
     Result<void> write(const Packet& packet);
     // Of the last frame, for the index.
     void add_bounds(const SpaceBounds& bounds) { indexer_.add(bounds); }
+    // Those of all frames of a stream that goes into this one, if this packet of it is an index that tells them.
+    void add_bounds_of(const Packet& packet);
+    // Where there is no room for the index, the stream is complete without it, which a warning says.
     Result<void> finish();
+    // Once it is finished: whether it begins with an index.
+    bool has_index() const { return has_index_; }
+    bool has_bounds() const { return indexer_.bounds().has_value(); }
     // Where a stream that ends early is left, beside its place; empty where it went to a pipe.
     std::string keep();
     std::uint64_t bytes() const { return bytes_; }
@@ -62,6 +69,7 @@ private:
     std::optional<OutputFile> file_;  // none: standard output
     StreamIndexer indexer_;
     std::uint64_t bytes_ = 0;
+    bool has_index_ = false;
 };
 
 // ---- What the commands accept as a stream ---------------------------------------------------------------------------

@@ -92,7 +92,7 @@ CompareOptions compare_options(const Options& options) {
 
 // Everything that a result depends on besides its coder and quality.
 Result<std::string> common_key(const Options& options) {
-    const auto files = find_sequence(options.capture.input);
+    const auto files = find_sequence(options.capture.inputs);
     if (!files) return tl::unexpected(files.error());
     auto inputs = files->paths;
     if (!options.capture.skeleton.empty()) inputs.emplace_back(options.capture.skeleton);
@@ -181,7 +181,7 @@ Result<void> run_tasks(const Options& options, const ResultCache& cache, Capture
 }
 
 std::string capture_title(const Options& options, const RdPoint& point) {
-    auto input = path(options.capture.input).lexically_normal();
+    auto input = path(input_name(options.capture)).lexically_normal();
     std::string name = (input.has_filename() ? input.filename() : input.parent_path().filename()).string();
     if (name.find_first_of("%*?") != std::string::npos) name = (input.parent_path().filename() / name).string();
     const auto sums = totals(point);
@@ -212,12 +212,9 @@ nlohmann::json as_json(const Options& options, const std::string& title, const s
     for (const auto& point : points) list.push_back(to_json(point));
     nlohmann::json differences;
     for (const char* reference : rate_references) differences[reference] = rate_differences_json(points, reference);
-    return {{"program", "htvm-lab " HTVM_VERSION},
-            {"capture", title},
-            {"input", options.capture.input},
-            {"surface_samples", options.samples},
-            {"coder_threads", options.coder_threads},
-            {"points", std::move(list)},
+    return {{"program", "htvm-lab " HTVM_VERSION},       {"capture", title},
+            {"input", input_name(options.capture)},      {"surface_samples", options.samples},
+            {"coder_threads", options.coder_threads},    {"points", std::move(list)},
             {"rate_differences", std::move(differences)}};
 }
 
@@ -240,7 +237,7 @@ Result<void> write_outputs(const Options& options, const std::vector<RdPoint>& p
 }
 
 Result<void> rate_distortion(const Options& options) {
-    if (options.capture.input == "-")
+    if (is_piped(options.capture))
         return fail(ErrorKind::bad_input, "the sweep keeps its results by the files they came from: give files, not -");
     const auto coders = chosen_coders(options);
     if (!coders) return tl::unexpected(coders.error());

@@ -66,7 +66,7 @@ ExperimentPlan plan_of(const Options& options) {
 
 std::string capture_name(const Options& options) {
     if (!options.title.empty()) return options.title;
-    const auto input = path(options.capture.input).lexically_normal();
+    const auto input = path(input_name(options.capture)).lexically_normal();
     std::string name = (input.has_filename() ? input.filename() : input.parent_path().filename()).string();
     if (name.find_first_of("%*?") != std::string::npos) name = input.parent_path().filename().string();
     return name;
@@ -115,7 +115,7 @@ Result<std::vector<Pose>> poses_for_noise(const Options& options, const SourceFr
 }
 
 Result<Laboratory> laboratory_of(const Options& options, const SourceFrames& source) {
-    const auto files = find_sequence(options.capture.input);
+    const auto files = find_sequence(options.capture.inputs);
     if (!files) return tl::unexpected(files.error());
     auto inputs = files->paths;
     for (const auto& name : {options.capture.skeleton, true_skeleton_file(options)})
@@ -383,7 +383,7 @@ Result<void> write_report(const Options& options, const Report& report, const Fi
 }
 
 Result<void> reproduce(Options options) {
-    if (options.capture.input == "-")
+    if (is_piped(options.capture))
         return fail(ErrorKind::bad_input, "results are kept by the files they came from: give files, not -");
     if (std::system("command -v gnuplot >/dev/null 2>&1") != 0)
         return fail(ErrorKind::unsupported,

@@ -9,6 +9,7 @@
 #include "htvm/frame_numbers.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
+#include "htvm/running_time.hpp"
 #include "htvm/scene.hpp"
 
 namespace htvm {
@@ -58,17 +59,15 @@ public:
     void add(const Packet& packet, std::uint64_t offset);
     // The bounds of a frame.
     void add(const SpaceBounds& bounds);
+    const std::optional<SpaceBounds>& bounds() const { return index_.bounds; }  // of all of them so far
     // bytes: of the stream without its index.
     StreamIndex finish(std::uint64_t bytes);
 
 private:
-    void end_sequence();
     FrameNumbers numbers_;
+    RunningTime time_;
     StreamIndex index_;
     std::uint64_t header_offset_ = 0;
-    double seconds_of_one_frame_ = 0;
-    std::uint64_t frames_of_sequence_ = 0;
-    std::int64_t first_us_ = 0, last_us_ = 0;
 };
 
 }  // namespace htvm

@@ -210,6 +210,28 @@ Result<SequenceFiles> find_sequence(std::string_view what) {
                 "there is no file or folder " + std::string(what) + ": " + what_is_there(folder, *names));
 }
 
+Result<SequenceFiles> find_sequence(std::span<const std::string> names) {
+    if (names.size() == 1) return find_sequence(std::string_view(names[0]));
+    if (names.empty()) return fail(ErrorKind::bad_input, "no file or folder was named");
+    SequenceFiles files;
+    std::error_code error;
+    for (const auto& name : names) {
+        const fs::path path{name};
+        if (!is_mesh_file_name(path) || fs::is_directory(path, error))
+            return fail(ErrorKind::bad_input,
+                        name +
+                            " is not a mesh file (.ply, .obj, .drc); of several names each must be one, a frame "
+                            "each; or name one folder, or one pattern in quotes");
+        if (!fs::exists(path, error)) return fail(ErrorKind::bad_input, "there is no file " + name);
+        if (!files.paths.empty() && path.extension() != files.paths[0].extension())
+            return fail(ErrorKind::bad_input, files.paths[0].string() + " and " + name +
+                                                  " are mesh files of different formats; name those of one");
+        files.paths.push_back(path);
+    }
+    files.numbers = numbers_in_names(files.paths);
+    return files;
+}
+
 std::vector<std::uint64_t> numbers_in_names(std::span<const fs::path> paths) {
     std::vector<std::uint64_t> out;
     std::optional<NameParts> first;

@@ -28,6 +28,10 @@ struct SequenceFiles {
 // contains files of different formats, since then it most likely contains each frame twice.
 Result<SequenceFiles> find_sequence(std::string_view what);
 
+// The same of several names, as a shell makes them of a pattern: of mesh files of one format, which stay in their
+// order.
+Result<SequenceFiles> find_sequence(std::span<const std::string> names);
+
 // The last number in each name, if the names differ only in it and the numbers ascend; else empty.
 std::vector<std::uint64_t> numbers_in_names(std::span<const std::filesystem::path> paths);
 

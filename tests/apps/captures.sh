@@ -49,6 +49,22 @@ cp -r capture holey && echo nonsense >holey/frame_00003.ply
 awk -F, 'NR > 1 && $6 > 1 { exit 1 }' holey.csv || fail "frames are compared with others' originals"
 expect 0 "frame 3 of holey left out: holey.htvm has no such" "$htvm" compare holey holey.htvm --only m1
 
+# Files by name, as a shell makes them of a pattern: in their order, whatever reads a capture.
+"$htvm" encode capture -o folder.htvm --quiet
+expect 0 "6 frames" "$htvm" encode capture/*.ply -o files.htvm
+cmp -s folder.htvm files.htvm || fail "files by name make another stream than their folder"
+expect 0 "M1 geometry" "$htvm" compare capture/*.ply files.htvm --frames 2 --only m1
+expect 2 "is one mesh, behind several originals" "$htvm" compare capture/*.ply capture/*.ply
+"$htvm" calibrate capture/*.ply -s capture/skeleton.json -o radii.json --quiet || fail "calibrate does not take files by name"
+expect 1 "skeleton.json is not a mesh file" "$htvm" encode capture/* -o x.htvm
+expect 1 "capture is not a mesh file" "$htvm" encode capture/frame_00000.ply capture -o x.htvm
+expect 1 "there is no file capture/none.ply" "$htvm" encode capture/frame_00000.ply capture/none.ply -o x.htvm
+# A shell sorts 10 before 9.
+mkdir unpadded
+for k in 0 1 2; do cp capture/frame_0000$k.ply unpadded/$((k + 8)).ply; done
+expect 0 "in the order given, where unpadded/10.ply comes before unpadded/8.ply" "$htvm" encode unpadded/*.ply -o x.htvm
+rm -r unpadded
+
 # A number that is missing.
 cp -r capture gap
 rm gap/frame_00002.ply gap/frame_00003.ply

@@ -109,6 +109,7 @@ for file in part/*.ply; do cmp -s "$file" "enhanced/${file#part/}" || fail "EP: 
 
 # An index for a stream that has none; the same again changes nothing.
 cp live.htvm indexed.htvm
+expect 0 "12 frames is at its beginning, without their bounds, which --bounds finds" "$htvm" index indexed.htvm
 expect 0 "12 frames" "$htvm" index indexed.htvm --bounds
 expect 0 "within" "$htvm" info indexed.htvm
 cp indexed.htvm again.htvm
@@ -130,6 +131,23 @@ expect 2 "excludes" "$htvm" cut walk.htvm --first 1 --to 5 -o none.htvm
 expect 0 "12 frames" "$htvm" cut enhanced.htvm -o cut.htvm
 expect 0 "all sound" "$htvm" verify cut.htvm
 
+# The index says where to begin: what lies before that is not read, and may be damaged.
+"$htvm" encode walk --keyint 4 --session 0 -o - 2>/dev/null >unindexed.htvm
+for part in "--first 5 --frames 4" "--first 9" "--from 0.14 --to 0.3" "--from 0.27"; do
+    # Without an index, all is read.
+    "$htvm" cut unindexed.htvm $part -o read.htvm 2>/dev/null
+    "$htvm" cut walk.htvm $part -o found.htvm 2>/dev/null
+    "$htvm" index read.htvm --bounds --quiet && "$htvm" index found.htvm --bounds --quiet
+    cmp -s read.htvm found.htvm || fail "cut $part is another with an index than without"
+done
+{ poisoned "${first[0]}" "${intra[0]}"; } >damaged.htvm
+"$htvm" cut walk.htvm --first 5 --frames 4 -o whole.htvm 2>/dev/null
+"$htvm" cut damaged.htvm --first 5 --frames 4 -o part.htvm 2>/dev/null || fail "cut reads what it does not need"
+cmp -s whole.htvm part.htvm || fail "a cut behind damage is another"
+expect 0 "numbers 4 to 7" "$htvm" cut damaged.htvm --from 0.14 --to 0.26 -o part.htvm
+expect 3 "damaged.htvm is damaged" "$htvm" cut damaged.htvm --first 3 -o part.htvm
+expect 0 "numbers 16 to 19 of two.htvm" "$htvm" cut two.htvm --first 17 --frames 3 -o part.htvm
+
 # Joining: parts of a stream become what they were, others a sequence of their own.
 for part in 0 4 8; do "$htvm" cut walk.htvm --first $part --frames 4 -o part$part.htvm 2>/dev/null; done
 expect 0 "12 frames in 1 sequence" "$htvm" join part0.htvm part4.htvm part8.htvm -o joined.htvm
@@ -141,7 +159,9 @@ same part 0 whole
 expect 0 "all sound" "$htvm" verify joined.htvm
 expect 0 "16 frames in 3 sequences" "$htvm" join a.htvm b.htvm part4.htvm part8.htvm -o joined.htvm
 expect 0 "all sound" "$htvm" verify joined.htvm
-expect 0 "" "$htvm" join part8.htvm part0.htvm -o joined.htvm
+expect 0 "part0.htvm is earlier than the streams before it" "$htvm" join part8.htvm part0.htvm -o joined.htvm
+expect 0 "0.13 s without frames lie before part8.htvm" "$htvm" join part0.htvm part8.htvm -o apart.htvm
+"$htvm" join part0.htvm part4.htvm -o joined2.htvm 2>&1 | grep -q "without frames" && fail "join sees a pause where there is none"
 expect 0 "8 frames in 1 sequence, all sound, with an index" "$htvm" verify joined.htvm
 rm -rf part
 "$htvm" decode joined.htvm --first 5 -o part 2>/dev/null

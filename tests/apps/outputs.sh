@@ -52,6 +52,25 @@ ln -s out.htvm link.htvm
 [ -L link.htvm ] && ! cmp -s good.htvm out.htvm && [ ! -e out.htvm.partial ] || fail "a link is replaced, or what it leads to is not"
 [ "$(stat -c %a out.htvm)" = 600 ] || fail "a file's permissions change as it is written anew"
 
+# An index in front needs room for a second copy: where there is none, that is said, and the stream is whole without.
+# Of a size of whole kilobytes, so that a limit in kilobytes leaves room for the stream alone.
+title() { printf "%$1s" | tr ' ' x; }
+indexed() { "$htvm" encode capture --title "$(title $1)" -o big.htvm --quiet; }
+indexed 200
+front=$(($(od -An -tu1 -j 24 -N 1 big.htvm) + 36))
+size=$(($(stat -c %s big.htvm) - front))
+words=$((200 + (1024 - size % 1024) % 1024))
+rm big.htvm
+full_at() { (trap '' XFSZ; ulimit -f "$1"; shift; exec "$@") }
+limit=$(((size + 1023) / 1024))
+expect 0 "the stream has no index in front, for which all of it is copied once: big.htvm cannot be written: File too large" \
+    full_at $limit "$htvm" encode capture --title "$(title $words)" -o big.htvm
+expect 0 '"front_index": null' "$htvm" info big.htvm --json
+expect 0 "all sound" "$htvm" verify big.htvm
+cp big.htvm same.htvm
+expect 6 "big.htvm could not be given an index" full_at $limit "$htvm" index big.htvm
+cmp -s big.htvm same.htvm || fail "a stream that gets no index is another"
+
 # What is no file is written to at once; a full disk has a code of its own.
 expect 0 "frames" "$htvm" encode capture --frames 2 -o /dev/null
 [ -c /dev/null ] || fail "/dev/null is replaced"

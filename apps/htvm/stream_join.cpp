@@ -1,0 +1,76 @@
+#include "stream_join.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "htvm/decoder.hpp"
+
+namespace htvm::app {
+
+Packet StreamJoin::moved(Packet packet) const {
+    packet.frame = packet.frame - stream_.first + stream_.number;
+    if (packet.kind != PacketKind::sequence) packet.reference = packet.reference - stream_.first + stream_.number;
+    packet.timestamp_us = static_cast<std::int64_t>(static_cast<std::uint64_t>(packet.timestamp_us) +
+                                                    static_cast<std::uint64_t>(stream_.later_us));
+    return packet;
+}
+
+// With the same header it is the same sequence; with another one a new sequence begins.
+void StreamJoin::begin_sequence(const Packet& frame) {
+    const bool goes_on = header_ && *header_ == stream_.in_force->payload;
+    const bool ascends = frames_ == 0 || frame.timestamp_us > last_us_;
+    if (!goes_on) {
+        next_number_ = 0;
+        ++sequences_;
+    } else if (!stream_.begun) {
+        const double seconds = (static_cast<double>(frame.timestamp_us) - static_cast<double>(last_us_)) / 1e6;
+        const double of_a_frame = static_cast<double>(stream_.time.one_frame_us()) / 1e6;
+        // Half a frame more is jitter.
+        if (!ascends || seconds > 1.5 * of_a_frame) stream_.pause_seconds = ascends ? seconds - of_a_frame : -1;
+    }
+    stream_.first = frame.frame;
+    stream_.number = next_number_;
+    stream_.later_us =
+        ascends ? 0
+                : static_cast<std::int64_t>(static_cast<std::uint64_t>(last_us_) + stream_.time.one_frame_us() -
+                                            static_cast<std::uint64_t>(frame.timestamp_us));
+    stream_.header = stream_.in_force;
+    stream_.begun = true;
+    header_ = stream_.in_force->payload;
+}
+
+Result<void> StreamJoin::write_frame(Packet packet) {
+    auto frame = moved(std::move(packet));
+    if (stream_.header) {
+        auto header = moved(*std::exchange(stream_.header, std::nullopt));
+        header.frame = frame.frame;
+        header.timestamp_us = frame.timestamp_us;
+        if (auto ok = output_.write(header); !ok) return ok;
+    }
+    for (auto& before : std::exchange(stream_.waiting, {}))
+        if (auto ok = output_.write(moved(std::move(before))); !ok) return ok;
+    ++frames_;
+    next_number_ = std::max(next_number_, frame.frame + 1);
+    last_us_ = frame.timestamp_us;
+    return output_.write(frame);
+}
+
+Result<void> StreamJoin::take(Packet packet) {
+    stream_.numbers.take(packet);
+    stream_.time.take(packet, stream_.numbers.begins_sequence());
+    output_.add_bounds_of(packet);
+    if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return {};
+    if (packet.kind == PacketKind::sequence) {
+        stream_.in_force = stream_.header = std::move(packet);
+        return {};
+    }
+    if (!frame_type(packet.kind)) {
+        stream_.waiting.push_back(std::move(packet));
+        return {};
+    }
+    if (!stream_.in_force) return {};
+    if (stream_.numbers.begins_sequence()) begin_sequence(packet);
+    return write_frame(std::move(packet));
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,35 @@
+// The time of frames in a whole stream: each of its sequences begins where the one before ends, a mean frame after its
+// last frame.
+#pragma once
+
+#include <cstdint>
+
+#include "htvm/packet.hpp"
+
+namespace htvm {
+
+class RunningTime {
+public:
+    // Takes every packet of the stream, in order. begins_sequence: FrameNumbers::begins_sequence() of this packet.
+    void take(const Packet& packet, bool begins_sequence);
+    // To begin in the middle of the stream's first sequence, whose first frame has this timestamp. Then only
+    // microseconds() is known.
+    void begin(std::int64_t first_timestamp_us);
+    // When the last frame begins, microseconds from the first one.
+    std::uint64_t microseconds() const;
+    // When it ends.
+    std::uint64_t total_us() const;
+    // How long a frame lasts by the frame rate of the sequence header in force, and so one that is alone in its
+    // sequence; 0 before any header.
+    std::uint64_t one_frame_us() const { return one_frame_us_; }
+
+private:
+    double span() const;                            // from the first to the last frame of this one, seconds
+    std::uint64_t before_us_ = 0;                   // of the sequences before
+    std::int64_t first_us_ = 0, last_us_ = 0;       // timestamps in this one
+    std::uint64_t frames_ = 0;                      // of this one
+    std::uint64_t one_frame_us_ = 0, lone_us_ = 0;  // of the header in force; of the one in force at the last frame
+    bool in_the_middle_ = false;                    // whether this one's first frame did not come
+};
+
+}  // namespace htvm
