@@ -1,0 +1,155 @@
+#include "live/broadcast.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "htvm/decoder.hpp"
+
+namespace htvm::live {
+namespace {
+
+bool is_index(PacketKind kind) { return kind == PacketKind::index || kind == PacketKind::front_index; }
+
+using Places = std::vector<std::uint64_t>;
+
+Places ascending(Places places) {
+    std::sort(places.begin(), places.end());
+    return places;
+}
+
+Places without(const Places& all, const Places& some) {
+    Places out;
+    std::set_difference(all.begin(), all.end(), some.begin(), some.end(), std::back_inserter(out));
+    return out;
+}
+
+Places united(const Places& a, const Places& b) {
+    Places out;
+    std::set_union(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(out));
+    return out;
+}
+
+}  // namespace
+
+void Broadcast::push(SharedPacket packet, Clock::time_point now) {
+    if (is_index(packet->header.kind)) return;
+    const auto place = dependencies_.push(packet->header);
+    const bool frame = frame_type(packet->header.kind).has_value();
+    packets_[place] = std::move(packet);
+    kept_ = ascending(dependencies_.kept());
+    const auto closure = ascending(dependencies_.closure());
+    if (frame) closure_ = closure;
+    forget_all_but(united(united(kept_, closure_), {place}));
+    if (frame && closure.empty()) {
+        ++undecodable_;
+        return;
+    }
+    for (auto& [viewer, queue] : viewers_) {
+        const bool slept = queue.waiting.empty();
+        if (queue.in_step)
+            give_in_step(queue, place, now);
+        else if (frame)
+            try_to_follow(queue, now);
+        if (slept && !queue.waiting.empty()) queue.wake();
+    }
+}
+
+Broadcast::Viewer Broadcast::join(std::function<void()> wake, Clock::time_point now) {
+    const Viewer viewer = next_viewer_++;
+    auto& queue = viewers_[viewer];
+    queue.wake = std::move(wake);
+    if (!closure_.empty()) try_to_follow(queue, now);
+    if (!queue.waiting.empty()) queue.wake();
+    return viewer;
+}
+
+SharedPacket Broadcast::next(Viewer viewer) {
+    auto& queue = viewers_.at(viewer);
+    if (queue.waiting.empty()) return nullptr;
+    auto packet = std::move(queue.waiting.front().packet);
+    queue.waiting.pop_front();
+    queue.bytes -= packet->bytes.size();
+    ++queue.counters.packets;
+    queue.counters.bytes += packet->bytes.size();
+    return packet;
+}
+
+std::size_t Broadcast::kept_bytes() const {
+    std::size_t out = 0;
+    for (const auto& [place, packet] : packets_) out += packet->bytes.size();
+    return out;
+}
+
+bool Broadcast::fits(const Queue& queue, const LivePacket& packet, Clock::time_point now) const {
+    if (queue.waiting.empty()) return true;
+    return queue.bytes + packet.bytes.size() <= limits_.bytes && now - queue.waiting.front().arrived <= limits_.wait;
+}
+
+void Broadcast::give(Queue& queue, std::uint64_t place, Clock::time_point now) {
+    const auto& packet = packets_.at(place);
+    queue.waiting.push_back({place, packet, now});
+    queue.bytes += packet->bytes.size();
+}
+
+void Broadcast::give_in_step(Queue& queue, std::uint64_t place, Clock::time_point now) {
+    const auto& packet = *packets_.at(place);
+    if (fits(queue, packet, now)) return give(queue, place, now);
+    const bool frame = frame_type(packet.header.kind).has_value();
+    // Nothing depends on it, as on sound.
+    if (packet.header.has(packet_flag::droppable)) {
+        queue.counters.dropped_frames += frame ? 1 : 0;
+        return;
+    }
+    fall_behind(queue, place);
+    if (frame) try_to_follow(queue, now);
+}
+
+// What waits is dropped: by the time it could be sent it would be late. `place`: the packet that does not fit.
+void Broadcast::fall_behind(Queue& queue, std::uint64_t place) {
+    Places dropped;
+    for (const auto& waiting : queue.waiting) {
+        dropped.push_back(waiting.place);
+        if (frame_type(waiting.packet->header.kind)) ++queue.counters.dropped_frames;
+    }
+    dropped.push_back(place);
+    std::sort(dropped.begin(), dropped.end());
+    queue.has = without(kept_, dropped);
+    queue.waiting.clear();
+    queue.bytes = 0;
+    queue.in_step = false;
+    ++queue.counters.fallen_behind;
+}
+
+// Gives the newest frame with all that it and later ones need, if that is little, or the viewer has just come.
+void Broadcast::try_to_follow(Queue& queue, Clock::time_point now) {
+    const auto needed = without(united(kept_, closure_), queue.has);
+    std::size_t frames = 0, bytes = 0;
+    for (const auto place : needed) {
+        const auto& packet = *packets_.at(place);
+        frames += frame_type(packet.header.kind) ? 1 : 0;
+        bytes += packet.bytes.size();
+    }
+    const std::size_t missed = frames > 0 ? frames - 1 : 0;
+    const bool little = (queue.joining || missed <= limits_.most_missed) && bytes <= limits_.bytes;
+    if (missed > 0 && !little) {
+        if (!queue.joining) ++queue.counters.dropped_frames;
+        return;
+    }
+    // A header that was repeated comes behind the I-frame that it is needed for.
+    for (const bool header : {true, false})
+        for (const auto place : needed)
+            if ((packets_.at(place)->header.kind == PacketKind::sequence) == header) give(queue, place, now);
+    queue.has.clear();
+    queue.in_step = true;
+    queue.joining = false;
+}
+
+void Broadcast::forget_all_but(const std::vector<std::uint64_t>& needed) {
+    const auto forgotten = [&](std::uint64_t place) {
+        return !std::binary_search(needed.begin(), needed.end(), place);
+    };
+    std::erase_if(packets_, [&](const auto& entry) { return forgotten(entry.first); });
+    for (auto& [viewer, queue] : viewers_) std::erase_if(queue.has, forgotten);
+}
+
+}  // namespace htvm::live

@@ -1,0 +1,99 @@
+// One live stream on its way from its publisher to its viewers. A late viewer is sent what the newest frame needs, then
+// everything as it comes. What waits for a slow viewer is bounded, so it neither delays the others nor takes memory:
+// it is dropped up to the next frame that needs little, and counted. What a viewer is sent can always be decoded.
+//
+// Only headers are read (docs/bitstream.md, section 2.2), and there is no network here: a server pushes packets in, and
+// takes for each viewer the next packet to write.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "htvm/dependency.hpp"
+#include "htvm/packet.hpp"
+
+namespace htvm::live {
+
+// A packet as it stands in a file, shared by the viewers.
+struct LivePacket {
+    PacketHeader header;  // as told_header() has it
+    std::vector<std::uint8_t> bytes;
+};
+using SharedPacket = std::shared_ptr<const LivePacket>;
+
+// How much may wait for one viewer, besides what the kernel has taken.
+struct QueueLimits {
+    std::size_t bytes = std::size_t{1} << 20;
+    std::chrono::milliseconds wait{2000};  // from a packet's arrival until it is taken
+    std::size_t most_missed = 4;           // frames sent belatedly so that a viewer can follow again; where more are
+                                           // missing, it waits for a frame that needs fewer
+};
+
+struct ViewerCounters {
+    std::uint64_t packets = 0, bytes = 0;  // taken to be written
+    std::uint64_t dropped_frames = 0;
+    std::uint64_t fallen_behind = 0;  // how often
+};
+
+class Broadcast {
+public:
+    using Clock = std::chrono::steady_clock;
+    using Viewer = std::uint64_t;
+
+    explicit Broadcast(const QueueLimits& limits = {}) : limits_(limits) {}
+
+    // The publisher's next packet. Indexes, which speak of a file, go no further, nor do frames that no viewer could
+    // decode, since what they refer to did not come.
+    void push(SharedPacket packet, Clock::time_point now);
+
+    // wake: called when packets wait for the viewer again after none did.
+    Viewer join(std::function<void()> wake, Clock::time_point now);
+    void leave(Viewer viewer) { viewers_.erase(viewer); }
+    // The next packet to write for this viewer; null if none waits.
+    SharedPacket next(Viewer viewer);
+
+    std::size_t viewers() const { return viewers_.size(); }
+    const ViewerCounters& counters(Viewer viewer) const { return viewers_.at(viewer).counters; }
+    std::size_t waiting_bytes(Viewer viewer) const { return viewers_.at(viewer).bytes; }
+    std::uint64_t undecodable_frames() const { return undecodable_; }
+    // Memory held for viewers who may still join.
+    std::size_t kept_bytes() const;
+
+private:
+    struct Waiting {
+        std::uint64_t place;
+        SharedPacket packet;
+        Clock::time_point arrived;
+    };
+    struct Queue {
+        std::function<void()> wake;
+        std::deque<Waiting> waiting;
+        std::size_t bytes = 0;             // of what waits
+        bool in_step = false;              // it was given all that later frames may need
+        bool joining = true;               // it was not given a frame yet
+        std::vector<std::uint64_t> has{};  // if not in step: which of kept_ it was sent, ascending
+        ViewerCounters counters{};
+    };
+    bool fits(const Queue& queue, const LivePacket& packet, Clock::time_point now) const;
+    void give(Queue& queue, std::uint64_t place, Clock::time_point now);
+    void give_in_step(Queue& queue, std::uint64_t place, Clock::time_point now);
+    void fall_behind(Queue& queue, std::uint64_t place);
+    void try_to_follow(Queue& queue, Clock::time_point now);
+    void forget_all_but(const std::vector<std::uint64_t>& needed);
+
+    QueueLimits limits_;
+    Dependencies dependencies_;
+    std::map<std::uint64_t, SharedPacket> packets_;  // by place: those of kept_ and closure_
+    // Ascending: what later frames may need, and what the newest frame needs; empty if that cannot be decoded.
+    std::vector<std::uint64_t> kept_, closure_;
+    std::map<Viewer, Queue> viewers_;
+    Viewer next_viewer_ = 0;
+    std::uint64_t undecodable_ = 0;
+};
+
+}  // namespace htvm::live
