@@ -12,7 +12,7 @@ add_library(htvm_python SHARED
   $<TARGET_OBJECTS:htvm_io> python/native/mesh_files.cpp)
 target_include_directories(htvm_python PRIVATE include src python/native)
 target_link_libraries(htvm_python PRIVATE Threads::Threads tl::expected ${DRACO_ARCHIVE})
-target_link_options(htvm_python PRIVATE -static-libstdc++ -static-libgcc LINKER:--gc-sections
+target_link_options(htvm_python PRIVATE -static-libstdc++ -static-libgcc LINKER:--gc-sections,--no-undefined
                     LINKER:--version-script=${PROJECT_SOURCE_DIR}/src/c_api/exported_functions.map)
 set_target_properties(htvm_python PROPERTIES
   OUTPUT_NAME htvm LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/python

@@ -8,6 +8,7 @@ import mmap
 import operator
 import os
 import stat
+import threading
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, BinaryIO, Iterator, List, Optional, Tuple, Union
@@ -136,6 +137,7 @@ class _Packets:
         self._begin = 0  # of data
         self._sync: Optional[bytes] = None  # what packets begin with
         self._dependencies = _Dependencies()
+        self._lock = threading.Lock()
 
     @property
     def forward_only(self) -> bool:
@@ -208,9 +210,12 @@ class _Packets:
         return packet
 
     def at(self, place: int) -> Optional[_Packet]:
-        while place >= len(self.list):
-            if self.next() is None:
-                return None
+        """Of a source that is not read forward alone. Iterators share what is found."""
+        if place >= len(self.list):
+            with self._lock:
+                while place >= len(self.list):
+                    if self.next() is None:
+                        return None
         return self.list[place]
 
     def bytes_of(self, packet: _Packet) -> NDArray[np.uint8]:
@@ -414,9 +419,7 @@ class Stream:
     def _frame_packets(self) -> List[_Packet]:
         if self._packets.forward_only:
             raise BadInput("a file object must be read to know its frames: open its path or its bytes instead")
-        while self._packets.next() is not None:
-            pass
-        return [packet for packet in self._packets.list if packet.number is not None]
+        return [packet for packet in self._packets.each() if packet.number is not None]
 
     @property
     def numbers(self) -> NDArray[np.uint32]:

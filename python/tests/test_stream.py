@@ -208,7 +208,7 @@ def test_iterators_do_not_disturb_each_other(stream):
     def decode(name):
         results[name] = [digest(frame) for frame in opened]
 
-    list(opened.numbers)  # afterwards iterators only read what they share
+    opened = htvm.open(stream)  # what iterators share is found by all of them
     threads = [threading.Thread(target=decode, args=(name,)) for name in range(4)]
     for thread in threads:
         thread.start()
