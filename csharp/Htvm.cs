@@ -221,6 +221,7 @@ namespace Htvm
         [DllImport(Library)] public static extern Status htvm_encoder_send_mesh(IntPtr encoder, ref Mesh mesh, IntPtr pose, long timestamp_us, int force_intra);
         [DllImport(Library)] public static extern Status htvm_encoder_finish(IntPtr encoder);
         [DllImport(Library)] public static extern Status htvm_encoder_receive_packet(IntPtr encoder, byte[] buffer, UIntPtr capacity, out UIntPtr size);
+        [DllImport(Library)] public static extern Status htvm_encoder_front_index(IntPtr encoder, byte[] buffer, UIntPtr capacity, out UIntPtr size);
         [DllImport(Library)] public static extern Status htvm_encoder_last_frame(IntPtr encoder, ref FrameInfo info, UIntPtr info_size);
 
         // Sizes in bytes of structs and arrays, as the functions take them.
@@ -669,6 +670,20 @@ namespace Htvm
         {
             Check(Native.htvm_encoder_finish(handle));
             return Receive();
+        }
+
+        // After Finish(): the index that a file begins with, to be put in front of all packets but the last. Null if there
+        // was no frame.
+        public byte[] FrontIndex()
+        {
+            UIntPtr size;
+            var status = Native.htvm_encoder_front_index(handle, null, UIntPtr.Zero, out size);
+            if (status == Status.Again) throw new HtvmException(Status.BadInput, "the index is known once the stream is finished");
+            if (status == Status.End) return null;
+            if (status != Status.BufferTooSmall) Check(status);
+            var index = new byte[(int)size.ToUInt64()];
+            Check(Native.htvm_encoder_front_index(handle, index, size, out size));
+            return index;
         }
 
         // What became of the last mesh. False before any.

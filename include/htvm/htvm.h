@@ -497,6 +497,11 @@ htvm_status htvm_encoder_finish(htvm_encoder* encoder);
  * more is sent; HTVM_END: no more. A stream in a file is the sequence of its packets. */
 htvm_status htvm_encoder_receive_packet(htvm_encoder* encoder, uint8_t* buffer, size_t capacity, size_t* size);
 
+/* The index that a finished file begins with: its frames, duration, bounds, and where decoding can start. It goes in
+ * front of the packets received, the last of which, the index at the end, is then left out. HTVM_BUFFER_TOO_SMALL as
+ * above. HTVM_AGAIN before htvm_encoder_receive_packet() has returned HTVM_END; HTVM_END: the stream has no frames. */
+htvm_status htvm_encoder_front_index(htvm_encoder* encoder, uint8_t* buffer, size_t capacity, size_t* size);
+
 /* About the last frame sent: its type and how many bytes it took. HTVM_AGAIN before any. */
 htvm_status htvm_encoder_last_frame(htvm_encoder* encoder, htvm_frame_info* info, size_t info_size);
 

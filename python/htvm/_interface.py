@@ -248,6 +248,7 @@ functions: dict[str, tuple[Any, list[Any]]] = {
         htvm_status, [htvm_encoder, POINTER(htvm_mesh), POINTER(htvm_pose), c_int64, ctypes.c_int]),
     "htvm_encoder_finish": (htvm_status, [htvm_encoder]),
     "htvm_encoder_receive_packet": (htvm_status, [htvm_encoder, POINTER(c_uint8), c_size_t, POINTER(c_size_t)]),
+    "htvm_encoder_front_index": (htvm_status, [htvm_encoder, POINTER(c_uint8), c_size_t, POINTER(c_size_t)]),
     "htvm_encoder_last_frame": (htvm_status, [htvm_encoder, POINTER(htvm_frame_info), c_size_t]),
     "htvm_mesh_file_read": (htvm_status, [c_char_p, c_char_p, POINTER(htvm_mesh_file), c_char_p, c_size_t]),
     "htvm_mesh_file_destroy": (None, [htvm_mesh_file]),

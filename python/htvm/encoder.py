@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-import io
 import os
+import shutil
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, BinaryIO, Dict, List, Mapping, Optional, Tuple, Union
@@ -135,8 +135,8 @@ class Encoder:
             for mesh in meshes:
                 encoder.push(mesh)
 
-    output: None; a path, which is written beside its place and renamed when the stream is complete, so that what fails
-        leaves the file that was there; or a binary file object, which is not closed
+    output: None; a path, where the complete stream is put with its index in front: until then it is beside it, and what
+        fails leaves the file that was there; or a binary file object, which gets the packets and is not closed
     profile: "tracked", "topology" or "paper"
     quality: 0 to 100, sets geometry_step and colour_step; None: they keep their defaults
     fps: frames per second: a number, a Fraction or a text such as "30000/1001"
@@ -163,7 +163,8 @@ class Encoder:
     ) -> None:
         self._handle = c.htvm_encoder()
         self._file: Optional[BinaryIO] = None
-        self._path: Optional[str] = None
+        self._path: Optional[str] = None  # of a file that was opened here
+        self._partial: Optional[str] = None  # where it is until it is complete
         self._skeleton = skeleton
         self._due_us: Union[Fraction, int] = 0
         self._finished = False
@@ -183,13 +184,13 @@ class Encoder:
         if hasattr(output, "write"):
             self._file = output
             return
-        path = os.path.realpath(output)
+        path: str = os.path.realpath(output)
+        self._path = path
         if os.path.exists(path) and not os.path.isfile(path):
-            self._file = io.open(path, "wb")  # a device or a pipe
-            self._path = ""
+            self._file = open(path, "wb")  # a device or a pipe
         else:
-            self._file = io.open(path + ".partial", "wb")
-            self._path = path
+            self._file = open(path + ".partial", "w+b")
+            self._partial = path + ".partial"
 
     def push(
         self,
@@ -215,7 +216,9 @@ class Encoder:
         # Counted exactly, so that the times of frames do not drift.
         exact = self._due_us if round(self._due_us) == timestamp_us else timestamp_us
         self._due_us = exact + self._frame_us
-        return self._receive()
+        packets = self._receive()
+        self._write(packets)
+        return packets
 
     def finish(self) -> List[bytes]:
         """Ends the stream, and returns its last packets. A file is complete then, and in its place."""
@@ -226,15 +229,15 @@ class Encoder:
         try:
             self._check(c.library.htvm_encoder_finish(self._handle))
             packets = self._receive()
-            self._close_file(complete=True)
+            self._put_in_place(packets)
         finally:
-            self._close_file(complete=False)
+            self._remove()
         return packets
 
     def discard(self) -> None:
         """Gives up: what was written of a file is removed. Without effect after `finish`."""
         self._finished = True
-        self._close_file(complete=False)
+        self._remove()
 
     @property
     def last_frame(self) -> Optional[EncodedFrame]:
@@ -256,7 +259,7 @@ class Encoder:
 
     def __del__(self) -> None:
         if getattr(self, "_file", None) is not None:
-            self._close_file(complete=False)
+            self._remove()
         if getattr(self, "_handle", None):
             c.library.htvm_encoder_destroy(self._handle)
 
@@ -285,31 +288,62 @@ class Encoder:
         out.arrays = arrays  # as long as the pointers to them
         return out
 
+    def _packet(self, function: Any) -> Optional[bytes]:
+        """What one of the library's functions that give a packet has; None if there is none now."""
+        size = ctypes.c_size_t()
+        status = function(self._handle, None, 0, size)
+        if status in (c.HTVM_AGAIN, c.HTVM_END):
+            return None
+        if status != c.HTVM_BUFFER_TOO_SMALL:
+            self._check(status)
+        packet = np.empty(size.value, np.uint8)
+        self._check(function(self._handle, c.pointer(packet, ctypes.c_uint8), size, size))
+        return packet.tobytes()
+
     def _receive(self) -> List[bytes]:
         packets: List[bytes] = []
-        while True:
-            size = ctypes.c_size_t()
-            status = c.library.htvm_encoder_receive_packet(self._handle, None, 0, size)
-            if status in (c.HTVM_AGAIN, c.HTVM_END):
-                return packets
-            if status != c.HTVM_BUFFER_TOO_SMALL:
-                self._check(status)
-            packet = np.empty(size.value, np.uint8)
-            self._check(c.library.htvm_encoder_receive_packet(
-                self._handle, c.pointer(packet, ctypes.c_uint8), size, size))
-            packets.append(packet.tobytes())
-            if self._file is not None:
-                self._file.write(packets[-1])
+        while (packet := self._packet(c.library.htvm_encoder_receive_packet)) is not None:
+            packets.append(packet)
+        return packets
 
-    def _close_file(self, complete: bool) -> None:
+    def _write(self, packets: List[bytes]) -> None:
+        if self._file is not None:
+            self._file.write(b"".join(packets))
+
+    def _put_in_place(self, last: List[bytes]) -> None:
+        """Ends the output. A file gets its index in front, in place of the last packet, the index at the end."""
         file, self._file = self._file, None
-        if file is None or self._path is None:
+        if file is None:
             return
-        file.close()
-        if self._path and complete:
-            os.replace(self._path + ".partial", self._path)
-        elif self._path:
-            os.remove(self._path + ".partial")
+        front = self._packet(c.library.htvm_encoder_front_index) if self._partial else None
+        if front is None:
+            file.write(b"".join(last))
+        else:
+            file.write(b"".join(last[:-1]))
+        if not self._partial:
+            if self._path is not None:
+                file.close()
+            return
+        with file:
+            if front is not None:
+                file.seek(0)
+                with open(self._partial + ".indexed", "wb") as indexed:
+                    indexed.write(front)
+                    shutil.copyfileobj(file, indexed, 1 << 20)
+        if front is not None:
+            os.replace(self._partial + ".indexed", self._partial)
+        os.replace(self._partial, str(self._path))
+        self._partial = None
+
+    def _remove(self) -> None:
+        """What is not in its place yet."""
+        file, self._file = self._file, None
+        if file is not None and self._path is not None:
+            file.close()
+        partial, self._partial = self._partial, None
+        for name in (partial, partial + ".indexed") if partial else ():
+            if os.path.exists(name):
+                os.remove(name)
 
 
 def _set_options(

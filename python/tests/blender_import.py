@@ -19,16 +19,20 @@ def expected(place):
     return htvm.read_mesh(os.path.join(decoded, f"{place:05}.ply"), unit="mm")
 
 
+def shown_positions(mesh):
+    positions = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
+
+
 def shown(obj):
     """Positions, triangles and colours, as the scene evaluates them: what renderers and exporters get."""
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    positions = np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.vertices.foreach_get("co", positions)
     triangles = np.empty(3 * len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("vertices", triangles)
     colours = np.empty(4 * len(mesh.vertices), np.float32)
     mesh.color_attributes["Color"].data.foreach_get("color_srgb", colours)
-    return positions.reshape(-1, 3), triangles.reshape(-1, 3), np.round(255 * colours).reshape(-1, 4)[:, :3]
+    return shown_positions(mesh), triangles.reshape(-1, 3), np.round(255 * colours).reshape(-1, 4)[:, :3]
 
 
 def check(obj, place):
@@ -78,6 +82,28 @@ for frame in (10, 11, 12):
     names = [name for name in os.listdir(work) if name.startswith("out") and name.endswith(f"{frame}.obj")]
     exported = htvm.read_mesh(os.path.join(work, names[0]), unit="m")
     assert np.abs(exported.positions - expected(frame - 1).positions).max() < 0.01, f"exported frame {frame}"
+
+# So do renderers: a picture of a person is not all background.
+camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+camera.location, camera.rotation_euler = (0, -5, 1), (np.pi / 2, 0, 0)
+scene.collection.objects.link(camera)
+scene.camera = camera
+scene.render.engine = "CYCLES"
+scene.cycles.samples, scene.cycles.use_denoising = 1, False
+scene.render.resolution_x = scene.render.resolution_y = 64
+scene.render.filepath = os.path.join(work, "render_")
+rendered = []
+scene.frame_start, scene.frame_end = 13, 14
+bpy.app.handlers.render_post.append(lambda scene, *_: rendered.append((scene.frame_current, shown_positions(obj.data))))
+bpy.ops.render.render(animation=True)
+assert [frame for frame, _ in rendered] == [13, 14]
+for frame, positions in rendered:
+    assert np.array_equal(positions, expected(frame - 1).positions), f"rendered frame {frame}"
+    image = bpy.data.images.load(os.path.join(work, f"render_{frame:04}.png"))
+    pixels = np.empty(64 * 64 * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    drawn = np.any(np.abs(pixels.reshape(-1, 4) - pixels[:4]) > 0.1, axis=1).mean()
+    assert 0.02 < drawn < 0.6, f"{drawn:.0%} of the picture is not background"
 
 # A saved scene shows the stream again.
 scene.frame_set(8)

@@ -1,5 +1,7 @@
 import io
-from pathlib import Path
+import os
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -64,8 +66,19 @@ def test_a_file_is_there_when_it_is_complete(tmp_path, stream):
         for number in range(12):
             encoder.push(sheet(number))
         assert path.read_text() == "an earlier file"
-    assert path.read_bytes() == stream
+    assert list(htvm.open(path).numbers) == list(range(12))
     assert [entry.name for entry in tmp_path.iterdir()] == ["sheet.htvm"]
+
+
+@pytest.mark.skipif(shutil.which(os.environ.get("HTVM_PROGRAM", "htvm")) is None, reason="the program htvm is not there")
+def test_a_file_begins_with_the_index_that_htvm_writes(tmp_path, stream):
+    with htvm.Encoder(tmp_path / "python.htvm", key_interval=4, subject_size=1000) as encoder:
+        for number in range(12):
+            encoder.push(sheet(number))
+    (tmp_path / "plain.htvm").write_bytes(stream)
+    program = os.environ.get("HTVM_PROGRAM", "htvm")
+    subprocess.run([program, "index", tmp_path / "plain.htvm", "--bounds", "-o", tmp_path / "indexed.htvm"], check=True)
+    assert (tmp_path / "python.htvm").read_bytes() == (tmp_path / "indexed.htvm").read_bytes()
 
 
 def test_what_fails_leaves_the_file_that_was_there(tmp_path):

@@ -9,6 +9,7 @@
 #include "c_api/c_status.h"
 #include "htvm/encoder.hpp"
 #include "htvm/option_list.hpp"
+#include "htvm/stream_index.hpp"
 
 using htvm::c_api::check_struct;
 using htvm::c_api::elements;
@@ -23,7 +24,10 @@ struct htvm_encoder {
     htvm::Encoder encoder;
     std::vector<std::uint8_t> packet;  // pulled but not yet received; empty: none
     std::uint32_t attributes = 0;      // of the last frame
+    htvm::StreamIndexer indexer;       // of the packets pulled, but for the index at the end
+    std::uint64_t indexed_bytes = 0;
     bool any_frame = false, finished = false;
+    bool ended = false;  // finished, and all packets were received
     LastError error;
 
     htvm_encoder(const htvm_allocator& memory, const htvm::Skeleton& skeleton, htvm::Encoder&& made)
@@ -104,6 +108,28 @@ htvm_status read_pose(htvm_encoder& encoder, const htvm_pose& given, htvm::Pose&
     out.joints = elements<htvm::Vector3d>(pose.joints, encoder.joints);
     out.orientations = elements<htvm::Rotation>(pose.orientations, encoder.bones);
     for (std::size_t j = 0; pose.tracked && j < encoder.joints; ++j) out.tracked.push_back(pose.tracked[j] != 0);
+    return HTVM_OK;
+}
+
+// The next packet's bytes; empty if there is none.
+std::vector<std::uint8_t> pull(htvm_encoder& encoder) {
+    const auto packet = encoder.encoder.pull();
+    if (!packet) return {};
+    auto bytes = htvm::write_packet(*packet);
+    if (packet->kind != htvm::PacketKind::index) {
+        encoder.indexer.add(*packet, encoder.indexed_bytes);
+        encoder.indexed_bytes += bytes.size();
+    }
+    return bytes;
+}
+
+htvm_status give_packet(LastError& error, const std::vector<std::uint8_t>& packet, std::uint8_t* buffer,
+                        std::size_t capacity, std::size_t* size) {
+    *size = packet.size();
+    if (capacity < *size)
+        return error.set(HTVM_BUFFER_TOO_SMALL, ("the packet has " + std::to_string(*size) + " bytes").c_str());
+    if (!buffer) return error.set(HTVM_BAD_INPUT, "the buffer is NULL");
+    std::memcpy(buffer, packet.data(), *size);
     return HTVM_OK;
 }
 
@@ -289,6 +315,7 @@ htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh,
         const auto pushed =
             encoder->encoder.push(cpp_mesh, with_pose ? &cpp_pose : nullptr, timestamp_us, force_intra != 0);
         if (!pushed) return error.set(pushed.error());
+        if (const auto bounds = encoder->encoder.bounds()) encoder->indexer.add(*bounds);
         encoder->any_frame = true;
         encoder->attributes = htvm::c_api::attributes_of(htvm::view_of(cpp_mesh));
         return htvm_status{HTVM_OK};
@@ -310,16 +337,24 @@ htvm_status htvm_encoder_receive_packet(htvm_encoder* encoder, uint8_t* buffer, 
         auto& error = encoder->error;
         if (!size) return error.set(HTVM_BAD_INPUT, "size is NULL");
         *size = 0;
-        if (encoder->packet.empty())
-            if (const auto packet = encoder->encoder.pull()) encoder->packet = htvm::write_packet(*packet);
+        if (encoder->packet.empty()) encoder->packet = pull(*encoder);
+        encoder->ended = encoder->finished && encoder->packet.empty();
         if (encoder->packet.empty()) return htvm_status{encoder->finished ? HTVM_END : HTVM_AGAIN};
-        *size = encoder->packet.size();
-        if (capacity < *size)
-            return error.set(HTVM_BUFFER_TOO_SMALL, ("the packet has " + std::to_string(*size) + " bytes").c_str());
-        if (!buffer) return error.set(HTVM_BAD_INPUT, "the buffer is NULL");
-        std::memcpy(buffer, encoder->packet.data(), *size);
-        encoder->packet.clear();
-        return htvm_status{HTVM_OK};
+        const auto given = give_packet(error, encoder->packet, buffer, capacity, size);
+        if (given == HTVM_OK) encoder->packet.clear();
+        return given;
+    });
+}
+
+htvm_status htvm_encoder_front_index(htvm_encoder* encoder, uint8_t* buffer, size_t capacity, size_t* size) {
+    if (!encoder) return HTVM_BAD_INPUT;
+    return guarded(encoder->error, [&] {
+        if (!size) return encoder->error.set(HTVM_BAD_INPUT, "size is NULL");
+        *size = 0;
+        if (!encoder->ended) return htvm_status{HTVM_AGAIN};
+        const auto index = encoder->indexer.finish(encoder->indexed_bytes);
+        if (index.frames == 0) return htvm_status{HTVM_END};
+        return give_packet(encoder->error, htvm::write_packet(htvm::write_index(index)), buffer, capacity, size);
     });
 }
 

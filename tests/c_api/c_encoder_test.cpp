@@ -10,6 +10,7 @@
 
 #include "c_api/c_test_streams.h"
 #include "htvm/option_list.hpp"
+#include "htvm/stream_index.hpp"
 
 namespace htvm {
 namespace {
@@ -254,6 +255,56 @@ TEST(CEncoder, APacketStaysUntilItsBufferIsLargeEnough) {
     PacketReader reader;
     reader.push(buffer);
     EXPECT_TRUE(reader.pull().has_value());
+}
+
+// As `htvm encode` puts it in front of a file: of everything but the index at the end.
+TEST(CEncoder, GivesTheIndexForTheFrontOfAFile) {
+    const auto encoder = make_encoder();
+    const auto frames = sequence_of(tfan_test::grid(5, 5), 3, none).frames;
+    std::size_t size = 0;
+    std::vector<std::uint8_t> buffer(1 << 16);
+    const auto front = [&] { return htvm_encoder_front_index(encoder.get(), buffer.data(), buffer.size(), &size); };
+    std::vector<std::vector<std::uint8_t>> packets;
+    const auto receive = [&] {
+        htvm_status status;
+        while ((status = htvm_encoder_receive_packet(encoder.get(), buffer.data(), buffer.size(), &size)) == HTVM_OK)
+            packets.emplace_back(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size));
+        return status;
+    };
+    for (std::size_t k = 0; k < frames.size(); ++k) {
+        const auto mesh = c_mesh(frames[k].mesh);
+        ASSERT_EQ(htvm_encoder_send_mesh(encoder.get(), &mesh, nullptr, 40000 * static_cast<int>(k), k == 2), HTVM_OK);
+        ASSERT_EQ(receive(), HTVM_AGAIN);
+    }
+    ASSERT_EQ(htvm_encoder_finish(encoder.get()), HTVM_OK);
+    EXPECT_EQ(front(), HTVM_AGAIN) << "not all packets were received";
+    ASSERT_EQ(receive(), HTVM_END);
+
+    Decoder decoder;
+    StreamIndexer expected;
+    std::uint64_t offset = 0;
+    packets.pop_back();
+    for (const auto& bytes : packets) {
+        PacketReader reader;
+        reader.push(bytes);
+        const auto packet = *reader.pull();
+        expected.add(packet, offset);
+        offset += bytes.size();
+        const auto frame = decoder.push(packet);
+        ASSERT_TRUE(frame.has_value());
+        if (*frame) expected.add(*bounds_of((*frame)->mesh.positions));
+    }
+    ASSERT_EQ(front(), HTVM_OK);
+    const auto index = write_packet(write_index(expected.finish(offset)));
+    EXPECT_EQ(std::vector<std::uint8_t>(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(size)), index);
+    EXPECT_EQ(htvm_encoder_front_index(encoder.get(), buffer.data(), size - 1, &size), HTVM_BUFFER_TOO_SMALL);
+    EXPECT_EQ(htvm_encoder_front_index(encoder.get(), buffer.data(), buffer.size(), nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_front_index(nullptr, buffer.data(), buffer.size(), &size), HTVM_BAD_INPUT);
+
+    const auto empty = make_encoder();
+    ASSERT_EQ(htvm_encoder_finish(empty.get()), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_receive_packet(empty.get(), buffer.data(), buffer.size(), &size), HTVM_END);
+    EXPECT_EQ(htvm_encoder_front_index(empty.get(), buffer.data(), buffer.size(), &size), HTVM_END);
 }
 
 TEST(CEncoder, OptionsThatDoNotGoTogetherAreToldInASentence) {

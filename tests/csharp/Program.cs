@@ -239,7 +239,14 @@ static class Program
             }
             FrameInfo last;
             Require(encoder.LastFrame(out last) && last.Frame == 3 && last.Type == FrameKind.Tracked, "the last frame");
-            store(encoder.Finish());
+            Fails(() => encoder.FrontIndex(), Status.BadInput, "finished");
+            var ending = encoder.Finish();
+            store(ending);
+            // In a file: the index in front, in place of the last packet.
+            var index = encoder.FrontIndex();
+            var length = (int)bytes.Length - ending[ending.Count - 1].Length;
+            var indexed = index.Concat(bytes.ToArray().Take(length)).ToArray();
+            Require(Digests(indexed).SequenceEqual(Digests(bytes.ToArray())), "the same frames behind the index");
         }
         var kinds = new List<FrameKind>();
         bytes.Position = 0;
