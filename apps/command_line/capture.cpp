@@ -132,7 +132,7 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
     Capture capture;
     capture.options_ = options;
     if (is_piped(options)) {
-        capture.pipe_.emplace(options.drop_late);
+        capture.pipe_ = std::make_shared<MeshPipe>(options.drop_late);
     } else if (auto found = capture.find_files(); !found) {
         return tl::unexpected(found.error());
     }
@@ -160,7 +160,7 @@ Result<void> Capture::find_files() {
                     fmt::format("--first {} leaves nothing: there are {} frames", options_.first, found));
     frames_ = found - options_.first;
     if (options_.frames > 0) frames_ = std::min(frames_, options_.frames);
-    next_ = options_.first;
+    next_ = begin_ = options_.first;
     return {};
 }
 
@@ -266,7 +266,7 @@ Result<void> Capture::find_poses() {
 Result<void> Capture::find_unit() {
     std::optional<Error> error;
     millimetres_per_unit_ = 1;
-    for (std::size_t end = options_.first + frames_;;) {
+    for (std::size_t end = begin_ + frames_;;) {
         auto mesh = pipe_ ? read_pipe() : read_file();
         if (mesh && !*mesh) break;
         if (mesh) peeked_ = std::move(**mesh);
@@ -298,7 +298,7 @@ Result<void> Capture::find_unit() {
     if (auto ok = scale_positions(*peeked_, millimetres_per_unit_); !ok) return ok;
     find_floor();
     // From files all is read again but what is kept.
-    if (!pipe_) next_ = options_.first;
+    if (!pipe_) next_ = begin_;
     at_.reset();
     return {};
 }
@@ -319,10 +319,10 @@ void Capture::find_floor() {
 // ---- Frames ---------------------------------------------------------------------------------------------------------
 
 Result<std::optional<Mesh>> Capture::read_file() {
-    if (next_ == options_.first + frames_) return std::optional<Mesh>{};
+    if (next_ == begin_ + frames_) return std::optional<Mesh>{};
     const std::size_t place = next_++;
     const std::int64_t before = timestamp_us_;
-    missing_ = at_ ? static_cast<std::size_t>(places_[place] - places_[place - 1] - 1) : 0;
+    missing_ = place > options_.first ? static_cast<std::size_t>(places_[place] - places_[place - 1] - 1) : 0;
     at_ = place;
     timestamp_us_ = file_times_.empty() ? regular_time(places_[place]) : file_times_[place];
     before_us_ = before;
@@ -377,15 +377,25 @@ Result<std::optional<Mesh>> Capture::next() {
 
 void Capture::rewind() {
     at_.reset();
-    next_ = options_.first;
+    next_ = begin_;
     taken_ = 0;
 }
 
-const Pose* Capture::pose() const { return poses_.empty() ? nullptr : &poses_[std::min(*at_, poses_.size() - 1)]; }
+void Capture::restrict_to(std::size_t first, std::size_t frames) {
+    begin_ = options_.first + first;
+    frames_ = frames;
+    rewind();
+}
+
+Mesh Capture::take_first() { return *std::exchange(peeked_, std::nullopt); }
+
+const Pose* Capture::pose_at(std::size_t place) const {
+    return poses_.empty() ? nullptr : &poses_[std::min(place, poses_.size() - 1)];
+}
 
 std::string Capture::name() const {
     if (pipe_) return fmt::format("mesh {} of standard input", at_.value_or(0));
-    return files_.paths[at_.value_or(options_.first)].string();
+    return files_.paths[at_.value_or(begin_)].string();
 }
 
 std::int64_t Capture::missing_timestamp_us(std::size_t k) const {

@@ -60,9 +60,15 @@ public:
     bool survives_errors() const { return !pipe_; }
     // Back to the first frame. From files only: standard input does not come again.
     void rewind();
+    // To these frames alone, of those there were when it was opened. From files only.
+    void restrict_to(std::size_t first, std::size_t frames);
+    // The first frame that can be read and has vertices, by which the unit was found: its mesh, in mm, once and before
+    // next(); and its pose, null where there is no skeleton. From files only.
+    Mesh take_first();
+    const Pose* first_pose() const { return pose_at(peeked_at_); }
 
     // Of the frame that next() gave, or failed at, last:
-    const Pose* pose() const;  // null where there is no skeleton
+    const Pose* pose() const { return pose_at(*at_); }  // null where there is no skeleton
     std::int64_t timestamp_us() const { return timestamp_us_; }
     std::string name() const;                                // its file, or its place on standard input
     std::size_t missing_before() const { return missing_; }  // frames of the numbers between it and the one before
@@ -91,11 +97,12 @@ private:
     Result<std::optional<Mesh>> read_pipe();
     Result<void> find_piped_time(std::size_t place, const std::string& timestamp);
     std::int64_t regular_time(std::uint64_t place) const;
+    const Pose* pose_at(std::size_t place) const;
 
     CaptureOptions options_;
     SequenceFiles files_;
     std::vector<std::uint64_t> places_;     // of the files in time, in frames
-    std::optional<MeshPipe> pipe_;          // standard input
+    std::shared_ptr<MeshPipe> pipe_;        // standard input; copies share it
     FrameTimes listed_;                     // of --timestamps
     std::vector<std::int64_t> file_times_;  // microseconds, of each file, where they are not regular
     FrameRate rate_{30000, 1000};
@@ -105,7 +112,7 @@ private:
     Skeleton skeleton_;
     std::vector<Pose> poses_;
     std::vector<double> radii_;
-    std::size_t frames_ = 0;
+    std::size_t begin_ = 0, frames_ = 0;  // place of the first frame; their number, 0 where it is not known
 
     std::optional<Mesh> peeked_;        // the first mesh that can be read, in mm, read beforehand to tell its unit
     std::size_t peeked_at_ = 0;         // its place

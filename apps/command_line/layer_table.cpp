@@ -31,15 +31,21 @@ void add(LayerTotals& totals, const FrameInfo& info) {
     totals.bytes += info.bytes;
 }
 
+void add(LayerTotals& totals, const LayerTotals& others) {
+    totals.frames += others.frames;
+    totals.source_vertices += others.source_vertices;
+    totals.bytes += others.bytes;
+}
+
 void add(TotalsByType& totals, const FrameInfo& info) { add(totals.of(info.type), info); }
+
+void add(TotalsByType& totals, const TotalsByType& others) {
+    for (std::size_t type = 0; type < frame_type_count; ++type) add(totals.totals[type], others.totals[type]);
+}
 
 LayerTotals TotalsByType::all() const {
     LayerTotals out;
-    for (const auto& sums : totals) {
-        out.frames += sums.frames;
-        out.source_vertices += sums.source_vertices;
-        out.bytes += sums.bytes;
-    }
+    for (const auto& sums : totals) add(out, sums);
     return out;
 }
 

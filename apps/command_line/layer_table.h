@@ -17,6 +17,7 @@ struct LayerTotals {
 };
 
 void add(LayerTotals& totals, const FrameInfo& info);
+void add(LayerTotals& totals, const LayerTotals& others);
 
 // The same for each kind of frame.
 struct TotalsByType {
@@ -26,6 +27,7 @@ struct TotalsByType {
     LayerTotals all() const;
 };
 void add(TotalsByType& totals, const FrameInfo& info);
+void add(TotalsByType& totals, const TotalsByType& others);
 
 // Bits per captured vertex; 0 if there is no vertex.
 double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);

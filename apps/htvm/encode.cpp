@@ -4,17 +4,18 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "command_line/interruption.h"
-#include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"
-#include "encoder_options.h"
+#include "encode_jobs.h"
+#include "encode_pass.h"
+#include "io/number_text.h"
 #include "rate_passes.h"
 #include "rate_report.h"
 #include "stream_file.h"
@@ -22,195 +23,10 @@
 namespace htvm::app {
 namespace {
 
-struct Options {
-    CaptureOptions capture;
-    EncodingOptions encoding;
-    std::string output, on_bad_frame = "stop";
-    bool fill = false, json = false;
-    bool keep_partial = true;  // of an encoding that ends early
-};
-
-// ---- One run over the capture ---------------------------------------------------------------------------------------
-
-struct Summary {
-    TotalsByType totals;
-    double encode_seconds = 0;
-    std::size_t without_triangles = 0;
-    // Of the capture's frames, coded or not.
-    std::size_t frames = 0;
-    std::int64_t first_us = 0, last_us = 0;
-    // Frames that are not as captured.
-    std::size_t left_out = 0, repeated = 0;  // bad ones
-    std::size_t missing = 0, filled = 0;     // by the numbers of the files
-    nlohmann::json list = nlohmann::json::array();
-};
-
-// Of two runs, the first writes nothing.
-struct Pass {
-    const Options& options;
-    Capture& capture;
-    Encoder& encoder;
-    StreamOutput* output;  // null: the packets go nowhere
-    RateReport& rate;
-    std::string name;  // for the progress line
-    Summary& summary;
-    Progress progress{name, capture.frames()};
-    std::optional<Mesh> last = {};  // coded last, where it may have to stand in for others
-    bool is_first_to_write = true;  // of several passes that do: says what is wrong with the capture
-};
-
-// Of hundreds the first few tell enough.
-void warn_of_frame(const Pass& pass, std::size_t how_many_so_far, const std::string& line) {
-    constexpr std::size_t most = 10;
-    if (!pass.output || !pass.is_first_to_write || how_many_so_far > most) return;
-    warn(how_many_so_far < most ? line : line + "; others like it follow");
-}
-
-Result<void> drain(const Pass& pass) {
-    while (auto packet = pass.encoder.pull()) {
-        pass.rate.buffer.add(*packet);
-        if (!pass.output) continue;
-        if (auto written = pass.output->write(*packet); !written) return written;
-    }
-    return {};
-}
-
-std::string progress_text(const Pass& pass, const FrameInfo& info) {
-    std::string text = fmt::format("{} {:.2f} bpv", kind_of(info.type).letter,
-                                   bits_per_vertex(info.bytes.total(), info.source_vertices));
-    if (pass.rate.controlled()) text += fmt::format(", quality {:.0f}", pass.encoder.last_cost().quality);
-    return text;
-}
-
-// What became of a mesh.
-enum class Coded { yes, dropped };
-
-// Under rate control a frame that does not fit is dropped, and the stream goes on without it; but not the first, as all
-// others need an I-frame before them.
-Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us) {
-    auto& summary = pass.summary;
-    const auto start = std::chrono::steady_clock::now();
-    const auto pushed = pass.encoder.push(mesh, pose, timestamp_us);
-    summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const bool dropped =
-        !pushed && pushed.error().kind == ErrorKind::limit && pass.rate.rate_controlled() && !pass.rate.costs.empty();
-    if (!pushed && !dropped)
-        return fail(pushed.error().kind, fmt::format("{}: {}", pass.capture.name(), pushed.error().message));
-    if (summary.frames++ == 0) summary.first_us = timestamp_us;
-    summary.last_us = timestamp_us;
-    if (dropped) {
-        add_dropped(pass.rate);
-        warn_of_frame(pass, pass.rate.dropped.size(),
-                      fmt::format("{} is dropped: {}", pass.capture.name(), pushed.error().message));
-        pass.progress.step("dropped");
-        return Coded::dropped;
-    }
-    const auto& info = pass.encoder.last_frame();
-    add(summary.totals, info);
-    add_coded(pass.rate, pass.encoder.last_cost());
-    if (pass.options.json && pass.output) {
-        summary.list.push_back(frame_json(info));
-        if (pass.rate.controlled()) summary.list.back()["quality"] = pass.encoder.last_cost().quality;
-    }
-    if (auto written = drain(pass); !written) return tl::unexpected(written.error());
-    if (const auto bounds = pass.encoder.bounds(); bounds && pass.output) pass.output->add_bounds(*bounds);
-    pass.progress.step(progress_text(pass, info));
-    return Coded::yes;
-}
-
-// The frame coded last, once more.
-Result<void> repeat(Pass& pass, std::int64_t timestamp_us) {
-    const auto coded = code(pass, *pass.last, nullptr, timestamp_us);
-    return coded ? Result<void>() : tl::unexpected(coded.error());
-}
-
-// Numbers that are missing between two files.
-Result<void> take_gap(Pass& pass) {
-    auto& summary = pass.summary;
-    const auto missing = pass.capture.missing_before();
-    if (missing == 0) return {};
-    const bool fill = pass.options.fill && pass.last;
-    warn_of_frame(pass, summary.missing + 1,
-                  fmt::format("{} missing before {}, by the numbers in the names; {}",
-                              counted(missing, "frame") + (missing == 1 ? " is" : " are"), pass.capture.name(),
-                              fill ? "the frame before is repeated" : "a gap in time is left (see --fill)"));
-    summary.missing += missing;
-    for (std::size_t k = 0; fill && k < missing; ++k) {
-        if (auto repeated = repeat(pass, pass.capture.missing_timestamp_us(k)); !repeated) return repeated;
-        ++summary.filled;
-    }
-    return {};
-}
-
-// A frame that cannot be read or coded.
-Result<void> take_bad(Pass& pass, const Error& error) {
-    auto& summary = pass.summary;
-    const auto& policy = pass.options.on_bad_frame;
-    if (interruption() != 0 || error.kind == ErrorKind::disk_full) return tl::unexpected(error);
-    if (!pass.capture.survives_errors()) return tl::unexpected(error);
-    if (policy == "stop") return fail(error.kind, error.message + " (--on-bad-frame skip goes on without such frames)");
-    const bool repeats = policy == "repeat" && pass.last;
-    warn_of_frame(pass, summary.left_out + summary.repeated + 1,
-                  error.message + (repeats ? "; the frame before is repeated in its place" : "; it is left out"));
-    ++(repeats ? summary.repeated : summary.left_out);
-    if (repeats) return repeat(pass, pass.capture.timestamp_us());
-    pass.progress.step("left out");
-    return {};
-}
-
-// What cannot be coded as it should, though the encoder would take it.
-Result<void> check_triangles(Pass& pass, const Mesh& mesh) {
-    auto& summary = pass.summary;
-    if (!mesh.triangles.empty()) return {};
-    const bool first = summary.totals.all().frames == summary.without_triangles;
-    const auto name = pass.capture.name();
-    if (first && pass.options.encoding.profile == "tracked" && !mesh.positions.empty())
-        return fail(ErrorKind::bad_input,
-                    name +
-                        " has points, but no triangles, and --profile tracked codes surfaces: make a mesh of the "
-                        "points first, or give --profile topology, which codes points as they are");
-    if (!first && pass.options.on_bad_frame != "stop") return fail(ErrorKind::bad_input, name + " has no triangles");
-    ++summary.without_triangles;
-    return {};
-}
-
-Result<void> take(Pass& pass, Mesh& mesh) {
-    if (auto fine = check_triangles(pass, mesh); !fine) return fine;
-    const auto coded = code(pass, mesh, pass.capture.pose(), pass.capture.timestamp_us());
-    if (!coded) return tl::unexpected(coded.error());
-    if (*coded == Coded::yes && (pass.options.fill || pass.options.on_bad_frame == "repeat"))
-        pass.last = std::move(mesh);
-    return {};
-}
-
-// Ends with an error of any kind where it is interrupted.
-Result<void> encode_frames(Pass& pass) {
-    const auto interrupted = [] { return fail(ErrorKind::bad_input, "interrupted"); };
-    for (;;) {
-        if (interruption() != 0) return interrupted();
-        auto mesh = pass.capture.next();
-        if (mesh && !*mesh) break;
-        if (auto filled = take_gap(pass); !filled) return filled;
-        const auto taken = mesh ? take(pass, **mesh) : tl::unexpected(mesh.error());
-        if (taken) continue;
-        if (auto survived = take_bad(pass, taken.error()); !survived) return survived;
-    }
-    if (interruption() != 0) return interrupted();
-    pass.encoder.finish();
-    return drain(pass);
-}
-
-// How long the capture's frames last.
-double seconds_of(const Summary& summary, double fps) {
-    const auto frames = static_cast<double>(summary.frames);
-    return summary.frames > 1 ? static_cast<double>(summary.last_us - summary.first_us) / 1e6 * frames / (frames - 1)
-                              : 1 / fps;
-}
-
 // ---- What is said of it ---------------------------------------------------------------------------------------------
 
-void report(const Options& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes, double fps,
-            std::size_t dropped_late) {
+void report(const EncodeOptions& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes,
+            double fps, std::size_t dropped_late) {
     const auto frames = summary.totals.all().frames;
     const double seconds = seconds_of(summary, fps);
     const double megabits = 8e-6 * static_cast<double>(bytes);
@@ -247,12 +63,11 @@ void report(const Options& options, const Summary& summary, const RateReport& ra
 }
 
 // Why an encoding ended early, and what is left of it.
-tl::unexpected<Error> ended_early(Pass& pass, const Error& error) {
+tl::unexpected<Error> ended_early(Pass& pass, StreamOutput& output, const Error& error) {
     const auto frames = pass.summary.totals.all().frames;
     if (frames == 0 || !pass.options.keep_partial) return tl::unexpected(error);
-    pass.encoder.finish();
-    const bool whole = drain(pass).has_value();
-    const auto kept = pass.output->keep();
+    const bool whole = finish(pass).has_value();
+    const auto kept = output.keep();
     std::string message = fmt::format("{}; {} encoded before", error.message,
                                       counted(frames, "frame") + (frames == 1 ? " was" : " were"));
     if (!kept.empty())
@@ -273,7 +88,7 @@ bool may_be_live(const std::string& output) {
 
 // ---- The passes -----------------------------------------------------------------------------------------------------
 
-int fewest_passes(const Options& options, const EncoderOptions& settings) {
+int fewest_passes(const EncodeOptions& options, const EncoderOptions& settings) {
     if (!(settings.rate.bits_per_second > 0)) return 1;
     if (options.encoding.passes > 0) return options.encoding.passes;
     return is_piped(options.capture) ? 1 : 2;
@@ -288,14 +103,41 @@ bool is_off(const RateReport& rate, double bits, double seconds) {
     return error < -rate_tolerance && quality.lowest < 100 && rate.buffer.peak_percent() < full;
 }
 
-Result<void> encode(const Options& options) {
-    watch_for_interruption();
-    auto capture = Capture::open(options.capture);
-    if (!capture) return tl::unexpected(capture.error());
-    auto settings = encoder_options(options.encoding, *capture);
-    if (!settings) return tl::unexpected(settings.error());
-    if (!is_given(options.encoding, "session") && may_be_live(options.output)) settings->session = random_session();
-    const int fewest = fewest_passes(options, *settings);
+// Each group of frames by an encoder of its own. A job that has nothing to do leaves no file.
+Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, const EncoderOptions& settings) {
+    const auto of_group = frames_of_group(settings.key_interval);
+    const auto groups = (capture.frames() + of_group - 1) / of_group;
+    const auto have =
+        fmt::format("{} make {} of {}", counted(capture.frames(), "frame"), counted(groups, "group"), of_group);
+    if (groups_of(options.job, groups).count() == 0) {
+        std::error_code error;
+        if (std::filesystem::is_regular_file(options.output, error))
+            return fail(ErrorKind::bad_input, fmt::format("job {} of {} has nothing to do, as {}, but {} is there: "
+                                                          "remove it, so that it is not joined with the others",
+                                                          options.job.number, options.job.of, have, options.output));
+        note(fmt::format("job {} of {} has nothing to do, and writes nothing: {}", options.job.number, options.job.of,
+                         have));
+        return {};
+    }
+    if (options.jobs > groups) note(fmt::format("{}: as many jobs are enough", have));
+    auto output = StreamOutput::open(options.output);
+    if (!output) return tl::unexpected(output.error());
+    Summary summary;
+    RateReport rate(settings);
+    if (auto done = encode_groups(options, settings, capture, *output, summary, rate); !done)
+        return may_be_live(options.output)
+                   ? done
+                   : fail(done.error().kind, fmt::format("{}; nothing is written", done.error().message));
+    if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
+    if (summary.bounds) output->add_bounds(*summary.bounds);
+    if (auto finished = output->finish(); !finished) return finished;
+    report(options, summary, rate, output->bytes(), capture.fps(), 0);
+    return {};
+}
+
+// One run after another, until the bitrate is met.
+Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, EncoderOptions settings) {
+    const int fewest = fewest_passes(options, settings);
     // What went to a pipe cannot be taken back.
     const int most = options.encoding.passes == 0 && fewest == 2 && !may_be_live(options.output) ? most_passes : fewest;
     std::optional<RatePasses> passes;
@@ -303,28 +145,40 @@ Result<void> encode(const Options& options) {
         // Before the first pass, so that a place that cannot be written to does not cost one.
         auto output = StreamOutput::open(options.output);
         if (!output) return tl::unexpected(output.error());
-        auto encoder = Encoder::create(*settings);
+        auto encoder = Encoder::create(settings);
         if (!encoder) return tl::unexpected(encoder.error());
         Summary summary;
-        RateReport rate(*settings);
+        RateReport rate(settings);
         const bool writes = number >= fewest;
         {
-            const auto name = most == 1 ? std::string("encoding") : fmt::format("pass {}", number);
-            Pass pass{options, *capture, *encoder, writes ? &*output : nullptr, rate, name, summary};
-            pass.is_first_to_write = number == fewest;
-            if (auto ok = encode_frames(pass); !ok) return writes ? ended_early(pass, ok.error()) : ok;
+            Progress progress(most == 1 ? "encoding" : fmt::format("pass {}", number), capture.frames());
+            FrameWarnings warnings;
+            Pass pass{.options = options,
+                      .capture = capture,
+                      .encoder = *encoder,
+                      .write = {},
+                      .step = [&](const std::string& text) { progress.step(text); },
+                      .is_stopped = [] { return interruption() != 0; },
+                      .warnings = number == fewest ? &warnings : nullptr,
+                      .summary = summary,
+                      .rate = rate};
+            if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
+            auto done = encode_frames(pass);
+            if (!done) return writes ? ended_early(pass, *output, done.error()) : done;
+            if (done = finish(pass); !done) return done;
         }
-        const double seconds = seconds_of(summary, capture->fps());
+        const double seconds = seconds_of(summary, capture.fps());
         if (!writes || (number < most && is_off(rate, 8.0 * static_cast<double>(output->bytes()), seconds))) {
             if (!passes) passes.emplace(rate.bits_per_second * seconds);
             passes->add(std::move(rate.costs));
-            settings->rate.first_pass = passes->expected();
-            capture->rewind();
+            settings.rate.first_pass = passes->expected();
+            capture.rewind();
             continue;
         }
         if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
+        if (summary.bounds) output->add_bounds(*summary.bounds);
         if (auto finished = output->finish(); !finished) return finished;
-        report(options, summary, rate, output->bytes(), capture->fps(), capture->dropped());
+        report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped());
         if (rate.dropped.empty()) return {};
         return fail(
             ErrorKind::limit,
@@ -334,18 +188,49 @@ Result<void> encode(const Options& options) {
     }
 }
 
+Job parse_job(const std::string& text) {
+    const auto slash = text.find('/');
+    const auto number = parse_number(text.substr(0, slash));
+    const auto of = slash == std::string::npos ? std::nullopt : parse_number(text.substr(slash + 1));
+    const auto is_count = [](double x) { return x >= 1 && x <= 1e6 && x == std::floor(x); };
+    if (!number || !of || !is_count(*number) || !is_count(*of) || *number > *of)
+        throw CLI::ValidationError("--job", "'" + text + "' is not I/N: job I of N, from 1/N to N/N");
+    return {static_cast<std::size_t>(*number), static_cast<std::size_t>(*of)};
+}
+
+// What groups cannot do, as they do not know of each other.
+void check_jobs(const EncodeOptions& options, bool random_session) {
+    if (!options.in_groups()) return;
+    const char* flag = options.jobs > 0 ? "--jobs" : "--job";
+    if (is_piped(options.capture))
+        throw CLI::ValidationError(flag,
+                                   "takes frames from many places at once, which needs files, not standard input");
+    if (is_given(options.encoding, "rate.bits_per_second"))
+        throw CLI::ValidationError(flag,
+                                   "encodes groups of frames that do not know what the others take, so they cannot "
+                                   "share a --bitrate; -q and --target-error go with it");
+    if (random_session && options.job.of > 0)
+        throw CLI::ValidationError("--session",
+                                   "is random, so the parts of several jobs would not be of one stream: give "
+                                   "all the same number");
+}
+
 }  // namespace
 
-Result<void> encode_by_default(const std::vector<std::string>& inputs, const std::string& output) {
-    Options options;
-    options.capture.inputs = inputs;
-    options.output = output;
-    options.keep_partial = false;
-    return encode(options);
+Result<void> encode(const EncodeOptions& options) {
+    watch_for_interruption();
+    auto capture = Capture::open(options.capture);
+    if (!capture) return tl::unexpected(capture.error());
+    auto settings = encoder_options(options.encoding, *capture);
+    if (!settings) return tl::unexpected(settings.error());
+    const bool drawn = !is_given(options.encoding, "session") && options.job.of == 0 && may_be_live(options.output);
+    if (drawn) settings->session = random_session();
+    return options.in_groups() ? encode_in_groups(options, *capture, *settings)
+                               : encode_in_passes(options, *capture, std::move(*settings));
 }
 
 void add_encode(CLI::App& app, Run& run) {
-    auto options = std::make_shared<Options>();
+    auto options = std::make_shared<EncodeOptions>();
     auto* command = app.add_subcommand("encode", "Compress a sequence of meshes into an .htvm stream");
     add_capture_options(*command, options->capture);
     command->add_option("-o,--output", options->output, "The stream: a file, or - for standard output")
@@ -364,6 +249,24 @@ void add_encode(CLI::App& app, Run& run) {
     command->add_flag("--drop-late", options->capture.drop_late,
                       "Of meshes on standard input that come faster than they are encoded, drop the oldest that wait,\n"
                       "so that a camera never has to (default: the sender waits)");
+    constexpr const char* jobs = "Many processors, many machines";
+    command
+        ->add_option(
+            "--jobs", options->jobs,
+            "Encode so many groups of frames at a time, each from one I-frame to the next (--keyint) by itself.\n"
+            "The stream is the same for any number, but not the one without --jobs, where what an encoder\n"
+            "has learned goes from group to group and I-frames may move. Not with --bitrate")
+        ->check(CLI::Range(1, 1024))
+        ->type_name("N")
+        ->group(jobs);
+    command
+        ->add_option_function<std::string>(
+            "--job", [options](const std::string& text) { options->job = parse_job(text); },
+            "Encode the Ith of N parts of the groups alone, on any machine. 'htvm join' of the parts, in order, gives\n"
+            "the stream of --jobs, byte by byte")
+        ->type_name("I/N")
+        ->excludes("--jobs")
+        ->group(jobs);
     command->add_flag("--json", options->json, "Print sizes by frame and layer as JSON on standard output");
     command->add_flag_callback(
         "--help-options",
@@ -378,11 +281,14 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode scan_*.obj -q 60 --keyint 60 -o person.htvm\n"
         "  htvm encode capture/ --profile topology -s capture/skeleton.json -o exact.htvm\n"
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
+        "  htvm encode capture/ --jobs 8 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
     show_first(*command, {"--skeleton", "--output", "--fps", "--unit", "--height", "--frames", "--first", "--quality",
-                          "--profile", "--bitrate", "--keyint", "--on-bad-frame", "--threads", "--json"});
-    command->callback([options, &run] {
+                          "--profile", "--bitrate", "--keyint", "--on-bad-frame", "--threads", "--jobs", "--json"});
+    command->callback([options, command, &run] {
         check_together(options->encoding);
+        const auto sessions = command->get_option("--session")->results();
+        check_jobs(*options, !sessions.empty() && sessions[0] == "random");
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
         if (options->capture.drop_late && !is_piped(options->capture))

@@ -1,15 +1,35 @@
-// What the command encode does, for others.
+// What the command encode does, for others too.
 #pragma once
 
+#include <cstddef>
 #include <string>
-#include <vector>
 
+#include "command_line/capture.h"
+#include "encoder_options.h"
 #include "htvm/result.hpp"
 
 namespace htvm::app {
 
-// Encodes a capture (CaptureOptions::inputs) by the default options, and tells of it as the command does. Nothing is
-// left where it fails or is interrupted.
-Result<void> encode_by_default(const std::vector<std::string>& inputs, const std::string& output);
+// One of several jobs that together encode a capture (encode_jobs.h).
+struct Job {
+    std::size_t number = 0, of = 0;  // 1 of 8 to 8 of 8
+};
+
+struct EncodeOptions {
+    CaptureOptions capture;
+    EncodingOptions encoding;
+    std::string output;
+    std::string on_bad_frame = "stop";  // or skip, repeat
+    bool fill = false;                  // repeats the frame before in the place of missing ones
+    bool json = false;
+    bool keep_partial = true;  // of an encoding that ends early
+    std::size_t jobs = 0;      // at a time; 0: the capture is encoded as a whole
+    Job job;                   // of 0: all of the capture
+    // Whether the capture is encoded in groups that do not know of each other.
+    bool in_groups() const { return jobs > 0 || job.of > 0; }
+};
+
+// Tells of it as the command does.
+Result<void> encode(const EncodeOptions& options);
 
 }  // namespace htvm::app

@@ -55,7 +55,11 @@ Result<fs::path> encode_capture(const std::vector<std::string>& inputs, Temporar
     if (capture.filename().empty()) capture = capture.parent_path();
     auto stream = folder.path / capture.filename().replace_extension(".htvm");
     note(fmt::format("{} is not a stream: encoding it first", inputs[0]));
-    if (auto encoded = encode_by_default(inputs, stream.string()); !encoded) return tl::unexpected(encoded.error());
+    EncodeOptions options;
+    options.capture.inputs = inputs;
+    options.output = stream.string();
+    options.keep_partial = false;
+    if (auto encoded = encode(options); !encoded) return tl::unexpected(encoded.error());
     return stream;
 }
 

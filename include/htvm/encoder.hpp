@@ -48,6 +48,10 @@ public:
     Encoder& operator=(Encoder&&) noexcept;
     ~Encoder();
 
+    // Before the first frame: takes from this one, which is not coded, what otherwise follows from the first one
+    // pushed, such as the lattice's origin, the subject's size and the bones' radii. So encoders of different parts of
+    // a capture write the same sequence header, and their streams can be joined to one sequence. Errors as of push().
+    Result<void> begin(const Mesh& first, const Pose* pose);
     // Codes one frame. pose: for the skeleton of the options; null if the tracker lost it, and then the last one is
     // kept. Timestamps must ascend. After an error the frame is not part of the stream, and the next may be pushed.
     // Under rate control, a frame that does not fit the buffer even at the lowest quality is a limit error.

@@ -37,6 +37,7 @@ struct Output {
 struct Encoder::State {
     ThreadPool pool;
     Configuration configuration;
+    bool configured = false;  // by Encoder::begin()
     bool begun = false, finished = false;
     PoseTracker poses;
     Sequence sequence;
@@ -86,7 +87,7 @@ tl::unexpected<Error> out_of_memory() { return fail(ErrorKind::limit, "out of me
 
 // Completes the configuration from the first frame: the origin of the lattice, the subject's size and, where not given,
 // the skeleton and the radii.
-Result<void> begin(State& state, const Mesh& mesh, const Pose* pose) {
+Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
     auto& configuration = state.configuration;
     const auto& options = configuration.options;
     auto& header = configuration.header;
@@ -280,6 +281,18 @@ Encoder::Encoder(Encoder&&) noexcept = default;
 Encoder& Encoder::operator=(Encoder&&) noexcept = default;
 Encoder::~Encoder() = default;
 
+Result<void> Encoder::begin(const Mesh& first, const Pose* pose) try {
+    auto& state = *state_;
+    if (state.begun) return fail(ErrorKind::bad_input, "the first frame was pushed already");
+    auto done = configure(state, first, pose);
+    state.configured = done.has_value();
+    return done;
+} catch (const std::bad_alloc&) {
+    return out_of_memory();
+} catch (const std::length_error&) {
+    return out_of_memory();
+}
+
 Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
     auto& state = *state_;
     state.stages.clear();
@@ -288,8 +301,8 @@ Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t time
         if (state.finished) return fail(ErrorKind::bad_input, "the sequence was finished; start a new encoder");
         if (state.last_timestamp && timestamp_us <= *state.last_timestamp)
             return fail(ErrorKind::bad_input, "timestamps must ascend");
-        if (!state.begun)
-            if (auto ok = begin(state, mesh, pose); !ok) return ok;
+        if (!state.begun && !state.configured)
+            if (auto ok = configure(state, mesh, pose); !ok) return ok;
         return push_frame(state, mesh, pose, timestamp_us, force_intra);
     };
     try {

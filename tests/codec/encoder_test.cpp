@@ -241,6 +241,37 @@ TEST(Encoder, AfterFinishNothingMayBePushed) {
     EXPECT_EQ(indices, 1);
 }
 
+// Each I-frame by itself, with the frames that refer to it.
+TEST(Encoder, PartsThatBeginWithTheSameFrameAreThoseOfTheWhole) {
+    const auto source = synthetic(true, 6, 300);
+    const auto options = with_synthetic_skeleton();
+    const auto whole = encode(source, options).packets;
+    const auto frame_payloads = [](const std::vector<Packet>& packets) {
+        std::vector<std::vector<std::uint8_t>> out;
+        for (const auto& packet : packets)
+            if (frame_type(packet.kind)) out.push_back(packet.payload);
+        return out;
+    };
+    const auto& first = source.frames[0];
+    std::vector<Packet> parts;
+    for (const std::size_t begin : {0u, 3u}) {
+        auto encoder = Encoder::create(options);
+        ASSERT_TRUE(encoder->begin(first.mesh, &*first.pose).has_value());
+        for (std::size_t t = begin; t < begin + 3; ++t) {
+            const auto& frame = source.frames[t];
+            ASSERT_TRUE(encoder->push(frame.mesh, &*frame.pose, static_cast<std::int64_t>(t)).has_value());
+        }
+        while (auto packet = encoder->pull()) {
+            if (packet->kind == PacketKind::sequence) {
+                EXPECT_EQ(packet->payload, whole[0].payload);
+            }
+            parts.push_back(std::move(*packet));
+        }
+        EXPECT_FALSE(encoder->begin(first.mesh, &*first.pose).has_value()) << "after frames were pushed";
+    }
+    EXPECT_EQ(frame_payloads(parts), frame_payloads(whole));
+}
+
 TEST(Encoder, AnEmptySequenceHasNoPackets) {
     auto encoder = Encoder::create({});
     encoder->finish();

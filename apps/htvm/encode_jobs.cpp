@@ -1,0 +1,211 @@
+#include "encode_jobs.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <new>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "command_line/interruption.h"
+#include "command_line/terminal.h"
+#include "core/thread.h"
+#include "stream_join.h"
+
+namespace htvm::app {
+namespace {
+
+struct Group {
+    std::size_t number = 0;
+    std::size_t first = 0, frames = 0;  // of the capture
+};
+
+struct CodedGroup {
+    std::vector<Packet> packets;
+    Summary summary;
+    std::vector<FrameCost> costs;
+};
+
+// What the encoders share.
+struct Work {
+    const EncodeOptions& options;
+    EncoderOptions settings;
+    const Mesh& first_mesh;
+    const Pose* first_pose;
+    std::vector<Group> groups;
+    std::size_t ahead;  // groups that may be finished or at work before the next one that is written
+    Progress& progress;
+    FrameWarnings warnings = {};
+
+    std::mutex mutex = {};
+    std::condition_variable changed = {};
+    std::size_t next = 0, written = 0;  // indices of groups
+    std::map<std::size_t, CodedGroup> coded = {};
+    std::optional<Error> failed = {};  // the first failure there was
+};
+
+bool is_stopped(Work& work) {
+    if (interruption() != 0) return true;
+    const std::lock_guard lock(work.mutex);
+    return work.failed.has_value();
+}
+
+std::string frames_text(const Group& group) {
+    return group.frames == 1 ? fmt::format("frame {}", group.first)
+                             : fmt::format("frames {} to {}", group.first, group.first + group.frames - 1);
+}
+
+// The frame before the group stands in for its first ones, if it has to.
+void find_stand_in(Pass& pass, const Group& group) {
+    if (group.first == 0 || (!pass.options.fill && pass.options.on_bad_frame != "repeat")) return;
+    pass.capture.restrict_to(group.first - 1, group.frames + 1);
+    auto before = pass.capture.next();
+    if (!before || !*before) return;
+    pass.last = std::move(**before);
+    if (const auto* pose = pass.capture.pose()) pass.last_pose = *pose;
+}
+
+Result<CodedGroup> code_group(Work& work, Capture& capture, const Group& group) {
+    auto encoder = Encoder::create(work.settings);
+    if (!encoder) return tl::unexpected(encoder.error());
+    if (auto begun = encoder->begin(work.first_mesh, work.first_pose); !begun) return tl::unexpected(begun.error());
+    CodedGroup out;
+    RateReport rate(work.settings);
+    Pass pass{.options = work.options,
+              .capture = capture,
+              .encoder = *encoder,
+              .write =
+                  [&](Packet packet) {
+                      out.packets.push_back(std::move(packet));
+                      return Result<void>();
+                  },
+              .step =
+                  [&](const std::string& text) {
+                      const std::lock_guard lock(work.mutex);
+                      work.progress.step(text);
+                  },
+              .is_stopped = [&] { return is_stopped(work); },
+              .warnings = &work.warnings,
+              .summary = out.summary,
+              .rate = rate,
+              .saw_triangles = !work.first_mesh.triangles.empty()};
+    capture.restrict_to(group.first, group.frames);
+    find_stand_in(pass, group);
+    if (auto done = encode_frames(pass); !done) return tl::unexpected(done.error());
+    out.costs = std::move(rate.costs);
+    return out;
+}
+
+// Takes one group after another. Each thread has a capture of its own, to read from.
+void code_groups(Work& work, Capture capture) {
+    for (;;) {
+        std::size_t index = 0;
+        {
+            std::unique_lock lock(work.mutex);
+            work.changed.wait(lock, [&] {
+                return work.failed || work.next == work.groups.size() || work.next < work.written + work.ahead;
+            });
+            if (work.failed || work.next == work.groups.size()) return;
+            index = work.next++;
+        }
+        const auto& group = work.groups[index];
+        auto coded = [&]() -> Result<CodedGroup> {
+            try {
+                return code_group(work, capture, group);
+            } catch (const std::bad_alloc&) {
+                return fail(ErrorKind::limit, "out of memory");
+            }
+        }();
+        {
+            const std::lock_guard lock(work.mutex);
+            if (coded)
+                work.coded.emplace(index, std::move(*coded));
+            else if (!work.failed)
+                work.failed = Error{coded.error().kind,
+                                    interruption() != 0
+                                        ? coded.error().message
+                                        : fmt::format("{} failed: {}", frames_text(group), coded.error().message)};
+        }
+        work.changed.notify_all();
+    }
+}
+
+// In the order of the capture, as they come.
+Result<void> write_groups(Work& work, StreamOutput& output, Summary& summary, RateReport& rate) {
+    StreamJoin join(output);
+    for (std::size_t index = 0; index < work.groups.size(); ++index) {
+        std::unique_lock lock(work.mutex);
+        work.changed.wait(lock, [&] { return work.failed || work.coded.contains(index); });
+        if (work.failed) return tl::unexpected(*work.failed);
+        auto coded = std::move(work.coded.extract(index).mapped());
+        lock.unlock();
+        join.begin_stream();
+        for (auto& packet : coded.packets)
+            if (auto ok = join.take(std::move(packet)); !ok) return ok;
+        add(summary, std::move(coded.summary));
+        for (const auto& cost : coded.costs) add_coded(rate, cost);
+        lock.lock();
+        ++work.written;
+        lock.unlock();
+        work.changed.notify_all();
+    }
+    return {};
+}
+
+std::vector<Group> groups_in(std::size_t frames, std::size_t of_each, const Job& job) {
+    const auto range = groups_of(job, (frames + of_each - 1) / of_each);
+    std::vector<Group> out;
+    for (auto number = range.begin; number < range.end; ++number)
+        out.push_back({number, number * of_each, std::min(of_each, frames - number * of_each)});
+    return out;
+}
+
+}  // namespace
+
+std::size_t frames_of_group(int key_interval) {
+    constexpr std::size_t least = 10;
+    const auto interval = static_cast<std::size_t>(key_interval);
+    return interval * ((least + interval - 1) / interval);
+}
+
+GroupRange groups_of(const Job& job, std::size_t groups) {
+    if (job.of == 0) return {0, groups};
+    return {(job.number - 1) * groups / job.of, job.number * groups / job.of};
+}
+
+Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& settings, Capture& capture,
+                           StreamOutput& output, Summary& summary, RateReport& rate) {
+    const auto start = std::chrono::steady_clock::now();
+    const auto pose = capture.first_pose() ? std::optional(*capture.first_pose()) : std::nullopt;
+    const auto mesh = capture.take_first();
+    auto groups = groups_in(capture.frames(), frames_of_group(settings.key_interval), options.job);
+    std::size_t frames = 0;
+    for (const auto& group : groups) frames += group.frames;
+    const auto threads = std::min(std::max<std::size_t>(options.jobs, 1), groups.size());
+    Progress progress("encoding", frames);
+    Work work{.options = options,
+              .settings = settings,
+              .first_mesh = mesh,
+              .first_pose = pose ? &*pose : nullptr,
+              .groups = std::move(groups),
+              .ahead = 2 * threads,
+              .progress = progress};
+    work.settings.threads = std::max(1u, internal::thread_count(settings.threads) / static_cast<unsigned>(threads));
+    std::vector<std::thread> encoders;
+    for (std::size_t k = 0; k < threads; ++k) encoders.emplace_back([&work, capture] { code_groups(work, capture); });
+    auto done = write_groups(work, output, summary, rate);
+    if (!done) {
+        const std::lock_guard lock(work.mutex);
+        if (!work.failed) work.failed = done.error();  // so that all stop
+    }
+    work.changed.notify_all();
+    for (auto& encoder : encoders) encoder.join();
+    summary.encode_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return done;
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,30 @@
+// A capture in groups of frames that are encoded without knowing of each other, by several encoders at a time or by
+// several machines. All begin with what follows from the capture's first frame, so that they write the same sequence
+// header, and each with an I-frame. So the stream depends neither on how many are encoded at a time nor on how they are
+// shared out: parts that are joined (StreamJoin) are the whole, byte by byte.
+#pragma once
+
+#include <cstddef>
+
+#include "encode_pass.h"
+#include "stream_file.h"
+
+namespace htvm::app {
+
+// Frames of a group: as many as from one I-frame to the next, but at least ten, as a sequence header comes with each.
+std::size_t frames_of_group(int key_interval);
+
+struct GroupRange {
+    std::size_t begin = 0, end = 0;
+    std::size_t count() const { return end - begin; }
+    bool operator==(const GroupRange&) const = default;
+};
+// The groups of a job, in order and as even as possible.
+GroupRange groups_of(const Job& job, std::size_t groups);
+
+// Encodes the groups of a job, or all, several at a time, and writes them in their order. Where one fails, the others
+// stop.
+Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& settings, Capture& capture,
+                           StreamOutput& output, Summary& summary, RateReport& rate);
+
+}  // namespace htvm::app

@@ -1,0 +1,196 @@
+#include "encode_pass.h"
+
+#include <fmt/core.h>
+
+#include <chrono>
+#include <utility>
+
+#include "command_line/terminal.h"
+
+namespace htvm::app {
+namespace {
+
+void warn_of_frame(const Pass& pass, FrameWarnings::Kind kind, const std::string& line) {
+    if (pass.warnings) pass.warnings->tell(kind, line);
+}
+
+Result<void> drain(const Pass& pass) {
+    while (auto packet = pass.encoder.pull()) {
+        pass.rate.buffer.add(*packet);
+        if (!pass.write) continue;
+        if (auto written = pass.write(std::move(*packet)); !written) return written;
+    }
+    return {};
+}
+
+std::string progress_text(const Pass& pass, const FrameInfo& info) {
+    std::string text = fmt::format("{} {:.2f} bpv", kind_of(info.type).letter,
+                                   bits_per_vertex(info.bytes.total(), info.source_vertices));
+    if (pass.rate.controlled()) text += fmt::format(", quality {:.0f}", pass.encoder.last_cost().quality);
+    return text;
+}
+
+// What became of a mesh.
+enum class Coded { yes, dropped };
+
+// Under rate control a frame that does not fit is dropped, and the stream goes on without it; but not the first, as all
+// others need an I-frame before them.
+Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us) {
+    auto& summary = pass.summary;
+    const auto start = std::chrono::steady_clock::now();
+    const auto pushed = pass.encoder.push(mesh, pose, timestamp_us);
+    summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const bool dropped =
+        !pushed && pushed.error().kind == ErrorKind::limit && pass.rate.rate_controlled() && !pass.rate.costs.empty();
+    if (!pushed && !dropped)
+        return fail(pushed.error().kind, fmt::format("{}: {}", pass.capture.name(), pushed.error().message));
+    if (summary.frames++ == 0) summary.first_us = timestamp_us;
+    summary.last_us = timestamp_us;
+    if (dropped) {
+        add_dropped(pass.rate);
+        warn_of_frame(pass, FrameWarnings::dropped,
+                      fmt::format("{} is dropped: {}", pass.capture.name(), pushed.error().message));
+        pass.step("dropped");
+        return Coded::dropped;
+    }
+    const auto& info = pass.encoder.last_frame();
+    add(summary.totals, info);
+    add_coded(pass.rate, pass.encoder.last_cost());
+    if (pass.options.json && pass.write) {
+        summary.list.push_back(frame_json(info));
+        if (pass.rate.controlled()) summary.list.back()["quality"] = pass.encoder.last_cost().quality;
+    }
+    if (auto written = drain(pass); !written) return tl::unexpected(written.error());
+    if (const auto bounds = pass.encoder.bounds())
+        summary.bounds = summary.bounds ? united(*summary.bounds, *bounds) : *bounds;
+    pass.step(progress_text(pass, info));
+    return Coded::yes;
+}
+
+// The frame before, once more.
+Result<void> repeat(Pass& pass, std::int64_t timestamp_us) {
+    const auto coded = code(pass, *pass.last, pass.last_pose ? &*pass.last_pose : nullptr, timestamp_us);
+    return coded ? Result<void>() : tl::unexpected(coded.error());
+}
+
+// Numbers that are missing between two files.
+Result<void> take_gap(Pass& pass) {
+    auto& summary = pass.summary;
+    const auto missing = pass.capture.missing_before();
+    if (missing == 0) return {};
+    const bool fill = pass.options.fill && pass.last;
+    warn_of_frame(pass, FrameWarnings::missing,
+                  fmt::format("{} missing before {}, by the numbers in the names; {}",
+                              counted(missing, "frame") + (missing == 1 ? " is" : " are"), pass.capture.name(),
+                              fill ? "the frame before is repeated" : "a gap in time is left (see --fill)"));
+    summary.missing += missing;
+    for (std::size_t k = 0; fill && k < missing; ++k) {
+        if (auto repeated = repeat(pass, pass.capture.missing_timestamp_us(k)); !repeated) return repeated;
+        ++summary.filled;
+    }
+    return {};
+}
+
+// A frame that cannot be read or coded.
+Result<void> take_bad(Pass& pass, const Error& error) {
+    auto& summary = pass.summary;
+    const auto& policy = pass.options.on_bad_frame;
+    if (pass.is_stopped() || error.kind == ErrorKind::disk_full) return tl::unexpected(error);
+    if (!pass.capture.survives_errors()) return tl::unexpected(error);
+    if (policy == "stop") return fail(error.kind, error.message + " (--on-bad-frame skip goes on without such frames)");
+    const bool repeats = policy == "repeat" && pass.last;
+    warn_of_frame(pass, FrameWarnings::bad,
+                  error.message + (repeats ? "; the frame before is repeated in its place" : "; it is left out"));
+    ++(repeats ? summary.repeated : summary.left_out);
+    if (repeats) return repeat(pass, pass.capture.timestamp_us());
+    pass.step("left out");
+    return {};
+}
+
+// What cannot be coded as it should, though the encoder would take it.
+Result<void> check_triangles(Pass& pass, const Mesh& mesh) {
+    auto& summary = pass.summary;
+    if (!mesh.triangles.empty()) {
+        pass.saw_triangles = true;
+        return {};
+    }
+    const bool first = !pass.saw_triangles;
+    const auto name = pass.capture.name();
+    if (first && pass.options.encoding.profile == "tracked" && !mesh.positions.empty())
+        return fail(ErrorKind::bad_input,
+                    name +
+                        " has points, but no triangles, and --profile tracked codes surfaces: make a mesh of the "
+                        "points first, or give --profile topology, which codes points as they are");
+    if (!first && pass.options.on_bad_frame != "stop") return fail(ErrorKind::bad_input, name + " has no triangles");
+    ++summary.without_triangles;
+    return {};
+}
+
+void keep_last(Pass& pass, Mesh mesh) {
+    if (!pass.options.fill && pass.options.on_bad_frame != "repeat") return;
+    pass.last = std::move(mesh);
+    if (const auto* pose = pass.capture.pose()) pass.last_pose = *pose;
+}
+
+Result<void> take(Pass& pass, Mesh& mesh) {
+    if (auto fine = check_triangles(pass, mesh); !fine) return fine;
+    const auto coded = code(pass, mesh, pass.capture.pose(), pass.capture.timestamp_us());
+    if (!coded) return tl::unexpected(coded.error());
+    if (*coded == Coded::yes) keep_last(pass, std::move(mesh));
+    return {};
+}
+
+}  // namespace
+
+void add(Summary& summary, Summary behind) {
+    const auto before = summary.totals.all().frames;
+    for (auto& frame : behind.list) {
+        for (const char* number : {"frame", "reference"}) frame[number] = frame[number].get<std::size_t>() + before;
+        summary.list.push_back(std::move(frame));
+    }
+    add(summary.totals, behind.totals);
+    summary.encode_seconds += behind.encode_seconds;
+    summary.without_triangles += behind.without_triangles;
+    if (behind.frames > 0 && summary.frames == 0) summary.first_us = behind.first_us;
+    if (behind.frames > 0) summary.last_us = behind.last_us;
+    summary.frames += behind.frames;
+    summary.left_out += behind.left_out;
+    summary.repeated += behind.repeated;
+    summary.missing += behind.missing;
+    summary.filled += behind.filled;
+    if (behind.bounds) summary.bounds = summary.bounds ? united(*summary.bounds, *behind.bounds) : *behind.bounds;
+}
+
+double seconds_of(const Summary& summary, double fps) {
+    const auto frames = static_cast<double>(summary.frames);
+    return summary.frames > 1 ? static_cast<double>(summary.last_us - summary.first_us) / 1e6 * frames / (frames - 1)
+                              : 1 / fps;
+}
+
+void FrameWarnings::tell(Kind kind, const std::string& line) {
+    constexpr std::size_t most = 10;
+    const std::lock_guard lock(mutex_);
+    const auto told = ++told_[kind];
+    if (told <= most) warn(told < most ? line : line + "; others like it follow");
+}
+
+Result<void> encode_frames(Pass& pass) {
+    const auto stopped = [] { return fail(ErrorKind::bad_input, "interrupted"); };
+    for (;;) {
+        if (pass.is_stopped()) return stopped();
+        auto mesh = pass.capture.next();
+        if (mesh && !*mesh) break;
+        if (auto filled = take_gap(pass); !filled) return filled;
+        const auto taken = mesh ? take(pass, **mesh) : tl::unexpected(mesh.error());
+        if (taken) continue;
+        if (auto survived = take_bad(pass, taken.error()); !survived) return survived;
+    }
+    return pass.is_stopped() ? stopped() : Result<void>();
+}
+
+Result<void> finish(Pass& pass) {
+    pass.encoder.finish();
+    return drain(pass);
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,70 @@
+// A run of an encoder over frames of a capture, with what becomes of those that are bad, missing or dropped.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "command_line/layer_table.h"
+#include "encode.h"
+#include "htvm/encoder.hpp"
+#include "rate_report.h"
+
+namespace htvm::app {
+
+struct Summary {
+    TotalsByType totals;
+    double encode_seconds = 0;
+    std::size_t without_triangles = 0;
+    // Of the capture's frames, coded or not.
+    std::size_t frames = 0;
+    std::int64_t first_us = 0, last_us = 0;
+    // Frames that are not as captured.
+    std::size_t left_out = 0, repeated = 0;  // bad ones
+    std::size_t missing = 0, filled = 0;     // by the numbers of the files
+    std::optional<SpaceBounds> bounds;       // of the decoded meshes
+    nlohmann::json list = nlohmann::json::array();
+};
+// Of frames behind those summed up so far, whose own numbers begin with 0.
+void add(Summary& summary, Summary behind);
+// How long the capture's frames last; fps: for a single one.
+double seconds_of(const Summary& summary, double fps);
+
+// Warnings of single frames, from any thread: of hundreds of a kind the first few tell enough.
+class FrameWarnings {
+public:
+    enum Kind : std::uint8_t { bad, missing, dropped };
+    void tell(Kind kind, const std::string& line);
+
+private:
+    std::mutex mutex_;
+    std::array<std::size_t, 3> told_{};
+};
+
+struct Pass {
+    const EncodeOptions& options;
+    Capture& capture;
+    Encoder& encoder;
+    std::function<Result<void>(Packet)> write;     // empty: the packets go nowhere, as of a first pass of several
+    std::function<void(const std::string&)> step;  // after each frame, with what can be said of it
+    std::function<bool()> is_stopped;              // asked before each frame
+    FrameWarnings* warnings;                       // null: what is wrong with the capture was said before
+    Summary& summary;
+    RateReport& rate;
+    bool saw_triangles = false;  // in a frame so far, or of those before
+    // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
+    std::optional<Mesh> last = {};
+    std::optional<Pose> last_pose = {};
+};
+
+// Ends with an error of any kind where it is stopped.
+Result<void> encode_frames(Pass& pass);
+// The end of the stream, also of one that ended early.
+Result<void> finish(Pass& pass);
+
+}  // namespace htvm::app
