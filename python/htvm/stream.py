@@ -126,13 +126,14 @@ class _Packets:
 
     # How far a stream that begins with something else is searched for its first packet.
     _search = 1 << 16
-    # How many bytes at a time are searched for the next packet behind damage.
+    # How many bytes at a time are read, and searched for the next packet behind damage.
     _window = 1 << 20
 
-    def __init__(self, data: NDArray[np.uint8], file: Optional[BinaryIO]) -> None:
+    def __init__(self, data: NDArray[np.uint8], file: Optional[BinaryIO], most_bytes: int) -> None:
         self.data = data  # all there is, or with a file, what was read and not taken yet
         self.list: List[_Packet] = []  # those found; with a file, none is kept
         self._file = file
+        self._most_bytes = most_bytes  # of a packet; larger ones are damage
         self._offset = 0  # of the next packet
         self._begin = 0  # of data
         self._sync: Optional[bytes] = None  # what packets begin with
@@ -145,12 +146,17 @@ class _Packets:
 
     def _have(self, end: int) -> bool:
         """Reads up to `end`, if the source has so much."""
-        while self._file is not None and self._begin + len(self.data) < end:
-            more = self._file.read(max(end - self._begin - len(self.data), 1))
+        have, pieces = self._begin + len(self.data), [self.data]
+        # In pieces, as a damaged header may claim more than the source has.
+        while self._file is not None and have < end:
+            more = self._file.read(min(end - have, self._window))
             if not more:
                 break
-            self.data = np.concatenate([self.data, np.frombuffer(more, np.uint8)])
-        return self._begin + len(self.data) >= end
+            pieces.append(np.frombuffer(more, np.uint8))
+            have += len(more)
+        if len(pieces) > 1:
+            self.data = np.concatenate(pieces)
+        return have >= end
 
     def _header_at(self, offset: int) -> Optional[c.htvm_packet_info]:
         if not self._have(offset + c.HTVM_PACKET_HEADER):
@@ -159,7 +165,7 @@ class _Packets:
         at = offset - self._begin
         status = c.library.htvm_packet_header_read(
             _address(self.data, at), c.HTVM_PACKET_HEADER, info, ctypes.sizeof(info))
-        if status != c.HTVM_OK:
+        if status != c.HTVM_OK or info.bytes > self._most_bytes:
             return None
         if not info.flags & c.HTVM_PACKET_TOLD and self._have(offset + info.bytes):
             # Streams of version 1: what they do not tell is derived from the whole packet.
@@ -350,7 +356,8 @@ class Frames:
             if packet is None:
                 break
             if packet.info is None:
-                raise CorruptStream(f"{packet.size} bytes from byte {packet.offset} on are damaged or cut short")
+                raise CorruptStream(f"{packet.size} bytes from byte {packet.offset} on are damaged, cut short, or a "
+                                    "packet larger than max_packet_bytes")
             try:
                 info = self._decoder.decode(self._packets.bytes_of(packet))
                 if info is None or packet.number is None or needed or packet.number < self._first:
@@ -432,6 +439,9 @@ class Stream:
         return np.array([packet.timestamp_us for packet in self._frame_packets()], np.int64)
 
     def __len__(self) -> int:
+        """How many frames there are. TypeError: a file object's are not known beforehand."""
+        if self._packets.forward_only:
+            raise TypeError("a file object must be read to know its length")  # as list() expects it
         return len(self._frame_packets())
 
     def close(self) -> None:
@@ -479,21 +489,23 @@ def open(
         setattr(options, name, value)
     file = None
     if isinstance(source, (bytes, bytearray, memoryview)):
-        packets = _Packets(np.frombuffer(source, np.uint8), None)
+        packets = _Packets(np.frombuffer(source, np.uint8), None, options.max_packet_bytes)
     elif isinstance(source, (str, os.PathLike)):
-        packets, file = _packets_of_file(source)
+        packets, file = _packets_of_file(source, options.max_packet_bytes)
     else:
-        packets = _Packets(np.empty(0, np.uint8), source)
+        packets = _Packets(np.empty(0, np.uint8), source, options.max_packet_bytes)
     if not packets.forward_only:
         packets.at(0)
     return Stream(packets, file, options)
 
 
-def _packets_of_file(path: Union[str, "os.PathLike[str]"]) -> Tuple[_Packets, Optional[BinaryIO]]:
+def _packets_of_file(
+    path: Union[str, "os.PathLike[str]"], most_bytes: int
+) -> Tuple[_Packets, Optional[BinaryIO]]:
     file = io.open(path, "rb")
     status = os.fstat(file.fileno())
     if not stat.S_ISREG(status.st_mode):
-        return _Packets(np.empty(0, np.uint8), file), file
+        return _Packets(np.empty(0, np.uint8), file, most_bytes), file
     with file:
         data: Union[mmap.mmap, bytes] = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if status.st_size else b""
-    return _Packets(np.frombuffer(data, np.uint8), None), None
+    return _Packets(np.frombuffer(data, np.uint8), None, most_bytes), None

@@ -127,12 +127,15 @@ def test_joined_streams_are_numbered_on(stream):
 
 def test_a_file_object_is_read_once_and_has_no_random_access(stream):
     opened = htvm.open(io.BytesIO(stream))
-    for call in (lambda: opened[3], lambda: len(opened), lambda: opened.sequence):
+    for call in (lambda: opened[3], lambda: opened.numbers, lambda: opened.sequence):
         with pytest.raises(htvm.BadInput, match="file object"):
             call()
+    with pytest.raises(TypeError, match="file object"):
+        len(opened)
     assert [frame.number for frame in opened.frames(5, 2)] == [5, 6]
     with pytest.raises(htvm.BadInput, match="only once"):
         iter(opened)
+    assert len(list(htvm.open(io.BytesIO(stream)))) == 12
 
 
 def test_the_sequence_header_is_told():
@@ -175,7 +178,8 @@ def test_damage_is_an_exception_behind_which_iterating_goes_on(kind):
     assert numbers == [0, 1, 2, 3, 6, 7, 8]
     assert sentences[0].startswith("frame 4: ") and sentences[1].startswith("frame 5: ")
     numbers, sentences = taken_until_damage(kind(whole[:at] + b"garbage" * 9 + whole[at:]))
-    assert numbers == list(range(9)) and sentences == [f"63 bytes from byte {at} on are damaged or cut short"]
+    assert numbers == list(range(9)) and sentences == [f"63 bytes from byte {at} on are damaged, cut short, or a "
+                                                   "packet larger than max_packet_bytes"]
     numbers, sentences = taken_until_damage(kind(whole[:at + 50]))
     assert numbers == [0, 1, 2, 3] and "cut short" in sentences[0]
 
@@ -198,6 +202,22 @@ def test_limits_of_the_decoder_are_kept(stream):
         list(htvm.open(stream, max_vertices=10))
     with pytest.raises(htvm.BadInput, match="max_vertices is out of range"):
         htvm.open(stream, max_vertices=-1)
+
+
+def test_a_header_that_claims_much_is_not_believed(stream):
+    """A source says how much it was asked for; the largest packet of the stream has less than 3000 bytes."""
+    class Source(io.BytesIO):
+        asked = []
+
+        def read(self, size=-1):
+            self.asked.append(size)
+            return super().read(size)
+
+    with pytest.raises(htvm.CorruptStream, match="larger than max_packet_bytes"):
+        list(htvm.open(stream, max_packet_bytes=200))
+    with pytest.raises(htvm.CorruptStream, match="larger than max_packet_bytes"):
+        list(htvm.open(Source(stream), max_packet_bytes=200))
+    assert max(Source.asked) <= 1 << 20
 
 
 def test_iterators_do_not_disturb_each_other(stream):
