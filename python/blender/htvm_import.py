@@ -1,7 +1,7 @@
 """Imports .htvm streams into Blender as an animated mesh with colours: File > Import > htvm stream.
 
-The object reads its frames from the stream while the scene plays, renders or is exported, so the .blend file stays small
-and needs the stream and this add-on. Blender's Python needs the package htvm: docs/blender.md says how to install both.
+The object reads its frames from the stream while the scene plays, renders or is exported, so the .blend file stays
+small and needs the stream and this add-on. Blender's Python needs the package htvm: docs/blender.md says how to install both.
 """
 
 import math

@@ -37,7 +37,8 @@ class Mesh:
     def __post_init__(self) -> None:
         self.positions = _rows("positions", self.positions, np.float32, 3)
         self.triangles = _rows("triangles", self.triangles, np.uint32, 3)
-        for name, type_, columns in (("colours", np.uint8, 3), ("normals", np.float32, 3), ("texcoords", np.float32, 2)):
+        attributes = ("colours", np.uint8, 3), ("normals", np.float32, 3), ("texcoords", np.float32, 2)
+        for name, type_, columns in attributes:
             given = getattr(self, name)
             if given is None:
                 continue

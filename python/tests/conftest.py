@@ -1,5 +1,7 @@
 """Meshes and streams for the tests."""
 
+import os
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,8 @@ import htvm
 
 project = Path(__file__).resolve().parents[2]
 conformance = project / "tests" / "data" / "conformance"
+program = os.environ.get("HTVM_PROGRAM", "htvm")
+needs_program = pytest.mark.skipif(shutil.which(program) is None, reason="the program htvm is not there")
 
 
 def sheet(frame, side=12):

@@ -1,15 +1,8 @@
-import os
-import shutil
-
 import numpy as np
 import pytest
-from conftest import encode, sheet
+from conftest import encode, needs_program, sheet
 
 import htvm
-
-needs_program = pytest.mark.skipif(
-    shutil.which(os.environ.get("HTVM_PROGRAM", "htvm")) is None, reason="the program htvm is not there")
-
 
 @needs_program
 def test_errors_of_a_stream_are_measured_frame_by_frame(tmp_path):

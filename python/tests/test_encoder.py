@@ -1,11 +1,9 @@
 import io
-import os
-import shutil
 import subprocess
 
 import numpy as np
 import pytest
-from conftest import encode, sheet
+from conftest import encode, needs_program, program, sheet
 
 import htvm
 
@@ -70,13 +68,12 @@ def test_a_file_is_there_when_it_is_complete(tmp_path, stream):
     assert [entry.name for entry in tmp_path.iterdir()] == ["sheet.htvm"]
 
 
-@pytest.mark.skipif(shutil.which(os.environ.get("HTVM_PROGRAM", "htvm")) is None, reason="the program htvm is not there")
+@needs_program
 def test_a_file_begins_with_the_index_that_htvm_writes(tmp_path, stream):
     with htvm.Encoder(tmp_path / "python.htvm", key_interval=4, subject_size=1000) as encoder:
         for number in range(12):
             encoder.push(sheet(number))
     (tmp_path / "plain.htvm").write_bytes(stream)
-    program = os.environ.get("HTVM_PROGRAM", "htvm")
     subprocess.run([program, "index", tmp_path / "plain.htvm", "--bounds", "-o", tmp_path / "indexed.htvm"], check=True)
     assert (tmp_path / "python.htvm").read_bytes() == (tmp_path / "indexed.htvm").read_bytes()
 

@@ -1,16 +1,13 @@
 """The programs in docs/python.md run as they are printed."""
 
-import os
 import re
-import shutil
 
-import pytest
-from conftest import encode, project, sheet
+from conftest import encode, needs_program, project, sheet
 
 import htvm
 
 
-@pytest.mark.skipif(shutil.which(os.environ.get("HTVM_PROGRAM", "htvm")) is None, reason="the program htvm is not there")
+@needs_program
 def test_the_manual_runs(tmp_path, monkeypatch, capsys):
     (tmp_path / "capture").mkdir()
     for number in range(6):

@@ -235,4 +235,5 @@ def test_iterators_do_not_disturb_each_other(stream):
     for thread in threads:
         thread.join()
     assert all(results[name] == expected for name in range(4))
-    assert [(a.number, b.number) for a, b in zip(opened.frames(2), opened.frames(7))] == [(n, n + 5) for n in range(2, 7)]
+    together = [(a.number, b.number) for a, b in zip(opened.frames(2), opened.frames(7))]
+    assert together == [(n, n + 5) for n in range(2, 7)]
