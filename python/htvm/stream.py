@@ -124,10 +124,12 @@ class _Dependencies:
 class _Packets:
     """The packets of a source, found by their headers, in order."""
 
-    # How far a stream that begins with something else is searched for its first packet.
-    _search = 1 << 16
+    # What packets begin with (docs/bitstream.md, section 2).
+    _sync = b"HTVP"
     # How many bytes at a time are read, and searched for the next packet behind damage.
     _window = 1 << 20
+    # How many bytes of a file object are searched before they are given up.
+    _step = 1 << 12
 
     def __init__(self, data: NDArray[np.uint8], file: Optional[BinaryIO], most_bytes: int) -> None:
         self.data = data  # all there is, or with a file, what was read and not taken yet
@@ -136,7 +138,6 @@ class _Packets:
         self._most_bytes = most_bytes  # of a packet; larger ones are damage
         self._offset = 0  # of the next packet
         self._begin = 0  # of data
-        self._sync: Optional[bytes] = None  # what packets begin with
         self._dependencies = _Dependencies()
         self._lock = threading.Lock()
 
@@ -176,21 +177,19 @@ class _Packets:
         return info
 
     def _find(self, offset: int) -> int:
-        """Where the next packet's header begins, at or behind the offset; the end of the source if there is none."""
+        """Where the next packet's header begins, at or behind the offset; else as far as was searched."""
         while self._have(offset + c.HTVM_PACKET_HEADER):
-            if self._header_at(offset) is not None:
+            if self.forward_only:
+                self._have(offset + self._step)
+            window = self.data[offset - self._begin:][:self._window].tobytes()
+            candidate = window.find(self._sync)
+            while candidate >= 0:
+                if self._header_at(offset + candidate) is not None:
+                    return offset + candidate
+                candidate = window.find(self._sync, candidate + 1)
+            offset += len(window) - len(self._sync) + 1
+            if self.forward_only:
                 return offset
-            if self._sync is None:
-                offset += 1
-                if offset > self._search:
-                    break
-                continue
-            begin = offset + 1 - self._begin
-            window = self.data[begin:begin + self._window].tobytes()
-            found = window.find(self._sync)
-            offset += 1 + found if found >= 0 else max(len(window) - len(self._sync) + 1, 1)
-        if self._sync is None:
-            raise CorruptStream("this is not an htvm stream")
         return self._begin + len(self.data)
 
     def next(self) -> Optional[_Packet]:
@@ -199,7 +198,7 @@ class _Packets:
             self.data, self._begin = self.data[self._offset - self._begin:], self._offset
         offset = self._offset
         if not self._have(offset + 1):
-            if self._sync is None:
+            if offset == 0:
                 raise CorruptStream("this is not an htvm stream: it is empty")
             return None
         info = self._header_at(offset)
@@ -207,10 +206,11 @@ class _Packets:
             end = self._find(offset + 1) if info is None else self._begin + len(self.data)
             packet = _Packet(None, offset, end - offset)
         else:
-            self._sync = self._sync or self.bytes_of(_Packet(info, offset, 4)).tobytes()
             self._dependencies.push(info)
             packet = _Packet(info, offset, info.bytes, self._dependencies.frame())
         self._offset += packet.size
+        if offset == 0 and info is None and self._header_at(self._offset) is None:
+            raise CorruptStream("this is not an htvm stream")
         if not self.forward_only:
             self.list.append(packet)
         return packet

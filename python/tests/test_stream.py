@@ -220,6 +220,13 @@ def test_a_header_that_claims_much_is_not_believed(stream):
     assert max(Source.asked) <= 1 << 20
 
 
+@pytest.mark.parametrize("kind", [bytes, io.BytesIO])
+def test_a_search_behind_damage_takes_time_in_proportion(stream, kind):
+    """Many beginnings of packets that are none."""
+    numbers, sentences = taken_until_damage(kind(stream + b"HTVP" * 200000 + stream))
+    assert numbers == list(range(24)) and sentences
+
+
 def test_iterators_do_not_disturb_each_other(stream):
     opened = htvm.open(stream)
     expected = [digest(frame) for frame in opened]
