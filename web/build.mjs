@@ -47,4 +47,4 @@ await rm('dist', { recursive: true, force: true });
 await mkdir('dist');
 for (const name of ['htvm-player.js', 'htvm-worker.js', 'htvm_decoder.wasm', 'htvm-player.LICENSES.txt'])
     await copyFile(`packages/player/dist/${name}`, `dist/${name}`);
-for (const name of ['index.html', 'page.js', 'page.css']) await copyFile(`site/${name}`, `dist/${name}`);
+for (const name of ['index.html', 'page.js', 'beside.js', 'page.css']) await copyFile(`site/${name}`, `dist/${name}`);

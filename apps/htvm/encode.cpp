@@ -104,7 +104,8 @@ bool is_off(const RateReport& rate, double bits, double seconds) {
 }
 
 // Each group of frames by an encoder of its own. A job that has nothing to do leaves no file.
-Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, const EncoderOptions& settings) {
+Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, const EncoderOptions& settings,
+                              const std::optional<AudioTrack>& audio) {
     const auto of_group = frames_of_group(settings.key_interval);
     const auto groups = (capture.frames() + of_group - 1) / of_group;
     const auto have =
@@ -122,6 +123,7 @@ Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, co
     if (options.jobs > groups) note(fmt::format("{}: as many jobs are enough", have));
     auto output = StreamOutput::open(options.output);
     if (!output) return tl::unexpected(output.error());
+    if (audio) output->lay(*audio);
     Summary summary;
     RateReport rate(settings);
     if (auto done = encode_groups(options, settings, capture, *output, summary, rate); !done)
@@ -136,7 +138,8 @@ Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, co
 }
 
 // One run after another, until the bitrate is met.
-Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, EncoderOptions settings) {
+Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, EncoderOptions settings,
+                              const std::optional<AudioTrack>& audio) {
     const int fewest = fewest_passes(options, settings);
     // What went to a pipe cannot be taken back.
     const int most = options.encoding.passes == 0 && fewest == 2 && !may_be_live(options.output) ? most_passes : fewest;
@@ -145,6 +148,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         // Before the first pass, so that a place that cannot be written to does not cost one.
         auto output = StreamOutput::open(options.output);
         if (!output) return tl::unexpected(output.error());
+        if (audio) output->lay(*audio);
         auto encoder = Encoder::create(settings);
         if (!encoder) return tl::unexpected(encoder.error());
         Summary summary;
@@ -209,6 +213,8 @@ void check_jobs(const EncodeOptions& options, bool random_session) {
         throw CLI::ValidationError(flag,
                                    "encodes groups of frames that do not know what the others take, so they cannot "
                                    "share a --bitrate; -q and --target-error go with it");
+    if (!options.audio.file.empty() && options.job.of > 0)
+        throw CLI::ValidationError("--audio", "is for the whole: give it to the htvm join of the parts");
     if (random_session && options.job.of > 0)
         throw CLI::ValidationError("--session",
                                    "is random, so the parts of several jobs would not be of one stream: give "
@@ -225,8 +231,10 @@ Result<void> encode(const EncodeOptions& options) {
     if (!settings) return tl::unexpected(settings.error());
     const bool drawn = !is_given(options.encoding, "session") && options.job.of == 0 && may_be_live(options.output);
     if (drawn) settings->session = random_session();
-    return options.in_groups() ? encode_in_groups(options, *capture, *settings)
-                               : encode_in_passes(options, *capture, std::move(*settings));
+    const auto audio = AudioTrack::open(options.audio);
+    if (!audio) return tl::unexpected(audio.error());
+    return options.in_groups() ? encode_in_groups(options, *capture, *settings, *audio)
+                               : encode_in_passes(options, *capture, std::move(*settings), *audio);
 }
 
 void add_encode(CLI::App& app, Run& run) {
@@ -236,6 +244,7 @@ void add_encode(CLI::App& app, Run& run) {
     command->add_option("-o,--output", options->output, "The stream: a file, or - for standard output")
         ->type_name("FILE")
         ->required();
+    add_audio_options(*command, options->audio);
     add_encoding_options(*command, options->encoding);
     command
         ->add_option(

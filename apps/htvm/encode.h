@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string>
 
+#include "audio_track.h"
 #include "command_line/capture.h"
 #include "encoder_options.h"
 #include "htvm/result.hpp"
@@ -19,6 +20,7 @@ struct EncodeOptions {
     CaptureOptions capture;
     EncodingOptions encoding;
     std::string output;
+    AudioOptions audio;
     std::string on_bad_frame = "stop";  // or skip, repeat
     bool fill = false;                  // repeats the frame before in the place of missing ones
     bool json = false;

@@ -9,6 +9,7 @@
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"
+#include "htvm/audio.hpp"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/running_time.hpp"
@@ -121,6 +122,28 @@ void print_index(const StreamIndex& index) {
     fmt::print("\n");
 }
 
+// The sound of the whole stream.
+struct AudioTotals {
+    std::uint64_t packets = 0, bytes = 0, samples = 0;  // samples: that are heard
+    std::uint8_t channels = 0;                          // the most
+    double seconds() const { return static_cast<double>(samples) / audio_samples_per_second; }
+};
+
+Result<void> add(AudioTotals& totals, const Packet& packet) {
+    const auto audio = read_audio(packet);
+    if (!audio) return audio.error().kind == ErrorKind::unsupported ? Result<void>() : tl::unexpected(audio.error());
+    ++totals.packets;
+    totals.bytes += packet.payload.size() + packet_overhead;
+    totals.samples += audio->samples() - audio->skip_begin - audio->skip_end;
+    totals.channels = std::max(totals.channels, audio->channels);
+    return {};
+}
+
+nlohmann::json audio_json(const AudioTotals& totals) {
+    if (totals.packets == 0) return {};
+    return {{"coder", "opus"}, {"channels", totals.channels}, {"seconds", totals.seconds()}, {"bytes", totals.bytes}};
+}
+
 Result<void> info(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
@@ -134,6 +157,7 @@ Result<void> info(const Options& options) {
     FrameNumbers numbers;
     RunningTime time;
     std::optional<StreamIndex> front;
+    AudioTotals audio;
     nlohmann::json sequences = nlohmann::json::array();
     std::optional<SequenceInfo> first_sequence;
     std::optional<BufferModel> buffer;
@@ -154,6 +178,9 @@ Result<void> info(const Options& options) {
                     "attribs", "mapping", "fans", "d.order", "bpv");
         }
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
+        if (packet->kind == PacketKind::audio)
+            if (auto ok = add(audio, *packet); !ok)
+                return fail(ok.error().kind, options.input + ": " + ok.error().message);
         if (packet->kind == PacketKind::front_index && !front) {
             auto read = read_index(*packet);
             if (!read) return fail(read.error().kind, options.input + ": " + read.error().message);
@@ -191,6 +218,7 @@ Result<void> info(const Options& options) {
                            {"sequences", sequences},
                            {"frames", frames},
                            {"bytes", bytes},
+                           {"audio", audio_json(audio)},
                            {"index", index},
                            {"front_index", front ? index_json(*front) : nlohmann::json()},
                            {"damaged_bytes", input->damaged_bytes()},
@@ -198,6 +226,9 @@ Result<void> info(const Options& options) {
         if (buffer) out["buffer"] = buffer_json(options, *buffer);
         fmt::print("{}\n", out.dump(2));
     } else {
+        if (audio.packets > 0)
+            fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
+                       audio.seconds(), audio.bytes);
         fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), count, seconds, bytes,
                    megabits, index ? ", with an index for seeking" : "");
     }

@@ -17,6 +17,7 @@ namespace {
 struct Options {
     std::vector<std::string> inputs;
     std::string output;
+    AudioOptions audio;
     DecoderOptions limits;
 };
 
@@ -51,6 +52,9 @@ Result<void> add_stream(StreamJoin& join, const std::string& path, const Decoder
 Result<void> run_join(const Options& options) {
     auto output = StreamOutput::open(options.output);
     if (!output) return tl::unexpected(output.error());
+    auto audio = AudioTrack::open(options.audio);
+    if (!audio) return tl::unexpected(audio.error());
+    if (*audio) output->lay(std::move(**audio));
     StreamJoin join(*output);
     for (const auto& input : options.inputs)
         if (auto added = add_stream(join, input, options.limits); !added) return added;
@@ -67,13 +71,15 @@ void add_join(CLI::App& app, Run& run) {
     auto* command = app.add_subcommand("join", "Put .htvm streams one after the other, without encoding them again");
     command->add_option("inputs", options->inputs, "The streams, in their order")->required()->expected(1, -1);
     command->add_option("-o,--output", options->output, "The new stream: a file, or - for standard output")->required();
+    add_audio_options(*command, options->audio);
     add_packet_limits(*command, options->limits);
     command->footer(
         "Streams with the same header, such as parts of one stream, become one sequence whose frames are numbered on.\n"
         "Timestamps stay as they are, unless they would not ascend; then those of the stream are moved behind the "
-        "last.\n"
-        "Example:\n"
-        "  htvm join part1.htvm part2.htvm -o whole.htvm");
+        "last. With --audio, sound that the streams have is left out.\n"
+        "Examples:\n"
+        "  htvm join part1.htvm part2.htvm -o whole.htvm\n"
+        "  htvm join silent.htvm --audio sound.opus -o person.htvm");
     command->callback([options, &run] { run = [options] { return run_join(*options); }; });
 }
 

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
+#include <cctype>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -25,6 +26,7 @@ namespace fs = std::filesystem;
 
 struct PlayOptions {
     std::vector<std::string> inputs;
+    std::string beside;  // empty: none
     std::uint16_t port = 0;
     bool no_open = false;
 };
@@ -48,18 +50,32 @@ struct TemporaryFolder {
     }
 };
 
-// Encodes a capture by the default options.
-Result<fs::path> encode_capture(const std::vector<std::string>& inputs, TemporaryFolder& folder) {
+Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeOptions options,
+                                TemporaryFolder& folder) {
     if (!folder.make()) return fail(ErrorKind::bad_input, "there is no place for a temporary file (TMPDIR)");
     auto capture = fs::absolute(inputs[0]).lexically_normal();
     if (capture.filename().empty()) capture = capture.parent_path();
     auto stream = folder.path / capture.filename().replace_extension(".htvm");
     note(fmt::format("{} is not a stream: encoding it first", inputs[0]));
-    EncodeOptions options;
     options.capture.inputs = inputs;
     options.output = stream.string();
     options.keep_partial = false;
     if (auto encoded = encode(options); !encoded) return tl::unexpected(encoded.error());
+    return stream;
+}
+
+// A stream that can be served; a capture is encoded first. The server follows no symbolic link, but this may be one.
+Result<fs::path> stream_of(const std::vector<std::string>& inputs, const EncodeOptions& encoding,
+                           TemporaryFolder& folder) {
+    fs::path stream = inputs[0];
+    if (inputs.size() > 1 || stream.extension() != ".htvm") {
+        auto encoded = encode_capture(inputs, encoding, folder);
+        if (!encoded) return encoded;
+        stream = *encoded;
+    }
+    std::error_code error;
+    stream = fs::canonical(stream, error);
+    if (error) return fail(ErrorKind::bad_input, fmt::format("there is no file {}", inputs[0]));
     return stream;
 }
 
@@ -84,35 +100,53 @@ void open_browser(std::string url) {
     posix_spawn_file_actions_destroy(&actions);
 }
 
+// For captures that streams are compared with: every vertex and triangle, each frame by itself.
+EncodeOptions nearly_lossless() {
+    EncodeOptions out;
+    out.encoding.profile = "topology";
+    out.encoding.quality = 100;
+    out.encoding.given = {{find_option("key_interval"), 1}, {find_option("topology.merge_duplicates"), 0}};
+    return out;
+}
+
+std::string percent_encoded(const std::string& text) {
+    std::string out;
+    for (const char c : text)
+        out += std::isalnum(static_cast<unsigned char>(c)) ? std::string(1, c)
+                                                           : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+    return out;
+}
+
 Result<void> play(const PlayOptions& options) {
     if (!live::has_player())
         return fail(ErrorKind::unsupported,
                     "this htvm was built without the web player: ./dev web builds it, then configure and build again");
     std::error_code error;
-    const fs::path input = options.inputs[0];
+    const auto& inputs = options.inputs;
     live::FileServerOptions server;
     server.port = options.port;
     server.loopback_names = true;
-    TemporaryFolder temporary;
-    const bool one = options.inputs.size() == 1;
-    if (one && fs::is_directory(input, error) && holds_streams(input)) {
-        server.folder = input.string();
+    TemporaryFolder temporary, beside_temporary;
+    std::string query;
+    if (options.beside.empty() && inputs.size() == 1 && fs::is_directory(inputs[0], error) &&
+        holds_streams(inputs[0])) {
+        server.folder = inputs[0];
     } else {
-        fs::path stream = input;
-        if (!one || input.extension() != ".htvm") {
-            auto encoded = encode_capture(options.inputs, temporary);
-            if (!encoded) return tl::unexpected(encoded.error());
-            stream = *encoded;
-        }
-        // The link itself may be a symbolic one: the server follows none.
-        stream = fs::canonical(stream, error);
-        if (error) return fail(ErrorKind::bad_input, fmt::format("there is no file {}", input.string()));
-        server.folder = stream.parent_path().string();
-        server.only = {stream.filename().string()};
+        const auto encoding = options.beside.empty() ? EncodeOptions() : nearly_lossless();
+        const auto stream = stream_of(inputs, encoding, temporary);
+        if (!stream) return tl::unexpected(stream.error());
+        server.files = {{stream->filename().string(), stream->string()}};
+    }
+    if (!options.beside.empty()) {
+        const auto stream = stream_of({options.beside}, nearly_lossless(), beside_temporary);
+        if (!stream) return tl::unexpected(stream.error());
+        server.files.push_back({"beside/" + stream->filename().string(), stream->string()});
+        query = fmt::format("?file={}&beside={}", percent_encoded(server.files[0].name),
+                            percent_encoded(server.files[1].name));
     }
     auto opened = live::FileServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
-    const auto url = fmt::format("http://127.0.0.1:{}/", opened->port());
+    const auto url = fmt::format("http://127.0.0.1:{}/{}", opened->port(), query);
     fmt::print("{}\n", url);
     std::fflush(stdout);
     note("Open this address in a browser. Ctrl-C ends.");
@@ -132,13 +166,20 @@ void add_play(CLI::App& app, Run& run) {
                      "pattern, meshes), which is encoded first")
         ->expected(1, -1)
         ->required();
+    command
+        ->add_option(
+            "--beside", options->beside,
+            "Another stream or capture, shown in step with the first in the same window, with a slider between\n"
+            "them. Captures are then encoded with hardly any loss, so that streams can be compared with them")
+        ->type_name("OTHER");
     command->add_option("--port", options->port, "Port on this machine's loopback address (default: a free one)");
     command->add_flag("--no-open", options->no_open, "Print the address, but do not open a browser");
     command->footer(
         "Prints the address to open and runs until Ctrl-C. Only this machine can reach it.\n"
         "Examples:\n"
         "  htvm play person.htvm\n"
-        "  htvm play capture/");
+        "  htvm play capture/\n"
+        "  htvm play capture/ --beside person.htvm");
     command->callback([options, &run] { run = [options] { return play(*options); }; });
 }
 

@@ -88,6 +88,20 @@ Result<StreamOutput> StreamOutput::open(const std::string& path) {
 }
 
 Result<void> StreamOutput::write(const Packet& packet) {
+    if (!audio_) return write_one(packet);
+    if (packet.kind == PacketKind::audio) return {};
+    const auto before = packet.kind == PacketKind::index ? audio_->rest() : audio_->before(packet);
+    if (auto written = write_all(before); !written) return written;
+    return write_one(packet);
+}
+
+Result<void> StreamOutput::write_all(const std::vector<Packet>& packets) {
+    for (const auto& packet : packets)
+        if (auto written = write_one(packet); !written) return written;
+    return {};
+}
+
+Result<void> StreamOutput::write_one(const Packet& packet) {
     if (is_indexed()) {
         if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return {};
         indexer_.add(packet, bytes_);
@@ -108,6 +122,8 @@ void StreamOutput::add_bounds_of(const Packet& packet) {
 }
 
 Result<void> StreamOutput::finish() {
+    if (audio_)
+        if (auto written = write_all(audio_->rest()); !written) return written;
     if (!file_) return {};
     if (!is_indexed()) return file_->finish();
     const auto index = indexer_.finish(bytes_);

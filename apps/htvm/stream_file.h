@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "audio_track.h"
 #include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
@@ -50,6 +51,8 @@ Result<void> check_whole(const StreamInput& input, const std::string& path,
 class StreamOutput {
 public:
     static Result<StreamOutput> open(const std::string& path);  // "-" is standard output
+    // Lays sound between the frames of the stream, in the place of its own. Before anything is written.
+    void lay(AudioTrack audio) { audio_.emplace(std::move(audio)); }
     Result<void> write(const Packet& packet);
     // Of the last frame, for the index.
     void add_bounds(const SpaceBounds& bounds) { indexer_.add(bounds); }
@@ -66,7 +69,10 @@ public:
 
 private:
     bool is_indexed() const { return file_ && file_->is_file(); }
+    Result<void> write_all(const std::vector<Packet>& packets);
+    Result<void> write_one(const Packet& packet);
     std::optional<OutputFile> file_;  // none: standard output
+    std::optional<AudioTrack> audio_;
     StreamIndexer indexer_;
     std::uint64_t bytes_ = 0;
     bool has_index_ = false;

@@ -10,6 +10,7 @@
 
 #include "command_line/terminal.h"
 #include "commands.h"
+#include "htvm/audio.hpp"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "io/mesh_file.h"
@@ -43,6 +44,8 @@ struct Verification {
     std::optional<std::uint32_t> last_number = {};
     std::int64_t last_us = 0;
     std::set<std::uint32_t> droppable = {};  // own numbers of frames since the I-frame
+    std::optional<double> audio_end = {};    // microseconds
+    std::uint64_t audio_packets = 0;
 };
 
 void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
@@ -50,6 +53,7 @@ void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
     if (v.numbers.begins_sequence()) {
         v.last_number.reset();
         v.droppable.clear();
+        v.audio_end.reset();
     }
     if (v.last_number && number <= *v.last_number) problem(fmt::format("comes after frame {}", *v.last_number));
     if (v.last_number && number > *v.last_number + 1)
@@ -71,6 +75,20 @@ void check_dependencies(Verification& v, const Packet& packet, std::uint32_t num
     if (packet.has(packet_flag::droppable) && packet.has(packet_flag::referred))
         problem("it is marked as droppable, and as one that others may refer to");
     if (packet.has(packet_flag::droppable)) v.droppable.insert(packet.frame);
+}
+
+// Sound comes behind the frame in whose time it begins, and piece after piece.
+void check_audio(Verification& v, const Packet& packet, std::uint32_t number) {
+    const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
+    const auto audio = read_audio(packet);
+    if (!audio && audio.error().kind == ErrorKind::unsupported) return;
+    if (!audio) return problem(audio.error().message);
+    ++v.audio_packets;
+    constexpr double longest = 120000;  // a packet of Opus, by which two pieces may overlap where streams are joined
+    const auto begin = static_cast<double>(packet.timestamp_us);
+    if (v.audio_end && begin < *v.audio_end - longest) problem("its sound begins before the sound before it ends");
+    if (!v.last_number || *v.last_number != number) problem("there is sound of it, but not directly behind it");
+    v.audio_end = begin + 1e6 * static_cast<double>(audio->samples()) / audio_samples_per_second;
 }
 
 void check_decoding(Verification& v, const Packet& packet, std::uint32_t number) {
@@ -100,6 +118,7 @@ void take(Verification& v, const Packet& packet) {
         check_order(v, packet, number);
         check_dependencies(v, packet, number);
     }
+    if (packet.kind == PacketKind::audio) check_audio(v, packet, number);
     check_decoding(v, packet, number);
 }
 
@@ -144,6 +163,7 @@ Result<void> run_verify(const Options& options) {
                                           {"frames", v.frames},
                                           {"sequences", v.numbers.dependencies().sequences()},
                                           {"index", v.index.has_value()},
+                                          {"audio_packets", v.audio_packets},
                                           {"damaged_bytes", input->damaged_bytes()},
                                           {"problems", problems}}
                                .dump(2));
@@ -155,8 +175,9 @@ Result<void> run_verify(const Options& options) {
         }
         if (v.problems.size() > most) fmt::print("and {} more\n", v.problems.size() - most);
         if (sound)
-            fmt::print("{}: {} in {}, all sound{}\n", options.input, counted(v.frames, "frame"),
-                       counted(v.numbers.dependencies().sequences(), "sequence"), v.index ? ", with an index" : "");
+            fmt::print("{}: {} in {}, all sound{}{}\n", options.input, counted(v.frames, "frame"),
+                       counted(v.numbers.dependencies().sequences(), "sequence"), v.index ? ", with an index" : "",
+                       v.audio_packets > 0 ? ", with audio" : "");
     }
     if (sound) return {};
     return fail(v.refused.value_or(ErrorKind::corrupt_stream),

@@ -1,6 +1,7 @@
 // htvm: compression of human time-varying meshes. This header brings the whole C++ API.
 #pragma once
 
+#include "htvm/audio.hpp"            // IWYU pragma: export
 #include "htvm/decoder.hpp"          // IWYU pragma: export
 #include "htvm/dependency.hpp"       // IWYU pragma: export
 #include "htvm/encoder.hpp"          // IWYU pragma: export

@@ -22,13 +22,14 @@ enum class PacketKind : std::uint8_t {
     tracked = 7,      // T-frame: the I-frame's mesh laid on the captured surface
     front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
     checkpoint = 9,   // reserved: a reference for viewers who join late; not shown
+    audio = 10,       // sound of the time from a frame to the next (audio.hpp); optional
 };
 
 // Bits of PacketHeader::flags (docs/bitstream.md, section 2.1), for programs that do not decode the packet.
 namespace packet_flag {
 inline constexpr std::uint8_t referred = 1;   // frames: later frames may refer to it
 inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but the one it refers to, which needs none
-inline constexpr std::uint8_t droppable = 4;  // frames: it may be left out without affecting any other frame
+inline constexpr std::uint8_t droppable = 4;  // frames, audio: it may be left out without affecting any frame
 inline constexpr std::uint8_t colour = 8;     // codebooks: it is for colours, not for geometry
 inline constexpr std::uint8_t session = 16;   // sequence headers: the session is not 0
 inline constexpr std::uint8_t told = 128;     // the other bits are valid; encoders of version 1 wrote 0

@@ -14,8 +14,10 @@
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/zlib/deflate_stream.hpp>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "core/crc32.h"
 #include "live/http_request.h"
@@ -92,6 +94,14 @@ Text make_text(std::string_view name, std::string content) {
 using Request = http::request<http::empty_body>;
 using Header = http::response<http::empty_body>;
 
+// A file by its path, which may change meanwhile as those of a folder may; symbolic links are not followed.
+Result<ServedFile> file_at(const std::filesystem::path& path) {
+    const auto folder = ServedFolder::open(path.parent_path().string());
+    if (!folder) return tl::unexpected(folder.error());
+    const std::vector<std::string> name = {path.filename().string()};
+    return folder->file(name);
+}
+
 struct Response {
     Header header;
     std::string own;           // a text made for this response,
@@ -104,20 +114,20 @@ struct Response {
 
 struct FileServer::State {
     FileServerOptions options;
-    ServedFolder folder;
+    std::optional<ServedFolder> folder;  // unless there are files with names
     net::io_context context{1};
     tcp::acceptor acceptor{context};
     std::map<std::string, Text, std::less<>> player;
     std::map<std::string, unsigned> by_address;
     unsigned connections = 0;
 
-    State(const FileServerOptions& given, ServedFolder served) : options(given), folder(std::move(served)) {}
+    explicit State(const FileServerOptions& given) : options(given) {}
 
     Response answer(const Request& request);
     Response answer_file(const Request& request, std::vector<std::string> segments, Header header);
     Response answer_text(const Request& request, const Text& text, Header header);
     std::string listing() const;
-    bool is_served(const std::string& path) const;
+    Result<ServedFile> served_file(const std::vector<std::string>& segments) const;
     bool host_is_loopback(std::string_view host) const;
 
     net::awaitable<void> accept();
@@ -125,10 +135,14 @@ struct FileServer::State {
     net::awaitable<bool> send(beast::tcp_stream& stream, Response& response, bool with_body);
 };
 
-bool FileServer::State::is_served(const std::string& path) const {
-    const auto& only = options.only;
-    return only.empty() ? path.ends_with(".htvm") || path.ends_with(".png") || path.ends_with(".jpg")
-                        : std::find(only.begin(), only.end(), path) != only.end();
+// segments: below /files/.
+Result<ServedFile> FileServer::State::served_file(const std::vector<std::string>& segments) const {
+    std::string path;
+    for (const auto& segment : segments) path += (path.empty() ? "" : "/") + segment;
+    for (const auto& [name, place] : options.files)
+        if (name == path) return file_at(place);
+    const bool watched = path.ends_with(".htvm") || path.ends_with(".png") || path.ends_with(".jpg");
+    return folder && watched ? folder->file(segments) : fail(ErrorKind::bad_input, "not served");
 }
 
 // A page of another site whose name was made to point here (DNS rebinding) sends that name.
@@ -140,8 +154,10 @@ bool FileServer::State::host_is_loopback(std::string_view host) const {
 
 std::string FileServer::State::listing() const {
     nlohmann::json list = nlohmann::json::array();
-    for (const auto& [path, size] : folder.files(".htvm"))
-        if (is_served(path)) list.push_back({{"path", path}, {"bytes", size}});
+    if (folder)
+        for (const auto& [path, size] : folder->files(".htvm")) list.push_back({{"path", path}, {"bytes", size}});
+    for (const auto& [name, path] : options.files)
+        if (const auto file = file_at(path)) list.push_back({{"path", name}, {"bytes", file->size}});
     // File names may be any bytes.
     return list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
@@ -168,13 +184,11 @@ Response FileServer::State::answer_file(const Request& request, std::vector<std:
     Response out;
     out.header = std::move(header);
     segments.erase(segments.begin());
-    std::string path;
-    for (const auto& segment : segments) path += (path.empty() ? "" : "/") + segment;
     if (options.other_sites) {
         out.header.set(http::field::access_control_allow_origin, "*");
         out.header.set(http::field::access_control_expose_headers, "Content-Range, ETag");
     }
-    auto file = is_served(path) ? folder.file(segments) : fail(ErrorKind::bad_input, "not served");
+    auto file = served_file(segments);
     if (!file) {
         out.header.result(http::status::not_found);
         return out;
@@ -200,7 +214,7 @@ Response FileServer::State::answer_file(const Request& request, std::vector<std:
                                                        std::to_string(part.first + part.count - 1) + '/' +
                                                        std::to_string(file->size));
     }
-    out.header.set(http::field::content_type, media_type(path));
+    out.header.set(http::field::content_type, media_type(segments.back()));
     out.file = std::move(*file);
     out.first = part.first;
     out.count = part.count;
@@ -326,9 +340,12 @@ FileServer& FileServer::operator=(FileServer&&) noexcept = default;
 FileServer::~FileServer() = default;
 
 Result<FileServer> FileServer::open(const FileServerOptions& options) {
-    auto folder = ServedFolder::open(options.folder);
-    if (!folder) return tl::unexpected(folder.error());
-    auto state = std::make_unique<State>(options, std::move(*folder));
+    auto state = std::make_unique<State>(options);
+    if (options.files.empty()) {
+        auto folder = ServedFolder::open(options.folder);
+        if (!folder) return tl::unexpected(folder.error());
+        state->folder.emplace(std::move(*folder));
+    }
     for (const auto& file : player_files())
         state->player.emplace(file.name, make_text(file.name, std::string(file.content)));
     beast::error_code error;

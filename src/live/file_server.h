@@ -17,11 +17,17 @@
 
 namespace htvm::live {
 
+// A file under a name of its own, wherever it lies.
+struct NamedFile {
+    std::string name;  // below /files/: segments joined by slashes
+    std::string path;
+};
+
 struct FileServerOptions {
     std::string address = "127.0.0.1";  // to listen on
     std::uint16_t port = 0;             // 0: a free one
-    std::string folder;                 // what is below /files/
-    std::vector<std::string> only;      // if there are any, just these files of the folder
+    std::string folder;                 // what is below /files/: its .htvm, .png and .jpg files,
+    std::vector<NamedFile> files;       // or, if there are any, these, in this order
     bool other_sites = false;           // whether pages of other sites may read the streams (CORS)
     bool loopback_names = false;        // refuse requests whose Host is not this machine's loopback address
     unsigned connections = 512;         // at once; more are closed

@@ -139,12 +139,15 @@ TEST_F(FileServerTest, ListsTheStreams) {
     EXPECT_EQ(body(get("/api/files")), R"([{"bytes":5,"path":"inner/a b.htvm"},{"bytes":20,"path":"person.htvm"}])");
 }
 
-TEST_F(FileServerTest, OneFileAloneIsServedIfAskedTo) {
-    options.only = {"person.htvm"};
+TEST_F(FileServerTest, FilesWithNamesAreServedAlone) {
+    options.files = {{"one.htvm", (root / "served" / "person.htvm").string()},
+                     {"beside/one.htvm", (root / "secret.htvm").string()}};
     start();
-    EXPECT_EQ(status(get("/files/person.htvm")), 200);
-    EXPECT_EQ(status(get("/files/inner/a%20b.htvm")), 404);
-    EXPECT_EQ(body(get("/api/files")), R"([{"bytes":20,"path":"person.htvm"}])");
+    EXPECT_EQ(status(get("/files/one.htvm")), 200);
+    EXPECT_EQ(body(get("/files/beside/one.htvm")), "secret");
+    for (const char* other : {"/files/person.htvm", "/files/inner/a%20b.htvm", "/files/beside/person.htvm"})
+        EXPECT_EQ(status(get(other)), 404) << other;
+    EXPECT_EQ(body(get("/api/files")), R"([{"bytes":20,"path":"one.htvm"},{"bytes":6,"path":"beside/one.htvm"}])");
 }
 
 TEST_F(FileServerTest, OtherSitesMayReadOnlyIfAllowed) {

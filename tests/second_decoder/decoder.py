@@ -12,11 +12,12 @@ import struct
 import sys
 import zlib
 
+from audio import read_audio
 from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from intra import decode_intra_mesh
 from reference import Reference, decode_pose
-from stream import (CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, TRACKED, packets, read_coded_frame,
+from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, TRACKED, packets, read_coded_frame,
                     read_frame_payload, read_sequence_header)
 from tracked import TrackedReference, decode_tracked_mesh
 
@@ -68,6 +69,8 @@ def decode_stream(data):
                 book = read_codebook(packet.payload)
                 if reference and reference.frame == packet.reference:
                     books[book.purpose] = book
+            elif packet.kind == AUDIO:
+                read_audio(packet.payload)
             elif packet.kind == INTRA:
                 check(header, "a frame came before any sequence header")
                 frame = read_coded_frame(packet)

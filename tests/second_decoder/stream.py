@@ -8,7 +8,7 @@ from conventions import Bytes, L, Unsupported, check
 
 # ---------------------------------------------------------------------------------------------- 2. packets
 
-SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED = 1, 2, 3, 4, 5, 6, 7
+SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED, AUDIO = 1, 2, 3, 4, 5, 6, 7, 10
 REFERRED, TOLD = 1, 128  # flags
 
 

@@ -1,5 +1,6 @@
 // The page of `htvm play` and `htvm serve`: a stream in the whole window, or the list of streams with a still of each.
 import '/player/htvm-player.js';
+import { playBeside } from '/player/beside.js';
 
 const content = document.getElementById('content');
 const address = (path) => `/files/${path.split('/').map(encodeURIComponent).join('/')}`;
@@ -58,8 +59,14 @@ function list(files) {
 
 const response = await fetch('/api/files');
 const files = response.ok ? await response.json() : [];
-const asked = new URLSearchParams(location.search).get('file');
-if (asked !== null) play(asked, false);
+const query = new URLSearchParams(location.search);
+const asked = query.get('file');
+const beside = query.get('beside');
+if (asked !== null && beside !== null) {
+    const streams = [asked, beside].map((path) => ({ name: nameOf(path.replace(/^beside\//, '')), address: address(path) }));
+    document.title = `${streams.map(({ name }) => name).join(' | ')} – htvm`;
+    content.append(playBeside(streams));
+} else if (asked !== null) play(asked, false);
 else if (files.length === 1) play(files[0].path, true);
 else if (files.length > 0) list(files);
 else content.append(make('p', { class: 'empty' }, 'There are no .htvm files in this folder.'));

@@ -6,7 +6,7 @@ export function launch() {
         executablePath: process.env.CHROMIUM ?? '/usr/bin/chromium',
         args: [
             '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-            '--enable-precise-memory-info', '--js-flags=--expose-gc',
+            '--enable-precise-memory-info', '--js-flags=--expose-gc', '--autoplay-policy=document-user-activation-required',
         ],
     });
 }

@@ -8,7 +8,7 @@ import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { launch } from './browser.mjs';
 import { TestServer } from './server.mjs';
-import { folder } from './streams.mjs';
+import { folder, makeCapture } from './streams.mjs';
 
 const program = process.env.HTVM;
 const options = { skip: program ? false : 'HTVM names no program', timeout: 60000 };
@@ -65,21 +65,65 @@ test('htvm play shows a stream, in a loop, in the whole window', options, () =>
         assert.deepEqual(await page.evaluate(() => [document.querySelector('htvm-player').clientWidth, innerWidth]), [640, 640]);
     }));
 
-async function makeCapture(capture) {
-    await mkdir(capture);
-    for (let frame = 0; frame < 3; ++frame) {
-        const lines = ['v 0 0 0', `v 400 ${frame} 0`, 'v 0 900 0', 'v 0 0 300', 'f 1 3 2', 'f 1 2 4', 'f 1 4 3', 'f 2 3 4'];
-        await writeFile(join(capture, `${frame}.obj`), `${lines.join('\n')}\n`);
-    }
-}
-
 test('htvm play encodes a capture first', options, async () => {
     const capture = join(work, 'capture');
-    await makeCapture(capture);
+    await makeCapture(capture, 3);
     await running(['play', '--no-open', capture], async (page, address) => {
         await page.goto(address);
         await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 3);
         assert.equal(await page.title(), 'capture – htvm');
+    });
+});
+
+test('htvm play --beside shows a capture and a stream of it in one window, in step, with a slider', options, async () => {
+    const capture = join(work, 'compared');
+    await makeCapture(capture, 12);
+    const stream = join(work, 'compared.htvm');
+    execFileSync(program, ['encode', capture, '-q', '30', '-o', stream], { stdio: 'pipe' });
+    await running(['play', '--no-open', capture, '--beside', stream], async (page, address) => {
+        await page.goto(address);
+        await page.waitForFunction(() => [...document.querySelectorAll('htvm-player')].every(({ statistics }) => statistics.framesShown > 3));
+        assert.equal(await page.title(), 'compared | compared – htvm');
+        // Both show the same frame after every picture, through the end and the beginning again.
+        const pairs = await page.evaluate(async () => {
+            const [first, second] = document.querySelectorAll('htvm-player');
+            const shown = [-1, -1];
+            [first, second].forEach((player, i) => player.addEventListener('framepresented', ({ detail }) => (shown[i] = detail.frame)));
+            const pairs = [];
+            for (let i = 0; i < 60 || pairs.length < 30; ++i) {
+                await new Promise(requestAnimationFrame);
+                if (first.secondsAhead > 0 && second.secondsAhead > 0 && shown[0] >= 0) pairs.push([...shown]);
+            }
+            return pairs;
+        });
+        const apart = pairs.filter(([a, b]) => a !== b).length;
+        assert.ok(apart <= pairs.length / 10, `${apart} of ${pairs.length} pictures are of different frames`); // at the beginning of a loop
+        // What is done to the first is done to the second.
+        const state = () => page.evaluate(async () => {
+            const players = [...document.querySelectorAll('htvm-player')];
+            for (const player of players) await player.idle();
+            return players.map(({ paused, currentTime, lit, view }) => [paused, Math.floor(currentTime * 30 + 0.1), lit, view.yaw, view.distance]);
+        });
+        for (const action of [
+            (first) => first.pause(), (first) => (first.currentTime = 7.4 / 30), (first) => first.step(-1), (first) => (first.lit = true),
+            (first) => (first.view = { ...first.view, yaw: 40, distance: 2 }),
+        ]) {
+            await page.evaluate(`(${action})(document.querySelector('htvm-player'))`);
+            if (`${action}`.includes('view')) await page.evaluate(() => document.querySelector('htvm-player').dispatchEvent(new Event('viewchange')));
+            const [first, second] = await state();
+            assert.deepEqual(second, first, `${action}`);
+        }
+        assert.equal((await state())[0][1], 6);
+        // The slider shows more of the one or of the other.
+        const covered = () => page.evaluate(() => getComputedStyle(document.querySelector('.over')).clipPath);
+        assert.match(await covered(), /50%/);
+        await page.getByRole('slider', { name: 'Where the second begins' }).press('ArrowLeft');
+        assert.match(await covered(), /48%/);
+        await page.mouse.move(0.48 * 640, 200);
+        await page.mouse.down();
+        await page.mouse.move(160, 200);
+        await page.mouse.up();
+        assert.match(await covered(), /25%/);
     });
 });
 
@@ -109,7 +153,7 @@ test('the five steps of docs/player.md lead to a page that plays', options, asyn
     assert.equal(steps.match(/#\s*\d\./g).length, 5);
     const place = join(work, 'steps');
     await mkdir(place);
-    await makeCapture(join(place, 'capture'));
+    await makeCapture(join(place, 'capture'), 3);
     await symlink(join(project, 'web'), join(place, 'web'));
     // The player is built, and the server is the tests' own.
     const lines = steps.split('\n').filter((line) => !/^(\.\/dev web|python3 -m http\.server) /.test(line));

@@ -1,5 +1,6 @@
 // Streams for the tests, made from those in tests/data/conformance.
-import { readFile } from 'node:fs/promises';
+import { mkdir, readFile, writeFile } from 'node:fs/promises';
+import { join as inFolder } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { crc32, isFrame, packetKind, PacketSplitter } from '../packages/decoder/dist/node.js';
 
@@ -10,6 +11,15 @@ export const conformance = (name) => readFile(`${folder}${name}.htvm`);
 /** Lines "FRAME KIND VERTICES TRIANGLES DIGEST", as the native decoder's test wrote them. */
 export async function digests(name) {
     return (await readFile(`${folder}${name}.digests`, 'utf8')).trim().split('\n');
+}
+
+/** A capture of a few triangles that move. */
+export async function makeCapture(capture, frames) {
+    await mkdir(capture);
+    for (let frame = 0; frame < frames; ++frame) {
+        const lines = ['v 0 0 0', `v 400 ${frame} 0`, 'v 0 900 0', 'v 0 0 300', 'f 1 3 2', 'f 1 2 4', 'f 1 4 3', 'f 2 3 4'];
+        await writeFile(inFolder(capture, `${String(frame).padStart(3, '0')}.obj`), `${lines.join('\n')}\n`);
+    }
 }
 
 export function packetsOf(stream) {

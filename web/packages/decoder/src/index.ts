@@ -1,3 +1,5 @@
+export { opusSamples, readAudio } from './audio.js';
+export type { AudioPacket } from './audio.js';
 export { crc32 } from './crc32.js';
 export { Decoder, DecoderError, DecoderModule } from './decoder.js';
 export type { DecoderOptions, ErrorCode, Axis, Frame, FrameKind, IndexEntry, SequenceInfo } from './decoder.js';

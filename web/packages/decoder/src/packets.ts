@@ -3,14 +3,14 @@
 import { crc32 } from './crc32.js';
 
 export const packetKind = {
-    sequence: 1, intra: 2, enhanced: 3, codebook: 4, index: 5, predicted: 6, tracked: 7, frontIndex: 8,
+    sequence: 1, intra: 2, enhanced: 3, codebook: 4, index: 5, predicted: 6, tracked: 7, frontIndex: 8, audio: 10,
 } as const;
 
 // Bits of the flags; without `told` the others are not valid.
 const flag = { referred: 1, told: 128 } as const;
 
-const headerSize = 32;
-const closingSize = 4; // the payload's CRC
+export const headerSize = 32;
+export const closingSize = 4; // the payload's CRC
 const syncWord = 0x50565448; // "HTVP", least significant byte first
 
 export interface PacketHeader {

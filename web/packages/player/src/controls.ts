@@ -3,8 +3,9 @@
 export interface ControlActions {
     togglePlay(): void;
     seek(fraction: number): void;
-    step(frames: number): void;
+    step(frames: 1 | -1): void;
     setRate(rate: number): void;
+    toggleMuted(): void;
     toggleLoop(): void;
     toggleLit(): void;
     toggleStatistics(): void;
@@ -23,6 +24,7 @@ export interface ControlState {
     statistics: boolean;
     rate: number;
     fullscreen: boolean;
+    sound: 'none' | 'off' | 'on';
 }
 
 export const rates = [0.25, 0.5, 0.75, 1, 1.25, 1.5, 2];
@@ -37,6 +39,8 @@ const icons = {
     statistics: 'M4 20V11h4v9zM10 20V4h4v16zM16 20v-6h4v6z',
     screenshot: 'M9 5 7.5 7H4v12h16V7h-3.5L15 5zm3 4a4 4 0 1 1 0 8 4 4 0 0 1 0-8z',
     fullscreen: 'M4 4h6v2H6v4H4zM14 4h6v6h-2V6h-4zM4 14h2v4h4v2H4zM18 14h2v6h-6v-2h4z',
+    loud: 'M4 9h4l5-4v14l-5-4H4zM15 8.5a4.5 4.5 0 0 1 0 7v-2a2.6 2.6 0 0 0 0-3zM15 5a8 8 0 0 1 0 14v-2a6 6 0 0 0 0-10z',
+    silent: 'M4 9h4l5-4v14l-5-4H4zM15.4 9 17.5 11.1 19.6 9 21 10.4 18.9 12.5 21 14.6 19.6 16 17.5 13.9 15.4 16 14 14.6 16.1 12.5 14 10.4z',
     vr: 'M3 7h18v10h-6l-2-3h-2l-2 3H3zm4.5 3a2 2 0 1 0 0 4 2 2 0 0 0 0-4zm9 0a2 2 0 1 0 0 4 2 2 0 0 0 0-4z',
 };
 
@@ -81,6 +85,7 @@ export class Controls {
     #play: HTMLButtonElement;
     #back: HTMLButtonElement;
     #forward: HTMLButtonElement;
+    #loud: HTMLButtonElement;
     #loop: HTMLButtonElement;
     #light: HTMLButtonElement;
     #statistics: HTMLButtonElement;
@@ -101,6 +106,8 @@ export class Controls {
         this.#play = button('play', 'Play (Space)', actions.togglePlay);
         this.#back = button('back', 'One frame back (,)', () => actions.step(-1));
         this.#forward = button('forward', 'One frame on (.)', () => actions.step(1));
+        this.#loud = button('loud', 'Sound (M)', actions.toggleMuted);
+        this.#loud.hidden = true;
         this.#loop = button('loop', 'Play again and again (L)', actions.toggleLoop);
         this.#light = button('light', 'Light', actions.toggleLit);
         this.#statistics = button('statistics', 'Statistics (S)', actions.toggleStatistics);
@@ -121,8 +128,8 @@ export class Controls {
         for (const type of ['pointerup', 'pointercancel', 'change'])
             this.#scrub.addEventListener(type, () => (this.#scrubbing = false));
         this.bar.append(
-            this.#play, this.#back, this.#forward, this.#time, this.#scrub, this.#rate, this.#loop, this.#light,
-            this.#statistics, screenshot, this.#vr, this.#fullscreen);
+            this.#play, this.#back, this.#forward, this.#time, this.#scrub, this.#loud, this.#rate, this.#loop,
+            this.#light, this.#statistics, screenshot, this.#vr, this.#fullscreen);
     }
 
     offerVr(): void {
@@ -154,6 +161,9 @@ export class Controls {
         press(this.#light, state.lit);
         press(this.#statistics, state.statistics);
         press(this.#fullscreen, state.fullscreen);
+        press(this.#loud, state.sound === 'on');
+        this.#loud.hidden = state.sound === 'none';
+        setIcon(this.#loud, state.sound === 'on' ? icons.loud : icons.silent);
         const rate = String(state.rate);
         if (this.#rate.value !== rate && rates.includes(state.rate)) this.#rate.value = rate;
     }
@@ -176,6 +186,7 @@ export const styles = `
 canvas { position: absolute; inset: 0; width: 100%; height: 100%; display: block; outline: none; touch-action: none; cursor: grab; }
 canvas:active { cursor: grabbing; }
 canvas:focus-visible { box-shadow: inset 0 0 0 2px var(--_accent); }
+::slotted(*) { position: absolute; inset: 0; pointer-events: none; }
 .poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; pointer-events: none; }
 .bar {
     position: absolute; left: 10px; right: 10px; bottom: 10px; display: flex; align-items: center; gap: 2px; padding: 4px 6px;
@@ -208,6 +219,10 @@ svg { display: block; width: 20px; height: 20px; fill: currentColor; }
 .rate option { color: #000; background: #fff; }
 .notice {
     position: absolute; left: 50%; top: 12px; transform: translateX(-50%); max-width: calc(100% - 40px); padding: 6px 12px;
+    border-radius: 8px; background: var(--_bar); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
+}
+.unmute {
+    position: absolute; left: 50%; bottom: 64px; transform: translateX(-50%); width: auto; height: auto; padding: 8px 16px;
     border-radius: 8px; background: var(--_bar); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
 }
 .failure { position: absolute; inset: 0; display: flex; align-items: center; justify-content: center; padding: 24px; text-align: center; user-select: text; -webkit-user-select: text; }

@@ -6,6 +6,7 @@ import type { FailureCode, FrameReport } from './messages.js';
 import { Orbit } from './orbit.js';
 import { Playback } from './playback.js';
 import { StageScene } from './scene.js';
+import { Sound } from './sound.js';
 import { Statistics, type StatisticsSummary } from './statistics.js';
 import { startWorker } from './worker_start.js';
 
@@ -37,6 +38,14 @@ export interface PlayerStatistics extends StatisticsSummary {
     indexUploads: number;
 }
 
+/** Where the camera is: turned about a point. Degrees to the right and up, metres. */
+export interface PlayerView {
+    yaw: number;
+    pitch: number;
+    distance: number;
+    target: [number, number, number];
+}
+
 export interface PlayerErrorDetail {
     code: FailureCode;
     /** In words. */
@@ -45,17 +54,26 @@ export interface PlayerErrorDetail {
 
 const keepNoticeMs = 6000;
 const restAfterMs = 2500;
+const radians = Math.PI / 180; // in a degree
 const axes: readonly string[] = ['x', 'y', 'z', '-x', '-y', '-z'];
 
 /**
- * Events: loadedmetadata, durationchange, play, pause, seeking, seeked, waiting, ended, timeupdate, error (its detail a
- * PlayerErrorDetail), notice (its detail a sentence), framepresented (its detail a FramePresentedDetail).
+ * Events: loadedmetadata, durationchange, play, pause, seeking, seeked, waiting, ended, timeupdate, ratechange, volumechange,
+ * viewchange, error (its detail a PlayerErrorDetail), notice (its detail a sentence), framepresented (its detail a
+ * FramePresentedDetail). What the element contains is drawn over the picture, below the controls.
  */
 export class HtvmPlayerElement extends HTMLElement {
-    static readonly observedAttributes = ['src', 'loop', 'controls', 'poster', 'lit', 'up', 'theme', 'floor', 'statistics', 'label', 'orbit'];
+    static readonly observedAttributes = [
+        'src', 'audio', 'muted', 'loop', 'controls', 'poster', 'lit', 'up', 'theme', 'floor', 'statistics', 'label', 'orbit',
+    ];
     /** Where the worker and the decoder lie; beside this file unless told, before the first element has a src. */
     static workerUrl: URL | string = new URL('./htvm-worker.js', import.meta.url);
     static decoderUrl: URL | string = new URL('./htvm_decoder.wasm', import.meta.url);
+
+    // As attributes: see the end of this file.
+    declare autoplay: boolean;
+    declare loop: boolean;
+    declare lit: boolean;
 
     #canvas = make('canvas', 'canvas', { tabindex: '0', role: 'img' });
     #poster = make('img', 'poster', { alt: '' });
@@ -64,10 +82,12 @@ export class HtvmPlayerElement extends HTMLElement {
     #failure = make('div', 'failure', { role: 'alert' });
     #description = make('div', 'description', { id: 'description' });
     #panel = make('pre', 'panel', { 'aria-hidden': 'true' });
+    #unmute = make('button', 'unmute', { type: 'button' });
     #controls: Controls;
     #scene: StageScene | null = null;
     #orbit: Orbit | null = null;
     #playback: Playback;
+    #sound: Sound;
     #statistics = new Statistics();
     #clock: Clock = browserClock;
     #request: number | null = null;
@@ -93,14 +113,20 @@ export class HtvmPlayerElement extends HTMLElement {
         const sheet = new CSSStyleSheet();
         sheet.replaceSync(styles);
         root.adoptedStyleSheets = [sheet];
-        this.#controls = new Controls(this.#actions());
-        for (const part of [this.#notice, this.#failure, this.#panel, this.#spinner, this.#poster]) part.hidden = true;
+        this.#controls = new Controls(this.#actions);
+        for (const part of [this.#notice, this.#failure, this.#panel, this.#spinner, this.#poster, this.#unmute]) part.hidden = true;
+        this.#unmute.textContent = 'Turn the sound on';
+        this.#unmute.addEventListener('click', () => this.#sound.allow());
         this.#canvas.setAttribute('aria-describedby', 'description');
-        root.append(this.#canvas, this.#poster, this.#panel, this.#spinner, this.#notice, this.#failure, this.#controls.bar, this.#description);
+        root.append(this.#canvas, this.#poster, document.createElement('slot'), this.#panel, this.#spinner, this.#notice, this.#failure, this.#unmute, this.#controls.bar, this.#description);
+        this.#sound = new Sound({
+            changed: () => this.#invalidate(),
+            notice: (text) => this.#say(text),
+        });
         this.#playback = new Playback(
             () => startWorker(new URL(HtvmPlayerElement.workerUrl, location.href)),
             new URL(HtvmPlayerElement.decoderUrl, location.href).href,
-            () => this.#clock.now(),
+            () => this.#sound.now(),
             {
                 opened: (sequence, layerNames) => {
                     this.#sequence = sequence;
@@ -113,6 +139,8 @@ export class HtvmPlayerElement extends HTMLElement {
                     this.#schedule();
                 },
                 arrived: () => this.#schedule(),
+                sound: (report) => this.#sound.take(report),
+                jumped: () => this.#sound.jumped(),
                 sought: () => this.#send('seeked'),
                 waiting: () => this.#send('waiting'),
                 ended: () => {
@@ -151,25 +179,22 @@ export class HtvmPlayerElement extends HTMLElement {
         this.setAttribute('src', value);
     }
 
-    get autoplay(): boolean {
-        return this.hasAttribute('autoplay');
+    /** The sound alone; true by the attribute of that name from the beginning on. */
+    get muted(): boolean {
+        return this.#sound.muted;
     }
-    set autoplay(on: boolean) {
-        this.toggleAttribute('autoplay', on);
-    }
-
-    get loop(): boolean {
-        return this.hasAttribute('loop');
-    }
-    set loop(on: boolean) {
-        this.toggleAttribute('loop', on);
+    set muted(muted: boolean) {
+        this.#sound.muted = muted;
+        this.#send('volumechange');
     }
 
-    get lit(): boolean {
-        return this.hasAttribute('lit');
+    /** 0 to 1. */
+    get volume(): number {
+        return this.#sound.volume;
     }
-    set lit(on: boolean) {
-        this.toggleAttribute('lit', on);
+    set volume(volume: number) {
+        this.#sound.volume = volume;
+        this.#send('volumechange');
     }
 
     get paused(): boolean {
@@ -198,6 +223,26 @@ export class HtvmPlayerElement extends HTMLElement {
     }
     set playbackRate(rate: number) {
         this.#playback.setRate(Math.min(2, Math.max(0.25, rate)));
+        this.#send('ratechange');
+        this.#invalidate();
+    }
+
+    /** How long playback goes on with the frames that are decoded; Infinity if they are the last. */
+    get secondsAhead(): number {
+        return this.#error ? Infinity : this.#playback.usAhead / 1e6;
+    }
+
+    /** Null before the first frame is shown. */
+    get view(): PlayerView | null {
+        if (!this.#scene) return null;
+        const { yaw, pitch, distance, target } = this.#scene.view;
+        return { yaw: yaw / radians, pitch: pitch / radians, distance, target: [target.x, target.y, target.z] };
+    }
+    set view(view: PlayerView) {
+        if (!this.#scene) return;
+        const { yaw, pitch, distance, target } = view;
+        Object.assign(this.#scene.view, { yaw: yaw * radians, pitch: pitch * radians, distance });
+        this.#scene.view.target.set(...target);
         this.#invalidate();
     }
 
@@ -223,6 +268,7 @@ export class HtvmPlayerElement extends HTMLElement {
     play(): void {
         if (this.#wantsPlay || this.#error) return;
         this.#wantsPlay = true;
+        this.#sound.allow();
         this.#playback.play();
         this.#send('play');
         this.#invalidate();
@@ -266,9 +312,8 @@ export class HtvmPlayerElement extends HTMLElement {
     /** The view as at the beginning. */
     resetView(): void {
         const [yaw = 0, pitch = 7, distance] = (this.getAttribute('orbit') ?? '').split(/[\s,]+/).filter(Boolean).map(Number);
-        const radians = Math.PI / 180;
         this.#scene?.resetView((yaw || 0) * radians, (pitch || 0) * radians, distance && distance > 0 ? distance : undefined);
-        this.#invalidate();
+        this.#viewChanged();
     }
 
     /** The source of time. For tests; set it before `src`. */
@@ -276,9 +321,8 @@ export class HtvmPlayerElement extends HTMLElement {
         return this.#clock;
     }
     set clock(clock: Clock) {
-        if (this.#request !== null) this.#clock.cancel(this.#request);
-        this.#request = null;
-        this.#clock = clock;
+        this.#cancelPicture();
+        this.#clock = this.#sound.clock = clock;
         this.#schedule();
     }
 
@@ -300,11 +344,11 @@ export class HtvmPlayerElement extends HTMLElement {
     disconnectedCallback(): void {
         this.#connected = false;
         this.#playback.close();
+        this.#sound.close();
         this.#resized.disconnect();
         this.#dark.removeEventListener('change', this.#applyTheme);
         document.removeEventListener('visibilitychange', this.#visibility);
-        if (this.#request !== null) this.#clock.cancel(this.#request);
-        this.#request = null;
+        this.#cancelPicture();
         this.#scene?.forget();
     }
 
@@ -312,7 +356,11 @@ export class HtvmPlayerElement extends HTMLElement {
         if (before === value) return;
         switch (name) {
             case 'src':
+            case 'audio':
                 if (this.#connected) this.#load();
+                break;
+            case 'muted':
+                this.muted = value !== null;
                 break;
             case 'loop':
                 this.#playback.setLoop(this.loop);
@@ -369,18 +417,19 @@ export class HtvmPlayerElement extends HTMLElement {
         this.#texcoords = null;
         this.#poster.hidden = !this.hasAttribute('poster');
         this.#scene?.forget();
+        this.#sound.close();
         if (!this.src) {
             this.#playback.close();
             return;
         }
         this.#playback.setLoop(this.loop);
         this.#playback.open(new URL(this.src, document.baseURI).href);
+        const audio = this.getAttribute('audio');
+        if (audio) void this.#sound.openFile(new URL(audio, document.baseURI).href);
         if (document.visibilityState === 'hidden') this.#playback.hide();
-        if (this.autoplay || this.#wantsPlay) {
-            this.#wantsPlay = true;
-            this.#playback.play();
-            this.#send('play');
-        }
+        const plays = this.autoplay || this.#wantsPlay;
+        this.#wantsPlay = false;
+        if (plays) this.play();
         this.#describe();
         this.#invalidate();
     }
@@ -392,7 +441,7 @@ export class HtvmPlayerElement extends HTMLElement {
         scene.setLit(this.lit);
         scene.floorVisible = this.getAttribute('floor') !== 'none';
         scene.below = this.hasAttribute('controls') ? 0.1 : 0;
-        this.#orbit = new Orbit(this.#canvas, scene.view, () => this.#invalidate(), () => this.resetView());
+        this.#orbit = new Orbit(this.#canvas, scene.view, () => this.#viewChanged(), () => this.resetView());
         this.#scene = scene;
         this.#setUp();
         this.#applyTheme();
@@ -416,14 +465,30 @@ export class HtvmPlayerElement extends HTMLElement {
         });
     }
 
+    #cancelPicture(): void {
+        if (this.#request !== null) this.#clock.cancel(this.#request);
+        this.#request = null;
+    }
+
+    // What is due now.
+    #tick(): FrameReport | null {
+        const now = this.#clock.now();
+        const playback = this.#playback;
+        const frame = document.visibilityState === 'hidden' ? null : playback.tick();
+        if (frame) this.#present(frame, now);
+        const { advances, presentUs, loopUs, durationUs, rate } = playback;
+        this.#sound.update({ advances, presentUs, loopUs, durationUs, loop: this.loop, rate });
+        return frame;
+    }
+
     #picture(): void {
         const now = this.#clock.now();
-        const frame = document.visibilityState === 'hidden' ? null : this.#playback.tick();
-        if (frame) this.#present(frame, now);
+        const frame = this.#tick();
         if (this.#noticeUntil > 0 && now > this.#noticeUntil) {
             this.#notice.hidden = true;
             this.#noticeUntil = 0;
         }
+        this.#unmute.hidden = !(this.#wantsPlay && this.#sound.blocked);
         const loading = !this.#error && this.src !== '' && this.#playback.stalled;
         this.#spinner.hidden = !loading;
         const resting = this.#wantsPlay && now > this.#restAt;
@@ -442,8 +507,7 @@ export class HtvmPlayerElement extends HTMLElement {
             this.#invalidate();
             // A manual clock draws only when it advances; what is due now is drawn now.
             if (this.#clock !== browserClock && this.#request !== null) {
-                this.#clock.cancel(this.#request);
-                this.#request = null;
+                this.#cancelPicture();
                 this.#picture();
             }
         });
@@ -501,7 +565,13 @@ export class HtvmPlayerElement extends HTMLElement {
             statistics: !this.#panel.hidden,
             rate,
             fullscreen: this.#isFullscreen(),
+            sound: !this.#sound.exists ? 'none' : this.muted || this.#sound.blocked ? 'off' : 'on',
         });
+    }
+
+    #viewChanged(): void {
+        this.#invalidate();
+        this.#send('viewchange');
     }
 
     #resize(): void {
@@ -524,6 +594,7 @@ export class HtvmPlayerElement extends HTMLElement {
     #visibility = (): void => {
         if (document.visibilityState === 'hidden') this.#playback.hide();
         else this.#playback.show();
+        this.#tick();
         this.#schedule();
     };
 
@@ -566,22 +637,24 @@ export class HtvmPlayerElement extends HTMLElement {
 
     // ---- what people do -------------------------------------------------------------------------------------------
 
-    #actions(): ControlActions {
-        return {
-            togglePlay: () => (this.paused ? this.play() : this.pause()),
-            seek: (fraction) => {
-                if (Number.isFinite(this.duration)) this.currentTime = fraction * this.duration;
-            },
-            step: (frames) => void this.step(frames as 1 | -1),
-            setRate: (rate) => (this.playbackRate = rate),
-            toggleLoop: () => (this.loop = !this.loop),
-            toggleLit: () => (this.lit = !this.lit),
-            toggleStatistics: () => this.toggleAttribute('statistics'),
-            screenshot: () => void this.#savePicture(),
-            toggleFullscreen: () => void this.#toggleFullscreen(),
-            enterVr: () => void this.#enterVr(),
-        };
-    }
+    #actions: ControlActions = {
+        togglePlay: () => (this.paused ? this.play() : this.pause()),
+        seek: (fraction) => {
+            if (Number.isFinite(this.duration)) this.currentTime = fraction * this.duration;
+        },
+        step: (frames) => void this.step(frames),
+        setRate: (rate) => (this.playbackRate = rate),
+        toggleMuted: () => {
+            if (this.#sound.blocked) this.#sound.allow();
+            else this.muted = !this.muted;
+        },
+        toggleLoop: () => (this.loop = !this.loop),
+        toggleLit: () => (this.lit = !this.lit),
+        toggleStatistics: () => this.toggleAttribute('statistics'),
+        screenshot: () => void this.#savePicture(),
+        toggleFullscreen: () => void this.#toggleFullscreen(),
+        enterVr: () => void this.#enterVr(),
+    };
 
     #stir(): void {
         this.#restAt = this.#clock.now() + restAfterMs;
@@ -593,18 +666,20 @@ export class HtvmPlayerElement extends HTMLElement {
         const target = event.composedPath()[0];
         const inWidget = target instanceof HTMLButtonElement || target instanceof HTMLSelectElement;
         if (event.key === ' ' && inWidget) return;
-        const actions: Record<string, () => void> = {
-            ' ': () => (this.paused ? this.play() : this.pause()),
-            k: () => (this.paused ? this.play() : this.pause()),
-            ',': () => void this.step(-1),
-            '.': () => void this.step(1),
-            l: () => (this.loop = !this.loop),
-            s: () => this.toggleAttribute('statistics'),
-            f: () => void this.#toggleFullscreen(),
+        const { togglePlay, step, toggleMuted, toggleLoop, toggleStatistics, toggleFullscreen } = this.#actions;
+        const keys: Record<string, () => void> = {
+            ' ': togglePlay,
+            k: togglePlay,
+            ',': () => step(-1),
+            '.': () => step(1),
+            m: toggleMuted,
+            l: toggleLoop,
+            s: toggleStatistics,
+            f: toggleFullscreen,
             Escape: () => this.#setWholeWindow(false),
             Home: () => (this.currentTime = 0),
         };
-        const action = actions[event.key];
+        const action = keys[event.key];
         if (!action) return;
         if (event.key !== 'Escape') event.preventDefault();
         action();
@@ -653,14 +728,12 @@ export class HtvmPlayerElement extends HTMLElement {
         const scene = this.#stage();
         const { xr } = scene.renderer;
         const session = await navigator.xr!.requestSession('immersive-vr', { optionalFeatures: ['local-floor'] });
-        if (this.#request !== null) this.#clock.cancel(this.#request);
-        this.#request = null;
+        this.#cancelPicture();
         xr.enabled = true;
         await xr.setSession(session);
         scene.standBack(1.8);
         scene.renderer.setAnimationLoop(() => {
-            const frame = this.#playback.tick();
-            if (frame) this.#present(frame, this.#clock.now());
+            this.#tick();
             scene.render();
         });
         session.addEventListener('end', () => {
@@ -671,3 +744,15 @@ export class HtvmPlayerElement extends HTMLElement {
         });
     }
 }
+
+for (const name of ['autoplay', 'loop', 'lit'])
+    Object.defineProperty(HtvmPlayerElement.prototype, name, {
+        get(this: HTMLElement): boolean {
+            return this.hasAttribute(name);
+        },
+        set(this: HTMLElement, on: boolean) {
+            this.toggleAttribute(name, on);
+        },
+        enumerable: true,
+        configurable: true,
+    });

@@ -1,7 +1,7 @@
 export { browserClock, ManualClock } from './clock.js';
 export type { Clock } from './clock.js';
 export { HtvmPlayerElement } from './element.js';
-export type { FramePresentedDetail, PlayerErrorDetail, PlayerStatistics } from './element.js';
+export type { FramePresentedDetail, PlayerErrorDetail, PlayerView, PlayerStatistics } from './element.js';
 export { streamVersion, type Axis } from '@htvm/decoder';
 import { HtvmPlayerElement } from './element.js';
 

@@ -1,5 +1,5 @@
 // The messages between the player and its worker.
-import type { SequenceInfo } from '@htvm/decoder';
+import type { AudioPacket, SequenceInfo } from '@htvm/decoder';
 
 /** To the worker. `serial` counts seeks: frames of older ones are thrown away. */
 export type Request =
@@ -20,6 +20,7 @@ export type Report =
     /** durationUs: null while it is unknown. seekable: whether all of it can be reached directly. */
     | { type: 'extent'; durationUs: number | null; seekable: boolean }
     | FrameReport
+    | AudioReport
     /** All frames of this serial were sent. */
     | { type: 'ended'; serial: number; frames: number; durationUs: number }
     /** Something is wrong, but playing continues; a sentence. */
@@ -30,6 +31,13 @@ export type Report =
     | { type: 'memory'; wasmBytes: number; heldBytes: number };
 
 export type FailureCode = 'missing' | 'network' | 'refused' | 'not-htvm' | 'empty' | 'version' | 'decoder' | 'changed';
+
+/** Sound, from `presentUs` on, as for frames. */
+export interface AudioReport extends AudioPacket {
+    type: 'audio';
+    serial: number;
+    presentUs: number;
+}
 
 /** A decoded frame. All arrays but indices and texcoords lie in `buffer`. */
 export interface FrameReport {

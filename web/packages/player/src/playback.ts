@@ -3,13 +3,17 @@
 // There are two times. Media time is the stream's: 0 is its first frame. Present time continues through loops, and starts
 // again at the media time with each seek; the clock runs in it.
 import type { SequenceInfo } from '@htvm/decoder';
-import type { FailureCode, FrameReport, Report, Request } from './messages.js';
+import type { AudioReport, FailureCode, FrameReport, Report, Request } from './messages.js';
 
 export interface PlaybackListener {
     opened(sequence: SequenceInfo, layerNames: readonly string[]): void;
     extent(durationUs: number | null, seekable: boolean): void;
     /** Something arrived: a picture may be due. */
     arrived(): void;
+    /** Sound, to be heard at its present time. */
+    sound(report: AudioReport): void;
+    /** Playback goes on elsewhere: no sound that came before this is heard any more. */
+    jumped(): void;
     sought(): void;
     /** Frames do not come as fast as they are shown. */
     waiting(): void;
@@ -80,6 +84,27 @@ export class Playback {
         return this.#ring.length;
     }
 
+    /** Microseconds; continues through loops. */
+    get presentUs(): number {
+        return this.#presentUs();
+    }
+    /** Present time at which media time 0 was last. */
+    get loopUs(): number {
+        return this.#current ? this.#current.presentUs - this.#current.timeUs : 0;
+    }
+    /** Whether present time advances, and pictures are shown. */
+    get advances(): boolean {
+        return this.#playing && !this.stalled && !this.#hidden;
+    }
+
+    /** How long, at this rate, until a frame is missing: microseconds; Infinity if there is none after the last. */
+    get usAhead(): number {
+        const last = this.#ring.at(-1) ?? this.#current;
+        if (this.#awaiting || !last) return 0;
+        if (this.#endedSerial === this.#serial) return Infinity;
+        return Math.max(0, last.presentUs + last.durationUs - this.#presentUs()) / this.#rate;
+    }
+
     /** Media time, microseconds. */
     get timeUs(): number {
         if (this.#awaiting || !this.#current) return this.#soughtUs;
@@ -147,6 +172,7 @@ export class Playback {
         this.#stalled = false;
         this.#anchorUs = this.#soughtUs;
         this.#anchorNow = this.#now();
+        this.#listener.jumped();
         this.#send({ type: 'seek', serial: this.#serial, timeUs: this.#soughtUs });
     }
 
@@ -285,6 +311,7 @@ export class Playback {
         this.#awaiting = true;
         const serial = ++this.#serial;
         this.#anchorUs = timeUs;
+        this.#listener.jumped();
         let worker: Worker;
         try {
             worker = await this.#makeWorker();
@@ -350,6 +377,9 @@ export class Playback {
                 break;
             case 'frame':
                 this.#takeFrame(report);
+                break;
+            case 'audio':
+                if (report.serial === this.#serial) this.#listener.sound(report);
                 break;
             case 'ended':
                 if (report.serial !== this.#serial) break;

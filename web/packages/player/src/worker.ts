@@ -1,5 +1,5 @@
 // The player's worker: fetches, decodes, computes normals, and sends frames as long as the player has room for them.
-import { Decoder, DecoderError, DecoderModule, isFrame, isStart, packetKind, type Frame } from '@htvm/decoder';
+import { Decoder, DecoderError, DecoderModule, isFrame, isStart, packetKind, readAudio, type Frame } from '@htvm/decoder';
 import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
 import { FilePackets, type TimedPacket } from './file_packets.js';
 import type { FrameReport, Report, Request } from './messages.js';
@@ -12,6 +12,7 @@ const scope = globalThis as unknown as {
 const post = (report: Report, transfer: Transferable[] = []): void => scope.postMessage(report, transfer);
 
 const mostReopenings = 4;
+const roundingUs = 500; // so near before a frame's time, that frame is meant
 const previewBeyond = 3; // frames between where decoding starts and what is sought
 
 class Session {
@@ -139,7 +140,7 @@ class Session {
             for (;;) {
                 const packet = await this.#file.next();
                 if (!packet) break;
-                const frame = this.#decode(packet);
+                const frame = this.#decode(packet, serial);
                 if (!frame) continue;
                 if (!(await this.#haveRoom(serial))) return;
                 this.#send(serial, frame, packet.timeUs, false);
@@ -177,17 +178,17 @@ class Session {
             }
             group.push({ ...packet, bytes: packet.bytes.slice() });
             bytes += packet.size;
-            if (isFrame(packet.kind) && packet.timeUs + this.#file.frameUs / 2 > timeUs) break;
+            if (isFrame(packet.kind) && packet.timeUs + this.#file.frameUs > timeUs + roundingUs) break;
             if (bytes > 1 << 26) break;
             if (packet.kind === packetKind.sequence) {
                 // Frames' duration is in it.
-                this.#decode(group.pop()!);
+                this.#decode(group.pop()!, serial);
             }
         }
         const frames = group.filter(({ kind }) => isFrame(kind)).length;
         let left = frames;
         for (const packet of group) {
-            const frame = this.#decode(packet);
+            const frame = this.#decode(packet, serial);
             if (isFrame(packet.kind)) --left;
             if (!frame) continue;
             const preview = left > 0;
@@ -207,7 +208,12 @@ class Session {
         return this.#serial === serial;
     }
 
-    #decode(packet: TimedPacket): { frame: Frame; decodeMs: number } | null {
+    // A frame, where the packet is one; sound is sent on as it is.
+    #decode(packet: TimedPacket, serial: number): { frame: Frame; decodeMs: number } | null {
+        if (packet.kind === packetKind.audio) {
+            this.#sendAudio(packet, serial);
+            return null;
+        }
         if (packet.kind === packetKind.index || packet.kind === packetKind.frontIndex) {
             this.#tellExtent();
             return null;
@@ -297,6 +303,13 @@ class Session {
         if (best >= 0) return this.#spare.splice(best, 1)[0]!;
         this.#spare.shift(); // too small for these frames
         return new ArrayBuffer(bytes + (bytes >> 3));
+    }
+
+    #sendAudio(packet: TimedPacket, serial: number): void {
+        const audio = readAudio(packet);
+        if (!audio) return this.#notice('Some of the sound cannot be played.');
+        const presentUs = packet.timeUs + this.#loopUs;
+        post({ type: 'audio', serial, presentUs, ...audio }, audio.opus.map(({ buffer }) => buffer));
     }
 
     #send(serial: number, { frame, decodeMs }: { frame: Frame; decodeMs: number }, timeUs: number, preview: boolean): void {

@@ -1,0 +1,173 @@
+#include "io/ogg_opus.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <string_view>
+
+#include "core/bytes.h"
+#include "core/opus_packet.h"
+#include "io/mesh_file.h"
+
+namespace htvm {
+
+using namespace internal;
+namespace {
+
+constexpr std::uint64_t most_bytes = std::uint64_t{1} << 30;
+constexpr const char* advice = "; ffmpeg makes one of any sound: ffmpeg -i SOUND -ac 2 -c:a libopus sound.opus";
+
+tl::unexpected<Error> damaged(std::string_view what) {
+    return fail(ErrorKind::bad_input, "the Ogg Opus file is damaged: " + std::string(what));
+}
+
+// CRC-32 of Ogg: the polynomial of zlib, but not reflected, and without a first or last exclusive-or.
+std::uint32_t ogg_crc(std::span<const std::uint8_t> bytes, std::uint32_t crc) {
+    static const auto table = [] {
+        std::array<std::uint32_t, 256> out{};
+        for (std::uint32_t n = 0; n < out.size(); ++n) {
+            out[n] = n << 24;
+            for (int bit = 0; bit < 8; ++bit) out[n] = (out[n] << 1) ^ ((out[n] >> 31) != 0 ? 0x04c11db7u : 0);
+        }
+        return out;
+    }();
+    for (const auto byte : bytes) crc = (crc << 8) ^ table[(crc >> 24) ^ byte];
+    return crc;
+}
+
+struct Page {
+    bool continues = false, first = false, last = false;
+    std::int64_t granule = -1;  // samples up to the end of the last packet that ends in it, pre-skip included
+    std::uint32_t serial = 0, number = 0;
+    std::span<const std::uint8_t> lacing, body;
+};
+
+// The page at the beginning of the bytes; nothing if there is none, or a damaged one.
+std::optional<Page> read_page(std::span<const std::uint8_t> bytes, std::size_t& size) {
+    ByteReader in(bytes);
+    const auto mark = in.bytes(4);
+    if (!in.ok() || std::memcmp(mark.data(), "OggS", 4) != 0 || in.u8() != 0) return std::nullopt;
+    Page page;
+    const auto flags = in.u8();
+    page.continues = (flags & 1) != 0;
+    page.first = (flags & 2) != 0;
+    page.last = (flags & 4) != 0;
+    page.granule = static_cast<std::int64_t>(in.u64());
+    page.serial = in.u32();
+    page.number = in.u32();
+    const auto stored = in.u32();
+    page.lacing = in.bytes(in.u8());
+    std::size_t body = 0;
+    for (const auto length : page.lacing) body += length;
+    page.body = in.bytes(body);
+    if (!in.ok()) return std::nullopt;
+    size = in.position();
+    // The sum is that of the page with zeros in place of the sum.
+    constexpr std::size_t sum_at = 22;
+    auto sum = ogg_crc(bytes.first(sum_at), 0);
+    sum = ogg_crc(std::array<std::uint8_t, 4>{}, sum);
+    if (ogg_crc(bytes.first(size).subspan(sum_at + 4), sum) != stored) return std::nullopt;
+    return page;
+}
+
+bool begins_with(std::span<const std::uint8_t> bytes, std::string_view text) {
+    return bytes.size() >= text.size() && std::memcmp(bytes.data(), text.data(), text.size()) == 0;
+}
+
+// The packet "OpusHead".
+Result<OpusTrack> read_head(std::span<const std::uint8_t> packet) {
+    ByteReader in(packet.subspan(8));
+    const auto version = in.u8();
+    OpusTrack out;
+    out.channels = in.u8();
+    out.pre_skip = in.u16();
+    (void)in.u32();  // the rate of what was coded: Opus is decoded at 48 kHz whatever that was
+    out.gain = static_cast<std::int16_t>(in.u16());
+    const auto family = in.u8();
+    if (!in.ok()) return damaged("its header is cut short");
+    if (version >= 16)
+        return fail(ErrorKind::unsupported, "the Ogg Opus file is of version " + std::to_string(version));
+    if (family != 0 || out.channels < 1 || out.channels > 2)
+        return fail(ErrorKind::unsupported, "the sound has " + std::to_string(out.channels) +
+                                                " channels, and streams have one or two" + advice);
+    return out;
+}
+
+}  // namespace
+
+Result<OpusTrack> read_ogg_opus(std::span<const std::uint8_t> file) {
+    std::optional<OpusTrack> track;
+    std::uint32_t serial = 0, next_number = 0;
+    std::size_t headers = 0;
+    std::vector<std::uint8_t> packet;  // what earlier pages have of the next one
+    bool open = false, ended = false;
+    std::uint64_t decoded = 0, decoded_at_first = 0;  // samples, of all packets so far; of the first page's
+    std::uint64_t first_granule = 0, last_granule = 0;
+    const auto take = [&]() -> Result<void> {
+        if (headers == 0) {
+            auto head = read_head(packet);
+            if (!head) return tl::unexpected(head.error());
+            track = std::move(*head);
+        } else if (headers > 1) {
+            const auto samples = opus_samples(packet);
+            if (!samples) return damaged("a packet of Opus is malformed");
+            decoded += *samples;
+            track->packets.push_back(packet);
+        }
+        headers = std::min<std::size_t>(headers + 1, 2);
+        packet.clear();
+        return {};
+    };
+    for (std::size_t at = 0; at < file.size() && !ended;) {
+        std::size_t size = 0;
+        const auto page = read_page(file.subspan(at), size);
+        if (!page && at == 0) return fail(ErrorKind::bad_input, std::string("it is no Ogg Opus file") + advice);
+        if (!page) return damaged("there is no page at byte " + std::to_string(at));
+        at += size;
+        // Other streams, such as a film's picture, may lie between.
+        if (!track && !(page->first && begins_with(page->body, "OpusHead"))) continue;
+        if (!track) {
+            serial = page->serial;
+            next_number = page->number;
+        }
+        if (page->serial != serial) continue;
+        if (page->number != next_number++) return damaged("a page is missing before byte " + std::to_string(at));
+        if (page->continues != open) return damaged("a packet has no beginning, or no end");
+        std::size_t begin = 0;
+        for (const auto length : page->lacing) {
+            const auto piece = page->body.subspan(begin, length);
+            packet.insert(packet.end(), piece.begin(), piece.end());
+            begin += length;
+            open = length == 255;
+            if (open) continue;
+            if (auto taken = take(); !taken) return tl::unexpected(taken.error());
+        }
+        if (page->granule >= 0 && decoded > 0) {
+            last_granule = static_cast<std::uint64_t>(page->granule);
+            if (decoded_at_first == 0) first_granule = last_granule;
+            if (decoded_at_first == 0) decoded_at_first = decoded;
+        }
+        ended = page->last;
+    }
+    if (!track) return fail(ErrorKind::bad_input, std::string("it is no Ogg Opus file") + advice);
+    if (open || track->packets.empty()) return damaged("it ends too early");
+    // A recording that was cut out counts samples that are not there, before its first. The last page may end before
+    // its last packet does.
+    const std::uint64_t missing = first_granule > decoded_at_first ? first_granule - decoded_at_first : 0;
+    const std::uint64_t end = last_granule >= missing ? std::min(decoded, last_granule - missing) : decoded;
+    track->samples = end > track->pre_skip ? end - track->pre_skip : 0;
+    if (track->samples == 0) return damaged("there is no sound in it");
+    return std::move(*track);
+}
+
+Result<OpusTrack> read_ogg_opus(const std::filesystem::path& path) {
+    const auto bytes = read_file(path, most_bytes);
+    if (!bytes) return tl::unexpected(bytes.error());
+    auto track = read_ogg_opus(*bytes);
+    if (!track) return fail(track.error().kind, path.string() + ": " + track.error().message);
+    return track;
+}
+
+}  // namespace htvm
