@@ -286,6 +286,35 @@ for (const manner of ['no-ranges', 'gzip'])
         assert.equal(server.requests.filter(({ path }) => path.endsWith('.htvm')).length, 1);
     });
 
+inPage('a body that never ends plays as it comes, as of a live stream', async (page) => {
+    await open(page, '/endless/long-none.htvm', { autoplay: '' });
+    const play = (until) => page.evaluate(async (what) => {
+        while (what === 'waiting' ? !test.events.includes('waiting') : test.frames.length < what) {
+            test.clock.advance(15);
+            await new Promise((resolve) => setTimeout(resolve));
+        }
+        return test.frames.map(({ line }) => line);
+    }, until);
+    const half = await play('waiting');
+    assert.ok(half.length > 20 && half.length < 45, `${half.length} frames`);
+    assert.deepEqual(half, expected.slice(0, half.length));
+    assert.ok(Number.isNaN(await page.evaluate(() => test.player.duration)));
+    server.release();
+    const whole = await play(expected.length);
+    assert.deepEqual(whole, expected);
+});
+
+inPage('a policy that forbids WebAssembly is an error that says what to allow', async (page) => {
+    await page.route('**/htvm-worker.js', async (route) => {
+        const response = await route.fetch();
+        await route.fulfill({ response, headers: { ...response.headers(), 'Content-Security-Policy': "script-src 'self'" } });
+    });
+    await open(page, '/as-is/tracked.htvm');
+    const error = await failure(page);
+    assert.equal(error.code, 'decoder');
+    assert.match(error.message, /wasm-unsafe-eval/);
+});
+
 inPage('plays from another site that allows it, which shows pages no special headers', async (page) => {
     other.streamHeaders = { 'Access-Control-Allow-Origin': '*' };
     for (const index of ['front', 'end']) {

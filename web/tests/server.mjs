@@ -3,6 +3,7 @@
 //   /as-is/FILE       ranges, ETag                       /no-ranges/FILE   whole files only
 //   /gzip/FILE        compressed where the browser asks  /cut/FILE         the first two thirds of the file
 //   /slow/FILE        held back until release()          /changing/FILE    the file that replace() names, with its ETag
+//   /endless/FILE     a body that never ends, of a size that is not told; its second half comes after release()
 //
 // Other addresses are pages and scripts. Every request is kept in `requests`.
 import { createServer } from 'node:http';
@@ -60,7 +61,7 @@ export class TestServer {
         const path = normalize(decodeURIComponent(new URL(request.url, this.origin).pathname)).slice(1);
         this.requests.push({ method: request.method, path, range: request.headers.range ?? null });
         const [first, ...rest] = path.split('/');
-        const manner = ['as-is', 'no-ranges', 'gzip', 'cut', 'slow', 'changing'].includes(first) ? first : null;
+        const manner = ['as-is', 'no-ranges', 'gzip', 'cut', 'slow', 'changing', 'endless'].includes(first) ? first : null;
         if (!manner) {
             const root = this.#roots[first];
             const file = root ? join(root, ...rest) : join(this.#roots[''], path);
@@ -76,6 +77,14 @@ export class TestServer {
         let body = await this.#stream(name);
         if (manner === 'cut') body = body.subarray(0, Math.floor((2 * body.length) / 3));
         const headers = { 'Content-Type': 'application/octet-stream', ETag: `"${name}"`, ...this.streamHeaders };
+        if (manner === 'endless') {
+            const half = Math.floor(body.length / 2);
+            response.writeHead(200, headers);
+            response.write(body.subarray(0, half));
+            await new Promise((resolve) => this.#held.push(resolve));
+            response.write(body.subarray(half));
+            return;
+        }
         const range = /^bytes=(\d+)-(\d+)$/.exec(request.headers.range ?? '');
         if (manner === 'gzip' && /gzip/.test(request.headers['accept-encoding'] ?? '')) {
             response.writeHead(200, { ...headers, 'Content-Encoding': 'gzip' });

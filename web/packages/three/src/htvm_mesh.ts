@@ -117,12 +117,12 @@ export class HtvmMesh extends Mesh<BufferGeometry, Material> {
  */
 export function srgbVertexColours<M extends Material>(material: M): M {
     material.onBeforeCompile = (shader) => {
-        shader.vertexShader = shader.vertexShader.replace(
-            '#include <color_vertex>',
-            `#include <color_vertex>
-            #ifdef USE_COLOR_ALPHA
-                vColor.rgb = mix(pow((vColor.rgb + 0.055) / 1.055, vec3(2.4)), vColor.rgb / 12.92,
-                                 vec3(lessThanEqual(vColor.rgb, vec3(0.04045))));
+        // Where they are interpolated already: between the values that were captured, as other programs do.
+        shader.fragmentShader = shader.fragmentShader.replace(
+            '#include <color_fragment>',
+            `#ifdef USE_COLOR_ALPHA
+                diffuseColor.rgb *= mix(pow((vColor.rgb + 0.055) / 1.055, vec3(2.4)), vColor.rgb / 12.92,
+                                        vec3(lessThanEqual(vColor.rgb, vec3(0.04045))));
             #endif`,
         );
     };
