@@ -45,7 +45,8 @@ void tell_value(const CLI::Option& option, OptionText& out) {
 
 std::string names_of(const std::set<CLI::Option*>& options) {
     std::vector<std::string> names;
-    for (const auto* option : options) names.push_back(option->get_name());
+    // Not by get_name(), which is empty for what a short help hides.
+    for (const auto* option : options) names.push_back("--" + option->get_lnames().at(0));
     std::sort(names.begin(), names.end());
     return fmt::format("{}", fmt::join(names, ", "));
 }

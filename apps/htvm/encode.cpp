@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "commands.h"
 #include "encode_jobs.h"
 #include "encode_pass.h"
+#include "htvm/running_time.hpp"
 #include "io/number_text.h"
 #include "rate_passes.h"
 #include "rate_report.h"
@@ -22,6 +24,11 @@
 
 namespace htvm::app {
 namespace {
+
+// How long the capture's frames last, coded or not.
+double seconds_of(const Summary& summary, double fps) {
+    return seconds_of_frames(summary.first_us, summary.last_us, std::max<std::size_t>(summary.frames, 1), 1 / fps);
+}
 
 // ---- What is said of it ---------------------------------------------------------------------------------------------
 

@@ -161,12 +161,6 @@ void add(Summary& summary, Summary behind) {
     if (behind.bounds) summary.bounds = summary.bounds ? united(*summary.bounds, *behind.bounds) : *behind.bounds;
 }
 
-double seconds_of(const Summary& summary, double fps) {
-    const auto frames = static_cast<double>(summary.frames);
-    return summary.frames > 1 ? static_cast<double>(summary.last_us - summary.first_us) / 1e6 * frames / (frames - 1)
-                              : 1 / fps;
-}
-
 void FrameWarnings::tell(Kind kind, const std::string& line) {
     constexpr std::size_t most = 10;
     const std::lock_guard lock(mutex_);

@@ -32,8 +32,6 @@ struct Summary {
 };
 // Of frames behind those summed up so far, whose own numbers begin with 0.
 void add(Summary& summary, Summary behind);
-// How long the capture's frames last; fps: for a single one.
-double seconds_of(const Summary& summary, double fps);
 
 // Warnings of single frames, from any thread: of hundreds of a kind the first few tell enough.
 class FrameWarnings {

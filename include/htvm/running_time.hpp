@@ -8,6 +8,10 @@
 
 namespace htvm {
 
+// How long frames last, seconds: a mean frame longer than from the first one's timestamp to the last one's. of_one: how
+// long a single one does.
+double seconds_of_frames(std::int64_t first_us, std::int64_t last_us, std::uint64_t frames, double of_one);
+
 class RunningTime {
 public:
     // Takes every packet of the stream, in order. begins_sequence: FrameNumbers::begins_sequence() of this packet.
@@ -21,15 +25,14 @@ public:
     std::uint64_t total_us() const;
     // How long a frame lasts by the frame rate of the sequence header in force, and so one that is alone in its
     // sequence; 0 before any header.
-    std::uint64_t one_frame_us() const { return one_frame_us_; }
+    std::uint64_t one_frame_us() const;
 
 private:
-    double span() const;                            // from the first to the last frame of this one, seconds
-    std::uint64_t before_us_ = 0;                   // of the sequences before
-    std::int64_t first_us_ = 0, last_us_ = 0;       // timestamps in this one
-    std::uint64_t frames_ = 0;                      // of this one
-    std::uint64_t one_frame_us_ = 0, lone_us_ = 0;  // of the header in force; of the one in force at the last frame
-    bool in_the_middle_ = false;                    // whether this one's first frame did not come
+    std::uint64_t before_us_ = 0;              // of the sequences before
+    std::int64_t first_us_ = 0, last_us_ = 0;  // timestamps in this one
+    std::uint64_t frames_ = 0;                 // of this one
+    double of_one_ = 0, of_lone_ = 0;          // seconds, by the header in force; by that of the last frame
+    bool in_the_middle_ = false;               // whether this one's first frame did not come
 };
 
 }  // namespace htvm

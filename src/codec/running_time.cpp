@@ -16,12 +16,22 @@ std::uint64_t in_microseconds(double seconds) {
     return static_cast<std::uint64_t>(std::clamp(seconds, 0.0, most) * 1e6 + 0.5);
 }
 
+double span(std::int64_t first_us, std::int64_t last_us) {
+    return (static_cast<double>(last_us) - static_cast<double>(first_us)) / 1e6;
+}
+
 }  // namespace
+
+double seconds_of_frames(std::int64_t first_us, std::int64_t last_us, std::uint64_t frames, double of_one) {
+    if (frames < 2) return frames == 0 ? 0 : of_one;
+    const auto count = static_cast<double>(frames);
+    return span(first_us, last_us) * count / (count - 1);
+}
 
 void RunningTime::take(const Packet& packet, bool begins_sequence) {
     if (packet.kind == PacketKind::sequence)
         if (const auto header = read_sequence_header(packet.payload))
-            one_frame_us_ = in_microseconds(static_cast<double>(header->fps_denominator) / header->fps_numerator);
+            of_one_ = static_cast<double>(header->fps_denominator) / header->fps_numerator;
     if (!frame_type(packet.kind)) return;
     if (begins_sequence && !in_the_middle_) {
         before_us_ = total_us();
@@ -31,7 +41,7 @@ void RunningTime::take(const Packet& packet, bool begins_sequence) {
     in_the_middle_ = false;
     ++frames_;
     last_us_ = packet.timestamp_us;
-    lone_us_ = one_frame_us_;
+    of_lone_ = of_one_;
 }
 
 void RunningTime::begin(std::int64_t first_timestamp_us) {
@@ -40,14 +50,11 @@ void RunningTime::begin(std::int64_t first_timestamp_us) {
 }
 
 std::uint64_t RunningTime::total_us() const {
-    if (frames_ == 0) return before_us_;
-    if (frames_ == 1) return before_us_ + lone_us_;
-    const auto frames = static_cast<double>(frames_);
-    return before_us_ + in_microseconds(span() * frames / (frames - 1));
+    return before_us_ + in_microseconds(seconds_of_frames(first_us_, last_us_, frames_, of_lone_));
 }
 
-std::uint64_t RunningTime::microseconds() const { return before_us_ + in_microseconds(span()); }
+std::uint64_t RunningTime::microseconds() const { return before_us_ + in_microseconds(span(first_us_, last_us_)); }
 
-double RunningTime::span() const { return (static_cast<double>(last_us_) - static_cast<double>(first_us_)) / 1e6; }
+std::uint64_t RunningTime::one_frame_us() const { return in_microseconds(of_one_); }
 
 }  // namespace htvm

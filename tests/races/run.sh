@@ -46,4 +46,6 @@ for profile in tracked topology paper; do
 done
 check "htvm encode, at a rate, two passes" "$htvm" encode "$logs/capture" -s "$logs/capture/skeleton.json" --bitrate 1.5 \
     --passes 2 --threads 4 -o "$logs/rate.htvm" || failures=$((failures + 1))
+check "htvm encode, two jobs" "$htvm" encode "$logs/capture" --keyint 10 --jobs 2 --threads 4 -o "$logs/jobs.htvm" ||
+    failures=$((failures + 1))
 [ $failures -eq 0 ]
