@@ -114,6 +114,14 @@ check(obj, 7)
 bpy.context.scene.frame_set(11)
 check(obj, 10)
 
+# A stream that is missing leaves the mesh as it is, until it is there again.
+obj.htvm.path = os.path.join(work, "elsewhere.htvm")
+bpy.context.scene.frame_set(5)
+check(obj, 10)
+obj.htvm.path = stream
+bpy.context.scene.frame_set(6)
+check(obj, 5)
+
 # What is no stream is an error of the operator, and adds nothing.
 objects = len(bpy.data.objects)
 try:
