@@ -68,7 +68,9 @@ Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeOp
 Result<fs::path> stream_of(const std::vector<std::string>& inputs, const EncodeOptions& encoding,
                            TemporaryFolder& folder) {
     fs::path stream = inputs[0];
-    if (inputs.size() > 1 || stream.extension() != ".htvm") {
+    if (inputs.size() > 1 && stream.extension() == ".htvm")
+        return fail(ErrorKind::bad_input, "only one stream is shown at a time; name the folder that they are in");
+    if (stream.extension() != ".htvm") {
         auto encoded = encode_capture(inputs, encoding, folder);
         if (!encoded) return encoded;
         stream = *encoded;
