@@ -40,6 +40,7 @@ void Broadcast::push(SharedPacket packet, Clock::time_point now) {
     const auto closure = ascending(dependencies_.closure());
     if (frame) closure_ = closure;
     forget_all_but(united(united(kept_, closure_), {place}));
+    if (kept_bytes() > limits_.kept_bytes) forget_all_but({place});
     if (frame && closure.empty()) {
         ++undecodable_;
         return;
@@ -124,14 +125,17 @@ void Broadcast::fall_behind(Queue& queue, std::uint64_t place) {
 void Broadcast::try_to_follow(Queue& queue, Clock::time_point now) {
     const auto needed = without(united(kept_, closure_), queue.has);
     std::size_t frames = 0, bytes = 0;
+    bool there = true;
     for (const auto place : needed) {
+        there = there && packets_.contains(place);
+        if (!there) break;
         const auto& packet = *packets_.at(place);
         frames += frame_type(packet.header.kind) ? 1 : 0;
         bytes += packet.bytes.size();
     }
     const std::size_t missed = frames > 0 ? frames - 1 : 0;
     const bool little = (queue.joining || missed <= limits_.most_missed) && bytes <= limits_.bytes;
-    if (missed > 0 && !little) {
+    if (!there || (missed > 0 && !little)) {
         if (!queue.joining) ++queue.counters.dropped_frames;
         return;
     }

@@ -26,12 +26,15 @@ struct LivePacket {
 };
 using SharedPacket = std::shared_ptr<const LivePacket>;
 
-// How much may wait for one viewer, besides what the kernel has taken.
-struct QueueLimits {
+struct BroadcastLimits {
+    // How much may wait for one viewer, besides what the kernel has taken:
     std::size_t bytes = std::size_t{1} << 20;
     std::chrono::milliseconds wait{2000};  // from a packet's arrival until it is taken
     std::size_t most_missed = 4;           // frames sent belatedly so that a viewer can follow again; where more are
                                            // missing, it waits for a frame that needs fewer
+    // How much is kept for those who may still join. If frames since the last I-frame are more, they must wait for the
+    // next one; those who watch are not affected.
+    std::size_t kept_bytes = std::size_t{64} << 20;
 };
 
 struct ViewerCounters {
@@ -45,7 +48,7 @@ public:
     using Clock = std::chrono::steady_clock;
     using Viewer = std::uint64_t;
 
-    explicit Broadcast(const QueueLimits& limits = {}) : limits_(limits) {}
+    explicit Broadcast(const BroadcastLimits& limits = {}) : limits_(limits) {}
 
     // The publisher's next packet. Indexes, which speak of a file, go no further, nor do frames that no viewer could
     // decode, since what they refer to did not come.
@@ -86,9 +89,10 @@ private:
     void try_to_follow(Queue& queue, Clock::time_point now);
     void forget_all_but(const std::vector<std::uint64_t>& needed);
 
-    QueueLimits limits_;
+    BroadcastLimits limits_;
     Dependencies dependencies_;
-    std::map<std::uint64_t, SharedPacket> packets_;  // by place: those of kept_ and closure_
+    std::map<std::uint64_t, SharedPacket>
+        packets_;  // by place: those of kept_ and closure_, unless they were too large
     // Ascending: what later frames may need, and what the newest frame needs; empty if that cannot be decoded.
     std::vector<std::uint64_t> kept_, closure_;
     std::map<Viewer, Queue> viewers_;

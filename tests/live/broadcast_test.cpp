@@ -176,6 +176,24 @@ TEST(Broadcast, FramesThatNobodyCanDecodeAreCountedAndGoNoFurther) {
     EXPECT_EQ(broadcast.undecodable_frames(), 3u);
 }
 
+TEST(Broadcast, WhatIsKeptForThoseWhoMayJoinIsBounded) {
+    Broadcast broadcast({.kept_bytes = 3000});
+    Watching viewer(broadcast);
+    broadcast.push(header(), start);
+    broadcast.push(intra(0), start);
+    for (std::uint32_t i = 1; i <= 40; ++i) {
+        broadcast.push(tracked(i), start);
+        EXPECT_LE(broadcast.kept_bytes(), 3000u);
+    }
+    EXPECT_EQ(viewer.take().size(), 42u);
+    Watching late(broadcast);
+    EXPECT_EQ(late.take_numbers(), Numbers{});
+    broadcast.push(header(), start);
+    broadcast.push(intra(41), start);
+    EXPECT_EQ(late.take_numbers(), (Numbers{-1, 41}));
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 41}));
+}
+
 TEST(Broadcast, AnotherSessionBeginsAnotherSequence) {
     Broadcast broadcast;
     for (const auto& next : {header(7), intra(0), tracked(1), header(8), intra(0), tracked(1)})
