@@ -13,6 +13,7 @@
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
 #include <boost/beast/zlib/deflate_stream.hpp>
 #include <filesystem>
 #include <map>
@@ -21,6 +22,7 @@
 
 #include "core/crc32.h"
 #include "live/http_request.h"
+#include "live/live_connection.h"
 #include "live/player_files.h"
 #include "live/served_folder.h"
 
@@ -123,15 +125,20 @@ struct FileServer::State {
 
     explicit State(const FileServerOptions& given) : options(given) {}
 
+    Header common_header() const;
     Response answer(const Request& request);
     Response answer_file(const Request& request, std::vector<std::string> segments, Header header);
     Response answer_text(const Request& request, const Text& text, Header header);
+    Response answer_json(std::string json, Header header) const;
     std::string listing() const;
+    std::string live_listing() const;
     Result<ServedFile> served_file(const std::vector<std::string>& segments) const;
     bool host_is_loopback(std::string_view host) const;
 
     net::awaitable<void> accept();
     net::awaitable<void> serve(beast::tcp_stream stream, std::string address);
+    net::awaitable<bool> serve_live(beast::tcp_stream& stream, const Request& request);
+    net::awaitable<void> tidy_hub();
     net::awaitable<bool> send(beast::tcp_stream& stream, Response& response, bool with_body);
 };
 
@@ -159,6 +166,20 @@ std::string FileServer::State::listing() const {
     for (const auto& [name, path] : options.files)
         if (const auto file = file_at(path)) list.push_back({{"path", name}, {"bytes", file->size}});
     // File names may be any bytes.
+    return list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string FileServer::State::live_listing() const {
+    nlohmann::json list = nlohmann::json::array();
+    for (const auto& stream : options.hub->streams())
+        list.push_back({{"name", stream.name},
+                        {"published", stream.published},
+                        {"viewers", stream.viewers},
+                        {"packets", stream.publisher.packets},
+                        {"bytes", stream.publisher.bytes},
+                        {"damaged_messages", stream.publisher.damaged},
+                        {"undecodable_frames", stream.undecodable_frames},
+                        {"dropped_frames", stream.dropped_frames}});
     return list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -221,11 +242,26 @@ Response FileServer::State::answer_file(const Request& request, std::vector<std:
     return out;
 }
 
-Response FileServer::State::answer(const Request& request) {
+Response FileServer::State::answer_json(std::string json, Header header) const {
+    Response out;
+    out.header = std::move(header);
+    out.own = std::move(json);
+    out.header.set(http::field::content_type, "application/json");
+    out.header.set(http::field::cache_control, "no-store");
+    return out;
+}
+
+// What every response has.
+Header FileServer::State::common_header() const {
     Header header{http::status::ok, 11};
     header.set("X-Content-Type-Options", "nosniff");
     header.set("Referrer-Policy", "no-referrer");
     header.set("Cross-Origin-Resource-Policy", options.other_sites ? "cross-origin" : "same-origin");
+    return header;
+}
+
+Response FileServer::State::answer(const Request& request) {
+    Header header = common_header();
     const auto refuse = [&](http::status status) {
         header.result(status);
         Response out;
@@ -242,14 +278,9 @@ Response FileServer::State::answer(const Request& request) {
     if (!segments) return refuse(http::status::bad_request);
     const auto& path = *segments;
     if (path.size() > 1 && path[0] == "files") return answer_file(request, std::move(*segments), header);
-    if (path.size() == 2 && path[0] == "api" && path[1] == "files") {
-        Response out;
-        out.header = header;
-        out.own = listing();
-        out.header.set(http::field::content_type, "application/json");
-        out.header.set(http::field::cache_control, "no-store");
-        return out;
-    }
+    if (path.size() == 2 && path[0] == "api" && path[1] == "files") return answer_json(listing(), header);
+    if (path.size() == 2 && path[0] == "api" && path[1] == "streams" && options.hub)
+        return answer_json(live_listing(), header);
     const bool page = path.empty(), script = path.size() == 2 && path[0] == "player";
     const auto found = player.find(page ? "index.html" : script ? path[1] : "");
     if (found == player.end()) return refuse(http::status::not_found);
@@ -286,6 +317,37 @@ net::awaitable<bool> FileServer::State::send(beast::tcp_stream& stream, Response
     co_return true;
 }
 
+// Whether the request was for a live stream; the connection is then of no further use.
+net::awaitable<bool> FileServer::State::serve_live(beast::tcp_stream& stream, const Request& request) {
+    const auto path = path_segments(request.target());
+    if (!options.hub || !path || path->size() != 2) co_return false;
+    if (options.loopback_names && !host_is_loopback(request[http::field::host])) co_return false;
+    const bool socket = beast::websocket::is_upgrade(request);
+    const auto &what = (*path)[0], &name = (*path)[1];
+    if (what == "publish" && socket) {
+        co_await publish_by_socket(std::move(stream), request, name, *options.hub);
+        co_return true;
+    }
+    if (what != "watch" || request.method() != http::verb::get) co_return false;
+    if (socket) {
+        co_await watch_by_socket(std::move(stream), request, name, *options.hub);
+    } else {
+        auto header = common_header();
+        if (options.other_sites) header.set(http::field::access_control_allow_origin, "*");
+        co_await watch_by_body(stream, std::move(header), name, *options.hub);
+    }
+    co_return true;
+}
+
+net::awaitable<void> FileServer::State::tidy_hub() {
+    net::steady_timer timer(context);
+    for (;;) {
+        timer.expires_after(std::chrono::seconds(1));
+        co_await timer.async_wait(awaited);
+        options.hub->tidy(Hub::Clock::now());
+    }
+}
+
 net::awaitable<void> FileServer::State::serve(beast::tcp_stream stream, std::string address) {
     beast::flat_buffer buffer(header_limit);
     for (bool alive = true; alive;) {
@@ -297,6 +359,7 @@ net::awaitable<void> FileServer::State::serve(beast::tcp_stream stream, std::str
         // No request here has a body; one that does would be read as the next request.
         const bool body = !parser.is_done();
         const auto& request = parser.get();
+        if (!body && co_await serve_live(stream, request)) break;
         Response response;
         if (body)
             response.header.result(http::status::bad_request);
@@ -369,6 +432,7 @@ void FileServer::run() {
     net::signal_set signals(state_->context, SIGINT, SIGTERM);
     signals.async_wait([this](const beast::error_code&, int) { state_->context.stop(); });
     net::co_spawn(state_->context, state_->accept(), net::detached);
+    if (state_->options.hub) net::co_spawn(state_->context, state_->tidy_hub(), net::detached);
     state_->context.run();
 }
 

@@ -5,6 +5,11 @@
 //   /player/NAME     the player's scripts, kept in the program
 //   /api/files       the streams as JSON: [{"path": ..., "bytes": ...}, ...]
 //   /files/PATH      the streams themselves, by ranges too
+//
+// With a hub, live streams too (WebSockets; /watch/NAME is an endless body where no WebSocket is asked for):
+//   /publish/NAME    packets from a publisher
+//   /watch/NAME      packets for viewers
+//   /api/streams     the live streams as JSON
 #pragma once
 
 #include <chrono>
@@ -14,6 +19,7 @@
 #include <vector>
 
 #include "htvm/result.hpp"
+#include "live/hub.h"
 
 namespace htvm::live {
 
@@ -34,6 +40,7 @@ struct FileServerOptions {
     unsigned connections_per_address = 64;
     std::chrono::seconds header_time{10};  // for a whole request header, from the end of the response before
     std::chrono::seconds stall_time{30};   // for a client to take the next 64 KB
+    Hub* hub = nullptr;                    // of live streams; null: there are none. It must outlive the server
 };
 
 class FileServer {

@@ -39,7 +39,9 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
     if (known == streams_.end()) {
         if (streams_.size() >= limits_.streams)
             return fail(ErrorKind::limit, "there are as many streams as this hub carries");
-        streams_[connection.stream].broadcast = Broadcast(limits_.broadcast);
+        auto& stream = streams_[connection.stream];
+        stream.number = next_stream_++;
+        stream.broadcast = Broadcast(limits_.broadcast);
     } else if (known->second.connection) {
         auto& stream = known->second;
         const bool same = stream.session == header.reference;
@@ -108,19 +110,25 @@ Result<Hub::Viewer> Hub::watch(const std::string& name, std::function<void()> wa
         return fail(ErrorKind::limit, "'" + name + "' has as many viewers as this hub serves");
     const auto viewer = stream.broadcast.join(std::move(wake), now);
     stream.gone[viewer] = std::move(gone);
-    return Viewer{name, viewer};
+    return Viewer{name, stream.number, viewer};
+}
+
+// Null if it has ended.
+Hub::Stream* Hub::stream_of(const Viewer& viewer) {
+    const auto found = streams_.find(viewer.stream);
+    return found == streams_.end() || found->second.number != viewer.number ? nullptr : &found->second;
 }
 
 void Hub::leave(const Viewer& viewer) {
-    const auto found = streams_.find(viewer.stream);
-    if (found == streams_.end()) return;
-    found->second.broadcast.leave(viewer.viewer);
-    found->second.gone.erase(viewer.viewer);
+    auto* stream = stream_of(viewer);
+    if (!stream) return;
+    stream->broadcast.leave(viewer.viewer);
+    stream->gone.erase(viewer.viewer);
 }
 
 SharedPacket Hub::next(const Viewer& viewer) {
-    const auto found = streams_.find(viewer.stream);
-    return found == streams_.end() ? nullptr : found->second.broadcast.next(viewer.viewer);
+    auto* stream = stream_of(viewer);
+    return stream ? stream->broadcast.next(viewer.viewer) : nullptr;
 }
 
 void Hub::tidy(Clock::time_point now) {

@@ -52,6 +52,7 @@ public:
     };
     struct Viewer {
         std::string stream;
+        std::uint64_t number = 0;  // of the stream: another one may have its name later
         Broadcast::Viewer viewer = 0;
     };
 
@@ -77,9 +78,11 @@ public:
     void tidy(Clock::time_point now);
 
     std::vector<StreamInfo> streams() const;
+    const HubLimits& limits() const { return limits_; }
 
 private:
     struct Stream {
+        std::uint64_t number = 0;
         Broadcast broadcast;
         std::optional<std::uint64_t> connection;  // of the publisher, if it is connected and was admitted
         std::uint32_t session = 0;                // checksum of its sequence header
@@ -93,12 +96,13 @@ private:
         bool admitted = false;
         std::function<void(const std::string&)> taken_over;
     };
+    Stream* stream_of(const Viewer& viewer);
     Result<void> admit(std::uint64_t number, Connection& connection, const PacketHeader& header, Clock::time_point now);
 
     HubLimits limits_;
     std::map<std::string, Stream> streams_;
     std::map<std::uint64_t, Connection> connections_;
-    std::uint64_t next_connection_ = 0;
+    std::uint64_t next_connection_ = 0, next_stream_ = 0;
 };
 
 }  // namespace htvm::live

@@ -137,8 +137,14 @@ TEST_F(HubTest, AStreamWithoutAPublisherIsForgottenAndItsViewersAreTold) {
     hub.tidy(start + 10001ms);
     EXPECT_EQ(gone, 1);
     EXPECT_TRUE(hub.streams().empty());
+    // Another stream of the same name is none of theirs.
+    const auto again = publisher();
+    ASSERT_TRUE(hub.take(again, header(2), start + 11s));
+    const auto other = viewer();
+    ASSERT_TRUE(hub.take(again, intra(0), start + 11s));
     EXPECT_EQ(hub.next(watching), nullptr);
     hub.leave(watching);
+    EXPECT_EQ(frames(other), Frames{0});
 }
 
 TEST_F(HubTest, StreamsAndViewersAreLimited) {

@@ -1,0 +1,31 @@
+// The connections over which live streams come and go. One binary message of a WebSocket is one packet as it stands in
+// a file (subprotocol htvm.1); an endless HTTP body is the same packets one after the other, for proxies that block
+// WebSockets. Each coroutine runs until its connection ends, and all run on one thread.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <chrono>
+#include <string>
+
+#include "live/hub.h"
+
+namespace htvm::live {
+
+inline constexpr const char* live_protocol = "htvm.1";
+
+using LiveRequest = boost::beast::http::request<boost::beast::http::empty_body>;
+
+// The request asks for a WebSocket; `name` is the stream's.
+boost::asio::awaitable<void> publish_by_socket(boost::beast::tcp_stream stream, LiveRequest request, std::string name,
+                                               Hub& hub);
+boost::asio::awaitable<void> watch_by_socket(boost::beast::tcp_stream stream, LiveRequest request, std::string name,
+                                             Hub& hub);
+// Sends response and body. header: what every response has; the status is 404 or 503 if the stream cannot be watched.
+boost::asio::awaitable<void> watch_by_body(boost::beast::tcp_stream& stream,
+                                           boost::beast::http::response<boost::beast::http::empty_body> header,
+                                           std::string name, Hub& hub);
+
+}  // namespace htvm::live
