@@ -7,7 +7,7 @@ htvm=$(realpath "$1")
 out=$(realpath -m "${2:-$(dirname "$0")/seeds}")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-mkdir -p "$out"/{decode_file,decode_stream,c_decoder,import_{ply,obj,drc,bvh,json,azure}}
+mkdir -p "$out"/{decode_file,decode_stream,c_decoder,import_{ply,obj,drc,gltf,bvh,json,azure}}
 
 "$htvm" synth "$work/capture" --first-frame 30 --frames 5 --vertices 150 >/dev/null 2>&1
 "$htvm" synth "$work/normals" --first-frame 60 --frames 3 --vertices 150 --normals >/dev/null 2>&1
@@ -152,6 +152,25 @@ if command -v draco_encoder >/dev/null; then
     draco_encoder -i "$work/normals/frame_00060.ply" -o "$out/import_drc/person" -qp 8 >/dev/null
     draco_encoder -point_cloud -i "$work/normals/frame_00060.ply" -o "$out/import_drc/cloud" -qp 8 >/dev/null
 fi
+
+"$htvm" decode "$work/tiny_tracked.htvm" -o "$work/gltf/%d.glb" --quiet
+cp "$work/gltf/0.glb" "$out/import_gltf/everything"
+"$htvm" decode "$work/tiny_tracked.htvm" -o "$out/import_gltf/stream.glb" --quiet
+mv "$out/import_gltf/stream.glb" "$out/import_gltf/stream"
+# A strip, a fan and points of quantised positions, turned, moved and mirrored.
+cat >"$out/import_gltf/nodes" <<'GLTF'
+{"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_mesh_quantization"], "scene": 0, "scenes": [{"nodes": [0, 2]}],
+ "nodes": [{"children": [1], "translation": [1, 2, 3], "rotation": [0, 0, 1, 0]}, {"mesh": 0, "scale": [-1, 1, 1]},
+           {"mesh": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 1, 1, 1]}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "COLOR_0": 1}, "mode": 5, "material": 0},
+                            {"attributes": {"POSITION": 0}, "indices": 2, "mode": 6}, {"attributes": {"POSITION": 0}, "mode": 0}]}],
+ "materials": [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1]}}],
+ "accessors": [{"bufferView": 0, "componentType": 5120, "count": 4, "type": "VEC3", "normalized": true},
+               {"bufferView": 0, "componentType": 5121, "count": 4, "type": "VEC4", "normalized": true},
+               {"bufferView": 1, "componentType": 5121, "count": 4, "type": "SCALAR"}],
+ "bufferViews": [{"buffer": 0, "byteLength": 16, "byteStride": 4}, {"buffer": 0, "byteOffset": 16, "byteLength": 4}],
+ "buffers": [{"byteLength": 20, "uri": "data:;base64,AQIDBH8GBwgJgAsMDQ4P/wABAgM="}]}
+GLTF
 
 cat >"$out/import_bvh/person" <<'BVH'
 HIERARCHY

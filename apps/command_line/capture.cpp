@@ -52,9 +52,9 @@ std::string key_of_rate(const FrameRate& rate) {
 void add_capture_options(CLI::App& command, CaptureOptions& options) {
     command
         .add_option("input", options.inputs,
-                    "The meshes, one file per frame (.ply, .obj, .drc): a folder, a pattern such as scan_%05d.ply, a\n"
-                    "quoted glob such as 'scan_*.ply', files in their order, or - for concatenated PLY on standard\n"
-                    "input")
+                    "The meshes, one file per frame (.ply, .obj, .drc, .glb, .gltf): a folder, a pattern such as\n"
+                    "scan_%05d.ply, a quoted glob such as 'scan_*.ply', files in their order, or - for concatenated\n"
+                    "PLY on standard input")
         ->type_name("FILE")
         ->expected(1, -1)
         ->required();
@@ -86,7 +86,7 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
         .add_option(
             "--unit", options.unit,
             "Unit of the mesh files: mm, cm, dm, m, in or ft (default: mm, cm or m, guessed from the first mesh's\n"
-            "size)")
+            "size; m for glTF)")
         ->check(CLI::IsMember(units));
     auto* scale =
         command
@@ -277,7 +277,8 @@ Result<void> Capture::find_unit() {
     if (!peeked_ && error) return tl::unexpected(*error);
     if (!peeked_) return fail(ErrorKind::bad_input, "there is no mesh in " + input_name(options_));
     const bool guessed = options_.unit == "auto" && options_.height == 0 && options_.scale == 1;
-    const auto unit = options_.unit == "auto" ? guess_unit(*peeked_) : *length_unit(options_.unit);
+    const auto of_format = pipe_ ? std::nullopt : unit_of_format(files_.paths[peeked_at_]);
+    const auto unit = options_.unit == "auto" ? of_format.value_or(guess_unit(*peeked_)) : *length_unit(options_.unit);
     millimetres_per_unit_ = options_.scale * millimetres_per(unit);
     const double tall = height_of(*peeked_, options_.up);
     if (options_.height > 0) {
@@ -288,11 +289,12 @@ Result<void> Capture::find_unit() {
     constexpr double shortest = 400, tallest = 2600;  // millimetres, of people
     const double millimetres = tall * millimetres_per_unit_;
     if (guessed && tall > 0) {
-        const auto looks = fmt::format("the meshes look as if they were in {}, which makes the subject {} tall",
+        const auto looks = fmt::format("{} in {}, which makes the subject {} tall",
+                                       of_format ? "glTF files are" : "the meshes look as if they were",
                                        names_of(unit).name, length_text(millimetres));
         if (millimetres < shortest || millimetres > tallest)
             warn(looks + "; if that is wrong, give --unit or --height");
-        else if (unit != LengthUnit::millimetre)
+        else if (unit != LengthUnit::millimetre && !of_format)
             note(looks + " (see --unit)");
     }
     if (auto ok = scale_positions(*peeked_, millimetres_per_unit_); !ok) return ok;

@@ -21,6 +21,7 @@
 #include "commands.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
+#include "io/gltf_animation.h"
 #include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "io/ply.h"
@@ -57,14 +58,17 @@ struct Summary {
     double frames_per_second() const { return static_cast<double>(decoded) / std::max(decode_seconds, 1e-9); }
 };
 
+// Where the meshes go: a file for each, one after the other on standard output, or all in one .glb.
 class MeshOutput {
 public:
     static Result<MeshOutput> open(const Options& options) {
         MeshOutput out;
         out.standard_ = options.output == "-";
         if (out.standard_) return out;
-        auto names = output_names(options.output, "." + options.format);
+        auto names = mesh_output_names(options.output, "." + options.format);
         if (!names) return tl::unexpected(names.error());
+        out.in_metres_ = unit_of_format(output_path(*names, 0)) && options.unit == "capture";
+        out.animated_ = names->one_file && unit_of_format(output_path(*names, 0));
         out.names_ = std::move(*names);
         std::error_code error;
         if (!out.names_.folder.empty()) std::filesystem::create_directories(out.names_.folder, error);
@@ -74,7 +78,10 @@ public:
         return out;
     }
     // Returns the name of the file written.
-    Result<std::string> write(Mesh& mesh, const FrameInfo& info, double millimetres_per_unit) {
+    Result<std::string> write(Mesh& mesh, const FrameInfo& info, const SequenceInfo& sequence,
+                              double millimetres_per_unit) {
+        if (in_metres_) millimetres_per_unit = millimetres_per(LengthUnit::metre);
+        if (animated_) return animate(mesh, info, sequence, millimetres_per_unit);
         if (!standard_) {
             const auto path = output_path(names_, info.frame);
             MeshFileOptions file_options;
@@ -91,7 +98,10 @@ public:
             return tl::unexpected(write_error("standard output", errno));
         return std::string("-");
     }
-    bool one_file() const { return !standard_ && names_.one_file; }
+    // A .glb of all frames is complete.
+    Result<void> finish() { return animation_ ? animation_->finish(end_) : Result<void>(); }
+    // Whether the first frame is all that is asked for.
+    bool one_file() const { return !standard_ && !animated_ && names_.one_file; }
     // Meshes in the folder that this run did not write: they would be read as part of the same sequence.
     std::size_t other_meshes() const {
         if (!folder_alone_) return 0;  // with a pattern, its files are distinct from others
@@ -104,9 +114,36 @@ public:
     }
 
 private:
+    Result<std::string> animate(const Mesh& mesh, const FrameInfo& info, const SequenceInfo& sequence,
+                                double millimetres_per_unit) {
+        const auto path = output_path(names_, 0);
+        const auto in_file = [&](const Error& error) { return fail(error.kind, path.string() + ": " + error.message); };
+        if (!animation_) {
+            GltfAnimationOptions options{millimetres_per_unit, sequence.up, path.stem().string(), {}};
+            for (const auto& [key, value] : sequence.metadata) {
+                if (key == "title") options.title = value;
+                if (key == "rights") options.rights = value;
+            }
+            auto created = GltfAnimation::create(path, std::move(options));
+            if (!created) return tl::unexpected(created.error());
+            animation_.emplace(std::move(*created));
+        }
+        const double seconds = static_cast<double>(info.timestamp_us) / 1e6;
+        if (sequence_ != info.sequence) offset_ = end_ - seconds;
+        sequence_ = info.sequence;
+        if (auto ok = animation_->add(mesh, offset_ + seconds, fmt::format("frame {}", info.frame)); !ok)
+            return in_file(ok.error());
+        end_ = offset_ + seconds + static_cast<double>(sequence.fps_denominator) / sequence.fps_numerator;
+        return path.string();
+    }
+
     OutputNames names_;
     std::set<std::string> written_;
-    bool standard_ = false, folder_alone_ = false;
+    std::optional<GltfAnimation> animation_;  // from the first frame on, if all go into one .glb
+    std::optional<std::uint32_t> sequence_;   // of the last frame in it
+    double offset_ = 0, end_ = 0;             // seconds: of its sequence's timestamps; when it ends
+    bool standard_ = false, folder_alone_ = false, animated_ = false;
+    bool in_metres_ = false;  // whatever the capture was in
 };
 
 Result<double> output_unit(const Options& options, const SequenceInfo& info) {
@@ -141,7 +178,7 @@ bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.wri
 Result<void> write(Decoding& d, DecodedFrame& frame) {
     const auto unit = output_unit(d.options, *d.decoder.sequence());
     if (!unit) return tl::unexpected(unit.error());
-    const auto name = d.output.write(frame.mesh, frame.info, *unit);
+    const auto name = d.output.write(frame.mesh, frame.info, *d.decoder.sequence(), *unit);
     if (!name) return tl::unexpected(name.error());
     d.summary.times.numbers.push_back(frame.info.frame);
     d.summary.times.microseconds.push_back(frame.info.timestamp_us);
@@ -342,20 +379,10 @@ Result<void> judge(const Options& options, const MeshOutput& output, const Strea
 
 // Skips what the frames asked for do not need, if the stream is an undamaged file; otherwise all of it is read.
 void begin_at_first(Decoding& d) {
-    auto stream = SeekableStream::open(d.options.input, d.options.limits.max_packet_bytes);
-    if (!stream) return;
-    const auto start = find_start(*stream, d.options.first);
+    const auto start = go_to_frame(d.input, d.options.input, d.options.first, d.options.limits.max_packet_bytes);
     if (!start) return;
-    std::vector<Packet> needed;
-    for (const auto offset : start->needed) {
-        const auto place = stream->at(offset);
-        auto packet = place ? stream->read(*place) : std::nullopt;
-        if (!packet) return;
-        needed.push_back(std::move(*packet));
-    }
     d.numbers.begin(start->first_needed_frame, start->first_needed_number);
     d.promised = start->promised;
-    d.input.go_on_with(std::move(needed), start->go_on);
 }
 
 Result<void> decode(const Options& options) {
@@ -380,6 +407,7 @@ Result<void> decode(const Options& options) {
         }
         tell_lost(decoding);
     }
+    if (auto ok = output->finish(); !ok) return ok;
     if (!options.timestamps.empty())
         if (auto ok = write_file(options.timestamps, frame_times_csv(summary.times)); !ok) return ok;
     if (options.json) print_json(summary, *input);
@@ -401,8 +429,9 @@ void add_decode(CLI::App& app, Run& run) {
         ->required();
     command
         ->add_option("-o,--output", options->output,
-                     "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one file (for\n"
-                     "the first frame only), or - for concatenated PLY on standard output")
+                     "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one .glb (all\n"
+                     "frames, as an animation), of one .ply or .obj (the first frame only), or - for concatenated PLY\n"
+                     "on standard output")
         ->type_name("FILE")
         ->required();
     command
@@ -411,12 +440,13 @@ void add_decode(CLI::App& app, Run& run) {
             "Write when each frame was captured to this file too, CSV, as 'htvm encode --timestamps' reads it\n"
             "(PLY files say it in a comment anyway)")
         ->type_name("FILE");
-    command->add_option("--format", options->format, "Format in a folder: ply (default) or obj")
-        ->check(CLI::IsMember({"ply", "obj"}));
+    command->add_option("--format", options->format, "Format in a folder: ply (default), obj or glb")
+        ->check(CLI::IsMember({"ply", "obj", "glb"}));
     std::vector<std::string> units = {"capture"};
     for (const auto& unit : length_units) units.emplace_back(unit.symbol);
     command
-        ->add_option("--unit", options->unit, "Unit of the positions: the capture's (default), mm, cm, dm, m, in or ft")
+        ->add_option("--unit", options->unit,
+                     "Unit of the positions: the capture's (default; metres for .glb), mm, cm, dm, m, in or ft")
         ->check(CLI::IsMember(units));
     command
         ->add_option("--conceal", options->conceal,
@@ -439,6 +469,7 @@ void add_decode(CLI::App& app, Run& run) {
         "Examples:\n"
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"
+        "  htvm decode person.htvm -o person.glb\n"
         "  htvm decode - -o - < person.htvm | viewer --ply");
     command->callback([options, &run] {
         if (options->output == "-" && options->json)

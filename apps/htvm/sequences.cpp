@@ -15,6 +15,7 @@
 #include "io/mesh_file.h"
 #include "io/sequence.h"
 #include "stream_file.h"
+#include "stream_seek.h"
 
 namespace htvm::app {
 
@@ -29,11 +30,18 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
     Decoder headers(options);
     FrameNumbers numbers;
     bool ascends = true;
+    std::uint64_t indexed = 0;  // frames of the indices in front
+    bool bounded = true;
     while (const auto packet = input->next()) {
         numbers.take(*packet);
         if (packet->kind == PacketKind::sequence)
             if (auto ok = headers.push(*packet); !ok)
                 return fail(ok.error().kind, source.name + ": " + ok.error().message);
+        if (const auto index = read_index(*packet); packet->kind == PacketKind::front_index && index) {
+            indexed += index->frames;
+            bounded = bounded && index->bounds;
+            if (bounded) source.bounds = source.bounds ? united(*source.bounds, *index->bounds) : index->bounds;
+        }
         if (!frame_type(packet->kind)) continue;
         ascends = ascends && (source.times_us.empty() || source.times_us.back() < packet->timestamp_us);
         source.numbers.push_back(numbers.of(packet->frame));
@@ -44,6 +52,8 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
     if (auto whole = check_whole(*input, source.name); !whole) return whole;
     if (!ascends) source.times_us.clear();  // of sequences one after the other
     source.frames = source.numbers.size();
+    if (!bounded || indexed != source.frames) source.bounds.reset();
+    source.up = headers.sequence()->up;
     source.rate = {headers.sequence()->fps_numerator, headers.sequence()->fps_denominator};
     source.millimetres_per_unit = headers.sequence()->unit_micrometres / 1000.0;
     return {};
@@ -57,13 +67,25 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
     if (auto scanned = scan_stream(source, options); !scanned) return tl::unexpected(scanned.error());
     auto input = StreamInput::open(path, options.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
-    source.mesh_at = [input = std::make_shared<StreamInput>(std::move(*input)),
-                      decoder = std::make_shared<Decoder>(options),
-                      next = std::size_t{0}](MeshSource& self, std::size_t position) mutable -> Result<Mesh> {
-        while (const auto packet = input->next()) {
-            auto frame = decoder->push(*packet);
+    struct Reading {
+        StreamInput input;
+        Decoder decoder;
+        DecoderOptions options;
+        FrameNumbers numbers = {};
+        bool begun = false;
+    };
+    source.mesh_at = [reading = std::make_shared<Reading>(Reading{std::move(*input), Decoder(options), options})](
+                         MeshSource& self, std::size_t position) -> Result<Mesh> {
+        auto& [stream, decoder, settings, numbers, begun] = *reading;
+        const auto number = self.numbers[position];
+        if (!std::exchange(begun, true) && position > 0)
+            if (const auto start = go_to_frame(stream, self.name, number, settings.max_packet_bytes))
+                numbers.begin(start->first_needed_frame, start->first_needed_number);
+        while (const auto packet = stream.next()) {
+            numbers.take(*packet);
+            auto frame = decoder.push(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
-            if (*frame && next++ == position) return std::move((*frame)->mesh);
+            if (*frame && numbers.of((*frame)->info.frame) == number) return std::move((*frame)->mesh);
         }
         return fail(ErrorKind::corrupt_stream, self.name + " changed while it was read");
     };
@@ -116,7 +138,8 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     source.mesh_at = [paths = files->paths](MeshSource& self, std::size_t position) -> Result<Mesh> {
         auto mesh = read_mesh(paths[position]);
         if (!mesh) return tl::unexpected(mesh.error());
-        if (std::exchange(self.guesses_unit, false)) self.millimetres_per_unit = millimetres_per(guess_unit(*mesh));
+        if (std::exchange(self.guesses_unit, false))
+            self.millimetres_per_unit = millimetres_per(likely_unit(paths[position], *mesh));
         if (const auto ok = scale_positions(*mesh, self.millimetres_per_unit); !ok) return tl::unexpected(ok.error());
         return std::move(*mesh);
     };

@@ -14,6 +14,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 #include "io/timestamps.h"
 
 namespace htvm::app {
@@ -24,9 +25,11 @@ struct MeshSource {
     std::vector<std::uint64_t> numbers;  // of the frames, ascending; empty if the files' names have none
     std::vector<std::int64_t> times_us;  // of the frames, ascending; empty if they are known for none
     bool is_stream = false;
-    FrameRate rate;                   // of a stream
-    double millimetres_per_unit = 1;  // the unit that files are in, or that a stream's capture was in
-    bool guesses_unit = false;        // of files: from the first one that is read
+    FrameRate rate;                     // of a stream
+    UpAxis up = UpAxis::unknown;        // of a stream that says so
+    std::optional<SpaceBounds> bounds;  // mm, of all frames of a stream that says so
+    double millimetres_per_unit = 1;    // the unit that files are in, or that a stream's capture was in
+    bool guesses_unit = false;          // of files: from the first one that is read
     // The mesh in mm of the frame at this position of the sequence. Positions must ascend from call to call.
     std::function<Result<Mesh>(MeshSource&, std::size_t position)> mesh_at;
 };

@@ -166,4 +166,20 @@ std::optional<StreamStart> find_start(SeekableStream& stream, std::uint64_t fram
     }
 }
 
+std::optional<StreamStart> go_to_frame(StreamInput& input, const std::string& path, std::uint64_t frame,
+                                       std::uint64_t max_packet_bytes) {
+    auto stream = SeekableStream::open(path, max_packet_bytes);
+    auto start = stream ? find_start(*stream, frame) : std::nullopt;
+    if (!start) return std::nullopt;
+    std::vector<Packet> needed;
+    for (const auto offset : start->needed) {
+        const auto place = stream->at(offset);
+        auto packet = place ? stream->read(*place) : std::nullopt;
+        if (!packet) return std::nullopt;
+        needed.push_back(std::move(*packet));
+    }
+    input.go_on_with(std::move(needed), start->go_on);
+    return start;
+}
+
 }  // namespace htvm::app

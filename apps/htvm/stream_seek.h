@@ -10,6 +10,7 @@
 #include "htvm/packet.hpp"
 #include "htvm/result.hpp"
 #include "htvm/stream_index.hpp"
+#include "stream_file.h"
 
 namespace htvm::app {
 
@@ -54,5 +55,10 @@ struct StreamStart {
 };
 // frame: numbered through the whole file. Nothing if there is no such frame, or damage lies between.
 std::optional<StreamStart> find_start(SeekableStream& stream, std::uint64_t frame);
+
+// Makes the input of this file go on with that frame: first come the packets that it needs, then the file from there
+// on. Nothing if that cannot be done, as for pipes and damaged streams: then the input is as it was.
+std::optional<StreamStart> go_to_frame(StreamInput& input, const std::string& path, std::uint64_t frame,
+                                       std::uint64_t max_packet_bytes);
 
 }  // namespace htvm::app

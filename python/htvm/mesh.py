@@ -92,10 +92,10 @@ def copied_attribute(numbers: Any, rows: int, columns: int, type_: Any) -> Optio
 
 
 def read_mesh(path: Path, unit: str = "auto") -> Mesh:
-    """Reads a mesh file (PLY, OBJ, Draco), as ``htvm encode`` does.
+    """Reads a mesh file (PLY, OBJ, Draco, glTF), as ``htvm encode`` does.
 
     unit: of the file's coordinates: "mm", "cm", "dm", "m", "in" or "ft". "auto" guesses it from the size of the mesh,
-    taking it for a person; for the files of one capture it is better to name it.
+    taking it for a person (glTF is in metres); for the files of one capture it is better to name it.
 
     Raises BadInput, Unsupported (a format that is not read) or LimitExceeded.
     """
@@ -119,7 +119,7 @@ def read_mesh(path: Path, unit: str = "auto") -> Mesh:
 
 
 def write_mesh(path: Path, mesh: Mesh, unit: str = "mm") -> None:
-    """Writes a mesh, or a frame, as PLY or OBJ by the file's name, in the unit, replacing any file of that name."""
+    """Writes a mesh, or a frame, as PLY, OBJ or .glb by the file's name, in the unit (glTF wants "m"), replacing any file of that name."""
     text = ctypes.create_string_buffer(512)
     status = c.library.htvm_mesh_file_write(os.fsencode(path), unit.encode(), as_c_mesh(mesh), text, len(text))
     if status != c.HTVM_OK:

@@ -47,7 +47,8 @@ htvm_status htvm_mesh_file_read(const char* path, const char* unit, htvm_mesh_fi
         auto mesh = htvm::read_mesh(path, options);
         if (!mesh) return error.set(mesh.error());
         if (guess)
-            if (const auto ok = htvm::scale_positions(*mesh, htvm::millimetres_per(htvm::guess_unit(*mesh))); !ok)
+            if (const auto ok = htvm::scale_positions(*mesh, htvm::millimetres_per(htvm::likely_unit(path, *mesh)));
+                !ok)
                 return error.set(ok.error());
         *file = new htvm_mesh_file{std::move(*mesh)};
         return htvm_status{HTVM_OK};

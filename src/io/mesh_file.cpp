@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "io/drc.h"
+#include "io/gltf.h"
 #include "io/obj.h"
 #include "io/output_file.h"
 #include "io/ply.h"
@@ -18,7 +19,7 @@ namespace htvm {
 
 namespace {
 
-enum class MeshFormat { ply, obj, drc };
+enum class MeshFormat { ply, obj, drc, glb, gltf };
 
 std::optional<MeshFormat> format_of(const std::filesystem::path& path) {
     std::string extension = path.extension().string();
@@ -27,6 +28,8 @@ std::optional<MeshFormat> format_of(const std::filesystem::path& path) {
     if (extension == ".ply") return MeshFormat::ply;
     if (extension == ".obj") return MeshFormat::obj;
     if (extension == ".drc") return MeshFormat::drc;
+    if (extension == ".glb") return MeshFormat::glb;
+    if (extension == ".gltf") return MeshFormat::gltf;
     return std::nullopt;
 }
 
@@ -38,12 +41,16 @@ tl::unexpected<Error> fail_at(const std::filesystem::path& path, const Error& er
     return fail_at(path, error.kind, error.message);
 }
 
-Result<Mesh> parse(MeshFormat format, const std::vector<std::uint8_t>& bytes, const MeshLimits& limits) {
+Result<Mesh> parse(MeshFormat format, const std::vector<std::uint8_t>& bytes, const std::filesystem::path& path,
+                   const MeshLimits& limits) {
     switch (format) {
         case MeshFormat::ply:
             return read_ply(bytes, limits);
         case MeshFormat::obj:
             return read_obj(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), limits);
+        case MeshFormat::glb:
+        case MeshFormat::gltf:
+            return read_gltf(bytes, path.has_parent_path() ? path.parent_path() : ".", limits);
         case MeshFormat::drc:
             break;
     }
@@ -53,6 +60,11 @@ Result<Mesh> parse(MeshFormat format, const std::vector<std::uint8_t>& bytes, co
 }  // namespace
 
 bool is_mesh_file_name(const std::filesystem::path& path) { return format_of(path).has_value(); }
+
+bool is_written_mesh_file_name(const std::filesystem::path& path) {
+    const auto format = format_of(path);
+    return format == MeshFormat::ply || format == MeshFormat::obj || format == MeshFormat::glb;
+}
 
 Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, std::uint64_t most_bytes) {
     std::error_code error;
@@ -105,11 +117,11 @@ Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions&
     const auto format = format_of(path);
     if (!format) {
         return fail_at(path, ErrorKind::unsupported,
-                       "the name ends in none of .ply, .obj, .drc, the formats that are read");
+                       "the name ends in none of " + std::string(mesh_file_extensions) + ", the formats that are read");
     }
     const auto bytes = read_file(path);
     if (!bytes) return tl::unexpected(bytes.error());
-    auto mesh = parse(*format, *bytes, options.limits);
+    auto mesh = parse(*format, *bytes, path, options.limits);
     if (!mesh) return fail_at(path, mesh.error());
     if (auto ok = scale_positions(*mesh, options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
     return mesh;
@@ -117,8 +129,9 @@ Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions&
 
 Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, const MeshFileOptions& options) {
     const auto format = format_of(path);
-    if (!format || *format == MeshFormat::drc) {
-        return fail_at(path, ErrorKind::unsupported, "the name must end in .ply or .obj, the formats that are written");
+    if (!is_written_mesh_file_name(path)) {
+        return fail_at(path, ErrorKind::unsupported,
+                       "the name must end in .ply, .obj or .glb, the formats that are written");
     }
     if (!(options.millimetres_per_unit > 0)) {
         return fail_at(path, ErrorKind::bad_input, "the millimetres per unit must be above 0");
@@ -130,8 +143,8 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         if (auto ok = scale_positions(scaled, 1 / options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
         written = &scaled;
     }
-    if (*format == MeshFormat::ply) {
-        const auto bytes = write_ply(*written, options.timestamp);
+    if (*format != MeshFormat::obj) {
+        const auto bytes = *format == MeshFormat::ply ? write_ply(*written, options.timestamp) : write_gltf(*written);
         if (!bytes) return fail_at(path, bytes.error());
         return write_file(path, *bytes);
     }
@@ -160,6 +173,16 @@ LengthUnit guess_unit(const Mesh& mesh) {
     const double diagonal = std::sqrt(squared);
     if (!(diagonal > 0) || diagonal >= 600) return LengthUnit::millimetre;
     return diagonal < 10 ? LengthUnit::metre : LengthUnit::centimetre;
+}
+
+std::optional<LengthUnit> unit_of_format(const std::filesystem::path& path) {
+    const auto format = format_of(path);
+    if (format == MeshFormat::glb || format == MeshFormat::gltf) return LengthUnit::metre;
+    return std::nullopt;
+}
+
+LengthUnit likely_unit(const std::filesystem::path& path, const Mesh& mesh) {
+    return unit_of_format(path).value_or(guess_unit(mesh));
 }
 
 }  // namespace htvm

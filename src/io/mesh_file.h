@@ -1,10 +1,11 @@
-// Mesh files: the extension (.ply, .obj, .drc, in either case) decides the format.
+// Mesh files: the extension (.ply, .obj, .drc, .glb, .gltf, in either case) decides the format.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -28,11 +29,15 @@ std::string timestamp_in_file(const std::filesystem::path& path);
 Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options = {});
 
 // Writes a mesh, with positions scaled from millimetres to the file's unit, replacing any file of that name. The folder
-// must exist. Writing .drc is unsupported. Every error message begins with the file's name.
+// must exist. Writing .drc and .gltf is unsupported. Every error message begins with the file's name.
 Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, const MeshFileOptions& options = {});
 
-// True for the extensions that read_mesh reads.
+// The extensions that read_mesh reads, for messages.
+inline constexpr std::string_view mesh_file_extensions = ".ply, .obj, .drc, .glb, .gltf";
+// True for these.
 bool is_mesh_file_name(const std::filesystem::path& path);
+// True for those that write_mesh writes: .ply, .obj, .glb.
+bool is_written_mesh_file_name(const std::filesystem::path& path);
 
 // The bytes of any file. Fails (bad_input) if it cannot be read, (limit) above most_bytes.
 Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path,
@@ -68,5 +73,10 @@ Result<LengthUnit> length_unit(std::string_view symbol);
 // below 600, otherwise millimetres. A person's diagonal is 0.5 m (an infant) to 3 m (arms and legs spread), so the
 // bounds are safe except for scenes above 6 m in cm. For a mesh without extent: mm.
 LengthUnit guess_unit(const Mesh& mesh);
+
+// The unit that the file's format prescribes, whatever the mesh looks like: metres for glTF; nothing for the others.
+std::optional<LengthUnit> unit_of_format(const std::filesystem::path& path);
+// That unit, or else the one that the file's mesh looks as if it were in.
+LengthUnit likely_unit(const std::filesystem::path& path, const Mesh& mesh);
 
 }  // namespace htvm

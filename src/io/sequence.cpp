@@ -126,8 +126,8 @@ Result<SequenceFiles> files_of_folder(const fs::path& folder) {
     std::copy_if(names->begin(), names->end(), std::back_inserter(meshes),
                  [](const std::string& name) { return name[0] != '.' && is_mesh_file_name(name); });
     if (meshes.empty()) {
-        return fail(ErrorKind::bad_input,
-                    "no mesh files (.ply, .obj, .drc) were found: " + what_is_there(folder, *names));
+        return fail(ErrorKind::bad_input, "no mesh files (" + std::string(mesh_file_extensions) +
+                                              ") were found: " + what_is_there(folder, *names));
     }
     return sequence_of(folder, meshes);
 }
@@ -161,8 +161,8 @@ Result<SequenceFiles> files_of_glob(const fs::path& folder, const std::string& g
         if (glob_matches(glob, name) && is_mesh_file_name(name)) found.push_back(name);
     }
     if (found.empty()) {
-        return fail(ErrorKind::bad_input, "no mesh file (.ply, .obj, .drc) matches " + std::string(what) + ": " +
-                                              what_is_there(folder, *names));
+        return fail(ErrorKind::bad_input, "no mesh file (" + std::string(mesh_file_extensions) + ") matches " +
+                                              std::string(what) + ": " + what_is_there(folder, *names));
     }
     return sequence_of(folder, found);
 }
@@ -336,11 +336,15 @@ Result<OutputNames> output_names(std::string_view what, std::string_view extensi
         names.prefix = path.filename().string();
         names.one_file = true;
     }
-    const fs::path example = output_path(names, 0);
-    if (!is_mesh_file_name(example) || example.extension() == ".drc" || example.extension() == ".DRC") {
-        return fail(ErrorKind::unsupported, "meshes are written as .ply or .obj, not as " + example.string());
-    }
     return names;
+}
+
+Result<OutputNames> mesh_output_names(std::string_view what, std::string_view extension) {
+    auto names = output_names(what, extension);
+    if (!names) return names;
+    const fs::path example = output_path(*names, 0);
+    if (is_written_mesh_file_name(example)) return names;
+    return fail(ErrorKind::unsupported, "meshes are written as .ply, .obj or .glb, not as " + example.string());
 }
 
 std::filesystem::path output_path(const OutputNames& names, std::uint64_t n) {

@@ -20,7 +20,7 @@ struct SequenceFiles {
 
 // The files that `what` refers to. It may be, tried in this order:
 // - the name of a file: that file;
-// - a folder: its mesh files (.ply, .obj, .drc, without hidden ones) in natural order;
+// - a folder: its mesh files (as in mesh_file.h, without hidden ones) in natural order;
 // - a name with one %d or %05d in its last part: the existing files of that name with any number (with %05d: of at
 //   least five digits, padded with zeros), by ascending number; the first need not be 0 and numbers may be missing;
 // - a name with * (any characters) or ? (one character) in its last part: the mesh files that match, in natural order.
@@ -59,9 +59,11 @@ struct OutputNames {
 };
 
 // From a pattern (`out/frame_%05d.obj`), a folder (`out/`, or a name without extension: `out/00000.ply` and so on with
-// `extension`), or the name of one file (`frame.ply`: one_file). Fails (bad_input, unsupported) if the pattern is not a
-// single %d or %0Nd in the last part, or if the extension is not one that can be written (.ply, .obj).
-Result<OutputNames> output_names(std::string_view what, std::string_view extension = ".ply");
+// `extension`), or the name of one file (`frame.ply`: one_file). Fails (bad_input) if the pattern is not a single %d or
+// %0Nd in the last part.
+Result<OutputNames> output_names(std::string_view what, std::string_view extension);
+// The same for meshes. Fails (unsupported) too if the extension is not one that is written (mesh_file.h).
+Result<OutputNames> mesh_output_names(std::string_view what, std::string_view extension = ".ply");
 
 // The file for frame n.
 std::filesystem::path output_path(const OutputNames& names, std::uint64_t n);

@@ -1,5 +1,6 @@
 #include "io/mesh_file.h"
 
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 
@@ -54,18 +55,37 @@ TEST_F(MeshFile, ErrorsBeginWithTheNameOfTheFile) {
     std::ofstream(folder / "bad.ply") << "ply\n";
     std::ofstream(folder / "bad.obj") << "f 1 2 3\n";
     std::ofstream(folder / "bad.drc") << "no";
+    std::ofstream(folder / "bad.glb") << "glTF";
+    std::ofstream(folder / "bad.gltf") << "{}";
     std::ofstream(folder / "bad.stl") << "solid\n";
     std::filesystem::create_directory(folder / "folder.ply");
-    for (const char* name : {"bad.ply", "bad.obj", "bad.drc", "bad.stl", "absent.ply", "folder.ply"}) {
+    for (const char* name :
+         {"bad.ply", "bad.obj", "bad.drc", "bad.glb", "bad.gltf", "bad.stl", "absent.ply", "folder.ply"}) {
         const auto mesh = read_mesh(folder / name);
         ASSERT_FALSE(mesh) << name;
         EXPECT_THAT(mesh.error().message, StartsWith((folder / name).string()));
     }
-    for (const char* name : {"a.drc", "a.stl", "a", "absent/a.ply"}) {
+    for (const char* name : {"a.drc", "a.gltf", "a.stl", "a", "absent/a.ply", "absent/a.glb"}) {
         const auto written = write_mesh(folder / name, Mesh());
         ASSERT_FALSE(written) << name;
         EXPECT_THAT(written.error().message, StartsWith((folder / name).string()));
     }
+}
+
+TEST_F(MeshFile, GltfIsInMetresByItsFormat) {
+    Mesh mesh = random_mesh(1, 50, 80, {.texcoords = false});
+    MeshFileOptions metres;
+    metres.millimetres_per_unit = millimetres_per(*unit_of_format("a.GLB"));
+    for (auto& p : mesh.positions) p = {std::round(p[0]), std::round(p[1]), std::round(p[2])};
+    ASSERT_TRUE(write_mesh(folder / "a.glb", mesh, metres));
+    const auto again = read_mesh(folder / "a.glb", metres);
+    ASSERT_TRUE(again) << again.error().message;
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+        for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(again->positions[v][i], mesh.positions[v][i], 1e-3);
+    EXPECT_EQ(again->triangles, mesh.triangles);
+    EXPECT_EQ(again->colours, mesh.colours);
+    EXPECT_EQ(unit_of_format("a.gltf"), LengthUnit::metre);
+    EXPECT_FALSE(unit_of_format("a.ply"));
 }
 
 TEST_F(MeshFile, AFileAboveTheLimitIsNotRead) {

@@ -131,7 +131,7 @@ TEST_F(Sequence, APatternIsTheFilesWithANumberInItsPlace) {
 }
 
 TEST_F(Sequence, ErrorsSayWhatWasLookedForAndWhatIsThere) {
-    EXPECT_THAT(error(""), AllOf(HasSubstr(".ply, .obj, .drc"), HasSubstr("holds no files")));
+    EXPECT_THAT(error(""), AllOf(HasSubstr(".ply, .obj, .drc, .glb, .gltf"), HasSubstr("holds no files")));
     touch({"a1.ply", "a2.ply", "a3.ply", "a4.ply", "a5.ply"});
     const auto there = HasSubstr("a1.ply, a2.ply, a3.ply and 2 others");
     EXPECT_THAT(error("b.ply"), AllOf(HasSubstr("b.ply"), there));
@@ -152,7 +152,7 @@ TEST_F(Sequence, AFolderOfTwoFormatsIsRefused) {
 
 TEST_F(Sequence, OutputNamesComeFromAPatternAFolderOrOneName) {
     const auto path = [](const std::string& what, std::uint64_t n) {
-        const auto names = output_names(what);
+        const auto names = mesh_output_names(what);
         EXPECT_TRUE(names) << names.error().message;
         return names ? output_path(*names, n).string() : "";
     };
@@ -164,17 +164,19 @@ TEST_F(Sequence, OutputNamesComeFromAPatternAFolderOrOneName) {
     EXPECT_EQ(path("out/", 12), "out/00012.ply");
     EXPECT_EQ(path(folder.string(), 1), (folder / "00001.ply").string());
     EXPECT_EQ(path("frame.obj", 5), "frame.obj");
-    EXPECT_TRUE(output_names("frame.obj")->one_file);
-    EXPECT_FALSE(output_names("out")->one_file);
-    EXPECT_EQ(output_path(*output_names("out", ".obj"), 1), "out/00001.obj");
-    for (const char* bad : {"", "a.drc", "a%d.stl", "a%x.ply", "a%d%d.ply", "a%d", "a%"}) {
-        EXPECT_FALSE(output_names(bad)) << bad;
+    EXPECT_TRUE(mesh_output_names("frame.obj")->one_file);
+    EXPECT_FALSE(mesh_output_names("out")->one_file);
+    EXPECT_EQ(output_path(*mesh_output_names("out", ".obj"), 1), "out/00001.obj");
+    EXPECT_EQ(path("out/f_%04d.glb", 7), "out/f_0007.glb");
+    EXPECT_EQ(output_path(*output_names("out", ".png"), 1), "out/00001.png");
+    for (const char* bad : {"", "a.drc", "a.gltf", "a%d.stl", "a%x.ply", "a%d%d.ply", "a%d", "a%"}) {
+        EXPECT_FALSE(mesh_output_names(bad)) << bad;
     }
 }
 
 TEST_F(Sequence, WhatWasWrittenUnderOutputNamesIsFoundInOrder) {
     const std::string pattern = (folder / "x%02d.ply").string();
-    const auto names = output_names(pattern);
+    const auto names = mesh_output_names(pattern);
     ASSERT_TRUE(names);
     for (const std::uint64_t n : {100, 9, 10, 0}) std::ofstream(output_path(*names, n)) << "x";
     const auto files = find_sequence(pattern);
