@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -21,6 +20,7 @@
 #include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "io/sequence.h"
+#include "picture_options.h"
 #include "sequences.h"
 #include "stream_file.h"
 
@@ -237,16 +237,12 @@ struct Options {
     CompareOptions compare;
     unsigned threads = 0;
     DecoderOptions limits;  // for streams
-    bool grey = false, follow_sequence = false, json = false;
+    ShadingOptions shading;
+    bool follow_sequence = false, json = false;
     double peak_mm = 0;
     std::string csv, pictures;
     int picture_views = 1;
 };
-
-const std::map<std::string, Shading> shadings{
-    {"flat", Shading::flat}, {"smooth", Shading::smooth}, {"unlit", Shading::unlit}};
-const std::map<std::string, UpAxis> axes{{"x", UpAxis::plus_x},   {"-x", UpAxis::minus_x}, {"y", UpAxis::plus_y},
-                                         {"-y", UpAxis::minus_y}, {"z", UpAxis::plus_z},   {"-z", UpAxis::minus_z}};
 
 void choose_metrics(Options& options) {
     CompareOptions& c = options.compare;
@@ -254,7 +250,8 @@ void choose_metrics(Options& options) {
         c.pictures = false;
         c.views.views = 1;
     }
-    c.render.colours = !options.grey;
+    c.render.colours = !options.shading.grey;
+    c.render.shading = options.shading.shading.value_or(Shading::smooth);
     if (options.only.empty()) return;
     const std::set<std::string> only(options.only.begin(), options.only.end());
     c.points = only.contains("m1");
@@ -474,24 +471,13 @@ void take_apart(Options& options) {
             "DECODED", options.decoded + " is one mesh, behind several originals; give patterns in quotes, or folders");
 }
 
-void add_picture_options(CLI::App& command, Options& o) {
+void add_view_options(CLI::App& command, Options& o) {
     ViewOptions& v = o.compare.views;
     command.add_option("--views", v.views, "Views around the body for M3; 0: no M3")
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
-    command.add_option("--width", v.width, "Width of the pictures, pixels")->capture_default_str();
-    command.add_option("--height", v.height, "Height of the pictures, pixels")->capture_default_str();
-    command.add_option("--shading", o.compare.render.shading, "Shading of the body; unlit draws the colours alone")
-        ->transform(CLI::CheckedTransformer(shadings))
-        ->option_text("flat|smooth|unlit=smooth");
-    command.add_flag("--grey", o.grey, "Draw without the colours (also done if one side has none)");
-    command.add_option("--up", v.up, "Where the head is")
-        ->transform(CLI::CheckedTransformer(axes))
-        ->option_text("x|-x|y|-y|z|-z=y");
-    command.add_option("--azimuth", v.first_azimuth, "Direction of the first view, degrees around the body")
-        ->capture_default_str();
-    command.add_option("--elevation", v.elevation, "Degrees by which the views look down")->capture_default_str();
-    command.add_flag("--orthographic", v.orthographic, "Parallel projection instead of perspective");
+    add_camera_options(command, v, "");
+    add_shading_options(command, o.shading, "");
     command.add_flag("--still-camera", o.follow_sequence,
                      "The cameras look at the box around the whole sequence instead of each frame's own\n"
                      "(reads the originals twice)");
@@ -553,7 +539,7 @@ void add_compare(CLI::App& app, Run& run) {
                         "Widest crack, mm (default: half of the mean edge length)");
     command->add_option("--flap-distance", o.compare.topology_options.flap_distance,
                         "Largest distance of a flap's layers, mm (default: the same)");
-    add_picture_options(*command, o);
+    add_view_options(*command, o);
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
     add_decoder_limits(*command, o.limits);

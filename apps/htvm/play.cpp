@@ -1,23 +1,19 @@
 // htvm play: a stream or a capture in a web browser, by the server and the player that the program carries inside.
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <spawn.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <array>
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <vector>
 
+#include "command_line/child_program.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "encode.h"
 #include "live/file_server.h"
-
-extern char** environ;
 
 namespace htvm::app {
 namespace {
@@ -89,17 +85,9 @@ bool holds_streams(const fs::path& folder) {
 }
 
 // It may run as long as the browser does, and says nothing.
-void open_browser(std::string url) {
-    if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY") && !std::getenv("BROWSER")) return;
-    std::string program = "xdg-open";
-    std::array<char*, 3> arguments = {program.data(), url.data(), nullptr};
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    for (const int stream : {STDOUT_FILENO, STDERR_FILENO})
-        posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_WRONLY, 0);
-    pid_t child = 0;
-    posix_spawnp(&child, program.c_str(), &actions, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
+void open_browser(const std::string& url) {
+    const bool screen = std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY") || std::getenv("BROWSER");
+    if (screen) start_program({"xdg-open", url}, {-1, false, false});
 }
 
 // For captures that streams are compared with: every vertex and triangle, each frame by itself.

@@ -51,7 +51,9 @@ void add_serve(CLI::App& app, Run& run) {
         ->check(CLI::Range(1, 100000));
     command->footer(
         "Runs until Ctrl-C. Symbolic links and hidden files are not served. It speaks HTTP without TLS: across other\n"
-        "people's networks put a web server with TLS in front of it.\n"
+        "people's networks put a web server with TLS in front of it. The page shows NAME.png or NAME.jpg as the still "
+        "of\n"
+        "NAME.htvm if it lies beside it (htvm still makes one).\n"
         "Example:\n"
         "  htvm serve --files streams/ --address 0.0.0.0");
     command->callback([options, &run] { run = [options] { return serve(*options); }; });

@@ -7,8 +7,9 @@
 // Read: every mesh that the file's scene shows, joined to one, with the transforms of the nodes applied. POSITION,
 // NORMAL, COLOR_0 (times the material's base colour) and TEXCOORD_0, of floats or integers; triangles, strips, fans and
 // points, with indices or without. Lines, materials otherwise, textures, cameras, lights and animations are passed
-// over, and so are nodes that are scaled to nothing, which glTF uses to hide. A vertex that lacks what others have is white, has a zero normal, texture coordinate 0, 0. Primitives of one
-// mesh that share their vertices go on sharing them.
+// over, and so are nodes that are scaled to nothing, which glTF uses to hide. A vertex that lacks what others have is
+// white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh that share their vertices go on sharing
+// them.
 //
 // Not read, with an error that says so: sparse accessors, skins and weighted morph targets (the vertices of a frame are
 // what counts), and required extensions about geometry other than KHR_mesh_quantization, such as Draco.

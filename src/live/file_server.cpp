@@ -19,6 +19,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 
 #include "core/crc32.h"
 #include "live/http_request.h"
@@ -161,8 +162,17 @@ bool FileServer::State::host_is_loopback(std::string_view host) const {
 
 std::string FileServer::State::listing() const {
     nlohmann::json list = nlohmann::json::array();
-    if (folder)
-        for (const auto& [path, size] : folder->files(".htvm")) list.push_back({{"path", path}, {"bytes", size}});
+    std::set<std::string> pictures;
+    for (const char* ending : {".png", ".jpg"})
+        for (const auto& [path, size] : folder ? folder->files(ending) : std::vector<FolderEntry>())
+            pictures.insert(path);
+    for (const auto& [path, size] : folder ? folder->files(".htvm") : std::vector<FolderEntry>()) {
+        nlohmann::json entry = {{"path", path}, {"bytes", size}};
+        const auto name = path.substr(0, path.size() - std::string_view(".htvm").size());
+        for (const char* ending : {".jpg", ".png"})
+            if (pictures.contains(name + ending)) entry["poster"] = name + ending;
+        list.push_back(std::move(entry));
+    }
     for (const auto& [name, path] : options.files)
         if (const auto file = file_at(path)) list.push_back({{"path", name}, {"bytes", file->size}});
     // File names may be any bytes.

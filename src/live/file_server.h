@@ -3,7 +3,8 @@
 //
 //   /                the player's page; it lists the streams, or plays one: /?file=NAME
 //   /player/NAME     the player's scripts, kept in the program
-//   /api/files       the streams as JSON: [{"path": ..., "bytes": ...}, ...]
+//   /api/files       the streams as JSON: [{"path": ..., "bytes": ..., "poster": ...}, ...]; the poster of NAME.htvm is
+//                    NAME.png or NAME.jpg beside it, where there is one
 //   /files/PATH      the streams themselves, by ranges too
 //
 // With a hub, live streams too (WebSockets; /watch/NAME is an endless body where no WebSocket is asked for):

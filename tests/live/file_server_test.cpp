@@ -137,6 +137,12 @@ TEST_F(FileServerTest, NothingOutsideTheFolderIsReached) {
 TEST_F(FileServerTest, ListsTheStreams) {
     start();
     EXPECT_EQ(body(get("/api/files")), R"([{"bytes":5,"path":"inner/a b.htvm"},{"bytes":20,"path":"person.htvm"}])");
+    write("served/inner/a b.jpg", "x");
+    write("served/person.jpg", "x");
+    write("served/person.png", "x");
+    write("served/other.png", "x");
+    EXPECT_EQ(body(get("/api/files")), R"([{"bytes":5,"path":"inner/a b.htvm","poster":"inner/a b.jpg"},)"
+                                       R"({"bytes":20,"path":"person.htvm","poster":"person.png"}])");
 }
 
 TEST_F(FileServerTest, FilesWithNamesAreServedAlone) {

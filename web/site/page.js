@@ -1,4 +1,5 @@
-// The page of `htvm play` and `htvm serve`: a stream in the whole window, or the list of streams with a still of each.
+// The page of `htvm play` and `htvm serve`: a stream in the whole window, or the list of streams with a still of each: the
+// poster that lies beside it, or one drawn here.
 import '/player/htvm-player.js';
 import { playBeside } from '/player/beside.js';
 
@@ -46,15 +47,17 @@ async function drawStills(items) {
 }
 
 function list(files) {
-    const items = files.map(({ path, bytes }) => {
-        const image = make('img', { alt: '', src: 'data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7' });
+    const items = files.map(({ path, bytes, poster }) => {
+        const src = poster ? address(poster) : 'data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7';
+        const image = make('img', { alt: '', src });
         const note = make('small', {}, sizeText(bytes));
         const link = make('a', { href: `/?file=${encodeURIComponent(path)}` }, image, make('span', {}, nameOf(path)), note);
-        return { path, image, note, row: make('li', {}, link) };
+        return { path, poster, image, note, row: make('li', {}, link) };
     });
     const rows = items.map(({ row }) => row);
     content.append(make('div', { class: 'list' }, make('h1', {}, 'Streams'), make('ul', {}, ...rows)));
-    void drawStills(items);
+    const without = items.filter(({ poster }) => !poster);
+    if (without.length > 0) void drawStills(without);
 }
 
 const response = await fetch('/api/files');

@@ -23,6 +23,8 @@ before(async () => {
     await cp(join(folder, 'tracked.htvm'), join(work, 'streams', 'tracked.htvm'));
     await cp(join(folder, 'person.htvm'), join(work, 'streams', 'more', 'a person.htvm'));
     await writeFile(join(work, 'streams', 'broken.htvm'), 'this is no stream');
+    await cp(join(folder, 'tracked.htvm'), join(work, 'streams', 'posed.htvm'));
+    execFileSync(program, ['still', join(folder, 'tracked.htvm'), '-o', join(work, 'streams', 'posed.png'), '--width', '40', '--height', '30', '--quiet']);
 });
 
 after(async () => {
@@ -130,7 +132,7 @@ test('htvm play --beside shows a capture and a stream of it in one window, in st
 test('htvm serve lists a folder with stills, and plays what is chosen', options, () =>
     running(['serve', '--files', join(work, 'streams'), '--port', '0'], async (page, address) => {
         await page.goto(address);
-        await page.waitForFunction(() => document.querySelectorAll('small').length === 3 && !document.querySelector('htvm-player'));
+        await page.waitForFunction(() => document.querySelectorAll('small').length === 4 && !document.querySelector('htvm-player'));
         const items = await page.evaluate(() =>
             [...document.querySelectorAll('li')].map((item) => [
                 item.querySelector('span').textContent, item.querySelector('small').textContent, item.querySelector('img').src.slice(0, 5),
@@ -138,12 +140,14 @@ test('htvm serve lists a folder with stills, and plays what is chosen', options,
         assert.deepEqual(items, [
             ['broken', '1 KB, cannot be played', 'data:'],
             ['more/a person', '15 KB, 0.2 s', 'blob:'],
+            ['posed', '11 KB', 'http:'],
             ['tracked', '11 KB, 0.2 s', 'blob:'],
         ]);
+        assert.equal(await page.evaluate(() => document.querySelector('img[src$="posed.png"]').naturalWidth), 40);
         await page.getByRole('link', { name: 'a person' }).click();
         await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 3);
         await page.getByRole('link', { name: 'All streams' }).click();
-        await page.waitForFunction(() => document.querySelectorAll('li').length === 3);
+        await page.waitForFunction(() => document.querySelectorAll('li').length === 4);
     }));
 
 test('the five steps of docs/player.md lead to a page that plays', options, async () => {

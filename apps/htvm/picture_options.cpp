@@ -1,0 +1,110 @@
+#include "picture_options.h"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <map>
+
+#include "command_line/terminal.h"
+#include "stream_file.h"
+
+namespace htvm::app {
+namespace {
+
+const std::map<std::string, Shading> shadings{
+    {"flat", Shading::flat}, {"smooth", Shading::smooth}, {"unlit", Shading::unlit}};
+const std::map<std::string, UpAxis> axes{{"x", UpAxis::plus_x},   {"-x", UpAxis::minus_x}, {"y", UpAxis::plus_y},
+                                         {"-y", UpAxis::minus_y}, {"z", UpAxis::plus_z},   {"-z", UpAxis::minus_z}};
+const std::map<std::string, Colour> named_colours{
+    {"white", {255, 255, 255}}, {"black", {0, 0, 0}}, {"grey", {128, 128, 128}}};
+
+constexpr int largest_canvas = 16384;  // pixels, as cameras_round() allows
+
+// "transparent", a name, or six hexadecimal digits.
+std::optional<Colour> parse_background(const std::string& text) {
+    if (text == "transparent") return std::nullopt;
+    if (const auto named = named_colours.find(text); named != named_colours.end()) return named->second;
+    const std::string digits = text.starts_with('#') ? text.substr(1) : text;
+    if (digits.size() != 6 || digits.find_first_not_of("0123456789abcdefABCDEF") != digits.npos)
+        throw CLI::ValidationError("--background",
+                                   "'" + text + "' is not a colour; write transparent, white, black, grey or #rrggbb");
+    const auto value = std::stoul(digits, nullptr, 16);
+    return Colour{static_cast<std::uint8_t>(value >> 16), static_cast<std::uint8_t>(value >> 8),
+                  static_cast<std::uint8_t>(value)};
+}
+
+}  // namespace
+
+void add_camera_options(CLI::App& command, ViewOptions& views, const std::string& up_default) {
+    command.add_option("--width", views.width, "Width of the pictures, pixels")->capture_default_str();
+    command.add_option("--height", views.height, "Height of the pictures, pixels")->capture_default_str();
+    command.add_option("--up", views.up, "Where the head is" + up_default)
+        ->transform(CLI::CheckedTransformer(axes))
+        ->option_text(views.up == UpAxis::unknown ? "x|-x|y|-y|z|-z" : "x|-x|y|-y|z|-z=y");
+    command.add_option("--azimuth", views.first_azimuth, "Direction of the first view, degrees around the body")
+        ->capture_default_str();
+    command.add_option("--elevation", views.elevation, "Degrees by which the views look down")->capture_default_str();
+    command.add_flag("--orthographic", views.orthographic, "Parallel projection instead of perspective");
+}
+
+void add_shading_options(CLI::App& command, ShadingOptions& options, const std::string& shading_default) {
+    command
+        .add_option("--shading", options.shading,
+                    "Shading of the body; unlit draws the colours alone" + shading_default)
+        ->transform(CLI::CheckedTransformer(shadings))
+        ->option_text(shading_default.empty() ? "flat|smooth|unlit=smooth" : "flat|smooth|unlit");
+    command.add_flag("--grey", options.grey, "Draw without the colours");
+}
+
+void add_picture_options(CLI::App& command, PictureOptions& options) {
+    options.views.views = 1;
+    options.views.up = UpAxis::unknown;
+    add_camera_options(command, options.views,
+                       " (default: as the stream says; else y or z, along which the first mesh is longer)");
+    command
+        .add_option("--field-of-view", options.views.field_of_view,
+                    "Degrees from the upper to the lower edge: a small angle looks flat, a wide one near")
+        ->capture_default_str();
+    add_shading_options(command, options.shading,
+                        " (default: unlit, as captured, or smooth where there are no colours)");
+    command
+        .add_option_function<std::string>(
+            "--background", [&options](const std::string& text) { options.background = parse_background(text); },
+            "transparent, white (default), black, grey, or #rrggbb")
+        ->type_name("COLOUR");
+    command
+        .add_option("--samples", options.samples,
+                    "Samples across a pixel, whose square are averaged for soft edges; 1: hard edges, faster")
+        ->check(CLI::Range(1, 16))
+        ->capture_default_str();
+    command.add_option("--threads", options.threads,
+                       "Threads to use (default: one per core); the pictures do not depend on it");
+    add_decoder_limits(command, options.limits);
+}
+
+RenderOptions render_options(const PictureOptions& options, const Mesh& mesh) {
+    RenderOptions out;
+    out.colours = !options.shading.grey;
+    const bool coloured = out.colours && !mesh.colours.empty();
+    out.shading = options.shading.shading.value_or(coloured ? Shading::unlit : Shading::smooth);
+    return out;
+}
+
+ViewOptions upright_views(const PictureOptions& options, const MeshSource& source, const Mesh& mesh) {
+    ViewOptions out = options.views;
+    if (out.up == UpAxis::unknown) out.up = source.up;
+    if (out.up != UpAxis::unknown) return out;
+    const Box box = bounding_box(mesh);
+    const Point3 extent = box.high - box.low;
+    out.up = extent[2] > extent[1] ? UpAxis::plus_z : UpAxis::plus_y;
+    if (out.up == UpAxis::plus_z) note("the first mesh is longer along z than along y: z is taken for up (see --up)");
+    return out;
+}
+
+int samples_of(const PictureOptions& options) {
+    const int size = std::max({options.views.width, options.views.height, 1});
+    return std::clamp(largest_canvas / size, 1, options.samples);
+}
+
+}  // namespace htvm::app

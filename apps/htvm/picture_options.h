@@ -1,0 +1,52 @@
+// What the commands that draw meshes have in common: where the camera stands, how the mesh is drawn, and, for pictures
+// that people look at, their size, background and edges.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "htvm/mesh.hpp"
+#include "htvm/result.hpp"
+#include "metrics/render.h"
+#include "metrics/smooth_picture.h"
+#include "sequences.h"
+
+namespace CLI {
+class App;
+}
+
+namespace htvm::app {
+
+// --width, --height, --azimuth, --elevation, --orthographic, and --up, whose default is described by up_default.
+void add_camera_options(CLI::App& command, ViewOptions& views, const std::string& up_default);
+
+struct ShadingOptions {
+    std::optional<Shading> shading;  // none: as the command says
+    bool grey = false;
+};
+// --shading, whose default is described by shading_default, and --grey.
+void add_shading_options(CLI::App& command, ShadingOptions& options, const std::string& shading_default);
+
+// ---- Pictures for people --------------------------------------------------------------------------------------------
+
+struct PictureOptions {
+    ViewOptions views;
+    ShadingOptions shading;
+    std::optional<Colour> background = Colour{255, 255, 255};  // none: transparent
+    int samples = 3;                                           // across a pixel
+    DecoderOptions limits;
+    unsigned threads = 0;
+};
+// All of the above, --field-of-view, --background, --samples, --threads and the decoder's limits.
+void add_picture_options(CLI::App& command, PictureOptions& options);
+
+// How this mesh is drawn: coloured ones unlit unless told otherwise, as captured colours contain the light.
+RenderOptions render_options(const PictureOptions& options, const Mesh& mesh);
+
+// The views with an axis that is up: the option's, else the source's, else y or z, along which the mesh is longer.
+ViewOptions upright_views(const PictureOptions& options, const MeshSource& source, const Mesh& mesh);
+
+// As many samples as the options say, or as the largest canvas has room for.
+int samples_of(const PictureOptions& options);
+
+}  // namespace htvm::app

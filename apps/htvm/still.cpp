@@ -1,0 +1,142 @@
+// htvm still: a picture of one frame.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "command_line/terminal.h"
+#include "commands.h"
+#include "core/thread.h"
+#include "io/output_file.h"
+#include "picture_options.h"
+#include "sequences.h"
+
+namespace htvm::app {
+namespace {
+
+struct Options {
+    std::vector<std::string> inputs;
+    std::string output;
+    std::optional<std::uint64_t> frame;
+    std::optional<double> seconds;
+    PictureOptions picture;
+    bool json = false;
+};
+
+// The position of the frame asked for; without one, the middle of the sequence: the first one is often a T-pose.
+Result<std::size_t> position_of(const Options& options, const MeshSource& source) {
+    const auto& numbers = source.numbers;
+    const auto& times = source.times_us;
+    const auto last = source.frames - 1;
+    if (options.frame) {
+        const auto found = std::lower_bound(numbers.begin(), numbers.end(), *options.frame);
+        const bool there =
+            numbers.empty() ? *options.frame <= last : found != numbers.end() && *found == *options.frame;
+        if (!there)
+            return fail(ErrorKind::bad_input,
+                        fmt::format("{} has no frame {}; its frames are {} to {}", source.name, *options.frame,
+                                    numbers.empty() ? 0 : numbers.front(), numbers.empty() ? last : numbers.back()));
+        return numbers.empty() ? static_cast<std::size_t>(*options.frame)
+                               : static_cast<std::size_t>(found - numbers.begin());
+    }
+    if (!options.seconds) return source.frames / 2;
+    if (times.empty()) {
+        const double per_second = source.rate.numerator > 0 ? source.rate.per_second() : 30;
+        return std::min(last, static_cast<std::size_t>(*options.seconds * per_second + 1e-6));
+    }
+    const auto seconds = [&](std::int64_t time) { return static_cast<double>(time - times.front()) / 1e6; };
+    const auto after = std::upper_bound(times.begin(), times.end(), *options.seconds + 1e-6,
+                                        [&](double asked, std::int64_t time) { return asked < seconds(time); });
+    return static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - times.begin(), 1) - 1);
+}
+
+Result<void> write_bytes(const std::string& output, const std::vector<std::uint8_t>& bytes) {
+    if (output != "-") return write_file(output, bytes);
+    if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) == bytes.size() && std::fflush(stdout) == 0) return {};
+    return tl::unexpected(write_error("standard output", errno));
+}
+
+Result<void> still(const Options& options) {
+    if (options.output != "-" && !options.output.ends_with(".png"))
+        return fail(ErrorKind::unsupported, "pictures are written as .png, not as " + options.output);
+    auto source = open_meshes(options.inputs, {"auto", "", options.picture.limits});
+    if (!source) return tl::unexpected(source.error());
+    if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
+    const auto position = position_of(options, *source);
+    if (!position) return tl::unexpected(position.error());
+    const auto mesh = source->mesh_at(*source, *position);
+    if (!mesh) return tl::unexpected(mesh.error());
+    if (const auto ok = check_measurable(*mesh, source->name); !ok) return ok;
+    const auto cameras = cameras_round(bounding_box(*mesh), upright_views(options.picture, *source, *mesh));
+    if (!cameras) return tl::unexpected(cameras.error());
+    const internal::ThreadPool pool(options.picture.threads);
+    Canvas canvas;
+    const auto camera = zoomed_to(*mesh, cameras->front(), options.picture.views.margin);
+    const auto picture = draw_smoothly(make_drawable(*mesh, render_options(options.picture, *mesh)), camera,
+                                       samples_of(options.picture), canvas, pool.threads());
+    const auto png = png_of(picture, options.picture.background);
+    if (!png) return tl::unexpected(png.error());
+    if (auto ok = write_bytes(options.output, *png); !ok) return ok;
+    const auto number = source->numbers.empty() ? *position : source->numbers[*position];
+    if (mesh->triangles.empty()) warn(fmt::format("frame {} has no triangles: the picture is empty", number));
+    if (options.json)
+        fmt::print("{}\n", nlohmann::json{{"file", options.output},
+                                          {"frame", number},
+                                          {"width", picture.width},
+                                          {"height", picture.height},
+                                          {"vertices", mesh->positions.size()},
+                                          {"triangles", mesh->triangles.size()}}
+                               .dump(2));
+    else if (options.output != "-")
+        note(fmt::format("{}: frame {} of {}, {} x {} pixels", options.output, number, source->name, picture.width,
+                         picture.height));
+    return {};
+}
+
+}  // namespace
+
+void add_still(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto& o = *options;
+    auto* command = app.add_subcommand("still", "Draw one frame of a stream or a capture as a picture");
+    command
+        ->add_option("input", o.inputs,
+                     "An .htvm stream; or a mesh file, several in their order, a folder, glob or %05d pattern")
+        ->type_name("FILE")
+        ->expected(1, -1)
+        ->required();
+    command->add_option("-o,--output", o.output, "The picture, a .png file, or - for standard output")
+        ->type_name("FILE")
+        ->required();
+    auto* frame = command->add_option(
+        "--frame", o.frame,
+        "Which frame, by its number: in a stream from 0, of files as in their names (default: the middle one)");
+    command->add_option("--time", o.seconds, "Which frame: the one shown at this time, seconds from the first one")
+        ->check(CLI::NonNegativeNumber)
+        ->excludes(frame);
+    o.picture.views.width = 1600;
+    o.picture.views.height = 1200;
+    o.picture.views.elevation = 5;
+    add_picture_options(*command, o.picture);
+    command->add_flag("--json", o.json, "Print what was drawn as JSON on standard output");
+    command->footer(
+        "The frame fills the picture, whichever way the camera looks. The page of 'htvm serve' shows NAME.png as\n"
+        "the still of NAME.htvm if it lies beside it.\n"
+        "Examples:\n"
+        "  htvm still person.htvm -o person.png\n"
+        "  htvm still capture/ --time 2.5 --azimuth 30 --background transparent -o poster.png");
+    command->callback([options, &run] {
+        if (options->output == "-" && options->json)
+            throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the picture; choose one");
+        run = [options] { return still(*options); };
+    });
+}
+
+}  // namespace htvm::app
