@@ -118,8 +118,11 @@ def read_mesh(path: Path, unit: str = "auto") -> Mesh:
         c.library.htvm_mesh_file_destroy(file)
 
 
-def write_mesh(path: Path, mesh: Mesh, unit: str = "mm") -> None:
-    """Writes a mesh, or a frame, as PLY, OBJ or .glb by the file's name, in the unit (glTF wants "m"), replacing any file of that name."""
+def write_mesh(path: Path, mesh: Mesh, unit: str = "auto") -> None:
+    """Writes a mesh, or a frame, as PLY, OBJ or .glb by the file's name, replacing any file of that name.
+
+    unit: as above; "auto": millimetres, or what the format prescribes, which is metres for glTF
+    """
     text = ctypes.create_string_buffer(512)
     status = c.library.htvm_mesh_file_write(os.fsencode(path), unit.encode(), as_c_mesh(mesh), text, len(text))
     if status != c.HTVM_OK:

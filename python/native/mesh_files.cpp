@@ -66,7 +66,9 @@ htvm_status htvm_mesh_file_write(const char* path, const char* unit, const htvm_
                                  size_t text_capacity) {
     return with_text(text, text_capacity, [&](LastError& error) {
         if (!path || !unit) return error.set(HTVM_BAD_INPUT, "the path or the unit is NULL");
-        const auto known = htvm::length_unit(unit);
+        const auto known = std::string_view(unit) == "auto"
+                               ? htvm::unit_of_format(path).value_or(htvm::LengthUnit::millimetre)
+                               : htvm::length_unit(unit);
         if (!known) return error.set(known.error());
         htvm::Mesh read;
         if (const auto status = htvm::c_api::read_mesh(error, mesh, read); status != HTVM_OK) return status;

@@ -44,6 +44,14 @@ def test_units_become_millimetres(tmp_path):
     assert np.allclose(htvm.read_mesh(tmp_path / "metres.obj", "cm").positions, tall.positions / 100)
 
 
+def test_gltf_is_in_metres_however_small_the_mesh(tmp_path):
+    mesh = sheet(3)
+    htvm.write_mesh(tmp_path / "mesh.glb", mesh)
+    read = htvm.read_mesh(tmp_path / "mesh.glb")
+    assert np.allclose(read.positions, mesh.positions, atol=1e-3) and np.array_equal(read.triangles, mesh.triangles)
+    assert np.allclose(htvm.read_mesh(tmp_path / "mesh.glb", unit="mm").positions, mesh.positions / 1000, atol=1e-6)
+
+
 def test_failures_name_the_file_and_are_of_their_kind(tmp_path):
     with pytest.raises(htvm.BadInput, match="nothing.ply: there is no such file"):
         htvm.read_mesh(tmp_path / "nothing.ply")
