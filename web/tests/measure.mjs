@@ -76,9 +76,17 @@ async function inChromium(browser, server, name) {
         player.pause();
         for (const share of [0.9, 0.1, 0.6, 0.3]) {
             const start = performance.now();
+            const exact = new Promise((resolve) => {
+                player.addEventListener('framepresented', function listen({ detail }) {
+                    if (detail.preview) return;
+                    player.removeEventListener('framepresented', listen);
+                    resolve();
+                });
+            });
             player.currentTime = share * player.duration;
-            await player.idle();
+            await exact;
             seeks.push(performance.now() - start);
+            await player.idle(); // the next one begins from rest
         }
         gc();
         return {

@@ -101,6 +101,26 @@ inPage('seeks without an index, ranges or a known size read on to the frame', as
     for (const number of [40, 5, 62]) assert.equal((await seek(page, (number + 0.4) / 30)).at(-1).line, expected[number]);
 });
 
+inPage('a seek decodes only what its frame needs', async (page) => {
+    // The I-frame so often that nothing behind it is decoded ahead, then the stream; all its EP-frames but the last would be
+    // errors.
+    const [header, ...packets] = packetsOf(await conformance('paper')).filter(({ kind }) => kind !== 5);
+    const before = 20;
+    const later = ({ kind, bytes, frame, reference, timestampUs, flags }, by, payload = bytes.slice(32, -4)) =>
+        packet(kind, payload, { frame: frame + by, reference: reference + by, timestampUs: timestampUs + Math.round((by * 1e6) / 30), flags });
+    const intra = packets.find(({ kind }) => kind === 2);
+    const last = packets.findLast(({ kind }) => kind === 3);
+    const stream = [header.bytes, ...Array.from({ length: before }, (_, i) => later(intra, i))];
+    for (const one of packets) stream.push(one.kind === 3 && one !== last ? later(one, before, new Uint8Array(40)) : later(one, before));
+    server.made.set('errors.htvm', new Uint8Array(Buffer.concat(stream)));
+    await open(page, '/as-is/errors.htvm');
+    const number = before + last.frame;
+    const shown = await seek(page, (number + 0.4) / 30);
+    const wanted = (await digests('paper')).find((line) => line.startsWith(`${last.frame} `));
+    assert.equal(shown.at(-1).line, wanted.replace(/^\d+/, number));
+    assert.deepEqual(await page.evaluate(() => test.notices), []);
+});
+
 inPage('an index that names wrong places is dropped', async (page) => {
     const stream = padded(firstSequence(await conformance('tracked_by_chance')), 4000, 'front');
     const header = packetsOf(stream)[0].size;

@@ -57,9 +57,15 @@ export function isFrame(kind: number): boolean {
     );
 }
 
+/** True for frames that later ones may refer to: I- and T-frames, unless their flags say otherwise. */
+export function isReferred({ kind, flags }: PacketHeader): boolean {
+    const may = kind === packetKind.intra || kind === packetKind.tracked;
+    return may && ((flags & flag.told) === 0 || (flags & flag.referred) !== 0);
+}
+
 /** True for I-frames from which decoding can start: all but those that later frames may not refer to. */
-export function isStart({ kind, flags }: PacketHeader): boolean {
-    return kind === packetKind.intra && ((flags & flag.told) === 0 || (flags & flag.referred) !== 0);
+export function isStart(header: PacketHeader): boolean {
+    return header.kind === packetKind.intra && isReferred(header);
 }
 
 /**

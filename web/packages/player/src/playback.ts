@@ -164,7 +164,8 @@ export class Playback {
         if (this.#url === '') return;
         if (this.durationUs !== null) timeUs = Math.min(timeUs, this.durationUs - 1);
         this.#soughtUs = Math.max(0, timeUs);
-        ++this.#serial;
+        // Before frames are returned: with room for more, the worker would decode on from the old place.
+        this.#send({ type: 'seek', serial: ++this.#serial, timeUs: this.#soughtUs });
         for (const frame of this.#ring.splice(0)) this.#done(frame);
         if (this.#preview) this.#done(this.#preview);
         this.#preview = null;
@@ -173,7 +174,6 @@ export class Playback {
         this.#anchorUs = this.#soughtUs;
         this.#anchorNow = this.#now();
         this.#listener.jumped();
-        this.#send({ type: 'seek', serial: this.#serial, timeUs: this.#soughtUs });
     }
 
     /** By frames, from the one shown; paused. */

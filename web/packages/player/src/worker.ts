@@ -1,5 +1,5 @@
 // The player's worker: fetches, decodes, computes normals, and sends frames as long as the player has room for them.
-import { Decoder, DecoderError, DecoderModule, isFrame, isStart, packetKind, readAudio, type Frame } from '@htvm/decoder';
+import { Decoder, DecoderError, DecoderModule, isFrame, isReferred, isStart, packetKind, readAudio, type Frame } from '@htvm/decoder';
 import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
 import { FilePackets, type TimedPacket } from './file_packets.js';
 import type { FrameReport, Report, Request } from './messages.js';
@@ -185,11 +185,10 @@ class Session {
                 this.#decode(group.pop()!, serial);
             }
         }
-        const frames = group.filter(({ kind }) => isFrame(kind)).length;
-        let left = frames;
+        let left = group.filter(({ kind }) => isFrame(kind)).length;
         for (const packet of group) {
+            if (isFrame(packet.kind) && --left > 0 && !isReferred(packet)) continue; // no later frame needs it
             const frame = this.#decode(packet, serial);
-            if (isFrame(packet.kind)) --left;
             if (!frame) continue;
             const preview = left > 0;
             if (preview && !(packet === group[0] && left > previewBeyond && !quietly)) continue;
