@@ -1,4 +1,4 @@
-"""The programs in docs/python.md run as they are printed."""
+"""The programs in docs/python.md and docs/use.md run as they are printed."""
 
 import re
 
@@ -24,3 +24,6 @@ def test_the_manual_runs(tmp_path, monkeypatch, capsys):
     assert "6 frames at 30.0 per second, A sheet" in printed
     assert htvm.open("copy.htvm").sequence.metadata == {"title": "A walk"}
     assert names["last"].number == 5 and names["measured"].value("m2.rms_mm") < 5
+    walk_through = re.findall(r"```python\n(.*?)```", (project / "docs/use.md").read_text(), re.S)
+    assert len(walk_through) == 1
+    exec(walk_through[0], {})
