@@ -112,8 +112,42 @@ private:
     Mesh mesh_;
 };
 
-Result<void> render_all(const Options& options, const std::vector<std::size_t>& shown, const Box& box,
-                        const ViewOptions& views) {
+// A camera that looks at the whole box from where it is at each picture.
+struct Orbit {
+    Box box;
+    ViewOptions views;
+    double turns = 1;
+    double zoom = 1;
+    Result<Camera> at(std::size_t picture, std::size_t pictures) const {
+        ViewOptions view = views;
+        view.first_azimuth += 360 * turns * static_cast<double>(picture) / static_cast<double>(pictures);
+        auto cameras = cameras_round(box, view);
+        if (!cameras) return tl::unexpected(cameras.error());
+        cameras->front().scale *= zoom;
+        return cameras->front();
+    }
+};
+
+// How much larger the pictures may be drawn: the corners of the box, which the camera has in view, are mostly empty.
+Result<double> largest_zoom(const Options& options, const std::vector<std::size_t>& shown, const Orbit& orbit) {
+    Frames frames(options);
+    std::optional<double> out;
+    Progress progress("measuring", shown.size());
+    for (std::size_t k = 0; k < shown.size(); ++k) {
+        if (interruption() != 0) break;
+        const auto mesh = frames.at(shown[k]);
+        if (!mesh) return tl::unexpected(mesh.error());
+        const auto camera = orbit.at(k, shown.size());
+        if (!camera) return tl::unexpected(camera.error());
+        if ((*mesh)->positions.empty()) continue;
+        const double zoom = zoomed_to(**mesh, *camera, orbit.views.margin).scale / camera->scale;
+        out = std::min(out.value_or(zoom), zoom);
+        progress.step();
+    }
+    return out.value_or(1);
+}
+
+Result<void> render_all(const Options& options, const std::vector<std::size_t>& shown, const Orbit& orbit) {
     auto video = VideoOutput::open(options.video);
     if (!video) return tl::unexpected(video.error());
     const internal::ThreadPool pool(options.picture.threads);
@@ -124,14 +158,10 @@ Result<void> render_all(const Options& options, const std::vector<std::size_t>& 
         if (interruption() != 0) return fail(ErrorKind::bad_input, "interrupted; no video was written");
         const auto mesh = frames.at(shown[k]);
         if (!mesh) return tl::unexpected(mesh.error());
-        ViewOptions view = views;
-        if (!options.still_camera)
-            view.first_azimuth += 360 * options.turns * static_cast<double>(k) / static_cast<double>(shown.size());
-        const auto cameras = cameras_round(box, view);
-        if (!cameras) return tl::unexpected(cameras.error());
+        const auto camera = orbit.at(k, shown.size());
+        if (!camera) return tl::unexpected(camera.error());
         const auto drawable = make_drawable(**mesh, render_options(options.picture, **mesh));
-        const auto picture =
-            draw_smoothly(drawable, cameras->front(), samples_of(options.picture), canvas, pool.threads());
+        const auto picture = draw_smoothly(drawable, *camera, samples_of(options.picture), canvas, pool.threads());
         if (auto ok = video->write(picture); !ok) return ok;
         progress.step();
     }
@@ -157,8 +187,11 @@ Result<void> render(Options options) {
     Frames from_first(options);
     const auto first = from_first.at(0);
     if (!first) return tl::unexpected(first.error());
-    const auto views = upright_views(options.picture, *source, **first);
-    if (auto ok = render_all(options, shown, *box, views); !ok) return ok;
+    Orbit orbit{*box, upright_views(options.picture, *source, **first), options.still_camera ? 0 : options.turns, 1};
+    const auto zoom = largest_zoom(options, shown, orbit);
+    if (!zoom) return tl::unexpected(zoom.error());
+    orbit.zoom = *zoom;
+    if (auto ok = render_all(options, shown, orbit); !ok) return ok;
     if (options.json)
         fmt::print("{}\n", nlohmann::json{{"file", video.path},
                                           {"pictures", shown.size()},
@@ -219,7 +252,7 @@ void add_render(CLI::App& app, Run& run) {
         ->type_name("FILE");
     command->add_flag("--json", o.json, "Print what was made as JSON on standard output");
     command->footer(
-        "All frames are in the picture all the time: the camera keeps the distance that the whole sequence needs.\n"
+        "The camera keeps the distance and the zoom at which every frame is whole in its picture.\n"
         "The frames of captures without times are taken for 30 a second.\n"
         "Examples:\n"
         "  htvm render person.htvm -o turntable.mp4\n"
