@@ -34,7 +34,7 @@ const char* shading_name(Shading shading) {
 }
 
 std::string row(const std::string& what, double forward, double backward, double larger, int digits) {
-    return fmt::format("  {:<34}{:>12.{}f}{:>12.{}f}{:>12.{}f}\n", what, forward, digits, backward, digits, larger,
+    return fmt::format("  {:<34} {:>11.{}f} {:>11.{}f} {:>11.{}f}\n", what, forward, digits, backward, digits, larger,
                        digits);
 }
 
@@ -266,13 +266,32 @@ struct Sources {
     MeshSource original, decoded;
 };
 
+// Whether the originals, as large as the guess of their unit makes them, are nearer to the size of the decoded stream
+// than in the unit that the stream's capture was in: then they are not the files that it was encoded from. By the first
+// frames of both, read from `original` and `decoded` of their own. Nothing is known of what cannot be read.
+bool guess_fits_better(MeshSource original, MeshSource decoded) {
+    if (original.frames == 0 || decoded.frames == 0) return false;
+    const auto first = original.mesh_at(original, 0);
+    if (!first || original.millimetres_per_unit == decoded.millimetres_per_unit) return false;
+    const auto second = decoded.mesh_at(decoded, 0);
+    if (!second) return false;
+    const double guessed = diagonal(bounding_box(*first)), right = diagonal(bounding_box(*second));
+    const double by_stream = guessed / original.millimetres_per_unit * decoded.millimetres_per_unit;
+    if (!(guessed > 0) || !(right > 0)) return false;
+    return std::abs(std::log(guessed / right)) < std::abs(std::log(by_stream / right));
+}
+
 Result<Sources> open_sources(const Options& options) {
     auto original = open_meshes(options.originals, {options.unit, options.timestamps, options.limits});
     if (!original) return tl::unexpected(original.error());
     auto decoded = open_meshes({options.decoded}, {options.unit, "", options.limits});
     if (!decoded) return tl::unexpected(decoded.error());
-    // A stream knows what its capture's files are in, however --scale or --height made millimetres of them.
+    // A stream knows what its capture's files are in, however --scale or --height made millimetres of them; but it may
+    // have been encoded from others.
     if (decoded->is_stream && original->guesses_unit) {
+        auto stream = open_meshes({options.decoded}, {options.unit, "", options.limits});
+        if (!stream) return tl::unexpected(stream.error());
+        if (guess_fits_better(*original, std::move(*stream))) return Sources{std::move(*original), std::move(*decoded)};
         original->guesses_unit = false;
         original->millimetres_per_unit = decoded->millimetres_per_unit;
     }
@@ -358,6 +377,17 @@ Result<void> write_pictures(const Options& options, const Mesh& original, const 
     return {};
 }
 
+void warn_of_sizes(const Sources& sources, const Mesh& original, const Mesh& decoded) {
+    constexpr double most = 5;
+    const double first = diagonal(bounding_box(original)), second = diagonal(bounding_box(decoded));
+    if (!(first > 0) || !(second > 0) || std::max(first, second) < most * std::min(first, second)) return;
+    const bool larger = first > second;
+    warn(fmt::format(
+        "{} is {:.3g} times as large as {}: if they are the same subject, give the unit of the files (--unit)",
+        larger ? sources.original.name : sources.decoded.name, larger ? first / second : second / first,
+        larger ? sources.decoded.name : sources.original.name));
+}
+
 struct Measured {
     SequenceComparison sums;
     std::vector<FrameComparison> frames;
@@ -373,6 +403,7 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         if (!first) return tl::unexpected(first.error());
         const auto second = decoded.mesh_at(decoded, pair.decoded);
         if (!second) return tl::unexpected(second.error());
+        if (out.frames.empty()) warn_of_sizes(sources, *first, *second);
         auto comparison = compare_frame(*first, *second, options.compare);
         if (!comparison)
             return fail(comparison.error().kind,

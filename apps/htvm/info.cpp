@@ -37,7 +37,8 @@ void print_frame(const FrameInfo& f) {
     auto bpv = [&](std::size_t bytes) { return bits_per_vertex(bytes, f.source_vertices); };
     const auto& b = f.bytes;
     fmt::print(
-        "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>9} {:>9} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} {:>8.3f} "
+        "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>9} {:>9} {:>15.3f} {:>8.3f} {:>8.3f} {:>17.3f} {:>8.3f} {:>8.3f} "
+        "{:>14.3f} "
         "{:>8.3f}\n",
         f.frame, kind_of(f.type).letter, f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices,
         f.triangles, b.total(), bpv(b[Layer::pose] + b[Layer::transforms]),
@@ -171,11 +172,12 @@ Result<void> info(const Options& options) {
             const bool first = !headers.sequence();
             if (auto ok = headers.push(*packet); !ok) return tl::unexpected(ok.error());
             if (!options.json && first) print_sequence(*headers.sequence(), options.input);
+            if (!options.json && first && front) print_index(*front);
             if (!options.json && first && !options.summary)
                 fmt::print(
-                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
-                    "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "motion", "geometry", "colour",
-                    "attribs", "mapping", "fans", "d.order", "bpv");
+                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>15} {:>8} {:>8} {:>17} {:>8} {:>8} {:>14} {:>8}\n",
+                    "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "pose/transforms", "geometry",
+                    "colour", "normals/texcoords", "mapping", "fans", "distance order", "bpv");
         }
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
         if (packet->kind == PacketKind::audio)
@@ -185,7 +187,7 @@ Result<void> info(const Options& options) {
             auto read = read_index(*packet);
             if (!read) return fail(read.error().kind, options.input + ": " + read.error().message);
             front = std::move(*read);
-            if (!options.json) print_index(*front);
+            if (!options.json && headers.sequence()) print_index(*front);  // else behind the line that names the file
         }
         if (packet->kind == PacketKind::index || packet->kind == PacketKind::front_index) index = true;
         if (!frame_type(packet->kind)) continue;
@@ -226,6 +228,10 @@ Result<void> info(const Options& options) {
         if (buffer) out["buffer"] = buffer_json(options, *buffer);
         fmt::print("{}\n", out.dump(2));
     } else {
+        if (!options.summary)
+            fmt::print(
+                "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
+                "mesh\n\n");
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);
@@ -258,9 +264,9 @@ void add_info(CLI::App& app, Run& run) {
         ->check(CLI::Range(0.01, 3600.0))
         ->needs(bitrate);
     command->footer(
-        "Columns: motion is the skeleton (I) or the bones' transforms (EP); fans and d.order are the connectivity's\n"
-        "two parts, TFAN's and the distance order's; attribs are normals and texture coordinates; bpv is the frame's\n"
-        "total, with packet and layer headers (overhead, below). All in bits per vertex of the captured mesh.\n"
+        "Columns: pose is the skeleton (I), transforms are the bones' (EP); fans and distance order are the\n"
+        "connectivity's two parts; texcoords are texture coordinates; bpv is the frame's total, with packet and layer\n"
+        "headers (overhead, below). All in bits per vertex of the captured mesh.\n"
         "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.");
     command->callback([options, &run] { run = [options] { return info(*options); }; });
 }

@@ -3,16 +3,19 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <sstream>
 #include <vector>
 
 #include "command_line/child_program.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "encode.h"
+#include "io/number_text.h"
 #include "live/file_server.h"
 
 namespace htvm::app {
@@ -25,6 +28,9 @@ struct PlayOptions {
     std::string beside;  // empty: none
     std::uint16_t port = 0;
     bool no_open = false;
+    std::string orbit;       // as the player's attribute; empty: the first view
+    std::size_t frames = 0;  // of captures; 0: all
+    double quality = default_quality;
 };
 
 // A folder of its own for what is encoded only to be played; removed at the end.
@@ -52,7 +58,7 @@ Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeOp
     auto capture = fs::absolute(inputs[0]).lexically_normal();
     if (capture.filename().empty()) capture = capture.parent_path();
     auto stream = folder.path / capture.filename().replace_extension(".htvm");
-    note(fmt::format("{} is not a stream: encoding it first", inputs[0]));
+    note(fmt::format("{} is not a stream: encoding it first, into a temporary file", inputs[0]));
     options.capture.inputs = inputs;
     options.output = stream.string();
     options.keep_partial = false;
@@ -107,6 +113,21 @@ std::string percent_encoded(const std::string& text) {
     return out;
 }
 
+// What is wrong with a place to look from, or nothing: one to three numbers.
+std::string check_orbit(const std::string& text) {
+    std::string numbers = text;
+    std::replace(numbers.begin(), numbers.end(), ',', ' ');
+    std::istringstream words(numbers);
+    std::vector<double> found;
+    for (std::string word; words >> word;) {
+        const auto number = parse_number(word);
+        if (!number) return fmt::format("{} is not a number", word);
+        found.push_back(*number);
+    }
+    const bool fits = !found.empty() && found.size() <= 3 && (found.size() < 3 || found[2] > 0);
+    return fits ? "" : "give degrees to the right and, if you like, degrees up and a distance above 0";
+}
+
 Result<void> play(const PlayOptions& options) {
     if (!live::has_player())
         return fail(ErrorKind::unsupported,
@@ -122,18 +143,24 @@ Result<void> play(const PlayOptions& options) {
         holds_streams(inputs[0])) {
         server.folder = inputs[0];
     } else {
-        const auto encoding = options.beside.empty() ? EncodeOptions() : nearly_lossless();
+        auto encoding = options.beside.empty() ? EncodeOptions() : nearly_lossless();
+        if (options.beside.empty()) encoding.encoding.quality = options.quality;
+        encoding.capture.frames = options.frames;
         const auto stream = stream_of(inputs, encoding, temporary);
         if (!stream) return tl::unexpected(stream.error());
         server.files = {{stream->filename().string(), stream->string()}};
     }
     if (!options.beside.empty()) {
-        const auto stream = stream_of({options.beside}, nearly_lossless(), beside_temporary);
+        auto encoding = nearly_lossless();
+        encoding.capture.frames = options.frames;
+        const auto stream = stream_of({options.beside}, encoding, beside_temporary);
         if (!stream) return tl::unexpected(stream.error());
         server.files.push_back({"beside/" + stream->filename().string(), stream->string()});
         query = fmt::format("?file={}&beside={}", percent_encoded(server.files[0].name),
                             percent_encoded(server.files[1].name));
     }
+    if (!options.orbit.empty())
+        query += fmt::format("{}orbit={}", query.empty() ? "?" : "&", percent_encoded(options.orbit));
     auto opened = live::FileServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
     const auto url = fmt::format("http://127.0.0.1:{}/{}", opened->port(), query);
@@ -156,19 +183,32 @@ void add_play(CLI::App& app, Run& run) {
                      "pattern, meshes), which is encoded first")
         ->expected(1, -1)
         ->required();
+    auto* beside =
+        command
+            ->add_option(
+                "--beside", options->beside,
+                "Another stream or capture, shown in step with the first in the same window, with a slider between\n"
+                "them. Captures are then encoded with hardly any loss, so that streams can be compared with them")
+            ->type_name("OTHER");
     command
-        ->add_option(
-            "--beside", options->beside,
-            "Another stream or capture, shown in step with the first in the same window, with a slider between\n"
-            "them. Captures are then encoded with hardly any loss, so that streams can be compared with them")
-        ->type_name("OTHER");
+        ->add_option("--orbit", options->orbit,
+                     "Where to look from: degrees to the right of the front, then, if given, degrees up and the\n"
+                     "distance in metres; in quotes: \"180\", from behind, or \"30 10\"")
+        ->type_name("ANGLES")
+        ->check(check_orbit);
+    command->add_option("--frames", options->frames, "Of a capture: encode at most this many frames (default: all)");
+    command
+        ->add_option("-q,--quality", options->quality,
+                     fmt::format("Of a capture: quality, 0 to 100 (default {:g})", default_quality))
+        ->check(CLI::Range(0.0, 100.0))
+        ->excludes(beside);
     command->add_option("--port", options->port, "Port on this machine's loopback address (default: a free one)");
     command->add_flag("--no-open", options->no_open, "Print the address, but do not open a browser");
     command->footer(
         "Prints the address to open and runs until Ctrl-C. Only this machine can reach it.\n"
         "Examples:\n"
         "  htvm play person.htvm\n"
-        "  htvm play capture/\n"
+        "  htvm play capture/ --frames 50 --orbit 180\n"
         "  htvm play capture/ --beside person.htvm");
     command->callback([options, &run] { run = [options] { return play(*options); }; });
 }

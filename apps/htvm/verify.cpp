@@ -29,6 +29,7 @@ struct Options {
 struct Problem {
     std::optional<std::uint32_t> frame;  // number in the stream
     std::string what;
+    std::optional<std::uint32_t> last_frame = frame;  // where it is one of several frames
 };
 
 struct Verification {
@@ -43,8 +44,10 @@ struct Verification {
     // Of the sequence in force.
     std::optional<std::uint32_t> last_number = {};
     std::int64_t last_us = 0;
-    std::set<std::uint32_t> droppable = {};  // own numbers of frames since the I-frame
-    std::optional<double> audio_end = {};    // microseconds
+    std::set<std::uint32_t> droppable = {};         // own numbers of frames since the I-frame
+    std::map<std::uint32_t, std::string> why = {};  // by own number: why a frame that cannot be decoded cannot
+    std::optional<std::size_t> lost = {};           // the newest problem that is of frames whose reference is missing
+    std::optional<double> audio_end = {};           // microseconds
     std::uint64_t audio_packets = 0;
 };
 
@@ -53,6 +56,7 @@ void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
     if (v.numbers.begins_sequence()) {
         v.last_number.reset();
         v.droppable.clear();
+        v.why.clear();
         v.audio_end.reset();
     }
     if (v.last_number && number <= *v.last_number) problem(fmt::format("comes after frame {}", *v.last_number));
@@ -66,15 +70,24 @@ void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
 
 void check_dependencies(Verification& v, const Packet& packet, std::uint32_t number) {
     const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
-    const auto closure = v.numbers.dependencies().closure();
-    if (closure.empty())
-        problem(fmt::format("it refers to frame {}, which is not there", v.numbers.of(packet.reference)));
     if (packet.reference != packet.frame && v.droppable.contains(packet.reference))
         problem(fmt::format("it refers to frame {}, which is marked as droppable", v.numbers.of(packet.reference)));
     if (!packet.has(packet_flag::told)) return;
     if (packet.has(packet_flag::droppable) && packet.has(packet_flag::referred))
         problem("it is marked as droppable, and as one that others may refer to");
     if (packet.has(packet_flag::droppable)) v.droppable.insert(packet.frame);
+}
+
+// Says once of frames behind each other that they have the same cause.
+void add_lost_frame(Verification& v, const Packet& packet, std::uint32_t number, const std::string& why) {
+    v.why[packet.frame] = why;
+    const auto what = "cannot be decoded, since " + why;
+    if (v.lost && v.problems[*v.lost].what == what && *v.problems[*v.lost].last_frame + 1 == number) {
+        v.problems[*v.lost].last_frame = number;
+        return;
+    }
+    v.lost = v.problems.size();
+    v.problems.push_back({number, what});
 }
 
 // Sound comes behind the frame in whose time it begins, and piece after piece.
@@ -93,10 +106,15 @@ void check_audio(Verification& v, const Packet& packet, std::uint32_t number) {
 
 void check_decoding(Verification& v, const Packet& packet, std::uint32_t number) {
     const auto decoded = v.decoder.decode(packet);
+    const bool is_frame = frame_type(packet.kind).has_value();
+    const auto reference = is_frame && packet.reference != packet.frame ? v.why.find(packet.reference) : v.why.end();
+    if (reference != v.why.end()) return add_lost_frame(v, packet, number, std::string(reference->second));
+    if (is_frame && packet.reference != packet.frame && v.numbers.dependencies().closure().empty())
+        return add_lost_frame(v, packet, number, fmt::format("frame {} is not there", v.numbers.of(packet.reference)));
     if (decoded) return;
+    if (is_frame) v.why[packet.frame] = fmt::format("frame {} cannot be decoded", number);
     const auto kind = decoded.error().kind;
     if (kind == ErrorKind::limit || kind == ErrorKind::unsupported) v.refused = kind;
-    const bool is_frame = frame_type(packet.kind).has_value();
     v.problems.push_back({is_frame ? std::optional(number) : std::nullopt, decoded.error().message});
 }
 
@@ -127,6 +145,7 @@ void check_index(Verification& v) {
     if (!v.index || v.index->bytes < v.offset) return;
     auto found = v.indexer.finish(v.offset);
     found.bounds = v.index->bounds;
+    found.duration_us = v.index->duration_us;  // informative: how long the last frame lasts is the writer's choice
     if (*v.index == found) return;
     if (v.index->frames != found.frames)
         v.problems.push_back(
@@ -150,15 +169,19 @@ Result<void> run_verify(const Options& options) {
         }
     }
     if (input->damaged_bytes() > 0)
-        v.problems.push_back({{}, counted(input->damaged_bytes(), "byte") + " are not part of an undamaged packet"});
+        v.problems.insert(  // the cause of others
+            v.problems.begin(),
+            Problem{{}, counted(input->damaged_bytes(), "byte") + " are not part of an undamaged packet"});
     if (input->cut_short_bytes() > 0) v.problems.push_back({{}, "the stream ends in the middle of a packet"});
     if (v.frames == 0) v.problems.push_back({{}, "there is no frame"});
     if (input->damaged_bytes() == 0) check_index(v);
     const bool sound = v.problems.empty();
     if (options.json) {
         nlohmann::json problems = nlohmann::json::array();
-        for (const auto& [frame, what] : v.problems)
-            problems.push_back({{"frame", frame ? nlohmann::json(*frame) : nlohmann::json()}, {"problem", what}});
+        for (const auto& [frame, what, last_frame] : v.problems)
+            problems.push_back({{"frame", frame ? nlohmann::json(*frame) : nlohmann::json()},
+                                {"last_frame", last_frame ? nlohmann::json(*last_frame) : nlohmann::json()},
+                                {"problem", what}});
         fmt::print("{}\n", nlohmann::json{{"sound", sound},
                                           {"frames", v.frames},
                                           {"sequences", v.numbers.dependencies().sequences()},
@@ -170,8 +193,11 @@ Result<void> run_verify(const Options& options) {
     } else {
         constexpr std::size_t most = 50;
         for (std::size_t i = 0; i < std::min(v.problems.size(), most); ++i) {
-            const auto& [frame, what] = v.problems[i];
-            fmt::print("{}{}\n", frame ? fmt::format("frame {}: ", *frame) : "", what);
+            const auto& [frame, what, last_frame] = v.problems[i];
+            const auto who = !frame                  ? std::string()
+                             : *frame == *last_frame ? fmt::format("frame {}: ", *frame)
+                                                     : fmt::format("frames {} to {}: ", *frame, *last_frame);
+            fmt::print("{}{}\n", who, what);
         }
         if (v.problems.size() > most) fmt::print("and {} more\n", v.problems.size() - most);
         if (sound)

@@ -1,5 +1,5 @@
-// The time of frames in a whole stream: each of its sequences begins where the one before ends, a mean frame after its
-// last frame.
+// The time of frames in a whole stream: each of its sequences begins where the one before ends, when its last frame has
+// lasted as long as a frame does.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace htvm {
 
-// How long frames last, seconds: a mean frame longer than from the first one's timestamp to the last one's. of_one: how
-// long a single one does.
+// How long frames last, seconds: from the first timestamp to the last, and a mean frame; or, where only some are
+// missing from the grid of the frame rate, of_one, which is how long a frame lasts by the rate, and so a single one.
 double seconds_of_frames(std::int64_t first_us, std::int64_t last_us, std::uint64_t frames, double of_one);
 
 class RunningTime {

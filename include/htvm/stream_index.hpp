@@ -34,7 +34,7 @@ struct SequencePoint {
 struct StreamIndex {
     std::uint64_t frames = 0;
     std::int64_t first_timestamp_us = 0;
-    std::uint64_t duration_us = 0;      // of each sequence from its first frame to its last, plus one mean frame
+    std::uint64_t duration_us = 0;      // of all sequences, each until its last frame ends: seconds_of_frames()
     std::uint64_t bytes = 0;            // of the stream behind the index packet
     std::optional<SpaceBounds> bounds;  // contain all decoded positions
     std::vector<SequencePoint> sequences;

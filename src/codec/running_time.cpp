@@ -1,6 +1,7 @@
 #include "htvm/running_time.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
@@ -25,7 +26,13 @@ double span(std::int64_t first_us, std::int64_t last_us) {
 double seconds_of_frames(std::int64_t first_us, std::int64_t last_us, std::uint64_t frames, double of_one) {
     if (frames < 2) return frames == 0 ? 0 : of_one;
     const auto count = static_cast<double>(frames);
-    return span(first_us, last_us) * count / (count - 1);
+    const double seconds = span(first_us, last_us);
+    // Frames missing between others are no reason for the last one to last longer: where the times are on the grid of
+    // the frame rate, and more than half of its places have a frame.
+    const double places = of_one > 0 ? std::round(seconds / of_one) : 0;
+    const bool on_grid = std::abs(seconds - places * of_one) <= 0.1 * of_one;
+    if (on_grid && places > count - 1 && places < 2 * (count - 1)) return seconds + of_one;
+    return seconds * count / (count - 1);
 }
 
 void RunningTime::take(const Packet& packet, bool begins_sequence) {

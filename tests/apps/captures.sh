@@ -70,6 +70,9 @@ cp -r capture gap
 rm gap/frame_00002.ply gap/frame_00003.ply
 expect 0 "2 frames are missing before gap/frame_00004.ply" "$htvm" encode gap -o gap.htvm
 has_times gap.htvm 0 33 133 167
+rm -rf one_missing && cp -r capture one_missing && rm one_missing/frame_00002.ply
+"$htvm" encode one_missing -o one_missing.htvm --quiet 2>/dev/null
+expect 0 "5 frames in 0.20 s" "$htvm" info one_missing.htvm
 expect 0 '"filled_frames": 2' "$htvm" encode gap --fill --json -o filled.htvm
 has_times filled.htvm 0 33 67 100 133 167
 mkdir tenths
@@ -90,6 +93,13 @@ expect 0 "unit_mm\": 0.1" "$htvm" info --json doll.htvm
 "$htvm" encode doll --height 1.8 -o tall.htvm --quiet
 "$htvm" decode tall.htvm -o tall --unit m --quiet
 expect 0 "" "$htvm" compare doll tall.htvm --only m1
+"$htvm" decode plain.htvm -o metres --unit m --quiet
+"$htvm" encode metres -o metres.htvm --quiet
+"$htvm" compare capture metres.htvm --only m2 --json 2>metres.txt >metres.json
+[ ! -s metres.txt ] || ! grep -q warning metres.txt || fail "the unit of the stream's capture is taken for the originals': $(cat metres.txt)"
+python3 -c 'import json, sys; sys.exit(json.load(open("metres.json"))["sequence"]["m2"]["rms_mm"] > 20)' ||
+    fail "compare takes millimetres for metres"
+expect 0 "warning: capture is 1e+03 times as large as metres.htvm" "$htvm" compare capture metres.htvm --only m2 --unit m
 heights() { # of the first mesh in a folder, as the guess of its unit tells
     "$htvm" encode "$1" --frames 1 -o x.htvm 2>&1 | grep -o "subject .* tall"
 }

@@ -228,6 +228,9 @@ expect 0 "6 disk full" "$htvm" help
 expect 2 "did you mean 'encode'?" "$htvm" help encod
 [ "$("$htvm" -V)" = "$("$htvm" --version)" ] || fail "-V is not --version"
 [ -z "$("$htvm" encode capture -o quiet.htvm --quiet 2>&1)" ] || fail "--quiet says something"
+expect 2 "sideways is not a number" "$htvm" play a.htvm --orbit sideways
+expect 2 "a distance above 0" "$htvm" play a.htvm --orbit "0 0 0"
+expect 2 "excludes" "$htvm" play capture -q 20 --beside a.htvm
 for command in synth encode decode info calibrate compare; do expect 0 "Usage" "$htvm" $command --help; done
 
 done_with "the command line does what it should"

@@ -73,6 +73,8 @@ poisoned() {
 [ "$(packets walk.htvm | head -1 | cut -d' ' -f3)" -eq 8 ] || fail "walk.htvm does not begin with an index"
 packets walk.htvm | grep -q ' 5 ' && fail "walk.htvm has an index at its end too"
 expect 0 "index: 12 frames, 0.40 s, 3 places to start, within" "$htvm" info walk.htvm
+"$htvm" info walk.htvm | head -n 1 | grep -q "^walk.htvm: 30 frames/s" || fail "info does not begin with the file's name"
+expect 0 "bits per captured vertex" "$htvm" info walk.htvm
 "$htvm" encode walk --keyint 4 -o - 2>/dev/null >live.htvm
 expect 0 '"front_index": null' "$htvm" info live.htvm --json
 
@@ -168,7 +170,7 @@ rm -rf part
 # Their timestamps are others, which a comment tells.
 cmp -s <(grep -av '^comment' part/00005.ply) <(grep -av '^comment' whole/00001.ply) || fail "parts joined in another order"
 
-# Verifying.
+# Verifying: the cause first, and each problem once.
 expect 0 "12 frames in 1 sequence, all sound" "$htvm" verify live.htvm
 expect 0 '"sound": true' "$htvm" verify walk.htvm --json
 expect 3 "not part of an undamaged packet" "$htvm" verify poisoned.htvm
@@ -178,8 +180,13 @@ expect 3 "ends in the middle of a packet" "$htvm" verify short.htvm
 gone=($(place 7 5))
 { head -c "${gone[0]}" walk.htvm; tail -c +$((gone[0] + gone[1] + 1)) walk.htvm; } >lost.htvm
 expect 3 "frame 6: comes after frame 4: frames are missing between them" "$htvm" verify lost.htvm
-expect 3 "frame 6: it refers to frame 5, which is not there" "$htvm" verify lost.htvm
+expect 3 "frames 6 to 7: cannot be decoded, since frame 5 is not there" "$htvm" verify lost.htvm
 expect 3 "the index does not fit the packets" "$htvm" verify lost.htvm
+cp walk.htvm overwritten.htvm
+printf 'overwrit' | dd of=overwritten.htvm bs=1 seek=$((gone[0] + gone[1] / 2)) conv=notrunc status=none
+"$htvm" verify overwritten.htvm >said.txt 2>/dev/null
+head -n 1 said.txt | grep -q "not part of an undamaged packet" || fail "verify does not begin with the damage: $(cat said.txt)"
+[ "$(wc -l <said.txt)" -eq 3 ] || fail "verify says things twice: $(cat said.txt)"
 expect 3 "frame 5 is not in the stream" "$htvm" decode lost.htvm -o x
 { head -c "${next[0]}" walk.htvm; } >tail.htvm
 expect 3 "frames 8 to 11 are not in the stream" "$htvm" decode tail.htvm -o x

@@ -29,6 +29,12 @@ TEST(RunningTime, FramesLastAMeanFrameLongerThanFromTheFirstToTheLast) {
     EXPECT_DOUBLE_EQ(seconds_of_frames(0, 0, 0, 0.04), 0);
 }
 
+TEST(RunningTime, MissingFramesDoNotLengthenTheLastOne) {
+    EXPECT_NEAR(seconds_of_frames(0, 166667, 5, 1.0 / 30), 0.2, 1e-6);  // one of six is missing
+    EXPECT_DOUBLE_EQ(seconds_of_frames(0, 160000, 3, 0.04), 0.24);      // at half the rate none is
+    EXPECT_DOUBLE_EQ(seconds_of_frames(0, 170000, 5, 0.04), 0.2125);    // not at the rate at all
+}
+
 TEST(RunningTime, ASequenceBeginsWhereTheOneBeforeEnds) {
     RunningTime time;
     time.take(header_of(25), false);

@@ -95,10 +95,10 @@ function slider(around) {
     return split;
 }
 
-/** streams: the two, each with a name and an address. */
-export function playBeside(streams) {
+/** streams: the two, each with a name and an address. view: attributes of both players. */
+export function playBeside(streams, view) {
     const clock = new CommonClock();
-    const [first, second] = streams.map(({ name, address }) => make('htvm-player', { src: address, label: `${name}, a three-dimensional capture` }));
+    const [first, second] = streams.map(({ name, address }) => make('htvm-player', { ...view, src: address, label: `${name}, a three-dimensional capture` }));
     for (const player of [first, second]) player.clock = clock;
     clock.players = [first, second];
     first.className = 'whole';

@@ -5,6 +5,8 @@ import { playBeside } from '/player/beside.js';
 
 const content = document.getElementById('content');
 const address = (path) => `/files/${path.split('/').map(encodeURIComponent).join('/')}`;
+const query = new URLSearchParams(location.search);
+const view = query.has('orbit') ? { orbit: query.get('orbit') } : {};
 const nameOf = (path) => path.replace(/\.htvm$/, '');
 
 function make(name, attributes = {}, ...children) {
@@ -17,7 +19,9 @@ function make(name, attributes = {}, ...children) {
 function play(path, alone) {
     document.title = `${nameOf(path)} – htvm`;
     const attributes = { class: 'whole', src: address(path), label: `${nameOf(path)}, a three-dimensional capture` };
-    content.append(make('htvm-player', { ...attributes, autoplay: '', loop: '', controls: '' }));
+    const player = make('htvm-player', { ...attributes, ...view, autoplay: '', loop: '', controls: '' });
+    content.append(player);
+    player.focus({ focusVisible: false }); // its keys work at once
     if (!alone) content.append(make('a', { class: 'back', href: '/' }, 'All streams'));
 }
 
@@ -27,7 +31,7 @@ function sizeText(bytes) {
 
 // One player draws the stills one after the other: browsers have few graphics contexts.
 async function drawStills(items) {
-    const player = make('htvm-player', { class: 'maker', floor: 'none', theme: 'light', 'aria-hidden': 'true' });
+    const player = make('htvm-player', { ...view, class: 'maker', floor: 'none', theme: 'light', 'aria-hidden': 'true' });
     document.body.append(player);
     for (const { path, image, note } of items) {
         const shown = new Promise((resolve) => {
@@ -51,7 +55,7 @@ function list(files) {
         const src = poster ? address(poster) : 'data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7';
         const image = make('img', { alt: '', src });
         const note = make('small', {}, sizeText(bytes));
-        const link = make('a', { href: `/?file=${encodeURIComponent(path)}` }, image, make('span', {}, nameOf(path)), note);
+        const link = make('a', { href: `/?${new URLSearchParams({ file: path, ...view })}` }, image, make('span', {}, nameOf(path)), note);
         return { path, poster, image, note, row: make('li', {}, link) };
     });
     const rows = items.map(({ row }) => row);
@@ -62,13 +66,12 @@ function list(files) {
 
 const response = await fetch('/api/files');
 const files = response.ok ? await response.json() : [];
-const query = new URLSearchParams(location.search);
 const asked = query.get('file');
 const beside = query.get('beside');
 if (asked !== null && beside !== null) {
     const streams = [asked, beside].map((path) => ({ name: nameOf(path.replace(/^beside\//, '')), address: address(path) }));
     document.title = `${streams.map(({ name }) => name).join(' | ')} – htvm`;
-    content.append(playBeside(streams));
+    content.append(playBeside(streams, view));
 } else if (asked !== null) play(asked, false);
 else if (files.length === 1) play(files[0].path, true);
 else if (files.length > 0) list(files);

@@ -65,6 +65,17 @@ test('htvm play shows a stream, in a loop, in the whole window', options, () =>
         await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 8);
         assert.equal(await page.title(), 'tracked – htvm');
         assert.deepEqual(await page.evaluate(() => [document.querySelector('htvm-player').clientWidth, innerWidth]), [640, 640]);
+        // Its keys work before anybody has clicked.
+        await page.keyboard.press('Space');
+        assert.equal(await page.evaluate(() => document.querySelector('htvm-player').paused), true);
+    }));
+
+test('htvm play --orbit says where the stream is seen from', options, () =>
+    running(['play', '--no-open', join(work, 'streams', 'tracked.htvm'), '--orbit', '180, 20'], async (page, address) => {
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 0);
+        const { yaw, pitch } = await page.evaluate(() => document.querySelector('htvm-player').view);
+        assert.deepEqual([yaw, pitch].map(Math.round).map(Math.abs), [180, 20]);
     }));
 
 test('htvm play encodes a capture first', options, async () => {
