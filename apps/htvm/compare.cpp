@@ -383,7 +383,7 @@ void warn_of_sizes(const Sources& sources, const Mesh& original, const Mesh& dec
     if (!(first > 0) || !(second > 0) || std::max(first, second) < most * std::min(first, second)) return;
     const bool larger = first > second;
     warn(fmt::format(
-        "{} is {:.3g} times as large as {}: if they are the same subject, give the unit of the files (--unit)",
+        "{} is about {:.0f} times as large as {}: if they are the same subject, give the unit of the files (--unit)",
         larger ? sources.original.name : sources.decoded.name, larger ? first / second : second / first,
         larger ? sources.decoded.name : sources.original.name));
 }
