@@ -60,8 +60,9 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
         ->required();
     command
         .add_option("-s,--skeleton", options.skeleton,
-                    "The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON. Without\n"
-                    "one, a single bone that spans the mesh is used, and fast limbs cost more bits")
+                    "The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON. It pays with\n"
+                    "--profile topology, where limbs cost more bits without it. By default it only helps to begin\n"
+                    "where limbs are fast, and may be left out")
         ->type_name("FILE");
     command
         .add_option_function<std::string>(
@@ -105,7 +106,7 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
             "Where the head is: x, -x, y, -y, z or -z (default: not known; for --height, y or z, whichever way\n"
             "the subject is longer)")
         ->check(CLI::IsMember({"x", "-x", "y", "-y", "z", "-z"}));
-    command.add_option("--frames", options.frames, "Use at most this many frames (default: all)");
+    command.add_option("--frames", options.frames, "Use at most this many frames; 0: all (default: all)");
     command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)");
     command.add_option("--skeleton-offset", options.skeleton_offset,
                        "Seconds to add to the skeleton's clock, if it is early or late");
@@ -237,10 +238,7 @@ Result<void> Capture::find_poses() {
     } else if (times.size() > 1) {
         rate_ = rate_of(times);
     }
-    if (!track) {
-        note("no skeleton given: one bone that spans the mesh stands in (see --skeleton)");
-        return {};
-    }
+    if (!track) return {};
     MeshClock clock;
     clock.frames = pipe_ ? track->poses.size() : files_.paths.size();
     clock.fps = fps();
@@ -250,10 +248,12 @@ Result<void> Capture::find_poses() {
                                                        : static_cast<double>(file_times_[k]) / 1e6);
     AlignOptions align_options;
     align_options.offset = options_.skeleton_offset;
+    align_options.first_used = begin_;
+    align_options.used = options_.frames;
     auto aligned = align(*track, clock, align_options);
     if (!aligned) return fail(aligned.error().kind, options_.skeleton + ": " + aligned.error().message);
-    for (const auto& line : track->notes) note("skeleton: " + line);
-    for (const auto& line : aligned->notes) note("skeleton: " + line);
+    for (const auto& line : track->notes) note(options_.skeleton + ": " + line);
+    for (const auto& line : aligned->notes) note(options_.skeleton + ": " + line);
     poses_ = std::move(aligned->poses);
     skeleton_ = std::move(track->skeleton);
     radii_ = std::move(track->radii);
@@ -275,7 +275,8 @@ Result<void> Capture::find_unit() {
         if (pipe_ || (peeked_ && !peeked_->positions.empty()) || next_ == end) break;
     }
     if (!peeked_ && error) return tl::unexpected(*error);
-    if (!peeked_) return fail(ErrorKind::bad_input, "there is no mesh in " + input_name(options_));
+    if (!peeked_)
+        return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
     const bool guessed = options_.unit == "auto" && options_.height == 0 && options_.scale == 1;
     const auto of_format = pipe_ ? std::nullopt : unit_of_format(files_.paths[peeked_at_]);
     const auto unit = options_.unit == "auto" ? of_format.value_or(guess_unit(*peeked_)) : *length_unit(options_.unit);

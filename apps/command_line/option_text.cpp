@@ -1,9 +1,14 @@
 #include "command_line/option_text.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <cstring>
 #include <set>
 #include <sstream>
 #include <string_view>
@@ -54,16 +59,54 @@ std::string names_of(const std::set<CLI::Option*>& options) {
 // What else the parser checks.
 std::string conditions_of(const CLI::Option& option) {
     std::vector<std::string> out;
-    const std::string type = option.get_type_name();
-    if (const auto range = type.find(" in ["); range != std::string::npos && type.ends_with(']')) {
-        auto limits = type.substr(range + 5, type.size() - range - 6);
-        if (const auto dash = limits.find(" - "); dash != std::string::npos) limits.replace(dash, 3, " to ");
-        out.push_back(limits);
-    }
+    if (const auto range = range_of(option); !range.empty()) out.push_back(range);
     if (!option.get_default_str().empty()) out.push_back("default " + option.get_default_str());
     if (!option.get_needs().empty()) out.push_back("only with " + names_of(option.get_needs()));
     if (!option.get_excludes().empty()) out.push_back("not with " + names_of(option.get_excludes()));
     return fmt::format("{}", fmt::join(out, "; "));
+}
+
+// Columns of the terminal, or as COLUMNS says.
+std::size_t terminal_width() {
+    constexpr std::size_t usual = 100, least = 60;
+    std::size_t columns = 0;
+    if (const char* said = std::getenv("COLUMNS")) std::from_chars(said, said + std::strlen(said), columns);
+    winsize size{};
+    if (columns == 0 && ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0) columns = size.ws_col;
+    return columns == 0 ? usual : std::max(columns, least);
+}
+
+std::string broken(const std::string& text, std::size_t width) {
+    std::string out;
+    std::size_t line = 0;
+    for (const auto& word : split(text, ' ')) {
+        const bool fits = line + 1 + word.size() <= width;
+        if (line > 0) out += fits ? ' ' : '\n';
+        line = line > 0 && fits ? line + 1 + word.size() : word.size();
+        out += word;
+    }
+    return out;
+}
+
+// Breaks text anew, which was broken for some width. Kept are the ends of lines that end a sentence or a heading, and
+// indented lines, which are tables and commands.
+std::string wrapped(const std::string& text, std::size_t width) {
+    std::string out, paragraph;
+    const auto add_line = [&](const std::string& line) { out += (out.empty() ? "" : "\n") + line; };
+    const auto end_paragraph = [&] {
+        if (!paragraph.empty()) add_line(broken(paragraph, width));
+        paragraph.clear();
+    };
+    for (const auto& line : split(text, '\n')) {
+        const bool kept = line.empty() || line.starts_with(' ');
+        if (kept || paragraph.ends_with('.') || paragraph.ends_with(':')) end_paragraph();
+        if (kept)
+            add_line(line);
+        else
+            paragraph += (paragraph.empty() ? "" : " ") + line;
+    }
+    end_paragraph();
+    return out;
 }
 
 // Indented lines of a description are a table.
@@ -83,7 +126,7 @@ void tell_meaning(const CLI::Option& option, OptionText& text) {
 class Help : public CLI::Formatter {
     std::string make_subcommand(const CLI::App* command) const override {
         std::ostringstream out;
-        CLI::detail::format_help(out, command->get_name(), summary_of(*command), column_width_);
+        CLI::detail::format_help(out, command->get_name(), wrapped(summary_of(*command), beside()), column_width_);
         return out.str();
     }
     std::string make_option_opts(const CLI::Option* option) const override {
@@ -93,10 +136,24 @@ class Help : public CLI::Formatter {
     }
     std::string make_option_desc(const CLI::Option* option) const override {
         const auto &meaning = option->get_description(), conditions = conditions_of(*option);
-        if (conditions.empty() || meaning.empty()) return meaning + conditions;
-        const auto first_line = meaning.substr(0, meaning.find("\n "));
-        return first_line + " (" + conditions + ")" + meaning.substr(first_line.size());
+        if (conditions.empty() || meaning.empty()) return in_column(meaning + conditions);
+        const auto words = meaning.substr(0, meaning.find("\n "));
+        return in_column(words + " (" + conditions + ")" + meaning.substr(words.size()));
     }
+    std::string make_description(const CLI::App* app) const override {
+        return wrapped(app->get_description(), width_) + "\n";
+    }
+    std::string make_footer(const CLI::App* app) const override {
+        return app->get_footer().empty() ? "" : wrapped(app->get_footer(), width_) + "\n";
+    }
+
+    // The space beside the column of flags.
+    std::size_t beside() const { return width_ - column_width_; }
+    std::string in_column(const std::string& meaning) const {
+        const auto table = std::min(meaning.find("\n "), meaning.size());
+        return broken(joined(meaning.substr(0, table)), beside()) + meaning.substr(table);
+    }
+    std::size_t width_ = terminal_width();
 };
 
 }  // namespace
@@ -118,6 +175,15 @@ std::vector<OptionText> option_texts(const CLI::App& command) {
         out.push_back(std::move(text));
     }
     return out;
+}
+
+std::string range_of(const CLI::Option& option) {
+    const std::string type = option.get_type_name();
+    const auto range = type.find(" in [");
+    if (range == std::string::npos || !type.ends_with(']')) return {};
+    auto limits = type.substr(range + 5, type.size() - range - 6);
+    if (const auto dash = limits.find(" - "); dash != std::string::npos) limits.replace(dash, 3, " to ");
+    return limits;
 }
 
 std::vector<const CLI::App*> commands_of(const CLI::App& program) {

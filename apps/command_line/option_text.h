@@ -7,6 +7,7 @@
 
 namespace CLI {
 class App;
+class Option;
 class FormatterBase;
 }  // namespace CLI
 
@@ -27,7 +28,10 @@ struct OptionText {
 std::vector<OptionText> option_texts(const CLI::App& command);
 std::vector<const CLI::App*> commands_of(const CLI::App& program);
 
-// Lays out --help, with the same words for values as the man pages.
+// The numbers that an option takes: "0 to 100"; empty where any will do.
+std::string range_of(const CLI::Option& option);
+
+// Lays out --help for the width of the terminal (or COLUMNS), with the same words for values as the man pages.
 std::shared_ptr<CLI::FormatterBase> help_formatter();
 
 // The first clause of the description: what the command does, in a few words.

@@ -58,16 +58,54 @@ std::vector<std::string> flags_of(const CLI::App& command) {
     return out;
 }
 
+bool is_number(const std::string& text) {
+    char* end = nullptr;
+    std::strtod(text.c_str(), &end);
+    return !text.empty() && *end == '\0';
+}
+
+// The number that an option was given and cannot take; empty if it is fine.
+std::string odd_number(const CLI::Option& option, const std::string& text) {
+    const auto type = option.get_type_name(), range = range_of(option);
+    const bool whole = type.find("INT") != std::string::npos;
+    if (!is_number(text)) return text + " is not a number";
+    if (!range.empty()) return fmt::format("{} is not {}{}", text, whole ? "a whole number from " : "in ", range);
+    if (whole && text.find_first_of(".eE") != std::string::npos) return text + " is not a whole number";
+    return text + " is out of range";
+}
+
+// What the parser said, with the option's own words where it speaks of numbers.
+std::string in_words(const CLI::App& app, const CLI::Error& error) {
+    const std::string said = error.what();
+    const bool of_number = said.find(" not in range ") != std::string::npos || said.starts_with("Could not convert: ");
+    for (const auto* command : app.get_subcommands()) {
+        for (const auto* option : command->get_options()) {
+            const auto& given = option->results();
+            const auto name = option->get_name();
+            if (!of_number || given.size() != 1 || name.empty()) continue;
+            if (said.starts_with(name + ": ") || said.starts_with("Could not convert: " + name + " = "))
+                return fmt::format("{}: {}", name, odd_number(*option, given[0]));
+        }
+    }
+    if (!app.get_subcommands().empty()) return said;
+    for (const auto& word : app.remaining())
+        if (word.starts_with('-')) return "there is no option " + word;
+    return said == "A subcommand is required" ? "a command is required" : said;
+}
+
 // What was wrong with the command line, what may have been meant, and where to read on.
 std::string usage_message(const CLI::App* app, const CLI::Error& error) {
     std::string command = app->get_name(), meant;
+    for (const auto& word : app->remaining())
+        if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*app));
     for (const auto* named : app->get_subcommands()) {
         command += " " + named->get_name();
         for (const auto& word : named->remaining())
             if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*named));
     }
     const std::string hint = meant.empty() ? "" : fmt::format("did you mean {}? ", meant);
-    return fmt::format("{}: error: {}; {}'{} --help' tells more\n", app->get_name(), error.what(), hint, command);
+    return fmt::format("{}: error: {}; {}'{} --help' tells more\n", app->get_name(), in_words(*app, error), hint,
+                       command);
 }
 
 // Output that is still buffered may fail to arrive: a full disk must not look like success.
@@ -104,7 +142,10 @@ bool names_no_command(const CLI::App& app, const std::string& word) {
 void say_no_such_command(const Program& program, const CLI::App& app, const std::string& word) {
     const auto found = program.elsewhere.find(word);
     const auto meant = meant_by(word, command_names(app));
+    const auto flags = flags_of(app);
+    const bool is_flag = std::find(flags.begin(), flags.end(), "--" + word) != flags.end();
     const std::string hint = found != program.elsewhere.end() ? fmt::format("it is '{}'", found->second)
+                             : is_flag                        ? fmt::format("did you mean --{}?", word)
                              : meant.empty()                  ? fmt::format("'{} --help' lists them", program.name)
                                                               : fmt::format("did you mean '{}'?", meant);
     fmt::print(stderr, "{}: error: there is no command '{}'; {}\n", program.name, word, hint);

@@ -67,9 +67,9 @@ std::string topology_rows(const SequenceComparison& sums) {
 }
 
 std::string picture_rows(const SequenceComparison& sums, const ComparisonSummary& s, const CompareOptions& options) {
-    return fmt::format("\n  M3, {} views of {} x {}, {} shading, {:.1f} % of the pixels foreground\n",
-                       options.views.views, options.views.width, options.views.height,
-                       shading_name(options.render.shading), 100 * s.foreground_share) +
+    return fmt::format("\n  M3, {} of {} x {}, {} shading, {:.1f} % of the pixels foreground\n",
+                       counted(static_cast<std::size_t>(options.views.views), "view"), options.views.width,
+                       options.views.height, shading_name(options.render.shading), 100 * s.foreground_share) +
            single("PSNR of the foreground, dB", s.m3_foreground_db, 2) +
            single("PSNR of the full picture, dB", s.m3_full_db, 2) +
            single("pixels of one mesh only, % of fgr.",
@@ -126,7 +126,7 @@ std::string comparison_table(const SequenceComparison& sums, const CompareOption
     const ComparisonSummary s = summarise(sums, peak_mm);
     const double frames = static_cast<double>(sums.frames);
     std::string out = fmt::format(
-        "{} frames; per frame {:.1f} vertices, {:.1f} triangles; decoded {:.1f} and {:.1f}\n", sums.frames,
+        "{}; per frame {:.1f} vertices, {:.1f} triangles; decoded {:.1f} and {:.1f}\n", counted(sums.frames, "frame"),
         static_cast<double>(sums.original_vertices) / frames, static_cast<double>(sums.original_triangles) / frames,
         static_cast<double>(sums.decoded_vertices) / frames, static_cast<double>(sums.decoded_triangles) / frames);
     if (options.points || options.surface)
@@ -546,7 +546,7 @@ void add_compare(CLI::App& app, Run& run) {
         ->type_name("FILE")
         ->expected(1, -1)
         ->required();
-    command->add_option("--frames", o.frames, "Compare at most this many frames");
+    command->add_option("--frames", o.frames, "Compare at most this many frames; 0: all (default: all)");
     command
         ->add_option("--only", o.only,
                      "Measure only some of m1, m2, texcoords, d1, d2, m3, topology, separated by commas")

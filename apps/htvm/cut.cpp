@@ -156,6 +156,14 @@ void skip_to_part(Cut& cut, StreamInput& input) {
     input.go_on_with({std::move(*front), std::move(*header)}, first->offset);
 }
 
+std::string no_such_frames(const Cut& cut) {
+    const auto& input = cut.options.input;
+    if (cut.waiting.empty()) return fmt::format("{} has no such frames; 'htvm info' tells which it has", input);
+    return fmt::format("{} has no such frames: it has {} and lasts {:.2f} s", input,
+                       counted(std::size_t{cut.last_number} + 1, "frame"),
+                       static_cast<double>(cut.time.microseconds() + cut.time.one_frame_us()) / 1e6);
+}
+
 Result<void> run_cut(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
     if (!input) return tl::unexpected(input.error());
@@ -170,9 +178,9 @@ Result<void> run_cut(const Options& options) {
     }
     if (auto fine = check_whole(*input, options.input); !fine) return fine;
     if (!cut.started)
-        return fail(ErrorKind::bad_input,
-                    cut.header ? fmt::format("{} has no such frames; 'htvm info' tells which it has", options.input)
-                               : options.input + " is not an htvm stream: no sequence header was found");
+        return fail(ErrorKind::bad_input, cut.header
+                                              ? no_such_frames(cut)
+                                              : options.input + " is not an htvm stream: no sequence header was found");
     if (auto finished = output->finish(); !finished) return finished;
     const bool widened = cut.first_asked > cut.start_number;
     note(fmt::format(
@@ -191,7 +199,7 @@ void add_cut(CLI::App& app, Run& run) {
     command->add_option("-o,--output", options->output, "The new stream: a file, or - for standard output")->required();
     auto* first = command->add_option("--first", options->first, "First frame, counted from 0 (default: 0)");
     auto* frames =
-        command->add_option("--frames", options->frames, "At most this many frames from there (default: all)");
+        command->add_option("--frames", options->frames, "At most this many frames from there; 0: all (default: all)");
     auto* from = command->add_option("--from", options->from, "Instead of --first: seconds from the first frame");
     auto* to =
         command->add_option("--to", options->to, "Instead of --frames: up to this many seconds from the first frame");
@@ -205,7 +213,12 @@ void add_cut(CLI::App& app, Run& run) {
         "Examples:\n"
         "  htvm cut person.htvm --first 300 --frames 150 -o part.htvm\n"
         "  htvm cut person.htvm --from 10 --to 15 -o part.htvm");
-    command->callback([options, &run] { run = [options] { return run_cut(*options); }; });
+    command->callback([options, &run] {
+        if (options->to >= 0 && options->to <= options->from)
+            throw CLI::ValidationError("--to",
+                                       fmt::format("{:g} s is not after --from, {:g} s", options->to, options->from));
+        run = [options] { return run_cut(*options); };
+    });
 }
 
 }  // namespace htvm::app

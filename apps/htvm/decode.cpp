@@ -342,16 +342,16 @@ void print_json(const Summary& summary, const StreamInput& input) {
 }
 
 void tell_what_was_written(const Options& options, const MeshOutput& output, const Summary& summary) {
-    std::string frames = output.one_file() ? "the first frame alone" : fmt::format("{} frames", summary.written());
-    const std::string where = options.output == "-" ? "standard output" : options.output;
+    std::string frames = output.one_file() ? "the first frame alone" : counted(summary.written(), "frame");
     if (summary.concealed > 0) frames += fmt::format(" ({} concealed)", summary.concealed);
-    note(fmt::format("{} to {}, decoded at {:.1f} frames/s", frames, where, summary.frames_per_second()));
+    note(fmt::format("{} to {}, decoded at {:.1f} frames/s", frames,
+                     options.output == "-" ? "standard output" : options.output, summary.frames_per_second()));
     const auto others = output.other_meshes();
     if (others > 0 && summary.written() > 0)
-        warn(
-            fmt::format("the output folder also contains {} other mesh files, perhaps from an earlier run, which will "
-                        "be read along with these",
-                        others));
+        warn(fmt::format(
+            "the output folder also contains {}, perhaps from an earlier run, which will be read along with "
+            "these",
+            counted(others, "other mesh file")));
 }
 
 // An error if the stream is incomplete.
@@ -455,7 +455,7 @@ void add_decode(CLI::App& app, Run& run) {
         ->check(CLI::IsMember({"gap", "animate"}));
     command->add_option("--first", options->first, "First frame to decode, counted from 0 (default: 0)")
         ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{0xFFFFFFFF}));
-    command->add_option("--frames", options->frames, "Decode at most this many frames (default: all)");
+    command->add_option("--frames", options->frames, "Decode at most this many frames; 0: all (default: all)");
     command->add_option("--threads", options->threads,
                         "Threads (default: one per core); the meshes do not depend on it");
     command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output");

@@ -52,9 +52,9 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
         fmt::print("{}\n", out.dump(2));
     } else {
         tell(layer_table(summary.totals));
-        note(fmt::format("{}: {} frames, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s",
-                         options.output, frames, bytes, megabits / seconds, fps,
-                         static_cast<double>(frames) / summary.encode_seconds));
+        note(fmt::format("{}: {}, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s",
+                         options.output == "-" ? "standard output" : options.output, counted(frames, "frame"), bytes,
+                         megabits / seconds, fps, static_cast<double>(frames) / summary.encode_seconds));
         if (rate.controlled()) note(rate_summary(rate, bytes, seconds));
     }
     if (dropped_late > 0)
@@ -110,13 +110,28 @@ bool is_off(const RateReport& rate, double bits, double seconds) {
     return error < -rate_tolerance && quality.lowest < 100 && rate.buffer.peak_percent() < full;
 }
 
+// What a skeleton would do, or a better first frame, where motion follows the bones.
+void note_bones(const EncodeOptions& options, const EncoderOptions& settings) {
+    if (settings.profile == Profile::tracked) return;
+    if (settings.skeleton.bones.empty())
+        note(
+            fmt::format("no skeleton given: one bone that spans the mesh stands in, which costs bits with --profile {} "
+                        "(see --skeleton)",
+                        options.encoding.profile));
+    else if (settings.radii.empty())
+        note("bone radii are calibrated on the first frame; a T-pose is best (see htvm calibrate)");
+}
+
 // Each group of frames by an encoder of its own. A job that has nothing to do leaves no file.
 Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, const EncoderOptions& settings,
                               const std::optional<AudioTrack>& audio) {
     const auto of_group = frames_of_group(settings.key_interval);
     const auto groups = (capture.frames() + of_group - 1) / of_group;
     const auto have =
-        fmt::format("{} make {} of {}", counted(capture.frames(), "frame"), counted(groups, "group"), of_group);
+        fmt::format("{} make {} of {}{}", counted(capture.frames(), "frame"), counted(groups, "group"), of_group,
+                    of_group > static_cast<std::size_t>(settings.key_interval)
+                        ? fmt::format(" (whole multiples of --keyint, of at least {})", least_of_group)
+                        : "");
     if (groups_of(options.job, groups).count() == 0) {
         std::error_code error;
         if (std::filesystem::is_regular_file(options.output, error))
@@ -131,6 +146,7 @@ Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, co
     auto output = StreamOutput::open(options.output);
     if (!output) return tl::unexpected(output.error());
     if (audio) output->lay(*audio);
+    note_bones(options, settings);
     Summary summary;
     RateReport rate(settings);
     if (auto done = encode_groups(options, settings, capture, *output, summary, rate); !done)
@@ -158,6 +174,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (audio) output->lay(*audio);
         auto encoder = Encoder::create(settings);
         if (!encoder) return tl::unexpected(encoder.error());
+        if (number == 1) note_bones(options, settings);
         Summary summary;
         RateReport rate(settings);
         const bool writes = number >= fewest;
@@ -269,7 +286,8 @@ void add_encode(CLI::App& app, Run& run) {
     command
         ->add_option(
             "--jobs", options->jobs,
-            "Encode so many groups of frames at a time, each from one I-frame to the next (--keyint) by itself.\n"
+            "Encode so many groups of frames at a time, each from one I-frame to the next (--keyint) by itself,\n"
+            "or, where --keyint is below ten, to the first I-frame that makes ten frames or more.\n"
             "The stream is the same for any number, but not the one without --jobs, where what an encoder\n"
             "has learned goes from group to group and I-frames may move. Not with --bitrate")
         ->check(CLI::Range(1, 1024))
@@ -293,14 +311,15 @@ void add_encode(CLI::App& app, Run& run) {
         "Print all options of the library with their ranges, as docs/options.md has them, and exit");
     command->footer(
         "Examples:\n"
-        "  htvm encode capture/ --skeleton capture/skeleton.json -o person.htvm\n"
+        "  htvm encode capture/ -o person.htvm\n"
         "  htvm encode scan_*.obj -q 60 --keyint 60 -o person.htvm\n"
         "  htvm encode capture/ --profile topology -s capture/skeleton.json -o exact.htvm\n"
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  htvm encode capture/ --jobs 8 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
-    show_first(*command, {"--skeleton", "--output", "--fps", "--unit", "--height", "--frames", "--first", "--quality",
-                          "--profile", "--bitrate", "--keyint", "--on-bad-frame", "--threads", "--jobs", "--json"});
+    show_first(*command,
+               {"--skeleton", "--output", "--fps", "--unit", "--height", "--frames", "--first", "--quality",
+                "--profile", "--bitrate", "--buffer", "--keyint", "--on-bad-frame", "--threads", "--jobs", "--json"});
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();

@@ -167,9 +167,8 @@ std::vector<Group> groups_in(std::size_t frames, std::size_t of_each, const Job&
 }  // namespace
 
 std::size_t frames_of_group(int key_interval) {
-    constexpr std::size_t least = 10;
     const auto interval = static_cast<std::size_t>(key_interval);
-    return interval * ((least + interval - 1) / interval);
+    return interval * ((least_of_group + interval - 1) / interval);
 }
 
 GroupRange groups_of(const Job& job, std::size_t groups) {

@@ -12,6 +12,7 @@
 namespace htvm::app {
 
 // Frames of a group: as many as from one I-frame to the next, but at least ten, as a sequence header comes with each.
+constexpr std::size_t least_of_group = 10;
 std::size_t frames_of_group(int key_interval);
 
 struct GroupRange {

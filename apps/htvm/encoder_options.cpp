@@ -11,7 +11,6 @@
 #include <random>
 #include <string_view>
 
-#include "command_line/terminal.h"
 #include "io/mesh_file.h"
 #include "io/number_text.h"
 
@@ -60,27 +59,6 @@ Option as_flag(const Option& option) {
     return out;
 }
 
-// Wrapped so that a line fits within a hundred characters beside the column of flags.
-std::string wrapped(std::string_view text) {
-    constexpr std::size_t longest = 70;
-    std::string out;
-    std::size_t line = 0;
-    while (!text.empty()) {
-        const auto word = text.substr(0, text.find(' '));
-        text.remove_prefix(std::min(text.size(), word.size() + 1));
-        if (line > 0 && line + 1 + word.size() > longest) {
-            out += '\n';
-            line = 0;
-        } else if (line > 0) {
-            out += ' ';
-            ++line;
-        }
-        out += word;
-        line += word.size();
-    }
-    return out;
-}
-
 std::string capitalised(std::string text) {
     if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
     return text;
@@ -97,14 +75,19 @@ std::string default_text(const Option& option) {
 }
 
 std::string help_of(const Option& option) {
+    if (&option == find_option("topology.merge_duplicates"))
+        return "Vertices that decode to the same point and attributes are merged by default, and triangles that "
+               "collapse are dropped; with this, the decoded set of triangles is exactly the input's";
     if (&option == find_option("session"))
-        return wrapped(
-            capitalised(meaning_text(option)) +
-            fmt::format(" ({}, or random; default: random where the output is no file, else 0)", range_text(option)));
-    if (option.kind == OptionKind::on_or_off)
-        return wrapped((option.flag_off ? "Do without " : "") + meaning_text(option));
-    const auto text = capitalised(meaning_text(option));
-    return wrapped(fmt::format("{} ({}; default {})", text, range_text(as_flag(option)), default_text(option)));
+        return capitalised(meaning_text(option)) +
+               fmt::format(" ({}, or random; default: random where the output is no file, else 0)", range_text(option));
+    if (option.kind == OptionKind::on_or_off) return (option.flag_off ? "Do without " : "") + meaning_text(option);
+    auto text = capitalised(meaning_text(option));
+    if (&option == find_option("rate.bits_per_second"))
+        text +=
+            ". A warning says how many frames have the lowest quality, have their motion alone, or were dropped, "
+            "for which the exit code is 5";
+    return fmt::format("{} ({}; default {})", text, range_text(as_flag(option)), default_text(option));
 }
 
 void add_option(CLI::App& command, EncodingOptions& options, const Option& option) {
@@ -134,24 +117,24 @@ void add_quality(CLI::App& command, EncodingOptions& options) {
     command
         .add_option(
             "-q,--quality", options.quality,
-            wrapped(fmt::format(
+            fmt::format(
                 "Quality, 0 to 100 (default {}). How far the surface is off (M2, mm, measured on three captures): with "
                 "--profile tracked 1.2 to 1.7 at 20, 0.7 to 1.1 at 40, 0.4 to 0.8 at 60, 0.2 to 0.7 at 80, where the "
                 "noisier capture, with noise of 1.5 mm that is new in every frame, errs more; with topology 1.6 to 2 "
                 "at "
                 "20, 0.9 at 40, 0.4 at 60, 0.16 at 80, 0.07 at 100. Steps of positions are 16 mm at 0, 2 mm at 50, "
                 "0.25 mm at 100; of colours 32, 5.7 and 1 of 255 levels",
-                default_quality)))
+                default_quality))
         ->check(CLI::Range(0.0, 100.0))
         ->type_name("NUMBER")
         ->group(heading(OptionGroup::common));
     command
         .add_option("--profile", options.profile,
-                    wrapped("What the stream keeps. tracked (default): the fewest bits. Each frame is the last "
-                            "I-frame's mesh laid on the "
-                            "frame's surface (T-frames), with or without a skeleton; connectivity and sampling are not "
-                            "the capture's. topology: keeps every frame's own connectivity, for several times the "
-                            "bits. paper: the same with the choices of the published method"))
+                    "What the stream keeps. tracked (default): the fewest bits. Each frame is the last "
+                    "I-frame's mesh laid on the "
+                    "frame's surface (T-frames), with or without a skeleton; connectivity and sampling are not "
+                    "the capture's. topology: keeps every frame's own connectivity, for several times the "
+                    "bits. paper: the same with the choices of the published method")
         ->check(CLI::IsMember({"tracked", "topology", "paper"}))
         ->type_name("WORD")
         ->group(heading(OptionGroup::common));
@@ -160,24 +143,23 @@ void add_quality(CLI::App& command, EncodingOptions& options) {
 void add_what_is_beside_the_list(CLI::App& command, EncodingOptions& options) {
     command
         .add_option("--intra", options.intra,
-                    wrapped("Coder of the I-frames: tfan (default; keeps every triangle) or draco (drops isolated "
-                            "vertices, splits non-manifold ones)"))
+                    "Coder of the I-frames: tfan (default; keeps every triangle) or draco (drops isolated "
+                    "vertices, splits non-manifold ones)")
         ->check(CLI::IsMember({"tfan", "draco"}))
         ->type_name("WORD")
         ->group(heading(OptionGroup::common));
     command
         .add_option("--radii", options.radii_file,
-                    wrapped("Bone radii from htvm calibrate (default: the skeleton file's, else calibrated on the "
-                            "first frame)"))
+                    "Bone radii from htvm calibrate (default: the skeleton file's, else calibrated on the "
+                    "first frame)")
         ->type_name("FILE")
         ->group(heading(OptionGroup::common));
     command
         .add_option(
             "--passes", options.passes,
-            wrapped(
-                "2 encodes twice, so that the rate is met and the quality stays even from frame to frame "
-                "(default: 1 for standard input, which comes once; for files 2, and more where these are off by more "
-                "than 5 %, as they can be on short captures)"))
+            "2 encodes twice, so that the rate is met and the quality stays even from frame to frame "
+            "(default: 1 for standard input, which comes once; for files 2, and more where these are off by more "
+            "than 5 %, as they can be on short captures)")
         ->check(CLI::Range(1, 2))
         ->type_name("NUMBER")
         ->group(heading(OptionGroup::rate))
@@ -189,8 +171,8 @@ void add_scene_options(CLI::App& command, EncodingOptions& options) {
     constexpr const char* scene = "What the stream says of the capture";
     command
         .add_option("--floor", options.floor,
-                    wrapped("Height of the floor on the axis of --up, metres, or lowest: of the first frame's vertices "
-                            "(default: not known)"))
+                    "Height of the floor on the axis of --up, metres, or lowest: of the first frame's vertices "
+                    "(default: not known)")
         ->type_name("NUMBER")
         ->needs(command.get_option("--up"))
         ->group(scene);
@@ -218,8 +200,8 @@ void add_scene_options(CLI::App& command, EncodingOptions& options) {
                     options.metadata.push_back({pair.substr(0, end), pair.substr(end + 1)});
                 }
             },
-            wrapped("Anything else, KEY=VALUE; may be given several times. Players know timecode=HH:MM:SS:FF, of the "
-                    "first frame"))
+            "Anything else, KEY=VALUE; may be given several times. Players know timecode=HH:MM:SS:FF, of the "
+            "first frame")
         ->type_name("KEY=VALUE")
         ->expected(1)
         ->take_all()
@@ -306,8 +288,6 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
         if (!radii) return tl::unexpected(radii.error());
         out.radii = std::move(*radii);
     }
-    if (out.radii.empty() && !out.skeleton.bones.empty())
-        note("bone radii are calibrated on the first frame; a T-pose is best (see htvm calibrate)");
     if (options.intra == "draco") out.intra_coder = draco_intra_coder();
     return out;
 }
@@ -334,8 +314,10 @@ std::string options_in_markdown() {
             if (*option.flag_unit) flag += fmt::format(", {}", option.flag_unit);
             Option listed = option;
             listed.flag_factor = 1;  // in the library's unit
-            out += fmt::format("| `{}` | {} | {} | {} | {} |\n", option.name, flag, range_text(option),
-                               default_text(listed), meaning_text(option));
+            const bool drawn = &option == find_option("session");
+            out += fmt::format("| `{}` | {} | {} | {}{} | {} |\n", option.name, flag, range_text(option),
+                               default_text(listed), drawn ? "; `htvm encode`: random where the output is no file" : "",
+                               meaning_text(option));
         }
     }
     out +=

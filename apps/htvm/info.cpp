@@ -115,8 +115,8 @@ nlohmann::json index_json(const StreamIndex& index) {
 }
 
 void print_index(const StreamIndex& index) {
-    fmt::print("index: {} frames, {:.2f} s, {} places to start", index.frames,
-               static_cast<double>(index.duration_us) / 1e6, index.points.size());
+    fmt::print("index: {}, {:.2f} s, {} to start", counted(index.frames, "frame"),
+               static_cast<double>(index.duration_us) / 1e6, counted(index.points.size(), "place"));
     if (const auto& b = index.bounds)
         fmt::print(", within {:.0f} {:.0f} {:.0f} to {:.0f} {:.0f} {:.0f} mm", b->low[0], b->low[1], b->low[2],
                    b->high[0], b->high[1], b->high[2]);
@@ -235,8 +235,8 @@ Result<void> info(const Options& options) {
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);
-        fmt::print("{}{} frames in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), count, seconds, bytes,
-                   megabits, index ? ", with an index for seeking" : "");
+        fmt::print("{}{} in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), counted(count, "frame"),
+                   seconds, bytes, megabits, index ? ", with an index for seeking" : "");
     }
     if (auto whole = check_whole(*input, options.input); !whole) return whole;
     if (buffer) return check_buffer(options, *buffer);

@@ -16,6 +16,7 @@
 #include "commands.h"
 #include "encode.h"
 #include "io/number_text.h"
+#include "io/sequence.h"
 #include "live/file_server.h"
 
 namespace htvm::app {
@@ -54,6 +55,7 @@ struct TemporaryFolder {
 
 Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeOptions options,
                                 TemporaryFolder& folder) {
+    if (const auto files = find_sequence(inputs); !files) return tl::unexpected(files.error());
     if (!folder.make()) return fail(ErrorKind::bad_input, "there is no place for a temporary file (TMPDIR)");
     auto capture = fs::absolute(inputs[0]).lexically_normal();
     if (capture.filename().empty()) capture = capture.parent_path();
@@ -196,13 +198,15 @@ void add_play(CLI::App& app, Run& run) {
                      "distance in metres; in quotes: \"180\", from behind, or \"30 10\"")
         ->type_name("ANGLES")
         ->check(check_orbit);
-    command->add_option("--frames", options->frames, "Of a capture: encode at most this many frames (default: all)");
+    command->add_option("--frames", options->frames,
+                        "Of a capture: encode at most this many frames; 0: all (default: all)");
     command
         ->add_option("-q,--quality", options->quality,
                      fmt::format("Of a capture: quality, 0 to 100 (default {:g})", default_quality))
         ->check(CLI::Range(0.0, 100.0))
         ->excludes(beside);
-    command->add_option("--port", options->port, "Port on this machine's loopback address (default: a free one)");
+    command->add_option("--port", options->port, "Port on this machine's loopback address (default: a free one)")
+        ->check(CLI::Range(0, 65535));
     command->add_flag("--no-open", options->no_open, "Print the address, but do not open a browser");
     command->footer(
         "Prints the address to open and runs until Ctrl-C. Only this machine can reach it.\n"

@@ -45,7 +45,8 @@ void add_serve(CLI::App& app, Run& run) {
         ->required();
     command->add_option("--address", options->address,
                         "Address to listen on (default 127.0.0.1: this machine alone; 0.0.0.0 or ::: all networks)");
-    command->add_option("--port", options->port, "Port to listen on; 0: a free one (default 8080)");
+    command->add_option("--port", options->port, "Port to listen on; 0: a free one (default 8080)")
+        ->check(CLI::Range(0, 65535));
     command->add_flag("--same-site", options->same_site, "Do not allow pages of other sites to read the streams");
     command->add_option("--connections", options->connections, "Connections at once (default 512)")
         ->check(CLI::Range(1, 100000));

@@ -92,18 +92,18 @@ void warn_of_other_meshes(const Options& options, const std::set<std::string>& w
         if (is_mesh_file_name(entry.path()) && !written.contains(entry.path().filename().string())) ++others;
     if (others > 0)
         warn(
-            fmt::format("{} holds {} other mesh files, which will be read along with these frames; remove them if that "
+            fmt::format("{} holds {}, which will be read along with these frames; remove them if that "
                         "is not wanted",
-                        options.folder, others));
+                        options.folder, counted(others, "other mesh file")));
 }
 
 void report(const Options& options, const Written& written) {
     const auto frames = static_cast<double>(options.frames);
-    note(
-        fmt::format("{} frames ({:.0f} vertices each on average), skeleton.json and skeleton_true.json to {}, made at "
-                    "{:.1f} frames/s",
-                    options.frames, static_cast<double>(written.vertices) / frames, options.folder,
-                    frames / std::max(written.seconds, 1e-9)));
+    note(fmt::format(
+        "{} ({:.0f} vertices each on average), skeleton.json and skeleton_true.json to {}, made at "
+        "{:.1f} frames/s",
+        counted(static_cast<std::size_t>(options.frames), "frame"), static_cast<double>(written.vertices) / frames,
+        options.folder, frames / std::max(written.seconds, 1e-9)));
     if (!options.json) return;
     const std::filesystem::path folder(options.folder);
     const nlohmann::json summary = {{"folder", options.folder},

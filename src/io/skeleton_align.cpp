@@ -145,6 +145,7 @@ Place find_place(const std::vector<std::size_t>& samples, const std::vector<doub
 }
 
 struct FillCount {
+    std::size_t of = 0;      // number of frames counted
     std::size_t joints = 0;  // number of joints filled in, over all frames
     std::size_t frames = 0;  // number of frames with some
     std::size_t whole = 0;   // number of frames with all
@@ -184,9 +185,12 @@ void place_lost_joints(const Skeleton& skeleton, std::vector<bool> known, std::v
         if (!known[j]) copy(first, j);
 }
 
-Result<FillCount> fill_joints(const SkeletonTrack& track, const std::vector<double>& times, std::vector<Pose>& poses) {
+Result<FillCount> fill_joints(const SkeletonTrack& track, const std::vector<double>& times, const AlignOptions& options,
+                              std::vector<Pose>& poses) {
     const std::size_t joints = track.skeleton.joint_names.size();
     FillCount count;
+    const std::size_t first = std::min(options.first_used, poses.size());
+    count.of = options.used > 0 ? std::min(options.used, poses.size() - first) : poses.size() - first;
     std::vector<bool> known(joints, false);
     for (Pose& pose : poses) {
         pose.joints.assign(joints, Vector3d{});
@@ -206,7 +210,7 @@ Result<FillCount> fill_joints(const SkeletonTrack& track, const std::vector<doub
     if (count.never.size() == joints)
         return fail(ErrorKind::bad_input, "The skeleton has no frame with a tracked joint; leave it out.");
     if (!count.never.empty()) place_lost_joints(track.skeleton, known, poses);
-    for (std::size_t t = 0; t < poses.size(); ++t) {
+    for (std::size_t t = first; t < first + count.of; ++t) {
         const auto filled =
             static_cast<std::size_t>(std::count(poses[t].tracked.begin(), poses[t].tracked.end(), false));
         const bool outside =
@@ -219,13 +223,13 @@ Result<FillCount> fill_joints(const SkeletonTrack& track, const std::vector<doub
     return count;
 }
 
-void say_filled(const FillCount& count, std::size_t frames, std::vector<std::string>& notes) {
+void say_filled(const FillCount& count, std::vector<std::string>& notes) {
     if (count.beyond > 0)
         notes.push_back("The skeleton does not cover " + counted(count.beyond, "mesh frame") + " of " +
-                        std::to_string(frames) + " at the ends: its nearest pose is held there.");
+                        std::to_string(count.of) + " at the ends: its nearest pose is held there.");
     if (count.whole > count.beyond)
         notes.push_back("The skeleton is missing in " + counted(count.whole - count.beyond, "mesh frame") + " of " +
-                        std::to_string(frames) + ": interpolated.");
+                        std::to_string(count.of) + ": interpolated.");
     if (count.frames > count.whole)
         notes.push_back("Single joints are missing in " + counted(count.frames - count.whole, "mesh frame") +
                         ": filled in from the nearest frames that have them (" + counted(count.joints, "joint") +
@@ -294,20 +298,16 @@ Result<AlignedPoses> align(const SkeletonTrack& track, const MeshClock& mesh, co
 
     const std::vector<double> times = mesh_times(track, mesh, options.offset, aligned.notes);
     aligned.poses.resize(mesh.frames);
-    const auto filled = fill_joints(track, times, aligned.poses);
+    const auto filled = fill_joints(track, times, options, aligned.poses);
     if (!filled) return tl::unexpected(filled.error());
-    say_filled(*filled, mesh.frames, aligned.notes);
+    say_filled(*filled, aligned.notes);
     if (times.back() < track.timestamps.back() - 1 / track.fps)
         aligned.notes.push_back("The skeleton goes on for " + number(track.timestamps.back() - times.back()) +
                                 " s after the last mesh frame: not used.");
 
-    const std::size_t bones = track.skeleton.bones.size();
     const std::size_t given = take_orientations(track, times, aligned.poses);
-    if (given < bones && options.derive_orientations) {
+    if (given < track.skeleton.bones.size() && options.derive_orientations)
         derive_missing_orientations(track.skeleton, aligned.poses);
-        aligned.notes.push_back("The skeleton gives no orientation for " + counted(bones - given, "bone") + " of " +
-                                std::to_string(bones) + ": derived from the joints' positions.");
-    }
     return aligned;
 }
 

@@ -20,6 +20,8 @@ struct MeshClock {
 
 struct AlignOptions {
     double offset = 0;                // seconds to add to the skeleton's timestamps if its clock is known to be off
+    std::size_t first_used = 0;       // the notes count the mesh frames from this one on,
+    std::size_t used = 0;             // and so many of them; 0: all
     bool derive_orientations = true;  // false: bones whose orientation is in no frame are left unknown_orientation
 };
 

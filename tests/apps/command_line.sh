@@ -105,7 +105,18 @@ expect 2 "did you mean 'encode'?" "$htvm" enocde capture
 expect 2 "did you mean --quality?" "$htvm" encode capture --qualty 50 -o x.htvm
 expect 2 "it is 'htvm-lab rd'" "$htvm" rd capture -o x
 expect 2 "it is 'htvm-lab reproduce'" "$htvm" reproduce --help
-expect 2 "quality" "$htvm" encode capture -q 200 -o x.htvm
+expect 2 "--quality: 200 is not in 0 to 100" "$htvm" encode capture -q 200 -o x.htvm
+expect 2 "--quality: abc is not a number" "$htvm" encode capture -q abc -o x.htvm
+expect 2 "--frames: 1.5 is not a whole number" "$htvm" encode capture --frames 1.5 -o x.htvm
+expect 2 "--port: 99999 is not a whole number from 0 to 65535" "$htvm" serve --files . --port 99999
+expect 2 "there is no option --vresion; did you mean --version?" "$htvm" --vresion
+expect 2 "did you mean --version?" "$htvm" version
+expect 1 "there is no mesh in standard input" "$htvm" encode - -o x.htvm
+# Help fits the terminal, but for the examples and tables.
+for command in encode decode compare serve; do
+    COLUMNS=80 "$htvm" $command --help | grep -vE '^ {1,30}[^ ]' | awk 'length > 80 { bad = 1; print } END { exit bad }' ||
+        fail "the help of $command is wider than 80 columns"
+done
 expect 1 "nowhere" "$htvm" encode nowhere -o x.htvm
 expect 1 "nowhere.htvm" "$htvm" decode nowhere.htvm -o x
 expect 3 "not an htvm stream" "$htvm" decode capture/skeleton.json -o x

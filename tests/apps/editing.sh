@@ -127,7 +127,9 @@ expect 0 "5 frames to part" "$htvm" decode cut.htvm -o part
 for n in 0 1 2 3 4; do cmp -s part/0000$n.ply whole/0000$((n + 4)).ply || fail "cut.htvm: frame $n"; done
 expect 0 "all sound" "$htvm" verify cut.htvm
 expect 0 "4 frames, numbers 4 to 7" "$htvm" cut live.htvm --from 0.13 --to 0.26 -o cut.htvm
-expect 1 "no such frames" "$htvm" cut walk.htvm --first 12 -o none.htvm
+expect 1 "no such frames: it has 12 frames and lasts 0.40 s" "$htvm" cut walk.htvm --first 12 -o none.htvm
+expect 1 "no such frames: it has 12 frames and lasts 0.40 s" "$htvm" cut walk.htvm --from 10 --to 15 -o none.htvm
+expect 2 "0.1 s is not after --from, 0.3 s" "$htvm" cut walk.htvm --from 0.3 --to 0.1 -o none.htvm
 [ -e none.htvm ] && fail "a cut of nothing leaves a file"
 expect 2 "excludes" "$htvm" cut walk.htvm --first 1 --to 5 -o none.htvm
 expect 0 "12 frames" "$htvm" cut enhanced.htvm -o cut.htvm

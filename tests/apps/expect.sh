@@ -1,5 +1,6 @@
 # What the tests of the command line share; sourced with the program's path: a folder to work in, expect and fail.
 set -u
+export COLUMNS=1000  # what help says stays on one line
 htvm=$1
 project=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)

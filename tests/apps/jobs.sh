@@ -74,6 +74,8 @@ cmp -s plain.htvm kept.htvm && [ ! -e kept.htvm.partial ] || fail "interrupted j
 # More jobs than groups: those without work say so, and leave no part.
 expect 0 "job 1 of 8 has nothing to do, and writes nothing: 34 frames make 4 groups of 10" \
     "$htvm" encode capture --keyint 10 --job 1/8 -o none.htvm
+expect 0 "34 frames make 3 groups of 12 (whole multiples of --keyint, of at least 10)" \
+    "$htvm" encode capture --keyint 4 --job 1/8 -o none.htvm
 [ -e none.htvm ] && fail "a job without work leaves a file"
 expect 1 "but kept.htvm is there: remove it" "$htvm" encode capture --keyint 10 --job 1/8 -o kept.htvm
 expect 0 "34 frames make 4 groups of 10: as many jobs are enough" "$htvm" encode capture --keyint 10 --jobs 9 -o x.htvm

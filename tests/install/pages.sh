@@ -34,7 +34,7 @@ command -v groff >/dev/null || echo "groff is not installed: the pages are not f
 # has_options PROGRAM COMMAND: every option of the help is on the page.
 has_options() {
     local option
-    for option in $("$1" "$2" --help | grep -oE '^ +(-[a-zA-Z],)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
+    for option in $(COLUMNS=1000 "$1" "$2" --help | grep -oE '^ +(-[a-zA-Z],)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
         grep -qF -- "\\fB${option//-/\\-}\\fR" "man1/$3-$2.1" || fail "the page of $3 $2 lacks $option"
         checks=$((checks + 1))
     done
