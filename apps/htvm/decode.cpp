@@ -94,8 +94,7 @@ public:
         if (auto ok = scale_positions(mesh, 1 / millimetres_per_unit); !ok) return tl::unexpected(ok.error());
         const auto bytes = write_ply(mesh, time_text(info.timestamp_us));
         if (!bytes) return tl::unexpected(bytes.error());
-        if (std::fwrite(bytes->data(), 1, bytes->size(), stdout) != bytes->size() || std::fflush(stdout) != 0)
-            return tl::unexpected(write_error("standard output", errno));
+        if (auto ok = write_standard_output(*bytes); !ok) return tl::unexpected(ok.error());
         return std::string("-");
     }
     // A .glb of all frames is complete.

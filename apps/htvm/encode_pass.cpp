@@ -61,8 +61,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         if (pass.rate.controlled()) summary.list.back()["quality"] = pass.encoder.last_cost().quality;
     }
     if (auto written = drain(pass); !written) return tl::unexpected(written.error());
-    if (const auto bounds = pass.encoder.bounds())
-        summary.bounds = summary.bounds ? united(*summary.bounds, *bounds) : *bounds;
+    extend(summary.bounds, pass.encoder.bounds());
     pass.step(progress_text(pass, info));
     return Coded::yes;
 }
@@ -158,7 +157,7 @@ void add(Summary& summary, Summary behind) {
     summary.repeated += behind.repeated;
     summary.missing += behind.missing;
     summary.filled += behind.filled;
-    if (behind.bounds) summary.bounds = summary.bounds ? united(*summary.bounds, *behind.bounds) : *behind.bounds;
+    extend(summary.bounds, behind.bounds);
 }
 
 void FrameWarnings::tell(Kind kind, const std::string& line) {

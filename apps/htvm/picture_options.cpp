@@ -57,8 +57,18 @@ void add_shading_options(CLI::App& command, ShadingOptions& options, const std::
     command.add_flag("--grey", options.grey, "Draw without the colours");
 }
 
+void add_picture_input(CLI::App& command, PictureOptions& options) {
+    command
+        .add_option("input", options.inputs,
+                    "An .htvm stream; or a mesh file, several in their order, a folder, glob or %05d pattern")
+        ->type_name("FILE")
+        ->expected(1, -1)
+        ->required();
+}
+
 void add_picture_options(CLI::App& command, PictureOptions& options) {
     options.views.views = 1;
+    options.views.elevation = 5;
     options.views.up = UpAxis::unknown;
     add_camera_options(command, options.views,
                        " (default: as the stream says; else y or z, along which the first mesh is longer)");

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
@@ -30,6 +31,7 @@ void add_shading_options(CLI::App& command, ShadingOptions& options, const std::
 // ---- Pictures for people --------------------------------------------------------------------------------------------
 
 struct PictureOptions {
+    std::vector<std::string> inputs;  // as open_meshes() takes them
     ViewOptions views;
     ShadingOptions shading;
     std::optional<Colour> background = Colour{255, 255, 255};  // none: transparent
@@ -37,6 +39,8 @@ struct PictureOptions {
     DecoderOptions limits;
     unsigned threads = 0;
 };
+// The positional argument: what is drawn.
+void add_picture_input(CLI::App& command, PictureOptions& options);
 // All of the above, --field-of-view, --background, --samples, --threads and the decoder's limits.
 void add_picture_options(CLI::App& command, PictureOptions& options);
 

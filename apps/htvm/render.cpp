@@ -23,7 +23,6 @@ namespace htvm::app {
 namespace {
 
 struct Options {
-    std::vector<std::string> inputs;
     VideoOptions video;
     PictureOptions picture;
     double turns = 1, seconds = 0;  // seconds: 0: as long as the frames last
@@ -34,7 +33,7 @@ struct Options {
 constexpr double seconds_of_one_mesh = 6;
 
 Result<MeshSource> open_source(const Options& options) {
-    auto source = open_meshes(options.inputs, {"auto", "", options.picture.limits});
+    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits});
     if (!source) return source;
     if (options.frames > 0) source->frames = std::min(source->frames, options.frames);
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
@@ -129,8 +128,7 @@ struct Orbit {
 };
 
 // How much larger the pictures may be drawn: the corners of the box, which the camera has in view, are mostly empty.
-Result<double> largest_zoom(const Options& options, const std::vector<std::size_t>& shown, const Orbit& orbit) {
-    Frames frames(options);
+Result<double> largest_zoom(Frames& frames, const std::vector<std::size_t>& shown, const Orbit& orbit) {
     std::optional<double> out;
     Progress progress("measuring", shown.size());
     for (std::size_t k = 0; k < shown.size(); ++k) {
@@ -147,11 +145,11 @@ Result<double> largest_zoom(const Options& options, const std::vector<std::size_
     return out.value_or(1);
 }
 
-Result<void> render_all(const Options& options, const std::vector<std::size_t>& shown, const Orbit& orbit) {
+Result<void> render_all(const Options& options, Frames& frames, const std::vector<std::size_t>& shown,
+                        const Orbit& orbit) {
     auto video = VideoOutput::open(options.video);
     if (!video) return tl::unexpected(video.error());
     const internal::ThreadPool pool(options.picture.threads);
-    Frames frames(options);
     Canvas canvas;
     Progress progress("rendering", shown.size());
     for (std::size_t k = 0; k < shown.size(); ++k) {
@@ -184,14 +182,14 @@ Result<void> render(Options options) {
     const auto shown = frames_shown(begins, seconds, video.rate);
     const auto box = box_of(options, *source);
     if (!box) return tl::unexpected(box.error());
-    Frames from_first(options);
-    const auto first = from_first.at(0);
+    Frames frames(options);
+    const auto first = frames.at(0);
     if (!first) return tl::unexpected(first.error());
     Orbit orbit{*box, upright_views(options.picture, *source, **first), options.still_camera ? 0 : options.turns, 1};
-    const auto zoom = largest_zoom(options, shown, orbit);
+    const auto zoom = largest_zoom(frames, shown, orbit);
     if (!zoom) return tl::unexpected(zoom.error());
     orbit.zoom = *zoom;
-    if (auto ok = render_all(options, shown, orbit); !ok) return ok;
+    if (auto ok = render_all(options, frames, shown, orbit); !ok) return ok;
     if (options.json)
         fmt::print("{}\n", nlohmann::json{{"file", video.path},
                                           {"pictures", shown.size()},
@@ -212,12 +210,7 @@ void add_render(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto& o = *options;
     auto* command = app.add_subcommand("render", "Make a video of a stream or a capture, with the camera going round");
-    command
-        ->add_option("input", o.inputs,
-                     "An .htvm stream; or a mesh file, several in their order, a folder, glob or %05d pattern")
-        ->type_name("FILE")
-        ->expected(1, -1)
-        ->required();
+    add_picture_input(*command, o.picture);
     command
         ->add_option("-o,--output", o.video.path,
                      "A video (.mp4, .mov, .mkv, .webm, .gif), which ffmpeg makes; or a folder or a pattern such as\n"
@@ -246,7 +239,6 @@ void add_render(CLI::App& app, Run& run) {
         ->type_name("RATE");
     o.picture.views.width = 1080;
     o.picture.views.height = 1080;
-    o.picture.views.elevation = 5;
     add_picture_options(*command, o.picture);
     command->add_option("--ffmpeg", o.video.ffmpeg, "The ffmpeg program (default: ffmpeg, found as the shell does)")
         ->type_name("FILE");

@@ -40,7 +40,7 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
         if (const auto index = read_index(*packet); packet->kind == PacketKind::front_index && index) {
             indexed += index->frames;
             bounded = bounded && index->bounds;
-            if (bounded) source.bounds = source.bounds ? united(*source.bounds, *index->bounds) : index->bounds;
+            if (bounded) extend(source.bounds, index->bounds);
         }
         if (!frame_type(packet->kind)) continue;
         ascends = ascends && (source.times_us.empty() || source.times_us.back() < packet->timestamp_us);

@@ -3,8 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -22,7 +20,6 @@ namespace htvm::app {
 namespace {
 
 struct Options {
-    std::vector<std::string> inputs;
     std::string output;
     std::optional<std::uint64_t> frame;
     std::optional<double> seconds;
@@ -57,16 +54,10 @@ Result<std::size_t> position_of(const Options& options, const MeshSource& source
     return static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - times.begin(), 1) - 1);
 }
 
-Result<void> write_bytes(const std::string& output, const std::vector<std::uint8_t>& bytes) {
-    if (output != "-") return write_file(output, bytes);
-    if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) == bytes.size() && std::fflush(stdout) == 0) return {};
-    return tl::unexpected(write_error("standard output", errno));
-}
-
 Result<void> still(const Options& options) {
     if (options.output != "-" && !options.output.ends_with(".png"))
         return fail(ErrorKind::unsupported, "pictures are written as .png, not as " + options.output);
-    auto source = open_meshes(options.inputs, {"auto", "", options.picture.limits});
+    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits});
     if (!source) return tl::unexpected(source.error());
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
     const auto position = position_of(options, *source);
@@ -83,7 +74,8 @@ Result<void> still(const Options& options) {
                                        samples_of(options.picture), canvas, pool.threads());
     const auto png = png_of(picture, options.picture.background);
     if (!png) return tl::unexpected(png.error());
-    if (auto ok = write_bytes(options.output, *png); !ok) return ok;
+    const auto written = options.output == "-" ? write_standard_output(*png) : write_file(options.output, *png);
+    if (!written) return written;
     const auto number = source->numbers.empty() ? *position : source->numbers[*position];
     if (mesh->triangles.empty()) warn(fmt::format("frame {} has no triangles: the picture is empty", number));
     if (options.json)
@@ -106,12 +98,7 @@ void add_still(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto& o = *options;
     auto* command = app.add_subcommand("still", "Draw one frame of a stream or a capture as a picture");
-    command
-        ->add_option("input", o.inputs,
-                     "An .htvm stream; or a mesh file, several in their order, a folder, glob or %05d pattern")
-        ->type_name("FILE")
-        ->expected(1, -1)
-        ->required();
+    add_picture_input(*command, o.picture);
     command->add_option("-o,--output", o.output, "The picture, a .png file, or - for standard output")
         ->type_name("FILE")
         ->required();
@@ -123,7 +110,6 @@ void add_still(CLI::App& app, Run& run) {
         ->excludes(frame);
     o.picture.views.width = 1600;
     o.picture.views.height = 1200;
-    o.picture.views.elevation = 5;
     add_picture_options(*command, o.picture);
     command->add_flag("--json", o.json, "Print what was drawn as JSON on standard output");
     command->footer(

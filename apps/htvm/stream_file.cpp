@@ -107,11 +107,7 @@ Result<void> StreamOutput::write_one(const Packet& packet) {
         indexer_.add(packet, bytes_);
     }
     const auto bytes = write_packet(packet);
-    if (file_) {
-        if (auto written = file_->write(bytes); !written) return written;
-    } else if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() || std::fflush(stdout) != 0) {
-        return tl::unexpected(write_error("standard output", errno));
-    }
+    if (auto written = file_ ? file_->write(bytes) : write_standard_output(bytes); !written) return written;
     bytes_ += bytes.size();
     return {};
 }

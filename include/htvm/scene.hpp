@@ -26,7 +26,8 @@ struct SpaceBounds {
     std::array<float, 3> low, high;
     bool operator==(const SpaceBounds&) const = default;
 };
-SpaceBounds united(const SpaceBounds& a, const SpaceBounds& b);
+// Makes `all` hold `more` too, where there is any.
+void extend(std::optional<SpaceBounds>& all, const std::optional<SpaceBounds>& more);
 // Nothing if there are no positions.
 std::optional<SpaceBounds> bounds_of(std::span<const Vector3f> positions);
 

@@ -24,9 +24,7 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
     if (ascends) index_.points.push_back({number, packet.timestamp_us, offset, 0, told_header(packet).flags});
 }
 
-void StreamIndexer::add(const SpaceBounds& bounds) {
-    index_.bounds = index_.bounds ? united(*index_.bounds, bounds) : bounds;
-}
+void StreamIndexer::add(const SpaceBounds& bounds) { extend(index_.bounds, bounds); }
 
 StreamIndex StreamIndexer::finish(std::uint64_t bytes) {
     index_.duration_us = time_.total_us();

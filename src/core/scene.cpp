@@ -4,13 +4,13 @@
 
 namespace htvm {
 
-SpaceBounds united(const SpaceBounds& a, const SpaceBounds& b) {
-    SpaceBounds out = a;
+void extend(std::optional<SpaceBounds>& all, const std::optional<SpaceBounds>& more) {
+    if (!all) all = more;
+    if (!more) return;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-        out.low[axis] = std::min(a.low[axis], b.low[axis]);
-        out.high[axis] = std::max(a.high[axis], b.high[axis]);
+        all->low[axis] = std::min(all->low[axis], more->low[axis]);
+        all->high[axis] = std::max(all->high[axis], more->high[axis]);
     }
-    return out;
 }
 
 std::optional<SpaceBounds> bounds_of(std::span<const Vector3f> positions) {

@@ -37,6 +37,11 @@ Error write_error(std::string_view name, int reason) {
             std::string(name) + " cannot be written: " + std::strerror(reason)};
 }
 
+Result<void> write_standard_output(std::span<const std::uint8_t> bytes) {
+    if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) == bytes.size() && std::fflush(stdout) == 0) return {};
+    return tl::unexpected(write_error("standard output", errno));
+}
+
 Result<OutputFile> OutputFile::create(const fs::path& path) {
     OutputFile out;
     std::error_code ignored;

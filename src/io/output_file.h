@@ -46,6 +46,9 @@ private:
 Result<void> write_file(const std::filesystem::path& path, std::span<const std::uint8_t> bytes);
 Result<void> write_file(const std::filesystem::path& path, std::string_view text);
 
+// To standard output, at once.
+Result<void> write_standard_output(std::span<const std::uint8_t> bytes);
+
 // "NAME cannot be written: REASON", of kind disk_full where that is the reason; reason: an errno.
 Error write_error(std::string_view name, int reason);
 

@@ -10,6 +10,8 @@ namespace {
 
 bool is_index(PacketKind kind) { return kind == PacketKind::index || kind == PacketKind::front_index; }
 
+bool is_frame(PacketKind kind) { return frame_type(kind).has_value(); }
+
 using Places = std::vector<std::uint64_t>;
 
 Places ascending(Places places) {
@@ -34,7 +36,7 @@ Places united(const Places& a, const Places& b) {
 void Broadcast::push(SharedPacket packet, Clock::time_point now) {
     if (is_index(packet->header.kind)) return;
     const auto place = dependencies_.push(packet->header);
-    const bool frame = frame_type(packet->header.kind).has_value();
+    const bool frame = is_frame(packet->header.kind);
     packets_[place] = std::move(packet);
     kept_ = ascending(dependencies_.kept());
     const auto closure = ascending(dependencies_.closure());
@@ -95,7 +97,7 @@ void Broadcast::give(Queue& queue, std::uint64_t place, Clock::time_point now) {
 void Broadcast::give_in_step(Queue& queue, std::uint64_t place, Clock::time_point now) {
     const auto& packet = *packets_.at(place);
     if (fits(queue, packet, now)) return give(queue, place, now);
-    const bool frame = frame_type(packet.header.kind).has_value();
+    const bool frame = is_frame(packet.header.kind);
     // Nothing depends on it, as on sound.
     if (packet.header.has(packet_flag::droppable)) {
         queue.counters.dropped_frames += frame ? 1 : 0;
@@ -110,7 +112,7 @@ void Broadcast::fall_behind(Queue& queue, std::uint64_t place) {
     Places dropped;
     for (const auto& waiting : queue.waiting) {
         dropped.push_back(waiting.place);
-        if (frame_type(waiting.packet->header.kind)) ++queue.counters.dropped_frames;
+        if (is_frame(waiting.packet->header.kind)) ++queue.counters.dropped_frames;
     }
     dropped.push_back(place);
     std::sort(dropped.begin(), dropped.end());
@@ -130,7 +132,7 @@ void Broadcast::try_to_follow(Queue& queue, Clock::time_point now) {
         there = there && packets_.contains(place);
         if (!there) break;
         const auto& packet = *packets_.at(place);
-        frames += frame_type(packet.header.kind) ? 1 : 0;
+        frames += is_frame(packet.header.kind) ? 1 : 0;
         bytes += packet.bytes.size();
     }
     const std::size_t missed = frames > 0 ? frames - 1 : 0;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/bytes.h"
 #include "core/crc32.h"
 
 namespace htvm::live {
@@ -13,10 +14,8 @@ std::optional<PacketHeader> header_of(std::span<const std::uint8_t> message, std
     const auto header = read_packet_header(message, payload_bytes);
     if (!header || payload_bytes > most_bytes || message.size() != packet_overhead + payload_bytes) return std::nullopt;
     const auto payload = message.subspan(packet_header_bytes, payload_bytes);
-    const auto end = message.last(4);
-    std::uint32_t told = 0;
-    for (std::size_t i = 0; i < 4; ++i) told |= std::uint32_t{end[i]} << (8 * i);
-    if (told != internal::crc32(payload)) return std::nullopt;
+    internal::ByteReader checksum(message.last(sizeof(std::uint32_t)));
+    if (checksum.u32() != internal::crc32(payload)) return std::nullopt;
     return header;
 }
 
@@ -48,11 +47,9 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
         if (!same && now - stream.heard < limits_.silence)
             return fail(ErrorKind::bad_input,
                         "'" + connection.stream + "' is being published by another session; end that one, or wait");
-        const auto before = connections_.find(*stream.connection);
-        if (before != connections_.end()) connections_.erase(before);
-        if (stream.taken_over)
-            stream.taken_over(same ? "this session was continued by another connection"
-                                   : "another session took the stream over");
+        const auto before = connections_.extract(*stream.connection);
+        before.mapped().taken_over(same ? "this session was continued by another connection"
+                                        : "another session took the stream over");
     } else if (known->second.session != header.reference && now - known->second.heard < limits_.silence) {
         return fail(ErrorKind::bad_input,
                     "'" + connection.stream + "' was published by another session a moment ago; wait for two seconds");
@@ -60,7 +57,6 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
     auto& stream = streams_.at(connection.stream);
     stream.connection = number;
     stream.session = header.reference;
-    stream.taken_over = connection.taken_over;
     connection.admitted = true;
     return {};
 }
@@ -95,7 +91,6 @@ void Hub::leave(Publisher publisher, Clock::time_point now) {
     if (found->second.admitted) {
         auto& stream = streams_.at(found->second.stream);
         stream.connection.reset();
-        stream.taken_over = {};
         stream.heard = now;
     }
     connections_.erase(found);

@@ -84,11 +84,10 @@ private:
     struct Stream {
         std::uint64_t number = 0;
         Broadcast broadcast;
-        std::optional<std::uint64_t> connection;  // of the publisher, if it is connected and was admitted
+        std::optional<std::uint64_t> connection;  // of the publisher, one of connections_, if it was admitted
         std::uint32_t session = 0;                // checksum of its sequence header
         Clock::time_point heard{};
         PublisherCounters counters;
-        std::function<void(const std::string&)> taken_over;
         std::map<Broadcast::Viewer, std::function<void()>> gone;  // of each viewer
     };
     struct Connection {

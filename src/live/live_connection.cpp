@@ -13,9 +13,8 @@
 #include <boost/beast/http/serializer.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket.hpp>
+#include <functional>
 #include <memory>
-#include <optional>
-#include <type_traits>
 #include <utility>
 
 namespace htvm::live {
@@ -42,17 +41,27 @@ void keep_kernel_buffers_small(beast::tcp_stream& stream) {
     ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
 }
 
-struct Connection {
-    websocket::stream<beast::tcp_stream> socket;
-    net::steady_timer news;  // cancelled when packets wait, or the connection ends
+// What a viewer's coroutine waits for: packets, or the end.
+struct News {
+    net::steady_timer timer;  // cancelled when there are some
     bool ended = false;
     std::string reason{};  // why, for the other side
-    explicit Connection(beast::tcp_stream stream) : socket(std::move(stream)), news(socket.get_executor()) {}
+    explicit News(const net::any_io_executor& executor) : timer(executor) {}
     void end(const std::string& why) {
         if (reason.empty()) reason = why;
         ended = true;
-        news.cancel();
+        timer.cancel();
     }
+    net::awaitable<void> wait() {
+        timer.expires_at(std::chrono::steady_clock::time_point::max());
+        co_await timer.async_wait(awaited);
+    }
+};
+
+struct Connection {
+    websocket::stream<beast::tcp_stream> socket;
+    News news;
+    explicit Connection(beast::tcp_stream stream) : socket(std::move(stream)), news(socket.get_executor()) {}
 };
 using SharedConnection = std::shared_ptr<Connection>;
 
@@ -83,34 +92,22 @@ net::awaitable<void> listen_to_viewer(SharedConnection connection) {
         const auto [error, bytes] = co_await connection->socket.async_read(buffer, awaited);
         if (error) break;
     }
-    connection->end("");
+    connection->news.end("");
 }
 
 // Takes leave of the hub however the coroutine ends: when the server stops, it is destroyed where it waits.
-template <class Member>
-class Membership {
-public:
-    Membership(Hub& hub, Member member) : hub_(hub), member_(std::move(member)) {}
-    Membership(const Membership&) = delete;
-    Membership& operator=(const Membership&) = delete;
-    ~Membership() { leave(); }
-    void leave() {
-        if (!std::exchange(member_of_hub_, false)) return;
-        if constexpr (std::is_same_v<Member, Hub::Publisher>)
-            hub_.leave(member_, Hub::Clock::now());
-        else
-            hub_.leave(member_);
-    }
-
-private:
-    Hub& hub_;
-    Member member_;
-    bool member_of_hub_ = true;
+struct Leave {
+    std::function<void()> leave;
+    explicit Leave(std::function<void()> given) : leave(std::move(given)) {}
+    Leave(const Leave&) = delete;
+    Leave& operator=(const Leave&) = delete;
+    ~Leave() { leave(); }
 };
 
-net::awaitable<void> wait_for_news(net::steady_timer& news) {
-    news.expires_at(std::chrono::steady_clock::time_point::max());
-    co_await news.async_wait(awaited);
+// news: lives as long as the owner that it is shared with.
+Result<Hub::Viewer> watch(Hub& hub, const std::string& name, const std::shared_ptr<News>& news) {
+    return hub.watch(
+        name, [news] { news->timer.cancel(); }, [news] { news->end("the stream has ended"); }, Hub::Clock::now());
 }
 
 }  // namespace
@@ -131,7 +128,7 @@ net::awaitable<void> publish_by_socket(beast::tcp_stream stream, LiveRequest req
         co_await close(connection, websocket::close_code::try_again_later, publisher.error().message);
         co_return;
     }
-    const Membership membership(hub, *publisher);
+    const Leave leave([&hub, &publisher] { hub.leave(*publisher, Hub::Clock::now()); });
     beast::flat_buffer buffer(largest);
     for (;;) {
         buffer.clear();
@@ -151,48 +148,38 @@ net::awaitable<void> watch_by_socket(beast::tcp_stream stream, LiveRequest reque
     const auto connection = std::make_shared<Connection>(std::move(stream));
     auto& socket = connection->socket;
     if (!co_await accepted(*connection, request, control_bytes)) co_return;
-    const auto viewer = hub.watch(
-        name, [connection] { connection->news.cancel(); }, [connection] { connection->end("the stream has ended"); },
-        Hub::Clock::now());
+    auto& news = connection->news;
+    const auto viewer = watch(hub, name, {connection, &news});
     if (!viewer) {
         co_await close(connection, websocket::close_code::policy_error, viewer.error().message);
         co_return;
     }
-    Membership membership(hub, *viewer);
+    const Leave leave([&hub, &viewer] { hub.leave(*viewer); });
     net::co_spawn(socket.get_executor(), listen_to_viewer(connection), net::detached);
     socket.binary(true);
-    while (!connection->ended) {
+    while (!news.ended) {
         const auto packet = hub.next(*viewer);
         if (!packet) {
-            co_await wait_for_news(connection->news);
+            co_await news.wait();
             continue;
         }
         const auto [error, bytes] = co_await socket.async_write(net::buffer(packet->bytes), awaited);
         if (error) break;
     }
-    membership.leave();
-    if (!connection->reason.empty()) co_await close(connection, websocket::close_code::going_away, connection->reason);
+    hub.leave(*viewer);  // nothing waits for it while the connection is closed
+    if (!news.reason.empty()) co_await close(connection, websocket::close_code::going_away, news.reason);
 }
 
 net::awaitable<void> watch_by_body(beast::tcp_stream& stream, http::response<http::empty_body> header, std::string name,
                                    Hub& hub) {
     keep_kernel_buffers_small(stream);
-    struct Waiting {
-        net::steady_timer news;
-        bool ended = false;
-    };
-    const auto waiting = std::make_shared<Waiting>(Waiting{net::steady_timer(stream.get_executor())});
-    const auto viewer = hub.watch(
-        name, [waiting] { waiting->news.cancel(); },
-        [waiting] {
-            waiting->ended = true;
-            waiting->news.cancel();
-        },
-        Hub::Clock::now());
-    std::optional<Membership<Hub::Viewer>> membership;
+    const auto news = std::make_shared<News>(stream.get_executor());
+    const auto viewer = watch(hub, name, news);
+    const Leave leave([&hub, &viewer] {
+        if (viewer) hub.leave(*viewer);
+    });
     header.keep_alive(false);
     if (viewer) {
-        membership.emplace(hub, *viewer);
         header.set(http::field::content_type, "application/octet-stream");
         header.set(http::field::cache_control, "no-store");
         header.chunked(true);
@@ -205,11 +192,11 @@ net::awaitable<void> watch_by_body(beast::tcp_stream& stream, http::response<htt
     stream.expires_after(silence);
     const auto [begun, header_bytes] = co_await http::async_write_header(stream, serializer, awaited);
     if (!viewer) co_return;
-    while (!begun && !waiting->ended) {
+    while (!begun && !news->ended) {
         const auto packet = hub.next(*viewer);
         if (!packet) {
             stream.expires_never();
-            co_await wait_for_news(waiting->news);
+            co_await news->wait();
             continue;
         }
         stream.expires_after(silence);
@@ -217,7 +204,7 @@ net::awaitable<void> watch_by_body(beast::tcp_stream& stream, http::response<htt
             stream, http::make_chunk(net::const_buffer(packet->bytes.data(), packet->bytes.size())), awaited);
         if (error) break;
     }
-    if (waiting->ended) co_await net::async_write(stream, http::make_chunk_last(), awaited);
+    if (news->ended) co_await net::async_write(stream, http::make_chunk_last(), awaited);
 }
 
 }  // namespace htvm::live
