@@ -46,7 +46,7 @@ std::span<const PlayerFile> player_files() {
 }  // namespace htvm::live
 " @ONLY)
 set_source_files_properties(${player_cpp} PROPERTIES OBJECT_DEPENDS "${player_paths}")
-htvm_floor(live SOURCES src/live/broadcast.cpp src/live/hub.cpp src/live/live_connection.cpp src/live/http_request.cpp src/live/served_folder.cpp src/live/file_server.cpp ${player_cpp}
+htvm_floor(live SOURCES src/live/broadcast.cpp src/live/hub.cpp src/live/control.cpp src/live/live_connection.cpp src/live/http_request.cpp src/live/served_folder.cpp src/live/file_server.cpp ${player_cpp}
            LINKS htvm_decoder htvm_core Boost::headers nlohmann_json::nlohmann_json)
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
