@@ -70,6 +70,7 @@ net::awaitable<bool> accepted(Connection& connection, const LiveRequest& request
     beast::get_lowest_layer(socket).expires_never();
     socket.set_option(websocket::stream_base::timeout{handshake, silence, true});
     socket.read_message_max(largest_message);
+    socket.auto_fragment(false);  // a packet is one write, not one for each 4 KB
     const auto offered = request[http::field::sec_websocket_protocol];
     const bool ours = http::token_list(offered).exists(live_protocol);
     socket.set_option(websocket::stream_base::decorator([ours](websocket::response_type& response) {
