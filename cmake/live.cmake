@@ -1,5 +1,6 @@
 # src/live: the web server of `htvm play` and `htvm serve`, and the player's files, which it carries inside.
 find_package(Boost 1.81 REQUIRED)
+find_package(OpenSSL 3.0 REQUIRED)
 
 set(HTVM_PLAYER "" CACHE STRING
     "Folder with the built web player to carry inside the program, or OFF; empty: web/dist, if ./dev web has built it")
@@ -46,9 +47,19 @@ std::span<const PlayerFile> player_files() {
 }  // namespace htvm::live
 " @ONLY)
 set_source_files_properties(${player_cpp} PROPERTIES OBJECT_DEPENDS "${player_paths}")
-htvm_floor(live SOURCES src/live/broadcast.cpp src/live/hub.cpp src/live/control.cpp src/live/live_connection.cpp src/live/http_request.cpp src/live/served_folder.cpp src/live/file_server.cpp ${player_cpp}
-           LINKS htvm_decoder htvm_core Boost::headers nlohmann_json::nlohmann_json)
+htvm_floor(live
+  SOURCES
+    src/live/broadcast.cpp
+    src/live/control.cpp
+    src/live/file_server.cpp
+    src/live/http_request.cpp
+    src/live/hub.cpp
+    src/live/line.cpp
+    src/live/live_connection.cpp
+    src/live/served_folder.cpp
+    ${player_cpp}
+  LINKS htvm_decoder htvm_core Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
-  set_source_files_properties(src/live/file_server.cpp src/live/live_connection.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)
+  set_source_files_properties(src/live/file_server.cpp src/live/line.cpp src/live/live_connection.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)
 endif()

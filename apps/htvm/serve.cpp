@@ -1,4 +1,4 @@
-// htvm serve: a folder of streams for others to watch, with a page that plays them.
+// htvm serve: a hub of live streams, and a folder of streams, for others to watch, with a page that plays them.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -25,9 +25,12 @@ Result<void> serve(const Options& options) {
     server.port = options.port;
     server.other_sites = !options.same_site;
     server.connections = options.connections;
+    live::Hub hub;
+    server.hub = &hub;
     auto opened = live::FileServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
-    if (!live::has_player()) warn("this htvm was built without the web player: it serves files, but has no pages");
+    if (!live::has_player()) warn("this htvm was built without the web player: it serves streams, but has no pages");
+    note("No publishers are known: programs on this machine may publish, under any name, and nobody else.");
     const bool six = options.address.find(':') != std::string::npos;
     fmt::print("http://{}{}{}:{}/\n", six ? "[" : "", options.address, six ? "]" : "", opened->port());
     std::fflush(stdout);
@@ -39,10 +42,12 @@ Result<void> serve(const Options& options) {
 
 void add_serve(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command = app.add_subcommand("serve", "Serve a folder of streams, with a page that plays them");
-    command->add_option("--files", options->folder, "The folder: its .htvm, .png and .jpg files can be read by anyone")
-        ->type_name("FOLDER")
-        ->required();
+    auto* command =
+        app.add_subcommand("serve", "Carry live streams and serve a folder of streams, with a page that plays them");
+    command
+        ->add_option("--files", options->folder,
+                     "A folder: its .htvm, .png and .jpg files can be read by anyone (default: live streams only)")
+        ->type_name("FOLDER");
     command->add_option("--address", options->address,
                         "Address to listen on (default 127.0.0.1: this machine alone; 0.0.0.0 or ::: all networks)");
     command->add_option("--port", options->port, "Port to listen on; 0: a free one (default 8080)")
@@ -51,12 +56,17 @@ void add_serve(CLI::App& app, Run& run) {
     command->add_option("--connections", options->connections, "Connections at once (default 512)")
         ->check(CLI::Range(1, 100000));
     command->footer(
-        "Runs until Ctrl-C. Symbolic links and hidden files are not served. It speaks HTTP without TLS: across other\n"
-        "people's networks put a web server with TLS in front of it. The page shows NAME.png or NAME.jpg as the still "
-        "of\n"
-        "NAME.htvm if it lies beside it (htvm still makes one).\n"
-        "Example:\n"
-        "  htvm serve --files streams/ --address 0.0.0.0");
+        "Runs until Ctrl-C. Live streams are published to ws://ADDRESS:PORT/publish/NAME, by programs on this machine\n"
+        "alone, and watched at http://ADDRESS:PORT/play/NAME by anyone who reaches it. Of the folder, symbolic links "
+        "and\n"
+        "hidden files are not served; the page shows NAME.png or NAME.jpg as the still of NAME.htvm if it lies beside "
+        "it\n"
+        "(htvm still makes one). It speaks HTTP without TLS: across other people's networks put a web server with TLS "
+        "in\n"
+        "front of it.\n"
+        "Examples:\n"
+        "  htvm serve --files streams/ --address 0.0.0.0\n"
+        "  htvm serve");
     command->callback([options, &run] { run = [options] { return serve(*options); }; });
 }
 

@@ -11,7 +11,6 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <boost/beast/zlib/deflate_stream.hpp>
@@ -113,6 +112,13 @@ struct Response {
     std::uint64_t first = 0, count = 0;
 };
 
+// To publish or watch one live stream.
+struct LiveTarget {
+    bool publish = false;
+    bool socket = false;  // whether by a WebSocket
+    std::string name;
+};
+
 }  // namespace
 
 struct FileServer::State {
@@ -121,7 +127,7 @@ struct FileServer::State {
     net::io_context context{1};
     tcp::acceptor acceptor{context};
     std::map<std::string, Text, std::less<>> player;
-    std::map<std::string, unsigned> by_address;
+    std::map<net::ip::address, unsigned> by_address;
     unsigned connections = 0;
 
     explicit State(const FileServerOptions& given) : options(given) {}
@@ -137,10 +143,13 @@ struct FileServer::State {
     bool host_is_loopback(std::string_view host) const;
 
     net::awaitable<void> accept();
-    net::awaitable<void> serve(beast::tcp_stream stream, std::string address);
-    net::awaitable<bool> serve_live(beast::tcp_stream& stream, const Request& request);
+    net::awaitable<void> serve(Line line, net::ip::address address);
+    std::optional<LiveTarget> live_target(const Request& request) const;
+    std::string publishing_refused(const Request& request, const net::ip::address& address) const;
+    net::awaitable<void> serve_live(Line line, Request request, LiveTarget target, net::ip::address address);
+    net::awaitable<void> refuse(Line line, Header header, http::status status, std::string why);
     net::awaitable<void> tidy_hub();
-    net::awaitable<bool> send(beast::tcp_stream& stream, Response& response, bool with_body);
+    net::awaitable<bool> send(Line& line, Response& response, bool with_body);
 };
 
 // segments: below /files/.
@@ -298,15 +307,15 @@ Response FileServer::State::answer(const Request& request) {
 }
 
 // False if the connection is of no use any more.
-net::awaitable<bool> FileServer::State::send(beast::tcp_stream& stream, Response& response, bool with_body) {
+net::awaitable<bool> FileServer::State::send(Line& line, Response& response, bool with_body) {
     auto& header = response.header;
     if (!response.own.empty()) response.content = response.own;
     const bool text = response.file.file.descriptor() < 0;
     const auto count = text ? response.content.size() : response.count;
     if (header.result() != http::status::not_modified) header.set(http::field::content_length, std::to_string(count));
     http::response_serializer<http::empty_body> serializer(header);
-    stream.expires_after(options.stall_time);
-    if (const auto [error, bytes] = co_await http::async_write_header(stream, serializer, awaited); error)
+    line.next_layer().expires_after(options.stall_time);
+    if (const auto [error, bytes] = co_await http::async_write_header(line, serializer, awaited); error)
         co_return false;
     if (!with_body) co_return true;
     std::vector<char> piece(text ? 0 : std::min<std::uint64_t>(piece_bytes, count));
@@ -319,34 +328,62 @@ net::awaitable<bool> FileServer::State::send(beast::tcp_stream& stream, Response
             next = {piece.data(), response.file.file.read(response.first + sent, {piece.data(), wanted})};
         }
         if (next.empty()) co_return false;  // the file has become shorter than was promised
-        stream.expires_after(options.stall_time);
-        const auto [error, bytes] = co_await net::async_write(stream, net::buffer(next), awaited);
+        line.next_layer().expires_after(options.stall_time);
+        const auto [error, bytes] = co_await net::async_write(line, net::buffer(next), awaited);
         if (error) co_return false;
         sent += bytes;
     }
     co_return true;
 }
 
-// Whether the request was for a live stream; the connection is then of no further use.
-net::awaitable<bool> FileServer::State::serve_live(beast::tcp_stream& stream, const Request& request) {
-    const auto path = path_segments(request.target());
-    if (!options.hub || !path || path->size() != 2) co_return false;
-    if (options.loopback_names && !host_is_loopback(request[http::field::host])) co_return false;
+// What the request wants of a live stream, unless it is for something else.
+std::optional<LiveTarget> FileServer::State::live_target(const Request& request) const {
+    auto path = path_segments(request.target());
+    if (!options.hub || !path || path->size() != 2) return std::nullopt;
+    if (options.loopback_names && !host_is_loopback(request[http::field::host])) return std::nullopt;
     const bool socket = beast::websocket::is_upgrade(request);
-    const auto &what = (*path)[0], &name = (*path)[1];
-    if (what == "publish" && socket) {
-        co_await publish_by_socket(std::move(stream), request, name, *options.hub);
-        co_return true;
-    }
-    if (what != "watch" || request.method() != http::verb::get) co_return false;
-    if (socket) {
-        co_await watch_by_socket(std::move(stream), request, name, *options.hub);
+    const bool publish = (*path)[0] == "publish", watch = (*path)[0] == "watch";
+    if (!(publish && socket) && !(watch && request.method() == http::verb::get)) return std::nullopt;
+    return LiveTarget{publish, socket, std::move((*path)[1])};
+}
+
+// Why somebody may not publish; "" if they may. A web page in a browser of this machine is somebody else, and so is who
+// comes through a web server on this machine.
+std::string FileServer::State::publishing_refused(const Request& request, const net::ip::address& address) const {
+    const auto origin = request[http::field::origin];
+    const bool page_elsewhere = !origin.empty() && !host_is_loopback(host_of_origin(origin));
+    const bool forwarded = request.count("Forwarded") || request.count("X-Forwarded-For") || request.count("Via");
+    if (address.is_loopback() && !page_elsewhere && !forwarded) return "";
+    return "this hub knows no publishers: only programs on its own machine may publish";
+}
+
+net::awaitable<void> FileServer::State::serve_live(Line line, Request request, LiveTarget target,
+                                                   net::ip::address address) {
+    auto header = common_header();
+    if (options.other_sites) header.set(http::field::access_control_allow_origin, "*");
+    if (target.publish) {
+        if (const auto why = publishing_refused(request, address); !why.empty())
+            co_await refuse(std::move(line), std::move(header), http::status::forbidden, why);
+        else
+            co_await publish_by_socket(std::move(line), request, target.name, *options.hub);
+    } else if (target.socket) {
+        co_await watch_by_socket(std::move(line), request, target.name, *options.hub);
     } else {
-        auto header = common_header();
-        if (options.other_sites) header.set(http::field::access_control_allow_origin, "*");
-        co_await watch_by_body(stream, std::move(header), name, *options.hub);
+        co_await watch_by_body(line, std::move(header), target.name, *options.hub);
+        co_await line.close();
     }
-    co_return true;
+}
+
+// Answers with a sentence and ends the connection.
+net::awaitable<void> FileServer::State::refuse(Line line, Header header, http::status status, std::string why) {
+    Response response;
+    response.header = std::move(header);
+    response.header.result(status);
+    response.header.keep_alive(false);
+    response.header.set(http::field::content_type, "text/plain; charset=utf-8");
+    response.own = std::move(why) + '\n';
+    co_await send(line, response, true);
+    co_await line.close();
 }
 
 net::awaitable<void> FileServer::State::tidy_hub() {
@@ -358,30 +395,34 @@ net::awaitable<void> FileServer::State::tidy_hub() {
     }
 }
 
-net::awaitable<void> FileServer::State::serve(beast::tcp_stream stream, std::string address) {
+net::awaitable<void> FileServer::State::serve(Line line, net::ip::address address) {
     beast::flat_buffer buffer(header_limit);
-    for (bool alive = true; alive;) {
+    bool open = true;
+    while (open) {
         http::request_parser<http::empty_body> parser;
         parser.header_limit(header_limit);
-        stream.expires_after(options.header_time);
-        const auto [error, bytes] = co_await http::async_read_header(stream, buffer, parser, awaited);
+        line.next_layer().expires_after(options.header_time);
+        const auto [error, bytes] = co_await http::async_read_header(line, buffer, parser, awaited);
         if (error) break;
         // No request here has a body; one that does would be read as the next request.
         const bool body = !parser.is_done();
         const auto& request = parser.get();
-        if (!body && co_await serve_live(stream, request)) break;
+        if (auto live = body ? std::nullopt : live_target(request)) {
+            open = false;
+            co_await serve_live(std::move(line), request, std::move(*live), address);
+            break;
+        }
         Response response;
         if (body)
             response.header.result(http::status::bad_request);
         else
             response = answer(request);
-        alive = request.keep_alive() && !body;
+        const bool alive = request.keep_alive() && !body;
         response.header.keep_alive(alive);
-        const bool sent = co_await send(stream, response, request.method() != http::verb::head);
-        alive = alive && sent;
+        const bool sent = co_await send(line, response, request.method() != http::verb::head);
+        if (!alive || !sent) break;
     }
-    beast::error_code ignored;
-    stream.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    if (open) co_await line.close();
     --connections;
     if (--by_address[address] == 0) by_address.erase(address);
 }
@@ -397,13 +438,13 @@ net::awaitable<void> FileServer::State::accept() {
             continue;
         }
         beast::error_code unknown;
-        const auto address = socket.remote_endpoint(unknown).address().to_string();
+        const auto address = socket.remote_endpoint(unknown).address();
         const auto found = by_address.find(address);
         const unsigned same = found == by_address.end() ? 0 : found->second;
         if (unknown || connections >= options.connections || same >= options.connections_per_address) continue;
         ++connections;
         by_address[address] = same + 1;
-        net::co_spawn(context, serve(beast::tcp_stream(std::move(socket)), address), net::detached);
+        net::co_spawn(context, serve(Line(beast::tcp_stream(std::move(socket))), address), net::detached);
     }
 }
 
@@ -414,7 +455,7 @@ FileServer::~FileServer() = default;
 
 Result<FileServer> FileServer::open(const FileServerOptions& options) {
     auto state = std::make_unique<State>(options);
-    if (options.files.empty()) {
+    if (options.files.empty() && !options.folder.empty()) {
         auto folder = ServedFolder::open(options.folder);
         if (!folder) return tl::unexpected(folder.error());
         state->folder.emplace(std::move(*folder));

@@ -8,7 +8,7 @@
 //   /files/PATH      the streams themselves, by ranges too
 //
 // With a hub, live streams too (WebSockets; /watch/NAME is an endless body where no WebSocket is asked for):
-//   /publish/NAME    packets from a publisher
+//   /publish/NAME    packets from a publisher: a program on this machine
 //   /watch/NAME      packets for viewers
 //   /api/streams     the live streams as JSON
 #pragma once
@@ -33,7 +33,7 @@ struct NamedFile {
 struct FileServerOptions {
     std::string address = "127.0.0.1";  // to listen on
     std::uint16_t port = 0;             // 0: a free one
-    std::string folder;                 // what is below /files/: its .htvm, .png and .jpg files,
+    std::string folder;                 // what is below /files/: its .htvm, .png and .jpg files ("": nothing),
     std::vector<NamedFile> files;       // or, if there are any, these, in this order
     bool other_sites = false;           // whether pages of other sites may read the streams (CORS)
     bool loopback_names = false;        // refuse requests whose Host is not this machine's loopback address

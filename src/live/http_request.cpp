@@ -99,6 +99,12 @@ bool names_tag(std::string_view list, std::string_view tag) {
     return false;
 }
 
+std::string_view host_of_origin(std::string_view origin) {
+    constexpr std::string_view after_scheme = "://";
+    const auto found = origin.find(after_scheme);
+    return found == std::string_view::npos ? "" : origin.substr(found + after_scheme.size());
+}
+
 bool accepts_gzip(std::string_view header) {
     while (!header.empty()) {
         auto item = next_item(header, ',');

@@ -28,6 +28,10 @@ FilePart requested_part(std::string_view range, std::uint64_t size);
 // Whether a list of entity tags, as in If-None-Match, has this one or is "*". Weak tags match too.
 bool names_tag(std::string_view list, std::string_view tag);
 
+// Host and port of the site that an Origin header names: "a.example:8080" of "https://a.example:8080"; "" if it is
+// none, such as "null".
+std::string_view host_of_origin(std::string_view origin);
+
 // Whether an Accept-Encoding header allows gzip.
 bool accepts_gzip(std::string_view header);
 

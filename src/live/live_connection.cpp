@@ -32,9 +32,9 @@ constexpr std::chrono::seconds silence{30}, handshake{10};
 constexpr std::size_t control_bytes = 4096;  // of a message that is no packet
 
 // The kernel must not hide how slow a viewer is: of what it takes, little may lie unsent.
-void keep_kernel_buffers_small(beast::tcp_stream& stream) {
+void keep_kernel_buffers_small(Line& line) {
     constexpr int unsent = 16384, sent = 131072;
-    auto& socket = stream.socket();
+    auto& socket = line.next_layer().socket();
     beast::error_code ignored;
     socket.set_option(net::ip::tcp::no_delay(true), ignored);
     socket.set_option(net::socket_base::send_buffer_size(sent), ignored);
@@ -59,9 +59,9 @@ struct News {
 };
 
 struct Connection {
-    websocket::stream<beast::tcp_stream> socket;
+    websocket::stream<Line> socket;
     News news;
-    explicit Connection(beast::tcp_stream stream) : socket(std::move(stream)), news(socket.get_executor()) {}
+    explicit Connection(Line line) : socket(std::move(line)), news(socket.get_executor()) {}
 };
 using SharedConnection = std::shared_ptr<Connection>;
 
@@ -113,8 +113,8 @@ Result<Hub::Viewer> watch(Hub& hub, const std::string& name, const std::shared_p
 
 }  // namespace
 
-net::awaitable<void> publish_by_socket(beast::tcp_stream stream, LiveRequest request, std::string name, Hub& hub) {
-    const auto connection = std::make_shared<Connection>(std::move(stream));
+net::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::string name, Hub& hub) {
+    const auto connection = std::make_shared<Connection>(std::move(line));
     auto& socket = connection->socket;
     const std::size_t largest = hub.limits().packet_bytes + packet_overhead;
     if (!co_await accepted(*connection, request, largest)) co_return;
@@ -144,9 +144,9 @@ net::awaitable<void> publish_by_socket(beast::tcp_stream stream, LiveRequest req
     }
 }
 
-net::awaitable<void> watch_by_socket(beast::tcp_stream stream, LiveRequest request, std::string name, Hub& hub) {
-    keep_kernel_buffers_small(stream);
-    const auto connection = std::make_shared<Connection>(std::move(stream));
+net::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string name, Hub& hub) {
+    keep_kernel_buffers_small(line);
+    const auto connection = std::make_shared<Connection>(std::move(line));
     auto& socket = connection->socket;
     if (!co_await accepted(*connection, request, control_bytes)) co_return;
     auto& news = connection->news;
@@ -171,10 +171,9 @@ net::awaitable<void> watch_by_socket(beast::tcp_stream stream, LiveRequest reque
     if (!news.reason.empty()) co_await close(connection, websocket::close_code::going_away, news.reason);
 }
 
-net::awaitable<void> watch_by_body(beast::tcp_stream& stream, http::response<http::empty_body> header, std::string name,
-                                   Hub& hub) {
-    keep_kernel_buffers_small(stream);
-    const auto news = std::make_shared<News>(stream.get_executor());
+net::awaitable<void> watch_by_body(Line& line, http::response<http::empty_body> header, std::string name, Hub& hub) {
+    keep_kernel_buffers_small(line);
+    const auto news = std::make_shared<News>(line.get_executor());
     const auto viewer = watch(hub, name, news);
     const Leave leave([&hub, &viewer] {
         if (viewer) hub.leave(*viewer);
@@ -190,22 +189,22 @@ net::awaitable<void> watch_by_body(beast::tcp_stream& stream, http::response<htt
         header.content_length(0);
     }
     http::response_serializer<http::empty_body> serializer(header);
-    stream.expires_after(silence);
-    const auto [begun, header_bytes] = co_await http::async_write_header(stream, serializer, awaited);
+    line.next_layer().expires_after(silence);
+    const auto [begun, header_bytes] = co_await http::async_write_header(line, serializer, awaited);
     if (!viewer) co_return;
     while (!begun && !news->ended) {
         const auto packet = hub.next(*viewer);
         if (!packet) {
-            stream.expires_never();
+            line.next_layer().expires_never();
             co_await news->wait();
             continue;
         }
-        stream.expires_after(silence);
+        line.next_layer().expires_after(silence);
         const auto [error, bytes] = co_await net::async_write(
-            stream, http::make_chunk(net::const_buffer(packet->bytes.data(), packet->bytes.size())), awaited);
+            line, http::make_chunk(net::const_buffer(packet->bytes.data(), packet->bytes.size())), awaited);
         if (error) break;
     }
-    if (news->ended) co_await net::async_write(stream, http::make_chunk_last(), awaited);
+    if (news->ended) co_await net::async_write(line, http::make_chunk_last(), awaited);
 }
 
 }  // namespace htvm::live

@@ -4,13 +4,13 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
 #include <chrono>
 #include <string>
 
 #include "live/hub.h"
+#include "live/line.h"
 
 namespace htvm::live {
 
@@ -19,12 +19,10 @@ inline constexpr const char* live_protocol = "htvm.1";
 using LiveRequest = boost::beast::http::request<boost::beast::http::empty_body>;
 
 // The request asks for a WebSocket; `name` is the stream's.
-boost::asio::awaitable<void> publish_by_socket(boost::beast::tcp_stream stream, LiveRequest request, std::string name,
-                                               Hub& hub);
-boost::asio::awaitable<void> watch_by_socket(boost::beast::tcp_stream stream, LiveRequest request, std::string name,
-                                             Hub& hub);
+boost::asio::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::string name, Hub& hub);
+boost::asio::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string name, Hub& hub);
 // Sends response and body. header: what every response has; the status is 404 or 503 if the stream cannot be watched.
-boost::asio::awaitable<void> watch_by_body(boost::beast::tcp_stream& stream,
+boost::asio::awaitable<void> watch_by_body(Line& line,
                                            boost::beast::http::response<boost::beast::http::empty_body> header,
                                            std::string name, Hub& hub);
 

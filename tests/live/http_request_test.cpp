@@ -99,5 +99,13 @@ TEST(AcceptsGzip, IfItIsNamedAndNotRefused) {
         EXPECT_FALSE(accepts_gzip(header)) << header;
 }
 
+TEST(HttpRequest, TheHostOfAnOriginIsWhatFollowsItsScheme) {
+    EXPECT_EQ(host_of_origin("https://a.example:8080"), "a.example:8080");
+    EXPECT_EQ(host_of_origin("http://[::1]"), "[::1]");
+    EXPECT_EQ(host_of_origin("null"), "");
+    EXPECT_EQ(host_of_origin(""), "");
+    EXPECT_EQ(host_of_origin("://"), "");
+}
+
 }  // namespace
 }  // namespace htvm::live

@@ -186,6 +186,25 @@ TEST_F(LiveConnectionTest, WhatCannotBeIsRefusedWithAReason) {
     wait_for_packets(3);
 }
 
+TEST_F(LiveConnectionTest, WithoutKnownPublishersOnlyProgramsOnThisMachineMayPublish) {
+    const auto status = [this](const std::string& headers) {
+        websocket::stream<tcp::socket> stream(connect());
+        stream.set_option(websocket::stream_base::decorator([&headers](websocket::request_type& request) {
+            const auto colon = headers.find(':');
+            if (!headers.empty()) request.set(headers.substr(0, colon), headers.substr(colon + 2));
+        }));
+        websocket::response_type response;
+        beast::error_code error;
+        stream.handshake(response, "127.0.0.1", "/publish/anna", error);
+        return response.result_int();
+    };
+    EXPECT_EQ(status(""), 101u);
+    EXPECT_EQ(status("Origin: http://127.0.0.1:" + std::to_string(server->port())), 101u);
+    EXPECT_EQ(status("Origin: https://a.example"), 403u);
+    EXPECT_EQ(status("Origin: null"), 403u);
+    EXPECT_EQ(status("X-Forwarded-For: 192.0.2.1"), 403u);
+}
+
 TEST_F(LiveConnectionTest, AViewerWhoDoesNotReadDelaysNobodyAndGoesOnAtTheNewestIntraFrame) {
     auto publisher = open("/publish/anna");
     publisher.send(header(1));

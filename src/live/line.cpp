@@ -1,0 +1,37 @@
+#include "live/line.h"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <chrono>
+
+namespace htvm::live {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+
+constexpr auto awaited = net::as_tuple(net::use_awaitable);
+constexpr std::chrono::seconds leave_time{1};
+
+beast::tcp_stream& Line::next_layer() {
+    if (auto* tls = secure()) return tls->next_layer();
+    return std::get<beast::tcp_stream>(stream_);
+}
+
+net::awaitable<beast::error_code> Line::handshake(net::ssl::stream_base::handshake_type side) {
+    auto* tls = secure();
+    if (!tls) co_return beast::error_code();
+    const auto [error] = co_await tls->async_handshake(side, awaited);
+    co_return error;
+}
+
+net::awaitable<void> Line::close() {
+    if (auto* tls = secure()) {
+        next_layer().expires_after(leave_time);
+        co_await tls->async_shutdown(awaited);
+    }
+    beast::error_code ignored;
+    next_layer().socket().shutdown(net::ip::tcp::socket::shutdown_both, ignored);
+}
+
+}  // namespace htvm::live
