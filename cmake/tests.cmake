@@ -50,6 +50,8 @@ add_test(NAME lab_command_line COMMAND ${PROJECT_SOURCE_DIR}/tests/lab/command_l
                                        $<TARGET_FILE:htvm>)
 add_test(NAME real_captures COMMAND ${PROJECT_SOURCE_DIR}/tests/apps/real_captures.sh $<TARGET_FILE:htvm>)
 set_tests_properties(command_line captures outputs gltf pictures lab_command_line real_captures PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77)
+# COST: the longest tests start first.
+set_tests_properties(real_captures command_line captures PROPERTIES COST 90)
 add_test(NAME c_examples COMMAND ${PROJECT_SOURCE_DIR}/tests/c_api/examples.sh $<TARGET_FILE:example_encode>
                                  $<TARGET_FILE:example_decode> ${PROJECT_SOURCE_DIR}/tests/data/conformance)
 add_test(NAME pages COMMAND ${PROJECT_SOURCE_DIR}/tests/install/pages.sh $<TARGET_FILE:htvm> $<TARGET_FILE:htvm-lab>)
@@ -65,6 +67,5 @@ endif()
 # Compares formats, in Python: sanitizers would only make it slow.
 if(NOT HTVM_SANITIZE)
   add_test(NAME second_decoder COMMAND ${PROJECT_SOURCE_DIR}/tests/second_decoder/check.sh $<TARGET_FILE:htvm>)
-  # COST: the longest test starts first.
   set_tests_properties(second_decoder PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 COST 100)
 endif()
