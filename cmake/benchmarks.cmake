@@ -4,3 +4,6 @@ if(benchmark_sources)
   add_executable(htvm_bench ${benchmark_sources})
   target_link_libraries(htvm_bench PRIVATE htvm_encoder htvm_decoder htvm_draco htvm_synth benchmark::benchmark_main)
 endif()
+# Viewers for ./dev live-load and lossy-line.
+add_executable(live_watch bench/live/watch.cpp)
+target_link_libraries(live_watch PRIVATE htvm_decoder CLI11::CLI11 fmt::fmt)
