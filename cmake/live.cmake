@@ -51,9 +51,11 @@ htvm_floor(live
   SOURCES
     src/live/broadcast.cpp
     src/live/control.cpp
+    src/live/far_stream.cpp
     src/live/file_server.cpp
     src/live/http_request.cpp
     src/live/hub.cpp
+    src/live/hub_message.cpp
     src/live/line.cpp
     src/live/live_connection.cpp
     src/live/served_folder.cpp

@@ -33,9 +33,13 @@ Places united(const Places& a, const Places& b) {
 
 }  // namespace
 
-void Broadcast::push(SharedPacket packet, Clock::time_point now) {
-    if (is_index(packet->header.kind)) return;
+std::optional<std::uint64_t> Broadcast::push(SharedPacket packet, Clock::time_point now) {
+    if (is_index(packet->header.kind) || is_kept(*packet)) return std::nullopt;
+    const auto sequence = dependencies_.sequences();
     const auto place = dependencies_.push(packet->header);
+    next_place_ = place + 1;
+    // What is left of the sequence before must not be sent behind the new header.
+    if (dependencies_.sequences() != sequence) closure_.clear();
     const bool frame = is_frame(packet->header.kind);
     packets_[place] = std::move(packet);
     kept_ = ascending(dependencies_.kept());
@@ -45,7 +49,7 @@ void Broadcast::push(SharedPacket packet, Clock::time_point now) {
     if (kept_bytes() > limits_.kept_bytes) forget_all_but({place});
     if (frame && closure.empty()) {
         ++undecodable_;
-        return;
+        return place;
     }
     for (auto& [viewer, queue] : viewers_) {
         const bool slept = queue.waiting.empty();
@@ -55,6 +59,39 @@ void Broadcast::push(SharedPacket packet, Clock::time_point now) {
             try_to_follow(queue, now);
         if (slept && !queue.waiting.empty()) queue.wake();
     }
+    return place;
+}
+
+bool Broadcast::is_kept(const LivePacket& packet) const {
+    if (packet.header.kind == PacketKind::sequence) return false;
+    const auto same = [&](std::uint64_t place) {
+        const auto found = packets_.find(place);
+        return found != packets_.end() && found->second->header.frame == packet.header.frame &&
+               found->second->bytes == packet.bytes;
+    };
+    return std::any_of(kept_.begin(), kept_.end(), same) || std::any_of(closure_.begin(), closure_.end(), same);
+}
+
+std::optional<std::vector<Broadcast::Placed>> Broadcast::kept() const {
+    std::vector<Placed> out;
+    for (const auto place : united(kept_, closure_)) {
+        const auto found = packets_.find(place);
+        if (found == packets_.end()) return std::nullopt;
+        out.push_back({place, found->second});
+    }
+    // A header that was repeated came behind the I-frame that it is needed for.
+    std::stable_partition(out.begin(), out.end(),
+                          [](const Placed& placed) { return placed.packet->header.kind == PacketKind::sequence; });
+    return out;
+}
+
+void Broadcast::forget() {
+    dependencies_ = Dependencies();
+    packets_.clear();
+    kept_.clear();
+    closure_.clear();
+    next_place_ = 0;
+    for (auto& [viewer, queue] : viewers_) queue = {.wake = queue.wake, .counters = queue.counters};
 }
 
 Broadcast::Viewer Broadcast::join(std::function<void()> wake, Clock::time_point now) {

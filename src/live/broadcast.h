@@ -12,6 +12,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "htvm/dependency.hpp"
@@ -51,8 +52,9 @@ public:
     explicit Broadcast(const BroadcastLimits& limits = {}) : limits_(limits) {}
 
     // The publisher's next packet. Indexes, which speak of a file, go no further, nor do frames that no viewer could
-    // decode, since what they refer to did not come.
-    void push(SharedPacket packet, Clock::time_point now);
+    // decode, since what they refer to did not come; nor does what is kept already, as a publisher sends it again who
+    // comes back. Returns the packet's place, which ascends by one, if it was taken.
+    std::optional<std::uint64_t> push(SharedPacket packet, Clock::time_point now);
 
     // wake: called when packets wait for the viewer again after none did.
     Viewer join(std::function<void()> wake, Clock::time_point now);
@@ -67,6 +69,17 @@ public:
     // Memory held for viewers who may still join.
     std::size_t kept_bytes() const;
 
+    // What a viewer who came now would be sent, in the order in which to decode it. Nothing if it was too large to be
+    // kept.
+    struct Placed {
+        std::uint64_t place;
+        SharedPacket packet;
+    };
+    std::optional<std::vector<Placed>> kept() const;
+    std::uint64_t next_place() const { return next_place_; }
+    // Begins anew, as after a pause in which nothing was pushed. Those who watch wait for the next frame.
+    void forget();
+
 private:
     struct Waiting {
         std::uint64_t place;
@@ -74,8 +87,8 @@ private:
         Clock::time_point arrived;
     };
     struct Queue {
-        std::function<void()> wake;
-        std::deque<Waiting> waiting;
+        std::function<void()> wake{};
+        std::deque<Waiting> waiting{};
         std::size_t bytes = 0;             // of what waits
         bool in_step = false;              // it was given all that later frames may need
         bool joining = true;               // it was not given a frame yet
@@ -87,6 +100,7 @@ private:
     void give_in_step(Queue& queue, std::uint64_t place, Clock::time_point now);
     void fall_behind(Queue& queue, std::uint64_t place);
     void try_to_follow(Queue& queue, Clock::time_point now);
+    bool is_kept(const LivePacket& packet) const;
     void forget_all_but(const std::vector<std::uint64_t>& needed);
 
     BroadcastLimits limits_;
@@ -97,7 +111,7 @@ private:
     std::vector<std::uint64_t> kept_, closure_;
     std::map<Viewer, Queue> viewers_;
     Viewer next_viewer_ = 0;
-    std::uint64_t undecodable_ = 0;
+    std::uint64_t undecodable_ = 0, next_place_ = 0;
 };
 
 }  // namespace htvm::live

@@ -268,5 +268,61 @@ TEST(Broadcast, WhateverIsDroppedWhatIsSentCanBeDecoded) {
     }
 }
 
+std::vector<std::uint64_t> places(const Broadcast& broadcast) {
+    std::vector<std::uint64_t> out;
+    const auto kept = broadcast.kept();
+    EXPECT_TRUE(kept);
+    for (const auto& placed : *kept) out.push_back(placed.place);
+    return out;
+}
+
+TEST(Broadcast, WhatIsKeptIsWhatALateViewerGetsWithThePlaceOfEach) {
+    Broadcast broadcast;
+    for (const auto& next : {header(), intra(0), tracked(1), header(), tracked(2)}) broadcast.push(next, start);
+    EXPECT_EQ(places(broadcast), (std::vector<std::uint64_t>{3, 1, 2, 4}));
+    EXPECT_EQ(broadcast.next_place(), 5u);
+    Broadcast small({.kept_bytes = 1050});
+    for (const auto& next : {header(), intra(0), tracked(1)}) small.push(next, start);
+    EXPECT_FALSE(small.kept());
+}
+
+TEST(Broadcast, WhatAPublisherSendsAgainGoesNoFurther) {
+    Broadcast broadcast;
+    Watching viewer(broadcast);
+    const auto first = intra(0), second = tracked(1);
+    for (const auto& next : {header(), first, second}) broadcast.push(next, start);
+    viewer.take();
+    for (const auto& next : {first, second}) EXPECT_FALSE(broadcast.push(next, start));
+    EXPECT_EQ(broadcast.push(tracked(2), start), 3u);
+    EXPECT_EQ(viewer.take_numbers(), Numbers{2});
+}
+
+TEST(Broadcast, TheSameFrameInTheNextSequenceIsAnother) {
+    Broadcast broadcast;
+    Watching viewer(broadcast);
+    for (const auto& next : {header(1), intra(0), header(2), intra(0)}) broadcast.push(next, start);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 0, -1, 0}));
+}
+
+TEST(Broadcast, BetweenANewHeaderAndItsFirstFrameAViewerWaits) {
+    Broadcast broadcast;
+    for (const auto& next : {header(1), intra(0), header(2)}) broadcast.push(next, start);
+    Watching viewer(broadcast);
+    EXPECT_EQ(viewer.take_numbers(), Numbers{});
+    broadcast.push(intra(0), start);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 0}));
+}
+
+TEST(Broadcast, AfterItForgotItsViewersGoOnWithTheNextClosure) {
+    Broadcast broadcast;
+    Watching viewer(broadcast);
+    for (const auto& next : {header(), intra(0)}) broadcast.push(next, start);
+    viewer.take();
+    broadcast.forget();
+    EXPECT_EQ(broadcast.next_place(), 0u);
+    for (const auto& next : {header(), intra(5), tracked(6)}) broadcast.push(next, start);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 5, 6}));
+}
+
 }  // namespace
 }  // namespace htvm::live
