@@ -1,5 +1,5 @@
-// The page of `htvm play` and `htvm serve`: a stream in the whole window, or the list of streams with a still of each: the
-// poster that lies beside it, or one drawn here.
+// The page of `htvm play` and `htvm serve`: a stream in the whole window (/play/NAME: a live one), or the list of streams, the
+// live ones first, and of files with a still of each: the poster that lies beside it, or one drawn here.
 import '/player/htvm-player.js';
 import { playBeside } from '/player/beside.js';
 
@@ -7,6 +7,7 @@ const content = document.getElementById('content');
 const address = (path) => `/files/${path.split('/').map(encodeURIComponent).join('/')}`;
 const query = new URLSearchParams(location.search);
 const view = query.has('orbit') ? { orbit: query.get('orbit') } : {};
+const updateMs = 3000; // of the list of live streams
 const nameOf = (path) => path.replace(/\.htvm$/, '');
 
 function make(name, attributes = {}, ...children) {
@@ -16,13 +17,22 @@ function make(name, attributes = {}, ...children) {
     return element;
 }
 
-function play(path, alone) {
-    document.title = `${nameOf(path)} – htvm`;
-    const attributes = { class: 'whole', src: address(path), label: `${nameOf(path)}, a three-dimensional capture` };
-    const player = make('htvm-player', { ...attributes, ...view, autoplay: '', loop: '', controls: '' });
+function play(name, attributes, alone) {
+    document.title = `${name} – htvm`;
+    const common = { class: 'whole', label: `${name}, a three-dimensional capture`, autoplay: '', controls: '' };
+    const player = make('htvm-player', { ...common, ...attributes, ...view });
     content.append(player);
     player.focus({ focusVisible: false }); // its keys work at once
     if (!alone) content.append(make('a', { class: 'back', href: '/' }, 'All streams'));
+}
+
+function playFile(path, alone) {
+    play(nameOf(path), { src: address(path), loop: '' }, alone);
+}
+
+// The query of a signed link goes on to the stream.
+function playLive(name, query) {
+    play(name, { src: `/watch/${encodeURIComponent(name)}${query}`, live: '' }, false);
 }
 
 function sizeText(bytes) {
@@ -50,7 +60,25 @@ async function drawStills(items) {
     player.remove();
 }
 
-function list(files) {
+// null where it cannot be had.
+async function fetched(path) {
+    try {
+        const response = await fetch(path);
+        return response.ok ? await response.json() : null;
+    } catch {
+        return null;
+    }
+}
+
+function liveRows(streams) {
+    return streams.map(({ name, published, viewers }) => {
+        const note = published ? `live, ${viewers} watching` : 'publisher gone';
+        const link = make('a', { href: `/play/${encodeURIComponent(name)}`, class: 'live' }, make('span', {}, name), make('small', {}, note));
+        return make('li', {}, link);
+    });
+}
+
+function list(files, streams) {
     const items = files.map(({ path, bytes, poster }) => {
         const src = poster ? address(poster) : 'data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7';
         const image = make('img', { alt: '', src });
@@ -58,21 +86,43 @@ function list(files) {
         const link = make('a', { href: `/?${new URLSearchParams({ file: path, ...view })}` }, image, make('span', {}, nameOf(path)), note);
         return { path, poster, image, note, row: make('li', {}, link) };
     });
-    const rows = items.map(({ row }) => row);
-    content.append(make('div', { class: 'list' }, make('h1', {}, 'Streams'), make('ul', {}, ...rows)));
+    const live = make('ul', { class: 'now', 'aria-label': 'Live streams' });
+    const empty = make('p', { class: 'empty' }, 'Nothing is live here now, and there are no .htvm files.');
+    const rows = make('ul', {}, ...items.map(({ row }) => row));
+    content.append(make('div', { class: 'list' }, make('h1', {}, 'Streams'), live, rows, empty));
+    const showLive = (now) => {
+        // Rows that are the same stay, so that one that has the focus keeps it.
+        const next = liveRows(now);
+        if (live.innerHTML !== make('ul', {}, ...next.map((row) => row.cloneNode(true))).innerHTML) live.replaceChildren(...next);
+        empty.hidden = now.length + files.length > 0;
+    };
+    showLive(streams);
+    const update = async () => {
+        const now = document.visibilityState === 'visible' ? await fetched('/api/streams') : null;
+        if (now) showLive(now);
+        setTimeout(update, updateMs);
+    };
+    setTimeout(update, updateMs);
     const without = items.filter(({ poster }) => !poster);
     if (without.length > 0) void drawStills(without);
 }
 
-const response = await fetch('/api/files');
-const files = response.ok ? await response.json() : [];
+const watched = /^\/play\/([^/]+)$/.exec(location.pathname);
 const asked = query.get('file');
 const beside = query.get('beside');
-if (asked !== null && beside !== null) {
+if (watched) {
+    playLive(decodeURIComponent(watched[1]), location.search);
+} else if (asked !== null && beside !== null) {
     const streams = [asked, beside].map((path) => ({ name: nameOf(path.replace(/^beside\//, '')), address: address(path) }));
     document.title = `${streams.map(({ name }) => name).join(' | ')} – htvm`;
     content.append(playBeside(streams, view));
-} else if (asked !== null) play(asked, false);
-else if (files.length === 1) play(files[0].path, true);
-else if (files.length > 0) list(files);
-else content.append(make('p', { class: 'empty' }, 'There are no .htvm files in this folder.'));
+} else if (asked !== null) {
+    playFile(asked, false);
+} else {
+    const [files, streams] = await Promise.all([fetched('/api/files'), fetched('/api/streams')]);
+    // Where there are no live streams, the page is of files alone.
+    if (streams) list(files ?? [], streams);
+    else if (files?.length === 1) playFile(files[0].path, true);
+    else if (files?.length > 0) list(files, []);
+    else content.append(make('p', { class: 'empty' }, 'There are no .htvm files in this folder.'));
+}

@@ -9,6 +9,7 @@ import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { readAudio } from '../packages/decoder/dist/node.js';
 import { launch } from './browser.mjs';
+import { LiveHub, Publishing } from './live_hub.mjs';
 import { TestServer } from './server.mjs';
 import { conformance, makeCapture, packetsOf } from './streams.mjs';
 
@@ -24,7 +25,7 @@ before(async () => {
     if (!program) return;
     browser = await launch();
     server = await new TestServer({ '': path('pages'), player: path('../packages/player/dist'), audio: path('../../tests/data/audio') }).start();
-    server.pageHeaders = { 'Content-Security-Policy': "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; connect-src 'self'" };
+    server.pageHeaders = { 'Content-Security-Policy': "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; connect-src 'self' ws:" };
     work = await mkdtemp(join(tmpdir(), 'htvm-sound-'));
     await makeCapture(join(work, 'capture'), 90);
     for (const [name, more] of [['sound', ['--audio', clicksFile]], ['silent', []]]) {
@@ -150,6 +151,56 @@ test('sound from a file beside the stream is in step too', options, () =>
     listening({ src: '/as-is/silent.htvm', audio: '/audio/clicks.opus', loop: '' }, async (page) => {
         assert.ok((await inStep(page, 4)).length >= 4);
     }));
+
+test('live sound is within 40 ms of the frames, and after a gap again', options, async () => {
+    const hub = await new LiveHub().start();
+    const publishing = new Publishing(hub, server.made.get('sound.htvm'));
+    try {
+        await listening({ src: hub.address('ws'), live: '' }, async (page) => {
+            await page.waitForFunction(() => player.statistics.live.state === 'live' && player.statistics.framesShown > 30);
+            assert.ok((await inStep(page, 4)).length >= 5);
+            for (const viewer of hub.viewers) viewer.destroy();
+            await page.waitForFunction(() => player.statistics.live.state === 'reconnecting');
+            await page.waitForFunction(() => player.statistics.live.state === 'live');
+            await page.evaluate(() => listen.for(1.5));
+            assert.ok((await inStep(page, 3)).length >= 3);
+            await page.evaluate(() => (player.muted = true));
+            assert.equal(await page.evaluate(async () => {
+                await listen.for(0.2);
+                listen.clicks.length = 0;
+                await listen.for(1);
+                return listen.clicks.length;
+            }), 0);
+        });
+    } finally {
+        publishing.stop();
+        await hub.stop();
+    }
+});
+
+test('where the browser has no WebCodecs, live streams play without sound, and the player says so', options, async () => {
+    const hub = await new LiveHub().start();
+    const publishing = new Publishing(hub, server.made.get('sound.htvm'));
+    const page = await browser.newPage({ viewport: { width: 400, height: 300 } });
+    try {
+        await page.addInitScript(() => delete globalThis.AudioDecoder);
+        await page.goto(`${server.origin}/page.html`);
+        await page.waitForFunction('window.ready');
+        await page.evaluate((src) => {
+            window.player = document.createElement('htvm-player');
+            for (const [name, value] of Object.entries({ src, live: '', autoplay: '', floor: 'none' })) player.setAttribute(name, value);
+            window.notices = [];
+            player.addEventListener('notice', ({ detail }) => notices.push(detail));
+            document.body.append(player);
+        }, hub.address('ws'));
+        await page.waitForFunction(() => notices.length > 0 && player.statistics.framesShown > 10);
+        assert.deepEqual(await page.evaluate(() => notices), ['Live sound is not possible here: this browser has no WebCodecs.']);
+    } finally {
+        await page.close();
+        publishing.stop();
+        await hub.stop();
+    }
+});
 
 test('a page of its own clock plays without sound, and a decoder of frames passes over audio', options, async () => {
     const page = await browser.newPage();

@@ -221,6 +221,15 @@ svg { display: block; width: 20px; height: 20px; fill: currentColor; }
     position: absolute; left: 50%; top: 12px; transform: translateX(-50%); max-width: calc(100% - 40px); padding: 6px 12px;
     border-radius: 8px; background: var(--_bar); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);
 }
+.livestate {
+    position: absolute; right: 10px; top: 10px; max-width: 60%; padding: 3px 10px; border-radius: 8px; background: var(--_bar);
+    box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18); pointer-events: none;
+}
+.livestate::before { content: ''; display: inline-block; width: 8px; height: 8px; margin-right: 7px; border-radius: 50%; background: #94a3b8; }
+.livestate.live::before { background: #dc2626; }
+.livestate.behind::before { background: #d97706; }
+:host([live]) :is(.back, .forward, .scrub, .rate, .loop) { display: none; }
+:host([live]) .time { flex: 1; }
 .unmute {
     position: absolute; left: 50%; bottom: 64px; transform: translateX(-50%); width: auto; height: auto; padding: 8px 16px;
     border-radius: 8px; background: var(--_bar); box-shadow: 0 1px 6px rgba(0, 0, 0, 0.18);

@@ -2,9 +2,10 @@
 import { crc32, type Axis, type SequenceInfo } from '@htvm/decoder';
 import { browserClock, type Clock } from './clock.js';
 import { Controls, make, styles, type ControlActions } from './controls.js';
+import { StampBook, type FrameStamps } from './frame_stamps.js';
 import type { FailureCode, FrameReport } from './messages.js';
 import { Orbit } from './orbit.js';
-import { Playback } from './playback.js';
+import { Playback, type LiveNumbers } from './playback.js';
 import { StageScene } from './scene.js';
 import { Sound } from './sound.js';
 import { Statistics, type StatisticsSummary } from './statistics.js';
@@ -36,6 +37,8 @@ export interface PlayerStatistics extends StatisticsSummary {
     textures: number;
     /** How often triangles were sent to the graphics card: once for each topology. */
     indexUploads: number;
+    /** Null for files. */
+    live: LiveNumbers | null;
 }
 
 /** Where the camera is: turned about a point. Degrees to the right and up, metres. */
@@ -60,11 +63,11 @@ const axes: readonly string[] = ['x', 'y', 'z', '-x', '-y', '-z'];
 /**
  * Events: loadedmetadata, durationchange, play, pause, seeking, seeked, waiting, ended, timeupdate, ratechange, volumechange,
  * viewchange, error (its detail a PlayerErrorDetail), notice (its detail a sentence), framepresented (its detail a
- * FramePresentedDetail). What the element contains is drawn over the picture, below the controls.
+ * FramePresentedDetail), livestate (its detail a LiveStateDetail). What the element contains is drawn over the picture, below the controls.
  */
 export class HtvmPlayerElement extends HTMLElement {
     static readonly observedAttributes = [
-        'src', 'audio', 'muted', 'loop', 'controls', 'poster', 'lit', 'up', 'theme', 'floor', 'statistics', 'label', 'orbit',
+        'src', 'live', 'audio', 'muted', 'loop', 'controls', 'poster', 'lit', 'up', 'theme', 'floor', 'statistics', 'label', 'orbit',
     ];
     /** Where the worker and the decoder lie; beside this file unless told, before the first element has a src. */
     static workerUrl: URL | string = new URL('./htvm-worker.js', import.meta.url);
@@ -74,12 +77,15 @@ export class HtvmPlayerElement extends HTMLElement {
     declare autoplay: boolean;
     declare loop: boolean;
     declare lit: boolean;
+    /** The stream is a live one: src is a hub's /watch/NAME. */
+    declare live: boolean;
 
     #canvas = make('canvas', 'canvas', { tabindex: '0', role: 'img' });
     #poster = make('img', 'poster', { alt: '' });
     #spinner = make('div', 'spinner', { 'aria-hidden': 'true' });
     #notice = make('div', 'notice', { role: 'status' });
     #failure = make('div', 'failure', { role: 'alert' });
+    #livestate = make('div', 'livestate', { role: 'status' });
     #description = make('div', 'description', { id: 'description' });
     #panel = make('pre', 'panel', { 'aria-hidden': 'true' });
     #unmute = make('button', 'unmute', { type: 'button' });
@@ -89,6 +95,9 @@ export class HtvmPlayerElement extends HTMLElement {
     #playback: Playback;
     #sound: Sound;
     #statistics = new Statistics();
+    #stamps = new StampBook();
+    #undrawn: FrameReport | null = null;
+    #liveText = '';
     #clock: Clock = browserClock;
     #request: number | null = null;
     #dirty = false;
@@ -114,11 +123,11 @@ export class HtvmPlayerElement extends HTMLElement {
         sheet.replaceSync(styles);
         root.adoptedStyleSheets = [sheet];
         this.#controls = new Controls(this.#actions);
-        for (const part of [this.#notice, this.#failure, this.#panel, this.#spinner, this.#poster, this.#unmute]) part.hidden = true;
+        for (const part of [this.#notice, this.#failure, this.#panel, this.#spinner, this.#poster, this.#unmute, this.#livestate]) part.hidden = true;
         this.#unmute.textContent = 'Turn the sound on';
         this.#unmute.addEventListener('click', () => this.#sound.allow());
         this.#canvas.setAttribute('aria-describedby', 'description');
-        root.append(this.#canvas, this.#poster, document.createElement('slot'), this.#panel, this.#spinner, this.#notice, this.#failure, this.#unmute, this.#controls.bar, this.#description);
+        root.append(this.#canvas, this.#poster, document.createElement('slot'), this.#panel, this.#spinner, this.#livestate, this.#notice, this.#failure, this.#unmute, this.#controls.bar, this.#description);
         this.#sound = new Sound({
             changed: () => this.#invalidate(),
             notice: (text) => this.#say(text),
@@ -138,7 +147,10 @@ export class HtvmPlayerElement extends HTMLElement {
                     this.#send('durationchange');
                     this.#schedule();
                 },
-                arrived: () => this.#schedule(),
+                arrived: (frame) => {
+                    if (frame) this.#stamps.decoded(frame);
+                    this.#schedule();
+                },
                 sound: (report) => this.#sound.take(report),
                 jumped: () => this.#sound.jumped(),
                 sought: () => this.#send('seeked'),
@@ -152,6 +164,10 @@ export class HtvmPlayerElement extends HTMLElement {
                 notice: (text) => this.#say(text),
                 failed: (code, message) => this.#fail({ code, message }),
                 restarted: () => this.#scene?.mesh.forgetTopology(),
+                live: (report) => {
+                    if (report.type === 'stamp') this.#stamps.message(report);
+                    else this.#invalidate();
+                },
             },
         );
         this.#resized = new ResizeObserver(() => this.#resize());
@@ -261,8 +277,16 @@ export class HtvmPlayerElement extends HTMLElement {
         const { geometries, textures } = this.#scene?.renderer.info.memory ?? { geometries: 0, textures: 0 };
         return {
             ...this.#statistics.summary(), framesShown: this.#shownFrames, wasmBytes, heldBytes, geometries, textures,
-            indexUploads: this.#scene?.mesh.uploads.indices ?? 0,
+            indexUploads: this.#scene?.mesh.uploads.indices ?? 0, live: this.#playback.live,
         };
+    }
+
+    /**
+     * For measuring: when the frames since the last call passed each stage. The hub tells what it knows of it where the address
+     * ends in `?stamps`, and the publisher too.
+     */
+    stamps(): FrameStamps[] {
+        return this.#stamps.take();
     }
 
     play(): void {
@@ -356,6 +380,7 @@ export class HtvmPlayerElement extends HTMLElement {
         if (before === value) return;
         switch (name) {
             case 'src':
+            case 'live':
             case 'audio':
                 if (this.#connected) this.#load();
                 break;
@@ -412,6 +437,8 @@ export class HtvmPlayerElement extends HTMLElement {
         this.#error = null;
         this.#failure.hidden = true;
         this.#notice.hidden = true;
+        this.#livestate.hidden = true;
+        this.#liveText = '';
         this.#sequence = null;
         this.#shownFrames = 0;
         this.#texcoords = null;
@@ -423,7 +450,15 @@ export class HtvmPlayerElement extends HTMLElement {
             return;
         }
         this.#playback.setLoop(this.loop);
-        this.#playback.open(new URL(this.src, document.baseURI).href);
+        const address = new URL(this.src, document.baseURI);
+        const live = this.live || /^wss?:$/.test(address.protocol);
+        this.#playback.open(address.href, live);
+        const playback = this.#playback;
+        this.#sound.live = live
+            ? { presentUs: () => playback.presentUs, speed: () => playback.speed, ready: (ms, presentUs) => playback.soundReady(ms, presentUs) }
+            : null;
+        this.#stamps = new StampBook();
+        this.#undrawn = null;
         const audio = this.getAttribute('audio');
         if (audio) void this.#sound.openFile(new URL(audio, document.baseURI).href);
         if (document.visibilityState === 'hidden') this.#playback.hide();
@@ -494,6 +529,9 @@ export class HtvmPlayerElement extends HTMLElement {
         const resting = this.#wantsPlay && now > this.#restAt;
         this.classList.toggle('resting', resting && this.#shownFrames > 0);
         if (this.#scene && !this.#contextLost && (frame || this.#dirty)) this.#scene.render();
+        if (this.#undrawn) this.#stamps.drawn(this.#undrawn);
+        this.#undrawn = null;
+        this.#sayLive();
         if (!this.#controls.bar.hidden) this.#showControls();
         this.#dirty = false;
         for (const resolve of this.#idleWaiting.splice(0)) resolve();
@@ -523,7 +561,8 @@ export class HtvmPlayerElement extends HTMLElement {
             this.#orbit?.setReach(scene.view.distance);
         }
         this.#statistics.add(frame, now);
-        if (!this.#panel.hidden) this.#panel.textContent = this.#statistics.text(frame, this.#playback.buffered);
+        if (frame.live) this.#undrawn = frame;
+        if (!this.#panel.hidden) this.#panel.textContent = this.#statistics.text(frame, this.#playback.buffered, this.#playback.live);
         const { frame: number, letter, timeUs, vertices, triangles, topology, preview } = frame;
         const digest = (): number => this.#digest(frame);
         const detail: FramePresentedDetail = {
@@ -607,6 +646,16 @@ export class HtvmPlayerElement extends HTMLElement {
         this.#description.textContent =
             'Drag or use the arrow keys to turn the view, shift to move it, plus and minus to come nearer or go away, 0 to ' +
             'go back. Space plays and pauses, comma and full stop go by one frame.';
+    }
+
+    // How the live stream is, where that has changed.
+    #sayLive(): void {
+        const detail = this.#error ? null : this.#playback.liveState;
+        this.#livestate.hidden = detail === null;
+        if (!detail || detail.text === this.#liveText) return;
+        this.#liveText = this.#livestate.textContent = detail.text;
+        this.#livestate.className = `livestate ${detail.state}`;
+        this.dispatchEvent(new CustomEvent('livestate', { detail }));
     }
 
     #say(text: string): void {
@@ -745,7 +794,7 @@ export class HtvmPlayerElement extends HTMLElement {
     }
 }
 
-for (const name of ['autoplay', 'loop', 'lit'])
+for (const name of ['autoplay', 'loop', 'lit', 'live'])
     Object.defineProperty(HtvmPlayerElement.prototype, name, {
         get(this: HTMLElement): boolean {
             return this.hasAttribute(name);

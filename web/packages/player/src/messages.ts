@@ -3,8 +3,9 @@ import type { AudioPacket, SequenceInfo } from '@htvm/decoder';
 
 /** To the worker. `serial` counts seeks: frames of older ones are thrown away. */
 export type Request =
-    /** traps: media times of frames that stopped a decoder before, to be left out. */
-    | { type: 'open'; url: string; wasmUrl: string; serial: number; timeUs: number; loop: boolean; traps: number[] }
+    /** traps: media times of frames that stopped a decoder before, to be left out. live: the stream is a live one. */
+    | { type: 'open'; url: string; wasmUrl: string; serial: number; timeUs: number; loop: boolean; traps: number[]; live: boolean }
+    /** Of a live stream: to what comes now. */
     | { type: 'seek'; serial: number; timeUs: number }
     | { type: 'loop'; on: boolean }
     /** How many frames may be with the player at once. */
@@ -28,7 +29,18 @@ export type Report =
     | { type: 'failed'; code: FailureCode; text: string }
     /** The decoder stopped, and this worker with it. atUs: media time of the packet that caused it. */
     | { type: 'trapped'; text: string; atUs: number }
-    | { type: 'memory'; wasmBytes: number; heldBytes: number };
+    | { type: 'memory'; wasmBytes: number; heldBytes: number }
+    | LiveReport;
+
+/** Of live streams. Times in ms are since 1970, by this machine's clock. */
+export type LiveReport =
+    /** How the connection to the hub is. reason: the hub's words, or ''. */
+    | { type: 'link'; link: 'connecting' | 'open' | 'reconnecting' | 'ended'; reason: string }
+    /** clockUs: the publisher's clock at `atMs`, as present time; null while it is not known. dropped: frames, by the hub. */
+    | { type: 'heartbeat'; atMs: number; published: boolean; clockUs: number | null; viewers: number; dropped: number }
+    | { type: 'gone'; reason: string }
+    /** When a frame was sent and when it came to the hub, in microseconds since 1970 by the clocks there. */
+    | { type: 'stamp'; frame: number; sentUs: number; hubUs: number };
 
 export type FailureCode = 'missing' | 'network' | 'refused' | 'not-htvm' | 'empty' | 'version' | 'decoder' | 'changed';
 
@@ -37,6 +49,16 @@ export interface AudioReport extends AudioPacket {
     type: 'audio';
     serial: number;
     presentUs: number;
+}
+
+/** Of a frame of a live stream; ms since 1970, by this machine's clock. */
+export interface LiveTimes {
+    receivedMs: number;
+    decodedMs: number;
+    /** When it could have been shown, had the player always had room for it. */
+    readyMs: number;
+    /** Frames that were not decoded, because the machine cannot keep up; from the beginning on. */
+    leftOut: number;
 }
 
 /** A decoded frame. All arrays but indices and texcoords lie in `buffer`. */
@@ -48,12 +70,14 @@ export interface FrameReport {
     frame: number;
     /** Media time: 0 is the stream's first frame. */
     timeUs: number;
-    /** The same, but continuing to grow through loops. */
+    /** The same, but continuing to grow through loops, and through the sessions of a live stream. */
     presentUs: number;
     /** Until the next frame, by the frame rate. */
     durationUs: number;
     /** An earlier frame, shown at once while the one that a seek asked for is being decoded. */
     preview: boolean;
+    /** Null for files. */
+    live: LiveTimes | null;
     topology: number;
     vertices: number;
     triangles: number;

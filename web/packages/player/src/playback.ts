@@ -1,15 +1,18 @@
 // Decides which frame is shown when. Frames arrive from the worker ahead of time, and each is shown from its timestamp on.
 //
 // There are two times. Media time is the stream's: 0 is its first frame. Present time continues through loops, and starts
-// again at the media time with each seek; the clock runs in it.
+// again at the media time with each seek; the clock runs in it. Of a live stream, present time is what live_clock.ts says,
+// and there is no other place to go to than now.
 import type { SequenceInfo } from '@htvm/decoder';
-import type { AudioReport, FailureCode, FrameReport, Report, Request } from './messages.js';
+import { LiveClock } from './live_clock.js';
+import { LiveState, type LiveStateDetail } from './live_state.js';
+import type { AudioReport, FailureCode, FrameReport, LiveReport, Report, Request } from './messages.js';
 
 export interface PlaybackListener {
     opened(sequence: SequenceInfo, layerNames: readonly string[]): void;
     extent(durationUs: number | null, seekable: boolean): void;
-    /** Something arrived: a picture may be due. */
-    arrived(): void;
+    /** Something arrived, perhaps a frame: a picture may be due. */
+    arrived(frame?: FrameReport): void;
     /** Sound, to be heard at its present time. */
     sound(report: AudioReport): void;
     /** Playback goes on elsewhere: no sound that came before this is heard any more. */
@@ -22,10 +25,39 @@ export interface PlaybackListener {
     failed(code: FailureCode, text: string): void;
     /** The decoder was started again, so topology numbers start again too. */
     restarted(): void;
+    /** A live stream's hub or connection said something. */
+    live(report: LiveReport): void;
+}
+
+/** Of a live stream. */
+export interface LiveNumbers extends LiveStateDetail {
+    /** How long frames that come without delay wait before they are shown, and the 98th percentile of arrivals' jitter: ms. */
+    bufferMs: number;
+    jitterMs: number;
+    /** 1 but while the clock follows the publisher's. */
+    speed: number;
+    /** Frames that the hub did not send, and of those it sent, how many were not decoded, and decoded but not shown in time. */
+    droppedByHub: number;
+    leftOut: number;
+    notShown: number;
+    /** Of the stream; NaN while that is not known. */
+    viewers: number;
+}
+
+/** What belongs to a live stream alone. */
+interface Live {
+    clock: LiveClock;
+    state: LiveState;
+    /** Nothing is asked of the hub: paused, or hidden. */
+    resting: boolean;
+    leftOut: number;
+    notShown: number;
 }
 
 const mostFrames = 12; // decoded ahead, the one shown included
+const mostFramesLive = 40; // as many as may wait in the jitter buffer
 const mostBytes = 96 << 20; // that they may take, if at least 3 can be had
+const lateFramesUs = 50000; // so much later than its end, a live frame is not shown any more
 const mostTraps = 3;
 
 export class Playback {
@@ -38,6 +70,7 @@ export class Playback {
     #now: () => number;
     #wasmUrl: string;
     #url = '';
+    #live: Live | null = null;
     #worker: Worker | null = null;
     #opening = 0; // counts open() and close(), so that results of earlier ones can be ignored
     #serial = 0;
@@ -97,6 +130,31 @@ export class Playback {
         return this.#playing && !this.stalled && !this.#hidden;
     }
 
+    /** Null for files. */
+    get liveState(): LiveStateDetail | null {
+        return this.#live?.state.describe(this.#current !== null && !this.#awaiting, this.#behindMs()) ?? null;
+    }
+
+    /** Null for files. */
+    get live(): LiveNumbers | null {
+        if (!this.#live) return null;
+        const { clock, state, leftOut, notShown } = this.#live;
+        return {
+            ...this.liveState!, bufferMs: clock.bufferMs, jitterMs: clock.jitterMs,
+            speed: clock.speed, droppedByHub: state.droppedByHub, viewers: state.viewers, leftOut, notShown,
+        };
+    }
+
+    /** Of a live stream: how fast present time goes now. */
+    get speed(): number {
+        return this.#live?.clock.speed ?? 1;
+    }
+
+    /** Of a live stream: a piece of sound could be heard from then on, in the time of `now`. */
+    soundReady(readyMs: number, presentUs: number): void {
+        if (this.#playing && !this.#awaiting) this.#live?.clock.ready('sound', readyMs, presentUs);
+    }
+
     /** How long, at this rate, until a frame is missing: microseconds; Infinity if there is none after the last. */
     get usAhead(): number {
         const last = this.#ring.at(-1) ?? this.#current;
@@ -112,9 +170,10 @@ export class Playback {
         return this.#current.timeUs + Math.min(Math.max(since, 0), this.#current.durationUs);
     }
 
-    open(url: string): void {
+    open(url: string, live = false): void {
         this.close();
         this.#url = url;
+        this.#live = live ? { clock: new LiveClock(), state: new LiveState(), resting: false, leftOut: 0, notShown: 0 } : null;
         this.#traps = [];
         this.#failed = false;
         this.durationUs = null;
@@ -137,6 +196,7 @@ export class Playback {
 
     play(): void {
         if (this.#playing) return;
+        if (this.#live) return this.#playLive(this.#live);
         if (this.#endedSerial === this.#serial && this.#ring.length === 0 && !this.#awaiting) this.seek(0);
         this.#anchor();
         this.#playing = true;
@@ -147,9 +207,12 @@ export class Playback {
         this.#anchor();
         this.#playing = false;
         this.#stalled = false;
+        if (this.#live && this.#current) this.#rest(this.#live);
     }
 
+    /** Not of live streams. */
     setRate(rate: number): void {
+        if (this.#live) return;
         this.#anchor();
         this.#rate = rate;
     }
@@ -159,11 +222,15 @@ export class Playback {
         this.#send({ type: 'loop', on });
     }
 
-    /** To the frame at a media time. */
+    /** To the frame at a media time. Not of live streams. */
     seek(timeUs: number): void {
-        if (this.#url === '') return;
+        if (this.#url === '' || this.#live) return;
         if (this.durationUs !== null) timeUs = Math.min(timeUs, this.durationUs - 1);
-        this.#soughtUs = Math.max(0, timeUs);
+        this.#goTo(Math.max(0, timeUs));
+    }
+
+    #goTo(timeUs: number): void {
+        this.#soughtUs = timeUs;
         // Before frames are returned: with room for more, the worker would decode on from the old place.
         this.#send({ type: 'seek', serial: ++this.#serial, timeUs: this.#soughtUs });
         for (const frame of this.#ring.splice(0)) this.#done(frame);
@@ -180,7 +247,7 @@ export class Playback {
     step(frames: number): void {
         this.pause();
         const current = this.#current;
-        if (!current || this.#awaiting) return;
+        if (!current || this.#awaiting || this.#live) return;
         if (frames === 1 && this.#ring.length > 0) {
             this.#anchorUs = this.#ring[0]!.presentUs;
             this.#anchorNow = this.#now();
@@ -194,7 +261,8 @@ export class Playback {
     /** The page is hidden: stops decoding; the clock continues. */
     hide(): void {
         this.#hidden = true;
-        if (this.#playing) this.#send({ type: 'rest' });
+        if (this.#live) this.#rest(this.#live);
+        else if (this.#playing) this.#send({ type: 'rest' });
         this.#checkIdle();
     }
 
@@ -202,6 +270,10 @@ export class Playback {
     show(): void {
         if (!this.#hidden) return;
         this.#hidden = false;
+        if (this.#live) {
+            if (this.#playing || !this.#current) this.#goLive(this.#live);
+            return;
+        }
         if (!this.#playing || this.#awaiting) return;
         const current = this.#current;
         let timeUs = this.#presentUs();
@@ -218,9 +290,11 @@ export class Playback {
             const at = this.#presentUs();
             while (this.#ring.length > 0 && this.#ring[0]!.presentUs <= at) {
                 const next = this.#ring.shift()!;
+                if (show && this.#live && !show.preview) ++this.#live.notShown;
                 if (show) this.#passOver(show, next);
                 show = next;
             }
+            if (show && this.#live && !show.preview) show = this.#inTime(this.#live, show, at);
             if (this.#playing && this.#ring.length === 0) this.#runDry(show ?? this.#current, at);
         }
         if (show) {
@@ -247,6 +321,7 @@ export class Playback {
     /** Whether idle() would resolve at once. */
     get settled(): boolean {
         if (this.#url === '' || this.#failed || (this.#hidden && this.#playing)) return true;
+        if (this.#live) return !this.#awaiting;
         const held = this.#ring.length + (this.#current ? 1 : 0) + (this.#preview ? 1 : 0);
         return !this.#awaiting && (held >= this.#room || this.#endedSerial === this.#serial);
     }
@@ -260,6 +335,7 @@ export class Playback {
     }
 
     #presentUs(): number {
+        if (this.#live) return this.#playing ? this.#live.clock.presentUs(this.#now()) : -Infinity;
         if (!this.#playing || this.#stalled || this.#awaiting) return this.#anchorUs;
         return this.#anchorUs + (this.#now() - this.#anchorNow) * 1000 * this.#rate;
     }
@@ -269,13 +345,66 @@ export class Playback {
         this.#anchorNow = this.#now();
     }
 
+    // A live frame that is to be shown, or null if it is too late for that: it stays until one comes that is not.
+    #inTime({ clock }: Live, frame: FrameReport, at: number): FrameReport | null {
+        const lateUs = at - frame.presentUs - frame.durationUs;
+        if (lateUs <= lateFramesUs) {
+            clock.inTime();
+            return frame;
+        }
+        clock.tooLate(this.#now(), frame.presentUs);
+        this.#ring.unshift(frame);
+        return null;
+    }
+
+    #playLive(live: Live): void {
+        this.#playing = true;
+        if (live.resting || this.#endedSerial === this.#serial) this.#goLive(live);
+    }
+
+    #rest(live: Live): void {
+        if (live.resting) return;
+        live.resting = true;
+        this.#send({ type: 'rest' });
+        for (const frame of this.#ring.splice(0)) this.#done(frame);
+        this.#listener.jumped();
+    }
+
+    #goLive(live: Live): void {
+        if (this.#hidden) return;
+        live.resting = false;
+        live.clock = new LiveClock();
+        this.#goTo(0);
+    }
+
+    #behindMs(): number {
+        const live = this.#live;
+        if (!live || !this.#current || !this.#playing || this.#awaiting) return NaN;
+        const now = this.#now();
+        const { presentUs, durationUs } = this.#current;
+        return live.clock.behindMs(now, Math.min(live.clock.presentUs(now), presentUs + durationUs));
+    }
+
+    // A time of the worker's, by the player's clock.
+    #fromWorker(ms: number): number {
+        return this.#now() - (performance.timeOrigin + performance.now() - ms);
+    }
+
+    #takeLive(live: Live, report: LiveReport): void {
+        live.state.take(report);
+        if (report.type === 'heartbeat' && report.clockUs !== null) live.clock.publisher(this.#fromWorker(report.atMs), report.clockUs);
+        if (report.type === 'link' && report.link === 'open') live.clock.reconnected(this.#now());
+        this.#listener.live(report);
+    }
+
     // There is no frame after this one, yet or at all.
     #runDry(last: FrameReport | null, at: number): void {
+        if (this.#live && this.#endedSerial !== this.#serial) return; // its clock goes on
         if (!last || at < last.presentUs + last.durationUs) return;
         this.#anchorUs = last.presentUs + last.durationUs;
         this.#anchorNow = this.#now();
         if (this.#endedSerial === this.#serial) {
-            if (this.#loop) {
+            if (this.#loop && !this.#live) {
                 this.seek(0);
             } else {
                 this.#playing = false;
@@ -333,7 +462,9 @@ export class Playback {
         };
         this.#send({
             type: 'open', url: this.#url, wasmUrl: this.#wasmUrl, serial, timeUs, loop: this.#loop, traps: this.#traps,
+            live: this.#live !== null,
         });
+        if (this.#live?.resting) this.#send({ type: 'rest' });
         this.#roomSetFor = 0;
         this.#send({ type: 'room', frames: this.#room });
         if (this.#serial !== serial) this.#send({ type: 'seek', serial: this.#serial, timeUs: this.#soughtUs });
@@ -352,6 +483,7 @@ export class Playback {
         }
         this.#listener.notice(`A part of the stream stopped the decoder, which was started again: ${text}.`);
         this.#listener.restarted();
+        if (this.#live) this.#live.clock = new LiveClock();
         void this.#start(this.timeUs);
     }
 
@@ -402,6 +534,8 @@ export class Playback {
                 this.wasmBytes = report.wasmBytes;
                 this.heldBytes = report.heldBytes;
                 break;
+            default:
+                if (this.#live) this.#takeLive(this.#live, report);
         }
         this.#checkIdle();
     }
@@ -413,10 +547,12 @@ export class Playback {
         }
         if (frame.buffer.byteLength > this.#roomSetFor) {
             this.#roomSetFor = frame.buffer.byteLength;
-            this.#room = Math.max(3, Math.min(mostFrames, Math.floor(mostBytes / (frame.buffer.byteLength + 1))));
+            const most = this.#live ? mostFramesLive : mostFrames;
+            this.#room = Math.max(3, Math.min(most, Math.floor(mostBytes / (frame.buffer.byteLength + 1))));
             this.#send({ type: 'room', frames: this.#room });
         }
-        if (frame.preview) {
+        if (this.#live) this.#takeLiveFrame(this.#live, frame);
+        else if (frame.preview) {
             if (this.#preview) this.#passOver(this.#preview, frame);
             this.#preview = frame;
         } else {
@@ -433,6 +569,24 @@ export class Playback {
                 this.#anchorNow = this.#now();
             }
         }
-        this.#listener.arrived();
+        this.#listener.arrived(frame);
+    }
+
+    #takeLiveFrame({ clock, state }: Live, frame: FrameReport): void {
+        state.frame();
+        this.#live!.leftOut = frame.live!.leftOut;
+        const sought = this.#awaiting;
+        this.#awaiting = false;
+        if (!this.#playing) frame.preview = true; // the one picture there is until somebody plays
+        if (frame.preview) {
+            if (this.#preview) this.#passOver(this.#preview, frame);
+            this.#preview = frame;
+        } else {
+            clock.arrived(this.#fromWorker(frame.live!.receivedMs), frame.presentUs);
+            clock.ready('frame', this.#fromWorker(frame.live!.readyMs), frame.presentUs);
+            this.#ring.push(frame);
+        }
+        if (sought) this.#listener.sought();
+        if (!this.#playing) this.#rest(this.#live!);
     }
 }

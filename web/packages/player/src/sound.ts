@@ -3,9 +3,10 @@
 //
 // Sound is kept in pieces, each with its present time (playback.ts). update(), called with every picture, starts those
 // that are due soon at the sound card's exact time. Where present time does not go on as expected, as after a pause, all
-// pieces are stopped and those that are still due start anew.
+// pieces are stopped and those that are still due start anew. Live sound is played by live_sound.ts.
 import { opusSamples } from '@htvm/decoder';
 import { browserClock, type Clock } from './clock.js';
+import { livePossible, LiveSound, type LiveTime } from './live_sound.js';
 import type { AudioReport } from './messages.js';
 import { oggFile } from './ogg.js';
 
@@ -71,6 +72,9 @@ export class Sound {
     #offsetMs = 0;
     #contextTime = -1;
     #movedAt = 0;
+    #liveTime: LiveTime | null = null;
+    #live: LiveSound | null = null;
+    #saidImpossible = false;
 
     constructor(listener: SoundListener) {
         this.#listener = listener;
@@ -136,6 +140,14 @@ export class Sound {
         this.#byContext = false;
         this.#offsetMs = offset;
         this.#file = null;
+        this.#live?.close();
+        this.#live = null;
+    }
+
+    /** The sound from now on is a live stream's, by this time; null: a file's. */
+    set live(time: LiveTime | null) {
+        this.#liveTime = time;
+        this.#saidImpossible = false;
     }
 
     /** A file that the browser can decode, to be heard from the first frame on. */
@@ -155,6 +167,7 @@ export class Sound {
     }
 
     take(report: AudioReport): void {
+        if (this.#liveTime) return this.#takeLive(report, this.#liveTime);
         if (!this.#open()) return;
         this.#waiting.push(report);
         void this.#decode();
@@ -163,6 +176,7 @@ export class Sound {
     /** Nothing that came before this is heard any more. */
     jumped(): void {
         ++this.#epoch;
+        this.#live?.jumped();
         this.#stop();
         this.#pieces = [];
         this.#waiting = [];
@@ -173,7 +187,7 @@ export class Sound {
 
     update(time: PlaybackTime): void {
         const context = this.#context;
-        if (!context) return;
+        if (!context || this.#liveTime) return;
         if (!time.advances || !this.#runs()) return this.#stop();
         if (this.#file) this.#cutFile(this.#file, time);
         const origin = context.currentTime - time.presentUs / 1e6 / time.rate;
@@ -186,6 +200,19 @@ export class Sound {
         }
         this.#pieces = this.#pieces.filter((piece) => piece.presentUs + piece.seconds * 1e6 > time.presentUs);
         for (const piece of this.#pieces) if (!piece.source) this.#start(piece, context);
+    }
+
+    #takeLive(report: AudioReport, time: LiveTime): void {
+        if (!livePossible()) {
+            if (this.#saidImpossible) return;
+            this.#saidImpossible = true;
+            const why = isSecureContext ? 'this browser has no WebCodecs' : 'browsers allow it only on pages by https';
+            return this.#listener.notice(`Live sound is not possible here: ${why}.`);
+        }
+        const context = this.#open();
+        if (!context || !this.#runs()) return;
+        this.#live ??= new LiveSound(context, this.#volumeNode!, () => this.now(), time, (text) => this.#listener.notice(text));
+        this.#live.take(report);
     }
 
     #setVolume(): void {

@@ -1,5 +1,6 @@
 // The panel's numbers, computed from the last frames shown.
 import type { FrameReport } from './messages.js';
+import type { LiveNumbers } from './playback.js';
 
 const kept = 60; // frames
 
@@ -51,7 +52,7 @@ export class Statistics {
         };
     }
 
-    text(frame: FrameReport, buffered: number): string {
+    text(frame: FrameReport, buffered: number, live: LiveNumbers | null): string {
         const { framesPerSecond, megabitsPerSecond, decodeMs, slowestDecodeMs, layers } = this.summary();
         const lines = [
             `frame    ${frame.frame} (${frame.letter}), ${frame.bytes} bytes`,
@@ -60,10 +61,21 @@ export class Statistics {
             `stream   ${megabitsPerSecond.toFixed(2)} Mbit/s`,
             `decoding ${decodeMs.toFixed(1)} ms, at most ${slowestDecodeMs.toFixed(1)}`,
             `ahead    ${buffered} frames`,
+            ...(live ? liveLines(live) : []),
             ...layers.slice(0, 5).map(({ name, share }, i) => {
                 return `${i === 0 ? 'bits' : '    '}     ${String(Math.round(100 * share)).padStart(2)} % ${name}`;
             }),
         ];
         return lines.join('\n');
     }
+}
+
+function liveLines(live: LiveNumbers): string[] {
+    const { behind, bufferMs, jitterMs, speed, droppedByHub, leftOut, notShown } = live;
+    const known = (value: number, text: string): string => (Number.isFinite(value) ? text : 'unknown');
+    return [
+        `behind   ${known(behind, `${(1000 * behind).toFixed(0)} ms`)}`,
+        `buffer   ${known(bufferMs, `${bufferMs.toFixed(0)} ms`)}, jitter ${known(jitterMs, `${jitterMs.toFixed(0)} ms`)}, speed ${speed.toFixed(3)}`,
+        `dropped  ${droppedByHub} by the hub, ${leftOut} not decoded, ${notShown} not shown`,
+    ];
 }

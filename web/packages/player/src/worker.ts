@@ -2,8 +2,9 @@
 import { Decoder, DecoderError, DecoderModule, isFrame, isReferred, isStart, packetKind, readAudio, type Frame } from '@htvm/decoder';
 import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
 import { FilePackets, type TimedPacket } from './file_packets.js';
-import type { FrameReport, Report, Request } from './messages.js';
-import { vertexNormals } from './normals.js';
+import { FrameSender } from './frame_sender.js';
+import { LiveSession } from './live_session.js';
+import type { Report, Request } from './messages.js';
 
 const scope = globalThis as unknown as {
     postMessage(message: Report, transfer?: Transferable[]): void;
@@ -27,17 +28,13 @@ class Session {
     #passingOver = false; // up to the next I-frame, after such a frame
     #loop: boolean;
     #resting = false;
-    #room = 2;
-    #out = 0; // frames that the player has
-    #spare: ArrayBuffer[] = [];
-    #sums = new Float32Array(0);
+    #sender = new FrameSender(post);
     #wake: (() => void) | null = null;
     #opened = false;
     #reopenings = 0;
     #decodedAny = false;
     #lastError = '';
     #noticed = new Set<string>();
-    #sentTopology = -1;
     #loopUs = 0; // what loops before this one took
     #frames = 0;
     #surveyAt = 1; // frames sent before what is beyond is looked for
@@ -68,11 +65,10 @@ class Session {
                 this.#loop = request.on;
                 break;
             case 'room':
-                this.#room = request.frames;
+                this.#sender.room = request.frames;
                 break;
             case 'done':
-                --this.#out;
-                if (this.#spare.length < this.#room) this.#spare.push(request.buffer);
+                this.#sender.takeBack(request.buffer);
                 break;
             case 'rest':
                 this.#resting = true;
@@ -129,7 +125,7 @@ class Session {
     // Decodes from what is sought to the end, and on as long as it is to loop.
     async #play(serial: number): Promise<void> {
         this.#loopUs = 0;
-        this.#sentTopology = -1;
+        this.#sender.forgetTopology();
         let sought: number | null = this.#timeUs;
         for (;;) {
             this.#begin(sought ?? 0);
@@ -203,7 +199,7 @@ class Session {
 
     // Waits until the player has room for a frame. False if it has asked for another place meanwhile.
     async #haveRoom(serial: number): Promise<boolean> {
-        while (this.#serial === serial && (this.#out >= this.#room || this.#resting)) await this.#signal();
+        while (this.#serial === serial && (!this.#sender.hasRoom || this.#resting)) await this.#signal();
         return this.#serial === serial;
     }
 
@@ -293,17 +289,6 @@ class Session {
         this.#tellExtent();
     }
 
-    #buffer(bytes: number): ArrayBuffer {
-        let best = -1;
-        for (let i = 0; i < this.#spare.length; ++i) {
-            const size = this.#spare[i]!.byteLength;
-            if (size >= bytes && (best < 0 || size < this.#spare[best]!.byteLength)) best = i;
-        }
-        if (best >= 0) return this.#spare.splice(best, 1)[0]!;
-        this.#spare.shift(); // too small for these frames
-        return new ArrayBuffer(bytes + (bytes >> 3));
-    }
-
     #sendAudio(packet: TimedPacket, serial: number): void {
         const audio = readAudio(packet);
         if (!audio) return this.#notice('Some of the sound cannot be played.');
@@ -312,89 +297,28 @@ class Session {
     }
 
     #send(serial: number, { frame, decodeMs }: { frame: Frame; decodeMs: number }, timeUs: number, preview: boolean): void {
-        const { vertices } = frame;
-        const normalBytes = frame.normals ? 12 : 4;
-        const buffer = this.#buffer(Math.max((12 + normalBytes + 4) * vertices, 16));
-        const positions = new Float32Array(buffer, 0, 3 * vertices);
-        positions.set(frame.positions);
-        let normals: Float32Array | Int8Array;
-        if (frame.normals) {
-            normals = new Float32Array(buffer, 12 * vertices, 3 * vertices);
-            normals.set(frame.normals);
-        } else {
-            normals = new Int8Array(buffer, 12 * vertices, 4 * vertices);
-            if (this.#sums.length < 3 * vertices) this.#sums = new Float32Array(3 * vertices + (vertices >> 1));
-            vertexNormals(positions, frame.indices, vertices, this.#sums, normals);
-        }
-        const colours = frame.colours && new Uint8Array(buffer, (12 + normalBytes) * vertices, 4 * vertices);
-        if (colours) {
-            const rgb = frame.colours!;
-            for (let v = 0, from = 0, to = 0; v < vertices; ++v) {
-                colours[to++] = rgb[from++]!;
-                colours[to++] = rgb[from++]!;
-                colours[to++] = rgb[from++]!;
-                colours[to++] = 255;
-            }
-        }
-        const newTopology = frame.topology !== this.#sentTopology;
-        this.#sentTopology = frame.topology;
-        const indices = newTopology ? frame.indices.slice() : null;
-        const texcoords = newTopology && frame.texcoords ? frame.texcoords.slice() : null;
-        const report: FrameReport = {
-            type: 'frame',
-            serial,
-            kind: frame.kind,
-            letter: frame.letter,
-            frame: frame.frame,
-            timeUs,
-            presentUs: timeUs + this.#loopUs,
-            durationUs: this.#file.frameUs,
-            preview,
-            topology: frame.topology,
-            vertices,
-            triangles: frame.triangles,
-            bytes: frame.bytes,
-            layers: this.#decoder.layerBytes(),
-            decodeMs,
-            bounds: boundsOf(positions),
-            buffer,
-            positions,
-            colours,
-            normals,
-            streamNormals: frame.normals !== null,
-            indices,
-            texcoords,
-        };
-        const transfer: Transferable[] = [buffer];
-        if (indices) transfer.push(indices.buffer);
-        if (texcoords) transfer.push(texcoords.buffer);
-        ++this.#out;
+        const presentUs = timeUs + this.#loopUs;
+        const durationUs = this.#file.frameUs;
+        this.#sender.send(this.#decoder, frame, { serial, timeUs, presentUs, durationUs, preview, decodeMs, live: null });
         ++this.#frames;
         this.#decodedAny = true;
         if (this.#frames % 64 === 1) this.#tellMemory();
-        post(report, transfer);
     }
 }
 
-function boundsOf(positions: Float32Array): FrameReport['bounds'] {
-    const bounds: FrameReport['bounds'] = [Infinity, Infinity, Infinity, -Infinity, -Infinity, -Infinity];
-    for (let i = 0; i < positions.length; i += 3)
-        for (let c = 0; c < 3; ++c) {
-            const value = positions[i + c]!;
-            if (value < bounds[c]!) bounds[c] = value;
-            if (value > bounds[c + 3]!) bounds[c + 3] = value;
-        }
-    return bounds;
-}
+let session: Promise<Session | LiveSession> | null = null;
 
-let session: Promise<Session> | null = null;
-
-async function open(request: Request & { type: 'open' }): Promise<Session> {
-    let opened: Session;
-    const source = new ByteSource(request.url);
-    source.prefetch(); // while the decoder is loaded
+async function open(request: Request & { type: 'open' }): Promise<Session | LiveSession> {
+    const decoder = fetch(request.wasmUrl).then((response) => DecoderModule.load(response));
+    let opened: Session | LiveSession;
     try {
-        opened = new Session(request, await DecoderModule.load(await fetch(request.wasmUrl)), source);
+        if (request.live) {
+            opened = new LiveSession(request, await decoder, post);
+        } else {
+            const source = new ByteSource(request.url);
+            source.prefetch(); // while the decoder is loaded
+            opened = new Session(request, await decoder, source);
+        }
     } catch (error) {
         const csp = error instanceof WebAssembly.CompileError && String(error).includes('Content Security Policy');
         const why = csp

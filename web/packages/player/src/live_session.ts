@@ -1,0 +1,298 @@
+// What the worker does with a live stream: decodes packets as they come, sends the frames on, and where the machine cannot
+// keep up, goes on at the newest place to start. What waits is bounded in time and bytes.
+import { Decoder, DecoderError, isFrame, isReferred, isStart, packetKind, readAudio, type DecoderModule, type Packet } from '@htvm/decoder';
+import { SourceError } from './byte_source.js';
+import { FrameSender } from './frame_sender.js';
+import { LiveSource, type HubMessage, type LiveListener } from './live_source.js';
+import type { Report, Request } from './messages.js';
+
+interface Waiting {
+    packet: Packet;
+    presentUs: number;
+    receivedMs: number;
+}
+
+const skipAfterMs = 200; // a frame that no other needs is not decoded after so long
+const startAfterMs = 1000; // where a frame has waited so long, decoding goes on at the newest place to start
+const giveUpAfterMs = 3000; // or, where there is none, at the next one that comes
+const mostBytes = 1 << 24; // that wait
+const catchUpMs = 1000; // of what the newest frame needs, nothing is shown for so long
+const jumpUs = 500000; // so far back, timestamps are of another run
+
+// The clock that all of this machine's threads share.
+const timeMs = (): number => performance.timeOrigin + performance.now();
+
+export class LiveSession {
+    #url: string;
+    #module: DecoderModule;
+    #decoder: Decoder;
+    #source: Pick<LiveSource, 'connect' | 'close' | 'askForKeyFrame'>;
+    #post: (report: Report, transfer?: Transferable[]) => void;
+    #sender: FrameSender;
+    #now: () => number;
+    #serial: number;
+    #queue: Waiting[] = [];
+    #queueBytes = 0;
+    #wake: (() => void) | null = null;
+    #resting = false;
+    #failed = false;
+    // From timestamps to present time, which goes on through sessions as far as arrivals are apart.
+    #header: Uint8Array | null = null;
+    #newSequence = false;
+    #again = false; // an identical header came while packets did: without a session that may be another run
+    #shiftUs = 0;
+    #last: { timestampUs: number; presentUs: number; receivedMs: number } | null = null;
+    #frameUs = 1e6 / 30;
+    #joining: number | null = null; // since when what the newest frame needs is decoded
+    #previewed = false;
+    #sentUs = -Infinity; // present time of the newest frame sent
+    #lost = false; // up to the next place to start
+    #leftOut = 0;
+    #busyUntilMs = 0;
+    #noticed = new Set<string>();
+    #frames = 0;
+
+    constructor(
+        request: Request & { type: 'open' }, module: DecoderModule, post: (report: Report, transfer?: Transferable[]) => void,
+        makeSource: (listener: LiveListener) => Pick<LiveSource, 'connect' | 'close' | 'askForKeyFrame'> =
+            (listener) => new LiveSource(request.url, listener),
+        now = timeMs,
+    ) {
+        this.#url = request.url;
+        this.#serial = request.serial;
+        this.#module = module;
+        this.#post = post;
+        this.#now = now;
+        this.#sender = new FrameSender(post);
+        this.#decoder = module.createDecoder();
+        this.#source = makeSource({
+            packet: (packet, first) => this.#arrive(packet, first),
+            message: (message) => this.#pass(message),
+            link: (link, reason) => {
+                this.#post({ type: 'link', link, reason });
+                if (link === 'ended') this.#post({ type: 'ended', serial: this.#serial, frames: this.#frames, durationUs: 0 });
+            },
+            failed: (error) => this.#fail(error),
+        });
+    }
+
+    take(request: Request): void {
+        switch (request.type) {
+            case 'seek':
+                this.#serial = request.serial;
+                this.#resting = false;
+                this.#sender.forgetTopology();
+                this.#rejoin();
+                this.#source.connect();
+                break;
+            case 'room':
+                this.#sender.room = request.frames;
+                break;
+            case 'done':
+                this.#sender.takeBack(request.buffer);
+                break;
+            case 'rest':
+                this.#resting = true;
+                this.#source.close();
+                this.#rejoin();
+                break;
+            case 'loop':
+            case 'open':
+                break;
+        }
+        this.#wake?.();
+    }
+
+    async run(): Promise<void> {
+        this.#source.connect();
+        while (!this.#failed) {
+            this.#shed();
+            const next = this.#sender.hasRoom && !this.#resting ? this.#queue.shift() : undefined;
+            if (!next) {
+                await new Promise<void>((resolve) => (this.#wake = resolve));
+                continue;
+            }
+            this.#queueBytes -= next.packet.size;
+            try {
+                this.#decode(next);
+            } catch (error) {
+                this.#source.close();
+                if (error instanceof DecoderError && error.code === 'trap')
+                    return this.#post({ type: 'trapped', text: error.message, atUs: next.presentUs });
+                return this.#fail(error);
+            }
+            if (this.#queue.length > 0) await otherTasks(); // packets and requests are heard between frames
+        }
+    }
+
+    // ---- what comes -----------------------------------------------------------------------------------------------
+
+    #arrive(packet: Packet, first: boolean): void {
+        const receivedMs = this.#now();
+        if (first) this.#rejoin();
+        if (packet.kind === packetKind.sequence) {
+            if (!this.#header || !sameBytes(this.#header, packet.bytes)) this.#newSequence = true;
+            else if (!first) this.#again = true;
+            this.#header = packet.bytes;
+            this.#put({ packet, presentUs: this.#last?.presentUs ?? 0, receivedMs });
+            return;
+        }
+        const timed = isFrame(packet.kind) || packet.kind === packetKind.audio;
+        const presentUs = timed ? this.#present(packet, receivedMs) : (this.#last?.presentUs ?? 0);
+        if (packet.kind === packetKind.audio) {
+            const audio = readAudio(packet);
+            if (!audio) this.#notice('Some of the sound cannot be played.');
+            else this.#post({ type: 'audio', serial: this.#serial, presentUs, ...audio }, audio.opus.map(({ buffer }) => buffer));
+        } else {
+            this.#put({ packet, presentUs, receivedMs });
+        }
+    }
+
+    #put(waiting: Waiting): void {
+        this.#queue.push(waiting);
+        this.#queueBytes += waiting.packet.size;
+        if (this.#queueBytes > mostBytes) this.#shed(); // the page may not take anything for long
+        this.#wake?.();
+    }
+
+    // Another run of the publisher goes on in present time where the one before was, as much later as it arrives.
+    #present({ timestampUs, kind }: Packet, receivedMs: number): number {
+        const last = this.#last;
+        const other = this.#newSequence || (this.#again && last !== null && timestampUs < last.timestampUs - jumpUs);
+        if (other && last) this.#shiftUs = Math.round(last.presentUs + (receivedMs - last.receivedMs) * 1000) - timestampUs;
+        if (isFrame(kind)) this.#again = false;
+        this.#newSequence = false;
+        const presentUs = timestampUs + this.#shiftUs;
+        if (other || !last || timestampUs > last.timestampUs) this.#last = { timestampUs, presentUs, receivedMs };
+        return presentUs;
+    }
+
+    #rejoin(): void {
+        this.#queue = [];
+        this.#queueBytes = 0;
+        this.#decoder.discard();
+        this.#joining = this.#now();
+        this.#lost = false;
+    }
+
+    #pass(message: HubMessage): void {
+        if (message.type === 'heartbeat') {
+            const { published, viewers, dropped, clockUs } = message;
+            const present = clockUs === null || !this.#last ? null : clockUs + this.#shiftUs;
+            this.#post({ type: 'heartbeat', atMs: this.#now(), published, viewers, dropped, clockUs: present });
+        } else if (message.type !== 'hello') {
+            this.#post(message);
+        }
+    }
+
+    // Bounds what waits: everything before the newest place to start goes; without one everything, after a while.
+    #shed(): void {
+        const head = this.#queue[0];
+        if (!head) return;
+        const waitedMs = this.#now() - head.receivedMs;
+        const tooMuch = this.#queueBytes > mostBytes;
+        if (waitedMs < startAfterMs && !tooMuch) return;
+        let start = this.#queue.map(({ packet }) => isStart(packet)).lastIndexOf(true);
+        if (start <= 0) {
+            if (waitedMs < giveUpAfterMs && !tooMuch) return;
+            if (start === 0 && !tooMuch) return;
+            start = this.#queue.length;
+            this.#lost = true;
+        }
+        const gone = this.#queue.splice(0, start);
+        this.#leftOut += gone.filter(({ packet }) => isFrame(packet.kind)).length;
+        const header = gone.filter(({ packet }) => packet.kind === packetKind.sequence).at(-1);
+        if (header) this.#queue.unshift({ ...header, receivedMs: this.#queue[0]?.receivedMs ?? this.#now() });
+        this.#queueBytes = this.#queue.reduce((sum, { packet }) => sum + packet.size, 0);
+        if (this.#lost) this.#source.askForKeyFrame();
+    }
+
+    // ---- decoding -------------------------------------------------------------------------------------------------
+
+    #decode({ packet, presentUs, receivedMs }: Waiting): void {
+        const frameKind = isFrame(packet.kind);
+        if (isStart(packet)) this.#lost = false;
+        const later = this.#queue.some(({ packet: { kind } }) => isFrame(kind));
+        const begin = this.#now();
+        const late = later && begin - receivedMs > skipAfterMs && !isReferred(packet);
+        if (frameKind && (this.#lost || late)) {
+            if (this.#lost) this.#source.askForKeyFrame();
+            ++this.#leftOut;
+            return;
+        }
+        try {
+            this.#decoder.sendPacket(packet.bytes);
+            const frame = this.#decoder.receive();
+            if (packet.kind === packetKind.sequence) this.#tellSequence();
+            if (!frame) return;
+            const decodeMs = this.#now() - begin;
+            const how = this.#howToSend(presentUs, later);
+            if (how !== 'no') {
+                const decodedMs = begin + decodeMs;
+                const readyMs = Math.max(receivedMs, this.#busyUntilMs) + decodeMs;
+                this.#sender.send(this.#decoder, frame, {
+                    serial: this.#serial, timeUs: packet.timestampUs, presentUs, durationUs: this.#frameUs, preview: how === 'preview',
+                    decodeMs, live: { receivedMs, decodedMs, readyMs, leftOut: this.#leftOut },
+                });
+                if (how === 'frame') this.#sentUs = presentUs;
+                this.#previewed = true;
+                if (++this.#frames % 64 === 1)
+                    this.#post({ type: 'memory', wasmBytes: this.#module.memoryBytes, heldBytes: this.#queueBytes });
+            }
+        } catch (error) {
+            if (!(error instanceof DecoderError) || error.code === 'trap') throw error;
+            if (packet.kind === packetKind.sequence && error.code === 'unsupported')
+                throw new SourceError('version', `This page's player cannot show this stream: ${error.message}`);
+            if (error.code === 'limit') this.#notice(`A frame is beyond what the player takes: ${error.message}`);
+            if (frameKind) this.#source.askForKeyFrame();
+        } finally {
+            this.#busyUntilMs = Math.max(receivedMs, this.#busyUntilMs) + this.#now() - begin;
+        }
+    }
+
+    // Of what the newest frame needs only the first is shown, at once, where there was no picture yet.
+    #howToSend(presentUs: number, later: boolean): 'frame' | 'preview' | 'no' {
+        if (this.#joining !== null) {
+            const going = later && this.#now() - this.#joining < catchUpMs;
+            if (going) return this.#previewed ? 'no' : 'preview';
+            this.#joining = null;
+        }
+        return presentUs > this.#sentUs ? 'frame' : 'no';
+    }
+
+    #tellSequence(): void {
+        const sequence = this.#decoder.sequence();
+        if (!sequence) return;
+        this.#frameUs = 1e6 / sequence.framesPerSecond;
+        this.#post({ type: 'opened', sequence, layerNames: this.#module.layerNames, version: this.#module.version });
+    }
+
+    #notice(text: string): void {
+        if (this.#noticed.has(text) || this.#noticed.size >= 8) return;
+        this.#noticed.add(text);
+        this.#post({ type: 'notice', text });
+    }
+
+    #fail(error: unknown): void {
+        this.#failed = true;
+        this.#wake?.();
+        if (error instanceof SourceError) this.#post({ type: 'failed', code: error.code, text: error.message });
+        else this.#post({ type: 'failed', code: 'decoder', text: `${this.#url}: ${error instanceof Error ? error.message : error}` });
+    }
+}
+
+function sameBytes(a: Uint8Array, b: Uint8Array): boolean {
+    return a.length === b.length && a.every((byte, i) => byte === b[i]);
+}
+
+// Lets messages be heard. A timer would wait for 4 ms.
+function otherTasks(): Promise<void> {
+    return new Promise((resolve) => {
+        const { port1, port2 } = new MessageChannel();
+        port1.onmessage = () => {
+            port1.close();
+            resolve();
+        };
+        port2.postMessage(null);
+    });
+}
