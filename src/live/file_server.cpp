@@ -40,7 +40,7 @@ constexpr auto awaited = net::as_tuple(net::use_awaitable);
 // What the player's pages may do; inline scripts and other sites' are forbidden.
 constexpr const char* page_policy =
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src 'self'; connect-src "
-    "'self'; "
+    "'self' ws: wss:; "  // a live stream's other hubs
     "img-src 'self' blob: data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 std::string_view media_type(std::string_view name) {
@@ -298,9 +298,11 @@ Response FileServer::State::answer(const Request& request) {
     const auto& path = *segments;
     if (path.size() > 1 && path[0] == "files") return answer_file(request, std::move(*segments), header);
     if (path.size() == 2 && path[0] == "api" && path[1] == "files") return answer_json(listing(), header);
-    if (path.size() == 2 && path[0] == "api" && path[1] == "streams" && options.hub)
-        return answer_json(live_listing(), header);
-    const bool page = path.empty(), script = path.size() == 2 && path[0] == "player";
+    if (path.size() == 2 && path[0] == "api" && path[1] == "streams")
+        return answer_json(options.hub ? live_listing() : "null", header);
+    // /play/NAME: the page finds the live stream of that name by itself.
+    const bool page = path.empty() || (path.size() == 2 && path[0] == "play" && options.hub);
+    const bool script = path.size() == 2 && path[0] == "player";
     const auto found = player.find(page ? "index.html" : script ? path[1] : "");
     if (found == player.end()) return refuse(http::status::not_found);
     return answer_text(request, found->second, header);

@@ -10,7 +10,8 @@
 // With a hub, live streams too (WebSockets; /watch/NAME is an endless body where no WebSocket is asked for):
 //   /publish/NAME    packets from a publisher: a program on this machine
 //   /watch/NAME      packets for viewers
-//   /api/streams     the live streams as JSON
+//   /api/streams     the live streams as JSON; null where there is no hub
+//   /play/NAME       the page, which plays the live stream of that name
 #pragma once
 
 #include <chrono>
