@@ -17,6 +17,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                           "a segment is one name");
         }
     }
+    if (const auto value = live::query_value(text, "key"))
+        fuzz::require(value->find_first_of(std::string_view("\n\0", 2)) == std::string::npos, "a value is one line");
     const auto part = live::requested_part(text, file_size);
     fuzz::require(part.kind != live::FilePart::Kind::part ||
                       (part.count > 0 && part.first < file_size && part.count <= file_size - part.first),

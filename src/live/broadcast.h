@@ -17,6 +17,7 @@
 
 #include "htvm/dependency.hpp"
 #include "htvm/packet.hpp"
+#include "live/control.h"
 
 namespace htvm::live {
 
@@ -24,6 +25,7 @@ namespace htvm::live {
 struct LivePacket {
     PacketHeader header;  // as told_header() has it
     std::vector<std::uint8_t> bytes;
+    std::optional<Stamp> stamp{};  // for measurement
 };
 using SharedPacket = std::shared_ptr<const LivePacket>;
 

@@ -148,7 +148,7 @@ struct FileServer::State {
     std::string publishing_refused(const Request& request, const net::ip::address& address) const;
     net::awaitable<void> serve_live(Line line, Request request, LiveTarget target, net::ip::address address);
     net::awaitable<void> refuse(Line line, Header header, http::status status, std::string why);
-    net::awaitable<void> tidy_hub();
+    net::awaitable<void> tick_hub();
     net::awaitable<bool> send(Line& line, Response& response, bool with_body);
 };
 
@@ -190,15 +190,25 @@ std::string FileServer::State::listing() const {
 
 std::string FileServer::State::live_listing() const {
     nlohmann::json list = nlohmann::json::array();
-    for (const auto& stream : options.hub->streams())
-        list.push_back({{"name", stream.name},
-                        {"published", stream.published},
-                        {"viewers", stream.viewers},
-                        {"packets", stream.publisher.packets},
-                        {"bytes", stream.publisher.bytes},
-                        {"damaged_messages", stream.publisher.damaged},
-                        {"undecodable_frames", stream.undecodable_frames},
-                        {"dropped_frames", stream.dropped_frames}});
+    for (const auto& stream : options.hub->streams(Hub::Clock::now())) {
+        nlohmann::json entry = {{"name", stream.name},
+                                {"published", stream.published},
+                                {"viewers", stream.viewers},
+                                {"packets", stream.publisher.packets},
+                                {"bytes", stream.publisher.bytes},
+                                {"damaged_messages", stream.publisher.damaged},
+                                {"undecodable_frames", stream.undecodable_frames},
+                                {"dropped_frames", stream.dropped_frames}};
+        if (stream.header) {
+            if (stream.header->session != 0) entry["session"] = session_text(stream.header->session);
+            entry["frames_per_second"] =
+                static_cast<double>(stream.header->fps_numerator) / static_cast<double>(stream.header->fps_denominator);
+        }
+        if (stream.clock) entry["clock"] = *stream.clock;
+        if (stream.since_packet)
+            entry["seconds_since_packet"] = static_cast<double>(stream.since_packet->count()) / 1000;
+        list.push_back(std::move(entry));
+    }
     return list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -388,12 +398,12 @@ net::awaitable<void> FileServer::State::refuse(Line line, Header header, http::s
     co_await line.close();
 }
 
-net::awaitable<void> FileServer::State::tidy_hub() {
+net::awaitable<void> FileServer::State::tick_hub() {
     net::steady_timer timer(context);
     for (;;) {
-        timer.expires_after(std::chrono::seconds(1));
+        timer.expires_after(std::chrono::milliseconds(100));
         co_await timer.async_wait(awaited);
-        options.hub->tidy(Hub::Clock::now());
+        options.hub->tick(Hub::Clock::now());
     }
 }
 
@@ -485,7 +495,7 @@ void FileServer::run() {
     net::signal_set signals(state_->context, SIGINT, SIGTERM);
     signals.async_wait([this](const beast::error_code&, int) { state_->context.stop(); });
     net::co_spawn(state_->context, state_->accept(), net::detached);
-    if (state_->options.hub) net::co_spawn(state_->context, state_->tidy_hub(), net::detached);
+    if (state_->options.hub) net::co_spawn(state_->context, state_->tick_hub(), net::detached);
     state_->context.run();
 }
 

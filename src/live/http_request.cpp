@@ -44,7 +44,7 @@ std::optional<std::string> unescaped(std::string_view text) {
             i += 2;
         }
         const auto byte = static_cast<unsigned char>(c);
-        if (byte < 0x20 || byte == 0x7f || c == '/' || c == '\\') return std::nullopt;
+        if (byte < 0x20 || byte == 0x7f) return std::nullopt;
         out.push_back(c);
     }
     return out;
@@ -60,10 +60,22 @@ std::optional<std::vector<std::string>> path_segments(std::string_view target) {
     while (!path.empty()) {
         auto segment = unescaped(next_item(path, '/'));
         if (!segment || segment->empty() || segment->front() == '.') return std::nullopt;
+        if (segment->find_first_of("/\\") != std::string::npos) return std::nullopt;
         if (segments.size() == most_segments) return std::nullopt;
         segments.push_back(std::move(*segment));
     }
     return segments;
+}
+
+std::optional<std::string> query_value(std::string_view target, std::string_view name) {
+    target = target.substr(0, target.find('#'));
+    auto query = target.substr(std::min(target.find('?'), target.size()));
+    if (!query.empty()) query.remove_prefix(1);
+    while (!query.empty()) {
+        auto value = next_item(query, '&');
+        if (next_item(value, '=') == name) return unescaped(value);
+    }
+    return std::nullopt;
 }
 
 FilePart requested_part(std::string_view range, std::uint64_t size) {

@@ -14,6 +14,10 @@ namespace htvm::live {
 // path is longer than 1,024 bytes or has more than 16 segments. So the segments never lead upwards or to hidden files.
 std::optional<std::vector<std::string>> path_segments(std::string_view target);
 
+// The decoded value of this member of the target's query: "2" of "?a=1&b=2"; "" of a name without a value. Nothing if
+// the query has no such member, its escapes are wrong, or it holds a control character. Of several the first counts.
+std::optional<std::string> query_value(std::string_view target, std::string_view name);
+
 // Which bytes of a file to send.
 struct FilePart {
     enum class Kind { whole, part, beyond };  // answered by 200, 206, 416

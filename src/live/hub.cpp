@@ -1,12 +1,19 @@
 #include "live/hub.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "codec/stream/sequence.h"
 #include "core/bytes.h"
 #include "core/crc32.h"
+#include "htvm/decoder.hpp"
 
 namespace htvm::live {
 namespace {
+
+// Of text messages. Viewers have little to say; a publisher may stamp each frame.
+constexpr double viewer_burst = 50, viewer_texts_each_second = 10;
+constexpr double publisher_burst = 1000, publisher_texts_each_second = 500;
 
 // The header of a message that is exactly one sound packet.
 std::optional<PacketHeader> header_of(std::span<const std::uint8_t> message, std::size_t most_bytes) {
@@ -19,139 +26,477 @@ std::optional<PacketHeader> header_of(std::span<const std::uint8_t> message, std
     return header;
 }
 
+std::int64_t microseconds(Hub::Clock::duration time) {
+    return std::chrono::duration_cast<std::chrono::microseconds>(time).count();
+}
+
+std::int64_t system_microseconds() {
+    return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+        .count();
+}
+
+CloseCode code_of(const Error& error) {
+    return error.kind == ErrorKind::limit ? CloseCode::try_later : CloseCode::refused;
+}
+
+std::optional<std::uint64_t> session_of(const std::optional<StreamInfo::Header>& header) {
+    return header && header->session != 0 ? std::optional(header->session) : std::nullopt;
+}
+
 }  // namespace
 
-Result<Hub::Publisher> Hub::publish(const std::string& name, std::function<void(const std::string&)> taken_over) {
-    if (!streams_.contains(name) && streams_.size() >= limits_.streams)
+// ---- Clocks and allowances ------------------------------------------------------------------------------------------
+
+void PublisherClock::tell(std::int64_t clock_us, Clock::time_point now) {
+    // Few enough that two clocks that differ in speed, by 0.02 % at most, stay together within two milliseconds.
+    constexpr std::size_t remembered = 8;
+    constexpr std::int64_t step = 500'000;
+    const auto ahead = clock_us - microseconds(now.time_since_epoch());
+    // The clock was set back, or the publisher itself was held up.
+    if (!ahead_us_.empty() && *std::max_element(ahead_us_.begin(), ahead_us_.end()) - ahead > step) forget();
+    ahead_us_.push_back(ahead);
+    if (ahead_us_.size() > remembered) ahead_us_.pop_front();
+}
+
+std::optional<std::int64_t> PublisherClock::at(Clock::time_point now) const {
+    if (ahead_us_.empty()) return std::nullopt;
+    return microseconds(now.time_since_epoch()) + *std::max_element(ahead_us_.begin(), ahead_us_.end());
+}
+
+bool TextAllowance::take(Clock::time_point now) {
+    const std::chrono::duration<double> passed = now - last_;
+    left_ = std::min(burst_, left_ + passed.count() * each_second_);
+    last_ = now;
+    if (left_ < 1) return false;
+    left_ -= 1;
+    return true;
+}
+
+// ---- Publishers -----------------------------------------------------------------------------------------------------
+
+Result<Hub::Publisher> Hub::publish(const std::string& name, std::function<void()> wake, Clock::time_point now) {
+    if (!streams_.contains(name) && streams_.size() >= limits_.streams) {
+        ++counters_.refused_publishers_limit;
         return fail(ErrorKind::limit, "there are as many streams as this hub carries");
+    }
     const auto number = next_connection_++;
-    connections_[number] = {name, false, std::move(taken_over)};
+    connections_.emplace(number, Connection{.stream = name,
+                                            .wake = std::move(wake),
+                                            .allowance = {publisher_burst, publisher_texts_each_second},
+                                            .heard = now,
+                                            .heartbeat_at = now + limits_.heartbeat});
     return Publisher{number};
+}
+
+// The stream that the connection publishes; null if none.
+Hub::Stream* Hub::published_by(const Connection& connection) {
+    const auto found = streams_.find(connection.stream);
+    return connection.admitted && found != streams_.end() ? &found->second : nullptr;
+}
+
+// The connection is of no use; it is told why.
+Result<void> Hub::refuse(Connection& connection, const Error& error, CloseCode code) {
+    connection.closing = Closing{code, error.message};
+    connection.wake();
+    return tl::unexpected(error);
 }
 
 // The first packet decides whose stream it is.
 Result<void> Hub::admit(std::uint64_t number, Connection& connection, const PacketHeader& header,
                         Clock::time_point now) {
-    if (header.kind != PacketKind::sequence || !header.has(packet_flag::told))
+    if (header.kind != PacketKind::sequence || !header.has(packet_flag::told)) {
+        ++counters_.refused_publishers_message;
         return fail(ErrorKind::bad_input, "the first packet must be a sequence header of version 2");
+    }
     const auto known = streams_.find(connection.stream);
     if (known == streams_.end()) {
-        if (streams_.size() >= limits_.streams)
+        if (streams_.size() >= limits_.streams) {
+            ++counters_.refused_publishers_limit;
             return fail(ErrorKind::limit, "there are as many streams as this hub carries");
+        }
         auto& stream = streams_[connection.stream];
         stream.number = next_stream_++;
         stream.broadcast = Broadcast(limits_.broadcast);
-    } else if (known->second.connection) {
+    } else {
         auto& stream = known->second;
         const bool same = stream.session == header.reference;
-        if (!same && now - stream.heard < limits_.silence)
+        if (!same && now - stream.heard < limits_.silence) {
+            ++counters_.refused_publishers_busy;
             return fail(ErrorKind::bad_input,
-                        "'" + connection.stream + "' is being published by another session; end that one, or wait");
-        const auto before = connections_.extract(*stream.connection);
-        before.mapped().taken_over(same ? "this session was continued by another connection"
-                                        : "another session took the stream over");
-    } else if (known->second.session != header.reference && now - known->second.heard < limits_.silence) {
-        return fail(ErrorKind::bad_input,
-                    "'" + connection.stream + "' was published by another session a moment ago; wait for two seconds");
+                        stream.connection
+                            ? "'" + connection.stream + "' is being published by another session; end that one, or wait"
+                            : "'" + connection.stream +
+                                  "' was published by another session a moment ago; wait for two seconds");
+        }
+        if (stream.connection) {
+            auto& before = connections_.at(*stream.connection);
+            before.admitted = false;
+            before.closing = same ? Closing{CloseCode::continued, "this session was continued by another connection"}
+                                  : Closing{CloseCode::taken_over, "another session took the stream over"};
+            before.wake();
+        }
     }
-    auto& stream = streams_.at(connection.stream);
-    stream.connection = number;
-    stream.session = header.reference;
+    streams_.at(connection.stream).connection = number;
     connection.admitted = true;
     return {};
 }
 
+// What a sequence header tells of the stream. The same connection may begin another session, such as the next round of
+// a loop.
+void Hub::begin_session(Stream& stream, const PacketHeader& header, std::span<const std::uint8_t> message) {
+    if (stream.session == header.reference) return;
+    stream.session = header.reference;
+    stream.clock.forget();
+    stream.has_frames = false;
+    stream.header.reset();
+    const auto payload = message.subspan(packet_header_bytes, message.size() - packet_overhead);
+    if (const auto read = internal::read_sequence_header(payload))
+        stream.header = StreamInfo::Header{read->session, read->fps_numerator, read->fps_denominator};
+}
+
 Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
-    if (found == connections_.end())
-        return fail(ErrorKind::bad_input, "the stream was taken over by another connection");
+    if (found == connections_.end() || found->second.closing)
+        return fail(ErrorKind::bad_input, "the connection has ended");
     auto& connection = found->second;
+    connection.heard = now;
     auto header = header_of(message, limits_.packet_bytes);
     if (!connection.admitted) {
-        if (!header) return fail(ErrorKind::bad_input, "the first message is not a packet");
-        if (auto ok = admit(publisher.connection, connection, *header, now); !ok) return ok;
+        if (!header) {
+            ++counters_.refused_publishers_message;
+            return refuse(connection, {ErrorKind::bad_input, "the first message is not a packet"}, CloseCode::refused);
+        }
+        if (const auto ok = admit(publisher.connection, connection, *header, now); !ok)
+            return refuse(connection, ok.error(), code_of(ok.error()));
     }
     auto& stream = streams_.at(connection.stream);
     if (!header) {
         ++stream.counters.damaged;
+        ++counters_.damaged_messages;
         return {};
     }
-    // The same connection may begin another session, such as the next round of a loop.
-    if (header->kind == PacketKind::sequence) stream.session = header->reference;
     stream.heard = now;
+    stream.last_packet = now;
     ++stream.counters.packets;
+    ++counters_.packets_in;
     stream.counters.bytes += message.size();
-    stream.broadcast.push(std::make_shared<LivePacket>(LivePacket{*header, std::move(message)}), now);
+    counters_.bytes_in += message.size();
+    if (header->kind == PacketKind::sequence) begin_session(stream, *header, message);
+    auto packet = std::make_shared<LivePacket>(LivePacket{*header, std::move(message), {}});
+    const bool frame = frame_type(header->kind).has_value();
+    stream.has_frames = stream.has_frames || frame;
+    if (frame && stream.stamp) {
+        if (stream.stamp->frame == header->frame) packet->stamp = stream.stamp;
+        if (packet->stamp) packet->stamp->hub = system_microseconds();
+        stream.stamp.reset();
+    }
+    const auto undecodable = stream.broadcast.undecodable_frames();
+    const bool new_one = stream.broadcast.push(packet, now).has_value();
+    if (stream.broadcast.undecodable_frames() > undecodable) {
+        ++counters_.undecodable_frames;
+        ask_for_key_frame(stream, now);
+        return {};
+    }
+    if (new_one && header->kind == PacketKind::intra) stream.wants_key_frame = false;
+    if (new_one)
+        for (const auto& listener : listeners_)
+            if (listener.sent) listener.sent(connection.stream, packet, now);
     return {};
 }
 
-void Hub::leave(Publisher publisher, Clock::time_point now) {
+Result<void> Hub::take_text(Publisher publisher, std::string_view text, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
-    if (found == connections_.end()) return;
-    if (found->second.admitted) {
-        auto& stream = streams_.at(found->second.stream);
-        stream.connection.reset();
-        stream.heard = now;
+    if (found == connections_.end() || found->second.closing)
+        return fail(ErrorKind::bad_input, "the connection has ended");
+    auto& connection = found->second;
+    const auto message = read_from_publisher(text);
+    if (message && connection.allowance.take(now)) {
+        take(publisher, *message, now);
+        return {};
     }
-    connections_.erase(found);
+    ++counters_.refused_publishers_message;
+    const Error error = message ? Error{ErrorKind::bad_input, "too many text messages"} : message.error();
+    const bool long_text = text.size() > most_text_bytes;
+    detach(connection, "the publisher sent a text message that is not allowed", now);
+    return refuse(connection, error, long_text ? CloseCode::too_large : CloseCode::refused);
 }
 
-Result<Hub::Viewer> Hub::watch(const std::string& name, std::function<void()> wake, std::function<void()> gone,
+void Hub::take(Publisher publisher, const FromPublisher& message, Clock::time_point now) {
+    heard(publisher, now);
+    const auto found = connections_.find(publisher.connection);
+    auto* stream = found == connections_.end() ? nullptr : published_by(found->second);
+    if (!stream) return;
+    if (const auto* heartbeat = std::get_if<HeartbeatFromPublisher>(&message)) {
+        stream->last_heartbeat = now;
+        if (heartbeat->clock) stream->clock.tell(*heartbeat->clock, now);
+    }
+    if (const auto* stamp = std::get_if<Stamp>(&message)) stream->stamp = *stamp;
+}
+
+void Hub::heard(Publisher publisher, Clock::time_point now) {
+    const auto found = connections_.find(publisher.connection);
+    if (found == connections_.end()) return;
+    found->second.heard = now;
+    if (auto* stream = published_by(found->second)) stream->heard = now;
+}
+
+ForPublisher Hub::next(Publisher publisher) {
+    const auto found = connections_.find(publisher.connection);
+    if (found == connections_.end()) return Closing{};
+    auto& connection = found->second;
+    if (connection.closing) return *connection.closing;
+    const auto known = streams_.find(connection.stream);
+    const auto* stream = known == streams_.end() ? nullptr : &known->second;
+    if (std::exchange(connection.hello, false))
+        return Hello{.stream = connection.stream,
+                     .session = stream ? session_of(stream->header) : std::nullopt,
+                     .hubs = other_hubs_};
+    if (std::exchange(connection.key_frame, false)) return KeyFrameRequest{};
+    if (!std::exchange(connection.heartbeat, false)) return {};
+    if (!connection.admitted) return HeartbeatToPublisher{};
+    const auto& counters = stream->counters;
+    return HeartbeatToPublisher{stream->watching.size(), counters.packets, counters.bytes, counters.damaged};
+}
+
+// The connection publishes no more; the stream waits for it to come back.
+void Hub::detach(Connection& connection, const std::string& why, Clock::time_point now) {
+    if (auto* stream = published_by(connection)) {
+        stream->connection.reset();
+        stream->heard = now;
+        stream->stamp.reset();
+        tell_gone(*stream, why);
+    }
+    connection.admitted = false;
+}
+
+void Hub::leave(Publisher publisher, bool ended_stream, Clock::time_point now) {
+    const auto found = connections_.find(publisher.connection);
+    if (found == connections_.end()) return;
+    const bool published = found->second.admitted;
+    const auto name = found->second.stream;
+    detach(found->second, "the publisher's connection ended", now);
+    connections_.erase(found);
+    if (published && ended_stream) end_stream(streams_.find(name), "the publisher ended the stream");
+}
+
+// Passed on at once, or by tick() once a second has passed since the last one; unless such a frame came meanwhile.
+void Hub::ask_for_key_frame(Stream& stream, Clock::time_point now) {
+    stream.wants_key_frame = true;
+    const bool too_soon = stream.asked_for_key_frame && now - *stream.asked_for_key_frame < limits_.key_frame;
+    if (!stream.connection || too_soon) return;
+    stream.wants_key_frame = false;
+    stream.asked_for_key_frame = now;
+    ++stream.key_frame_requests;
+    ++counters_.key_frame_requests;
+    auto& connection = connections_.at(*stream.connection);
+    connection.key_frame = true;
+    connection.wake();
+}
+
+void Hub::ask_for_key_frame(const std::string& name, Clock::time_point now) {
+    if (const auto found = streams_.find(name); found != streams_.end()) ask_for_key_frame(found->second, now);
+}
+
+// ---- Viewers --------------------------------------------------------------------------------------------------------
+
+Result<Hub::Viewer> Hub::watch(const std::string& name, std::function<void()> wake, const WatchOptions& options,
                                Clock::time_point now) {
     const auto found = streams_.find(name);
-    if (found == streams_.end()) return fail(ErrorKind::bad_input, "there is no stream '" + name + "'");
+    if (found == streams_.end()) {
+        ++counters_.refused_viewers_no_stream;
+        return fail(ErrorKind::bad_input, "there is no stream '" + name + "'");
+    }
     auto& stream = found->second;
-    if (stream.broadcast.viewers() >= limits_.viewers)
+    if (stream.broadcast.viewers() >= limits_.viewers) {
+        ++counters_.refused_viewers_limit;
         return fail(ErrorKind::limit, "'" + name + "' has as many viewers as this hub serves");
-    const auto viewer = stream.broadcast.join(std::move(wake), now);
-    stream.gone[viewer] = std::move(gone);
+    }
+    const auto viewer = stream.broadcast.join(wake, now);
+    // Heartbeats of many who came at once are spread over the second.
+    const auto first = limits_.heartbeat * static_cast<int>(1 + viewer % 10) / 10;
+    stream.watching.emplace(viewer, Watching{.wake = std::move(wake),
+                                             .options = options,
+                                             .allowance = {viewer_burst, viewer_texts_each_second},
+                                             .heartbeat_at = now + first});
+    stream.watching.at(viewer).wake();
+    // What was kept was too much, or the newest frames cannot be decoded.
+    if (stream.has_frames && stream.broadcast.waiting_bytes(viewer) == 0) ask_for_key_frame(stream, now);
     return Viewer{name, stream.number, viewer};
 }
 
-// Null if it has ended.
+// Null if it has ended and its viewers have left.
 Hub::Stream* Hub::stream_of(const Viewer& viewer) {
     const auto found = streams_.find(viewer.stream);
-    return found == streams_.end() || found->second.number != viewer.number ? nullptr : &found->second;
+    if (found != streams_.end() && found->second.number == viewer.number) return &found->second;
+    const auto ended = ended_.find(viewer.number);
+    return ended == ended_.end() ? nullptr : &ended->second;
+}
+
+Hub::Watching* Hub::watching(const Viewer& viewer) {
+    auto* stream = stream_of(viewer);
+    if (!stream) return nullptr;
+    const auto found = stream->watching.find(viewer.viewer);
+    return found == stream->watching.end() ? nullptr : &found->second;
 }
 
 void Hub::leave(const Viewer& viewer) {
-    auto* stream = stream_of(viewer);
-    if (!stream) return;
-    stream->broadcast.leave(viewer.viewer);
-    stream->gone.erase(viewer.viewer);
+    if (!watching(viewer)) return;
+    auto& stream = *stream_of(viewer);
+    const auto& counters = stream.broadcast.counters(viewer.viewer);
+    counters_.dropped_frames += counters.dropped_frames;
+    counters_.fallen_behind += counters.fallen_behind;
+    stream.broadcast.leave(viewer.viewer);
+    stream.watching.erase(viewer.viewer);
+    if (stream.ended && stream.watching.empty()) ended_.erase(viewer.number);
 }
 
-SharedPacket Hub::next(const Viewer& viewer) {
-    auto* stream = stream_of(viewer);
-    return stream ? stream->broadcast.next(viewer.viewer) : nullptr;
+Result<void> Hub::take_text(const Viewer& viewer, std::string_view text, Clock::time_point now) {
+    auto* watching = this->watching(viewer);
+    if (!watching || watching->closing) return fail(ErrorKind::bad_input, "the connection has ended");
+    const auto message = read_from_viewer(text);
+    if (message && watching->allowance.take(now)) {
+        if (std::holds_alternative<KeyFrameRequest>(*message)) ask_for_key_frame(*stream_of(viewer), now);
+        return {};
+    }
+    ++counters_.refused_viewers_message;
+    const Error error = message ? Error{ErrorKind::bad_input, "too many text messages"} : message.error();
+    watching->closing =
+        Closing{text.size() > most_text_bytes ? CloseCode::too_large : CloseCode::refused, error.message};
+    watching->wake();
+    return tl::unexpected(error);
 }
 
-void Hub::tidy(Clock::time_point now) {
+ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {
+    auto* watching = this->watching(viewer);
+    if (!watching) return Closing{};
+    if (watching->closing) return *watching->closing;
+    auto& stream = *stream_of(viewer);
+    const bool texts = watching->options.texts;
+    if (std::exchange(watching->hello, false) && texts)
+        return Hello{.stream = viewer.stream, .session = session_of(stream.header), .hubs = other_hubs_};
+    if (!stream.ended && std::exchange(watching->gone, false) && texts) return Gone{stream.gone};
+    if (std::exchange(watching->heartbeat, false) && texts)
+        return HeartbeatToViewer{.published = stream.connection.has_value(),
+                                 .clock = stream.connection ? stream.clock.at(now) : std::nullopt,
+                                 .session = session_of(stream.header),
+                                 .viewers = stream.watching.size(),
+                                 .dropped = stream.broadcast.counters(viewer.viewer).dropped_frames};
+    auto packet = std::exchange(watching->behind_stamp, nullptr);
+    if (!packet) {
+        packet = stream.broadcast.next(viewer.viewer);
+        if (packet && packet->stamp && watching->options.stamps) {
+            watching->behind_stamp = packet;
+            return *packet->stamp;
+        }
+    }
+    if (packet) {
+        ++counters_.packets_out;
+        counters_.bytes_out += packet->bytes.size();
+        return packet;
+    }
+    if (!stream.ended) return {};
+    if (std::exchange(watching->gone, false) && texts) return Gone{stream.gone};
+    return Closing{CloseCode::ended, stream.gone};
+}
+
+void Hub::tell_gone(Stream& stream, const std::string& reason) {
+    stream.gone = reason;
+    for (auto& [viewer, watching] : stream.watching) {
+        watching.gone = true;
+        watching.wake();
+    }
+}
+
+// ---- The life of streams --------------------------------------------------------------------------------------------
+
+void Hub::end_stream(std::map<std::string, Stream>::iterator found, const std::string& reason) {
+    auto stream = streams_.extract(found);
+    for (const auto& listener : listeners_)
+        if (listener.ended) listener.ended(stream.key());
+    stream.mapped().ended = true;
+    tell_gone(stream.mapped(), reason);
+    if (!stream.mapped().watching.empty()) ended_.emplace(stream.mapped().number, std::move(stream.mapped()));
+}
+
+void Hub::tick(Clock::time_point now) {
+    const auto beat = [&](auto& other) {
+        if (now < other.heartbeat_at) return;
+        // Without catching up with those that were missed.
+        other.heartbeat_at = std::max(other.heartbeat_at + limits_.heartbeat, now);
+        other.heartbeat = true;
+        other.wake();
+    };
+    for (auto& [number, connection] : connections_) {
+        if (connection.closing) continue;
+        beat(connection);
+        if (now - connection.heard < limits_.publisher_silence) continue;
+        ++counters_.silent_publishers;
+        detach(connection, "the publisher has fallen silent", now);
+        connection.closing = Closing{};
+        connection.wake();
+    }
     for (auto it = streams_.begin(); it != streams_.end();) {
         auto& stream = it->second;
-        if (stream.connection || now - stream.heard <= limits_.remembered_without_publisher) {
-            ++it;
-            continue;
-        }
-        const auto gone = std::move(stream.gone);
-        it = streams_.erase(it);
-        for (const auto& [viewer, tell] : gone) tell();
+        for (auto& [viewer, watching] : stream.watching) beat(watching);
+        if (stream.wants_key_frame) ask_for_key_frame(stream, now);
+        const auto found = it++;
+        if (!stream.connection && now - stream.heard > limits_.remembered_without_publisher)
+            end_stream(found, "the stream has ended");
     }
 }
 
-std::vector<StreamInfo> Hub::streams() const {
-    std::vector<StreamInfo> out;
-    for (const auto& [name, stream] : streams_) {
-        StreamInfo info{name,
-                        stream.connection.has_value(),
-                        stream.broadcast.viewers(),
-                        stream.counters,
-                        stream.broadcast.undecodable_frames(),
-                        0};
-        for (const auto& [viewer, tell] : stream.gone)
-            info.dropped_frames += stream.broadcast.counters(viewer).dropped_frames;
-        out.push_back(std::move(info));
+void Hub::close_all(CloseCode code, const std::string& reason) {
+    const auto close = [&](auto& other) {
+        other.closing = Closing{code, reason};
+        other.wake();
+    };
+    for (auto& [number, connection] : connections_) close(connection);
+    for (auto& [name, stream] : streams_)
+        for (auto& [viewer, watching] : stream.watching) close(watching);
+    for (auto& [number, stream] : ended_)
+        for (auto& [viewer, watching] : stream.watching) close(watching);
+}
+
+// ---- What is told ---------------------------------------------------------------------------------------------------
+
+StreamInfo Hub::info(const std::string& name, const Stream& stream, Clock::time_point now) const {
+    const auto since = [&](const std::optional<Clock::time_point>& then) {
+        return then ? std::optional(std::chrono::duration_cast<std::chrono::milliseconds>(now - *then)) : std::nullopt;
+    };
+    StreamInfo out{.name = name,
+                   .published = stream.connection.has_value(),
+                   .viewers = stream.watching.size(),
+                   .publisher = stream.counters,
+                   .undecodable_frames = stream.broadcast.undecodable_frames(),
+                   .kept_bytes = stream.broadcast.kept_bytes(),
+                   .key_frame_requests = stream.key_frame_requests,
+                   .header = stream.header,
+                   .clock = stream.connection ? stream.clock.at(now) : std::nullopt,
+                   .since_packet = since(stream.last_packet),
+                   .since_heartbeat = since(stream.last_heartbeat)};
+    for (const auto& [viewer, watching] : stream.watching) {
+        out.dropped_frames += stream.broadcast.counters(viewer).dropped_frames;
+        out.queue_bytes += stream.broadcast.waiting_bytes(viewer);
     }
+    return out;
+}
+
+std::vector<StreamInfo> Hub::streams(Clock::time_point now) const {
+    std::vector<StreamInfo> out;
+    for (const auto& [name, stream] : streams_) out.push_back(info(name, stream, now));
+    return out;
+}
+
+HubCounters Hub::counters() const {
+    auto out = counters_;
+    const auto add = [&](const Stream& stream) {
+        for (const auto& [viewer, watching] : stream.watching) {
+            out.dropped_frames += stream.broadcast.counters(viewer).dropped_frames;
+            out.fallen_behind += stream.broadcast.counters(viewer).fallen_behind;
+        }
+    };
+    for (const auto& [name, stream] : streams_) add(stream);
+    for (const auto& [number, stream] : ended_) add(stream);
     return out;
 }
 

@@ -1,32 +1,43 @@
 // The live streams of a server: who publishes them, and who watches. A publisher sends packets as they stand in a file;
 // the first is a sequence header, and its checksum tells one session from another. Of packets only headers and
-// checksums are read.
+// checksums are read, and of sequence headers what they tell of the stream.
 //
 // A publisher whose connection broke comes back with the same session and goes on. Another session takes the stream
 // over only once the old one has been silent for a while, so two publishers never mix.
+//
+// There is no network here: a server passes on what connections say, calls tick(), and writes for each connection what
+// next() gives: packets, and the text messages of live/control.h. Texts are made when they are written, so none waits
+// in a queue, and they come before packets that wait.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
 #include "htvm/result.hpp"
 #include "live/broadcast.h"
+#include "live/control.h"
 
 namespace htvm::live {
 
 struct HubLimits {
     BroadcastLimits broadcast{};
     std::size_t streams = 256;
-    std::size_t viewers = 4096;                        // of one stream
-    std::size_t packet_bytes = std::size_t{16} << 20;  // of one packet
-    std::chrono::milliseconds silence{2000};           // after which another session may take a stream over
+    std::size_t viewers = 4096;                         // of one stream
+    std::size_t packet_bytes = std::size_t{16} << 20;   // of one packet
+    std::chrono::milliseconds silence{2000};            // after which another session may take a stream over
+    std::chrono::milliseconds publisher_silence{3000};  // after which its connection is ended
     std::chrono::milliseconds remembered_without_publisher{10000};  // then the stream is gone
+    std::chrono::milliseconds heartbeat{1000};                      // from one to the next
+    std::chrono::milliseconds key_frame{1000};  // at least, from one request to a publisher to the next
 };
 
 struct PublisherCounters {
@@ -41,7 +52,80 @@ struct StreamInfo {
     std::size_t viewers = 0;
     PublisherCounters publisher;
     std::uint64_t undecodable_frames = 0;
-    std::uint64_t dropped_frames = 0;  // for viewers who still watch
+    std::uint64_t dropped_frames = 0;      // for viewers who still watch
+    std::size_t queue_bytes = 0;           // waiting for viewers
+    std::size_t kept_bytes = 0;            // for those who may still join
+    std::uint64_t key_frame_requests = 0;  // passed to publishers
+    // As the sequence header tells it; none if it cannot be read. Frames a second as a fraction.
+    struct Header {
+        std::uint64_t session = 0;  // 0: none
+        std::uint32_t fps_numerator = 0, fps_denominator = 1;
+    };
+    std::optional<Header> header;
+    std::optional<std::int64_t> clock;                         // the publisher's now, microseconds
+    std::optional<std::chrono::milliseconds> since_packet;     // since the last one
+    std::optional<std::chrono::milliseconds> since_heartbeat;  // since the publisher's last one
+};
+
+// Since the hub began, over all streams, also those that ended.
+struct HubCounters {
+    std::uint64_t packets_in = 0, bytes_in = 0, packets_out = 0, bytes_out = 0;
+    std::uint64_t damaged_messages = 0;
+    std::uint64_t undecodable_frames = 0;  // not sent to anybody: what they refer to did not come
+    std::uint64_t dropped_frames = 0;      // not sent to viewers who were too slow
+    std::uint64_t fallen_behind = 0;       // how often viewers were
+    std::uint64_t key_frame_requests = 0;  // passed to publishers
+    std::uint64_t refused_publishers_busy = 0, refused_publishers_limit = 0, refused_publishers_message = 0;
+    std::uint64_t refused_viewers_no_stream = 0, refused_viewers_limit = 0, refused_viewers_message = 0;
+    std::uint64_t silent_publishers = 0;  // whose connections were ended
+};
+
+// The publisher's clock, carried on by our own. What it tells is late by the time on the way, which varies: of the last
+// few times the one that was least late counts.
+class PublisherClock {
+public:
+    using Clock = Broadcast::Clock;
+    void tell(std::int64_t clock_us, Clock::time_point now);
+    void forget() { ahead_us_.clear(); }
+    std::optional<std::int64_t> at(Clock::time_point now) const;
+
+private:
+    std::deque<std::int64_t> ahead_us_;  // of our clock
+};
+
+// Bounds how many text messages a connection may send: so many at once, and so many a second.
+class TextAllowance {
+public:
+    using Clock = Broadcast::Clock;
+    TextAllowance(double burst, double each_second) : burst_(burst), each_second_(each_second), left_(burst) {}
+    // Whether one more is allowed.
+    bool take(Clock::time_point now);
+
+private:
+    double burst_, each_second_, left_;
+    Clock::time_point last_{};
+};
+
+// The end of a connection.
+struct Closing {
+    std::optional<CloseCode> code;  // none: the line is dead; nothing can be said
+    std::string reason{};
+};
+
+// What to write to a connection next; monostate: nothing for now. After Closing nothing comes.
+using ForPublisher = std::variant<std::monostate, Hello, HeartbeatToPublisher, KeyFrameRequest, Closing>;
+using ForViewer = std::variant<std::monostate, SharedPacket, Hello, HeartbeatToViewer, Gone, Stamp, Closing>;
+
+struct WatchOptions {
+    bool texts = true;    // false: packets only, as in an endless body
+    bool stamps = false;  // the publisher's stamps, before the packets that they are of
+};
+
+// Who is told what happens to the streams, at once.
+struct HubListener {
+    // A packet went to the viewers; those that nobody could decode do not.
+    std::function<void(const std::string& stream, const SharedPacket& packet, Broadcast::Clock::time_point now)> sent{};
+    std::function<void(const std::string& stream)> ended{};
 };
 
 class Hub {
@@ -58,50 +142,108 @@ public:
 
     explicit Hub(const HubLimits& limits = {}) : limits_(limits) {}
 
-    // A connection that wants to publish under this name. taken_over: called with a sentence when another connection
-    // goes on with the stream; this one is of no use any more. limit: there are too many streams.
-    Result<Publisher> publish(const std::string& name, std::function<void(const std::string&)> taken_over);
-    // The publisher's next message: one packet. A damaged one is counted and left out. bad_input: the first packet is
-    // no sequence header, or the stream belongs to another session that was heard of lately; the sentence is meant for
-    // the publisher, whose connection ends.
+    // A connection that wants to publish under this name. wake: called when there is something for it to be written
+    // after there was nothing. limit: there are too many streams.
+    Result<Publisher> publish(const std::string& name, std::function<void()> wake, Clock::time_point now);
+    // The publisher's next message: one packet. A damaged one is counted and left out. An error ends the connection,
+    // which next() says too: the first packet is no sequence header, the stream belongs to another session that was
+    // heard of lately, or there are too many streams.
     Result<void> take(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now);
-    void leave(Publisher publisher, Clock::time_point now);
+    // A text message. Likewise an error if it is none, too long, or one of too many.
+    Result<void> take_text(Publisher publisher, std::string_view text, Clock::time_point now);
+    void take(Publisher publisher, const FromPublisher& message, Clock::time_point now);
+    // A part of a message came: the line is alive.
+    void heard(Publisher publisher, Clock::time_point now);
+    ForPublisher next(Publisher publisher);
+    // The connection ended. ended_stream: the publisher said that the stream ended with it; its viewers are sent what
+    // waits for them, and their connections end. Otherwise it may come back.
+    void leave(Publisher publisher, bool ended_stream, Clock::time_point now);
 
-    // bad_input: there is no such stream; limit: it has too many viewers. wake: see Broadcast::join(). gone: called
-    // when the stream ends.
-    Result<Viewer> watch(const std::string& name, std::function<void()> wake, std::function<void()> gone,
+    // bad_input: there is no such stream; limit: it has too many viewers. wake: as for publish().
+    Result<Viewer> watch(const std::string& name, std::function<void()> wake, const WatchOptions& options,
                          Clock::time_point now);
+    // A text message; an error ends the connection.
+    Result<void> take_text(const Viewer& viewer, std::string_view text, Clock::time_point now);
+    ForViewer next(const Viewer& viewer, Clock::time_point now);
     void leave(const Viewer& viewer);
-    SharedPacket next(const Viewer& viewer);
 
-    // Ends streams that have been without a publisher for too long; to be called every second or so.
-    void tidy(Clock::time_point now);
+    // Heartbeats, silent publishers, and the end of streams that have been without a publisher for too long; to be
+    // called ten times a second.
+    void tick(Clock::time_point now);
 
-    std::vector<StreamInfo> streams() const;
+    // Asks the publisher of the stream for a frame that can be decoded by itself, at once or as soon as it may be
+    // asked again; unless such a frame comes before.
+    void ask_for_key_frame(const std::string& name, Clock::time_point now);
+    // It may ask for a key frame meanwhile, and must not change anything else.
+    void listen(HubListener listener) { listeners_.push_back(std::move(listener)); }
+    // Addresses of other hubs, for those who connect from now on.
+    void name_other_hubs(std::vector<std::string> addresses) { other_hubs_ = std::move(addresses); }
+    // Ends every connection.
+    void close_all(CloseCode code, const std::string& reason);
+
+    std::vector<StreamInfo> streams(Clock::time_point now) const;
+    HubCounters counters() const;
     const HubLimits& limits() const { return limits_; }
 
 private:
+    struct Watching {
+        std::function<void()> wake;
+        WatchOptions options;
+        TextAllowance allowance;
+        bool hello = true, heartbeat = false, gone = false;  // to be written
+        Clock::time_point heartbeat_at{};                    // the next one
+        SharedPacket behind_stamp{};                         // its stamp was written
+        std::optional<Closing> closing{};
+    };
     struct Stream {
         std::uint64_t number = 0;
         Broadcast broadcast;
         std::optional<std::uint64_t> connection;  // of the publisher, one of connections_, if it was admitted
-        std::uint32_t session = 0;                // checksum of its sequence header
+        std::optional<std::uint32_t> session;     // checksum of its sequence header
+        std::optional<StreamInfo::Header> header{};
         Clock::time_point heard{};
         PublisherCounters counters;
-        std::map<Broadcast::Viewer, std::function<void()>> gone;  // of each viewer
+        PublisherClock clock;
+        std::optional<Clock::time_point> last_packet{}, last_heartbeat{};
+        std::optional<Stamp> stamp{};  // of the frame that comes next
+        bool has_frames = false;       // some of this session came
+        bool wants_key_frame = false;  // once it may be asked for
+        std::optional<Clock::time_point> asked_for_key_frame{};
+        std::uint64_t key_frame_requests = 0;
+        bool ended = false;
+        std::string gone;  // why its publisher, or the stream, is gone
+        std::map<Broadcast::Viewer, Watching> watching;
     };
     struct Connection {
         std::string stream;
+        std::function<void()> wake;
+        TextAllowance allowance;
+        Clock::time_point heard{};
         bool admitted = false;
-        std::function<void(const std::string&)> taken_over;
+        bool hello = true, heartbeat = false, key_frame = false;  // to be written
+        Clock::time_point heartbeat_at{};
+        std::optional<Closing> closing{};
     };
     Stream* stream_of(const Viewer& viewer);
+    Watching* watching(const Viewer& viewer);
+    Stream* published_by(const Connection& connection);
     Result<void> admit(std::uint64_t number, Connection& connection, const PacketHeader& header, Clock::time_point now);
+    Result<void> refuse(Connection& connection, const Error& error, CloseCode code);
+    void detach(Connection& connection, const std::string& why, Clock::time_point now);
+    void begin_session(Stream& stream, const PacketHeader& header, std::span<const std::uint8_t> message);
+    void ask_for_key_frame(Stream& stream, Clock::time_point now);
+    void tell_gone(Stream& stream, const std::string& reason);
+    void end_stream(std::map<std::string, Stream>::iterator stream, const std::string& reason);
+    StreamInfo info(const std::string& name, const Stream& stream, Clock::time_point now) const;
 
     HubLimits limits_;
     std::map<std::string, Stream> streams_;
+    std::map<std::uint64_t, Stream> ended_;  // by number: until their last viewers have been sent what waits
     std::map<std::uint64_t, Connection> connections_;
     std::uint64_t next_connection_ = 0, next_stream_ = 0;
+    std::vector<std::string> other_hubs_;
+    std::vector<HubListener> listeners_;
+    HubCounters counters_;  // but for dropped_frames and fallen_behind of those who still watch
 };
 
 }  // namespace htvm::live

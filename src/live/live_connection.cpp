@@ -15,7 +15,12 @@
 #include <boost/beast/websocket.hpp>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
 #include <utility>
+
+#include "live/http_request.h"
 
 namespace htvm::live {
 namespace {
@@ -29,7 +34,7 @@ constexpr auto awaited = net::as_tuple(net::use_awaitable);
 
 // A viewer who pauses for some seconds comes back; a line that is dead does not.
 constexpr std::chrono::seconds silence{30}, handshake{10};
-constexpr std::size_t control_bytes = 4096;  // of a message that is no packet
+constexpr std::size_t piece_bytes = 65536;  // of a message that is being read
 
 // The kernel must not hide how slow a viewer is: of what it takes, little may lie unsent.
 void keep_kernel_buffers_small(Line& line) {
@@ -41,17 +46,12 @@ void keep_kernel_buffers_small(Line& line) {
     ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
 }
 
-// What a viewer's coroutine waits for: packets, or the end.
+// What a coroutine that writes waits for: that there is something to write, or the end.
 struct News {
-    net::steady_timer timer;  // cancelled when there are some
-    bool ended = false;
-    std::string reason{};  // why, for the other side
+    net::steady_timer timer;                          // cancelled when there is
+    bool ended = false;                               // the connection is of no use any more
+    std::optional<websocket::close_reason> theirs{};  // if the other side closed it
     explicit News(const net::any_io_executor& executor) : timer(executor) {}
-    void end(const std::string& why) {
-        if (reason.empty()) reason = why;
-        ended = true;
-        timer.cancel();
-    }
     net::awaitable<void> wait() {
         timer.expires_at(std::chrono::steady_clock::time_point::max());
         co_await timer.async_wait(awaited);
@@ -80,20 +80,75 @@ net::awaitable<bool> accepted(Connection& connection, const LiveRequest& request
     co_return !error;
 }
 
-net::awaitable<void> close(SharedConnection connection, websocket::close_code code, std::string reason) {
+net::awaitable<void> close(Connection& connection, CloseCode code, const std::string& reason) {
     constexpr std::size_t longest_reason = 120;
-    co_await connection->socket.async_close(websocket::close_reason(code, reason.substr(0, longest_reason)), awaited);
+    const websocket::close_reason why(static_cast<websocket::close_code>(code), reason.substr(0, longest_reason));
+    co_await connection.socket.async_close(why, awaited);
 }
 
-// Reads what a viewer sends, so that pings and the end of the connection are noticed.
-net::awaitable<void> listen_to_viewer(SharedConnection connection) {
-    beast::flat_buffer buffer(control_bytes);
-    for (;;) {
+// Reads messages until the connection ends or take(text, bytes) says that it should. heard: called for each piece.
+template <class Take, class Heard>
+net::awaitable<void> read_messages(SharedConnection connection, std::size_t largest_text, Take take, Heard heard) {
+    auto& socket = connection->socket;
+    beast::flat_buffer buffer;
+    for (bool wanted = true; wanted;) {
         buffer.clear();
-        const auto [error, bytes] = co_await connection->socket.async_read(buffer, awaited);
-        if (error) break;
+        beast::error_code failed;
+        do {
+            const auto [error, bytes] = co_await socket.async_read_some(buffer, piece_bytes, awaited);
+            failed = error;
+            heard();
+        } while (!failed && !socket.is_message_done() && !(socket.got_text() && buffer.size() > largest_text));
+        if (failed == websocket::error::closed) connection->news.theirs = socket.reason();
+        if (failed) {
+            connection->news.ended = true;
+            break;
+        }
+        wanted =
+            take(socket.got_text(), std::span(static_cast<const std::uint8_t*>(buffer.cdata().data()), buffer.size()));
     }
-    connection->news.end("");
+    connection->news.timer.cancel();
+}
+
+std::string_view text_of(std::span<const std::uint8_t> bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+// One writer writes texts and packets, one after the other.
+net::awaitable<bool> write(Connection& connection, bool text, net::const_buffer message) {
+    connection.socket.text(text);
+    const auto [error, bytes] = co_await connection.socket.async_write(message, awaited);
+    co_return !error;
+}
+
+// Writes what the hub has for the connection until it ends; next() gives that. Packets are shared, texts are made here.
+template <class Next>
+net::awaitable<void> write_messages(Connection& connection, Next next) {
+    auto& news = connection.news;
+    while (!news.ended) {
+        const auto message = next();
+        if (std::holds_alternative<std::monostate>(message)) {
+            co_await news.wait();
+            continue;
+        }
+        if (const auto* closing = std::get_if<Closing>(&message)) {
+            if (closing->code) co_await close(connection, *closing->code, closing->reason);
+            break;
+        }
+        std::string text;
+        net::const_buffer bytes;
+        std::visit(
+            [&]<class Message>(const Message& value) {
+                if constexpr (std::is_same_v<Message, SharedPacket>)
+                    bytes = net::buffer(value->bytes);
+                else if constexpr (!std::is_same_v<Message, std::monostate> && !std::is_same_v<Message, Closing>)
+                    bytes = net::buffer(text = write_text(value));
+            },
+            message);
+        if (!co_await write(connection, !text.empty(), bytes)) break;
+    }
+    // The reader ends with the line.
+    beast::get_lowest_layer(connection.socket).close();
 }
 
 // Takes leave of the hub however the coroutine ends: when the server stops, it is destroyed where it waits.
@@ -105,76 +160,61 @@ struct Leave {
     ~Leave() { leave(); }
 };
 
-// news: lives as long as the owner that it is shared with.
-Result<Hub::Viewer> watch(Hub& hub, const std::string& name, const std::shared_ptr<News>& news) {
-    return hub.watch(
-        name, [news] { news->timer.cancel(); }, [news] { news->end("the stream has ended"); }, Hub::Clock::now());
-}
-
 }  // namespace
 
 net::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::string name, Hub& hub) {
     const auto connection = std::make_shared<Connection>(std::move(line));
-    auto& socket = connection->socket;
-    const std::size_t largest = hub.limits().packet_bytes + packet_overhead;
-    if (!co_await accepted(*connection, request, largest)) co_return;
-    const std::weak_ptr<Connection> mine = connection;
-    const auto publisher = hub.publish(name, [mine](const std::string& reason) {
-        const auto replaced = mine.lock();
-        if (!replaced) return;
-        net::co_spawn(replaced->socket.get_executor(), close(replaced, websocket::close_code::policy_error, reason),
-                      net::detached);
-    });
+    if (!co_await accepted(*connection, request, hub.limits().packet_bytes + packet_overhead)) co_return;
+    auto& news = connection->news;
+    const auto publisher = hub.publish(
+        name, [&news] { news.timer.cancel(); }, Hub::Clock::now());
     if (!publisher) {
-        co_await close(connection, websocket::close_code::try_again_later, publisher.error().message);
+        co_await close(*connection, CloseCode::try_later, publisher.error().message);
         co_return;
     }
-    const Leave leave([&hub, &publisher] { hub.leave(*publisher, Hub::Clock::now()); });
-    beast::flat_buffer buffer(largest);
-    for (;;) {
-        buffer.clear();
-        const auto [error, bytes] = co_await socket.async_read(buffer, awaited);
-        if (error) break;
-        if (!socket.got_binary()) continue;
-        const auto* begin = static_cast<const std::uint8_t*>(buffer.cdata().data());
-        const auto taken = hub.take(*publisher, {begin, begin + bytes}, Hub::Clock::now());
-        if (taken) continue;
-        co_await close(connection, websocket::close_code::policy_error, taken.error().message);
-        break;
-    }
+    const Leave leave([&hub, &news, &publisher] {
+        const bool ended_stream = news.theirs && news.theirs->code == websocket::close_code::normal;
+        hub.leave(*publisher, ended_stream, Hub::Clock::now());
+    });
+    const auto take = [&hub, number = *publisher](bool text, std::span<const std::uint8_t> message) {
+        const auto now = Hub::Clock::now();
+        return (text ? hub.take_text(number, text_of(message), now)
+                     : hub.take(number, {message.begin(), message.end()}, now))
+            .has_value();
+    };
+    const auto heard = [&hub, number = *publisher] { hub.heard(number, Hub::Clock::now()); };
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, most_text_bytes, take, heard),
+                  net::detached);
+    co_await write_messages(*connection, [&] { return hub.next(*publisher); });
 }
 
 net::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string name, Hub& hub) {
     keep_kernel_buffers_small(line);
     const auto connection = std::make_shared<Connection>(std::move(line));
-    auto& socket = connection->socket;
-    if (!co_await accepted(*connection, request, control_bytes)) co_return;
+    if (!co_await accepted(*connection, request, most_text_bytes)) co_return;
+    const WatchOptions options{.stamps = query_value(request.target(), "stamps").has_value()};
     auto& news = connection->news;
-    const auto viewer = watch(hub, name, {connection, &news});
+    const auto viewer = hub.watch(
+        name, [&news] { news.timer.cancel(); }, options, Hub::Clock::now());
     if (!viewer) {
-        co_await close(connection, websocket::close_code::policy_error, viewer.error().message);
+        co_await close(*connection, CloseCode::try_later, viewer.error().message);
         co_return;
     }
     const Leave leave([&hub, &viewer] { hub.leave(*viewer); });
-    net::co_spawn(socket.get_executor(), listen_to_viewer(connection), net::detached);
-    socket.binary(true);
-    while (!news.ended) {
-        const auto packet = hub.next(*viewer);
-        if (!packet) {
-            co_await news.wait();
-            continue;
-        }
-        const auto [error, bytes] = co_await socket.async_write(net::buffer(packet->bytes), awaited);
-        if (error) break;
-    }
-    hub.leave(*viewer);  // nothing waits for it while the connection is closed
-    if (!news.reason.empty()) co_await close(connection, websocket::close_code::going_away, news.reason);
+    // What is no text counts as one: it means nothing, but a flood of it is a flood.
+    const auto take = [&hub, number = *viewer](bool text, std::span<const std::uint8_t> message) {
+        return hub.take_text(number, text ? text_of(message) : R"({"type":"binary"})", Hub::Clock::now()).has_value();
+    };
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, most_text_bytes, take, [] {}),
+                  net::detached);
+    co_await write_messages(*connection, [&] { return hub.next(*viewer, Hub::Clock::now()); });
 }
 
 net::awaitable<void> watch_by_body(Line& line, http::response<http::empty_body> header, std::string name, Hub& hub) {
     keep_kernel_buffers_small(line);
-    const auto news = std::make_shared<News>(line.get_executor());
-    const auto viewer = watch(hub, name, news);
+    News news(line.get_executor());
+    const auto viewer = hub.watch(
+        name, [&news] { news.timer.cancel(); }, {.texts = false}, Hub::Clock::now());
     const Leave leave([&hub, &viewer] {
         if (viewer) hub.leave(*viewer);
     });
@@ -191,20 +231,23 @@ net::awaitable<void> watch_by_body(Line& line, http::response<http::empty_body> 
     http::response_serializer<http::empty_body> serializer(header);
     line.next_layer().expires_after(silence);
     const auto [begun, header_bytes] = co_await http::async_write_header(line, serializer, awaited);
-    if (!viewer) co_return;
-    while (!begun && !news->ended) {
-        const auto packet = hub.next(*viewer);
+    if (!viewer || begun) co_return;
+    for (;;) {
+        const auto message = hub.next(*viewer, Hub::Clock::now());
+        if (std::holds_alternative<Closing>(message)) break;
+        const auto* packet = std::get_if<SharedPacket>(&message);
         if (!packet) {
             line.next_layer().expires_never();
-            co_await news->wait();
+            co_await news.wait();
             continue;
         }
         line.next_layer().expires_after(silence);
-        const auto [error, bytes] = co_await net::async_write(
-            line, http::make_chunk(net::const_buffer(packet->bytes.data(), packet->bytes.size())), awaited);
-        if (error) break;
+        const auto& bytes = (*packet)->bytes;
+        const auto [error, written] =
+            co_await net::async_write(line, http::make_chunk(net::const_buffer(bytes.data(), bytes.size())), awaited);
+        if (error) co_return;
     }
-    if (news->ended) co_await net::async_write(line, http::make_chunk_last(), awaited);
+    co_await net::async_write(line, http::make_chunk_last(), awaited);
 }
 
 }  // namespace htvm::live

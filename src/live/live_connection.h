@@ -1,6 +1,7 @@
 // The connections over which live streams come and go. One binary message of a WebSocket is one packet as it stands in
-// a file (subprotocol htvm.1); an endless HTTP body is the same packets one after the other, for proxies that block
-// WebSockets. Each coroutine runs until its connection ends, and all run on one thread.
+// a file (subprotocol htvm.1), text messages are those of live/control.h; an endless HTTP body is the same packets one
+// after the other, for proxies that block WebSockets. Each coroutine runs until its connection ends, and all run on one
+// thread.
 #pragma once
 
 #include <boost/asio/awaitable.hpp>

@@ -107,5 +107,14 @@ TEST(HttpRequest, TheHostOfAnOriginIsWhatFollowsItsScheme) {
     EXPECT_EQ(host_of_origin("://"), "");
 }
 
+TEST(HttpRequestTest, MembersOfAQuery) {
+    EXPECT_EQ(query_value("/watch/anna?key=2&stamps", "key"), "2");
+    EXPECT_EQ(query_value("/watch/anna?key=2&stamps", "stamps"), "");
+    EXPECT_EQ(query_value("/watch/anna?token=a%2Fb%3D=c#key=1", "token"), "a/b==c");
+    EXPECT_EQ(query_value("/a?b=1&b=2", "b"), "1");
+    for (const char* target : {"/watch/key", "/watch/anna?", "/a?monkey=1", "/a?key=%0a", "/a?key=%1", "/a#?key=1"})
+        EXPECT_EQ(query_value(target, "key"), std::nullopt) << target;
+}
+
 }  // namespace
 }  // namespace htvm::live

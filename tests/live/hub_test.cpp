@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "codec/stream/sequence.h"
+
 namespace htvm::live {
 namespace {
 
@@ -29,31 +31,81 @@ std::vector<std::uint8_t> intra(std::uint32_t frame) {
     return message(PacketKind::intra, frame, frame, referred | access);
 }
 
+std::vector<std::uint8_t> tracked(std::uint32_t frame) {
+    return message(PacketKind::tracked, frame, frame - 1, referred);
+}
+
+// A sequence header that tells something of the stream.
+std::vector<std::uint8_t> real_header(std::uint64_t session_number) {
+    internal::SequenceHeader out;
+    out.session = session_number;
+    out.fps_numerator = 25;
+    out.skeleton.joint_names = {"a", "b"};
+    out.skeleton.bones = {{0, 1}};
+    out.radii = {1};
+    return write_packet(internal::sequence_packet(out));
+}
+
 struct Fixture : testing::Test {
     Hub hub{HubLimits{.streams = 2, .viewers = 2}};
-    std::vector<std::string> told;
+    int woken = 0;
 
-    Hub::Publisher publisher(const std::string& name = "anna") {
-        auto out = hub.publish(name, [this](const std::string& reason) { told.push_back(reason); });
+    Hub::Publisher publisher(const std::string& name = "anna", Hub::Clock::time_point now = start) {
+        auto out = hub.publish(
+            name, [this] { ++woken; }, now);
         EXPECT_TRUE(out);
         return *out;
     }
-    Hub::Viewer viewer(int* gone = nullptr) {
+    // One that has begun to publish.
+    Hub::Publisher publishing(std::uint32_t session_number = 1) {
+        const auto out = publisher();
+        EXPECT_TRUE(hub.take(out, header(session_number), start));
+        return out;
+    }
+    Hub::Viewer viewer(const WatchOptions& options = {}, Hub::Clock::time_point now = start) {
         auto out = hub.watch(
-            "anna", [] {},
-            [gone] {
-                if (gone) ++*gone;
-            },
-            start);
+            "anna", [this] { ++woken; }, options, now);
         EXPECT_TRUE(out);
         return *out;
+    }
+    // All that is to be written to a viewer, up to the end of the connection or until nothing is left.
+    std::vector<ForViewer> all(const Hub::Viewer& viewer, Hub::Clock::time_point now = start) {
+        std::vector<ForViewer> out;
+        do out.push_back(hub.next(viewer, now));
+        while (!std::holds_alternative<std::monostate>(out.back()) && !std::holds_alternative<Closing>(out.back()));
+        return out;
     }
     std::vector<std::uint32_t> frames(const Hub::Viewer& viewer) {
         std::vector<std::uint32_t> out;
-        while (const auto packet = hub.next(viewer))
-            if (packet->header.kind != PacketKind::sequence) out.push_back(packet->header.frame);
+        for (const auto& message : all(viewer))
+            if (const auto* packet = std::get_if<SharedPacket>(&message))
+                if ((*packet)->header.kind != PacketKind::sequence) out.push_back((*packet)->header.frame);
         return out;
     }
+    template <class Message>
+    std::vector<Message> some(const Hub::Viewer& viewer, Hub::Clock::time_point now = start) {
+        std::vector<Message> out;
+        for (const auto& message : all(viewer, now))
+            if (const auto* one = std::get_if<Message>(&message)) out.push_back(*one);
+        return out;
+    }
+    template <class Message>
+    std::vector<Message> some(Hub::Publisher publisher) {
+        std::vector<Message> out;
+        for (;;) {
+            const auto message = hub.next(publisher);
+            if (const auto* one = std::get_if<Message>(&message)) out.push_back(*one);
+            if (std::holds_alternative<std::monostate>(message) || std::holds_alternative<Closing>(message)) return out;
+        }
+    }
+    // How the connection is closed: "CODE REASON"; "" if it is not.
+    template <class Other>
+    std::string closing(const Other& other) {
+        const auto out = some<Closing>(other);
+        if (out.empty()) return "";
+        return (out[0].code ? std::to_string(static_cast<int>(*out[0].code)) + ' ' : "dead") + out[0].reason;
+    }
+    StreamInfo info(Hub::Clock::time_point now = start) { return hub.streams(now).at(0); }
 };
 using HubTest = Fixture;
 using Frames = std::vector<std::uint32_t>;
@@ -68,15 +120,19 @@ TEST_F(HubTest, WhatIsPublishedIsWatched) {
 }
 
 TEST_F(HubTest, AStreamBeginsWithASequenceHeader) {
-    EXPECT_FALSE(hub.take(publisher(), intra(0), start));
-    EXPECT_FALSE(hub.take(publisher(), {1, 2, 3}, start));
+    const auto headless = publisher(), garbage = publisher();
+    EXPECT_FALSE(hub.take(headless, intra(0), start));
+    EXPECT_EQ(closing(headless), "1008 the first packet must be a sequence header of version 2");
+    EXPECT_FALSE(hub.take(garbage, {1, 2, 3}, start));
+    EXPECT_EQ(closing(garbage), "1008 the first message is not a packet");
     EXPECT_FALSE(hub.watch(
-        "anna", [] {}, [] {}, start));
+        "anna", [] {}, {}, start));
+    EXPECT_EQ(hub.counters().refused_publishers_message, 2u);
+    EXPECT_EQ(hub.counters().refused_viewers_no_stream, 1u);
 }
 
 TEST_F(HubTest, DamagedMessagesAreCountedAndGoNoFurther) {
-    const auto anna = publisher();
-    ASSERT_TRUE(hub.take(anna, header(1), start));
+    const auto anna = publishing();
     const auto watching = viewer();
     auto damaged = intra(0);
     damaged[40] ^= 1;
@@ -87,79 +143,363 @@ TEST_F(HubTest, DamagedMessagesAreCountedAndGoNoFurther) {
     for (const auto& wrong : {damaged, longer, shorter, std::vector<std::uint8_t>{}})
         EXPECT_TRUE(hub.take(anna, wrong, start));
     EXPECT_EQ(frames(watching), Frames{});
-    EXPECT_EQ(hub.streams()[0].publisher.damaged, 4u);
-    EXPECT_EQ(hub.streams()[0].publisher.packets, 1u);
+    EXPECT_EQ(info().publisher.damaged, 4u);
+    EXPECT_EQ(info().publisher.packets, 1u);
+    EXPECT_EQ(hub.counters().damaged_messages, 4u);
 }
 
 TEST_F(HubTest, TheSameSessionGoesOnOverAnotherConnection) {
-    const auto before = publisher();
-    ASSERT_TRUE(hub.take(before, header(1), start));
+    const auto before = publishing();
     ASSERT_TRUE(hub.take(before, intra(0), start));
     const auto watching = viewer();
     const auto again = publisher();
     ASSERT_TRUE(hub.take(again, header(1), start + 10ms));
-    EXPECT_EQ(told, std::vector<std::string>{"this session was continued by another connection"});
+    EXPECT_EQ(closing(before), "4000 this session was continued by another connection");
     EXPECT_FALSE(hub.take(before, intra(1), start + 10ms));
     ASSERT_TRUE(hub.take(again, intra(2), start + 20ms));
-    hub.leave(before, start + 30ms);  // the connection that was replaced ends nothing
-    EXPECT_TRUE(hub.streams()[0].published);
+    hub.leave(before, false, start + 30ms);  // the connection that was replaced ends nothing
+    EXPECT_TRUE(info().published);
     EXPECT_EQ(frames(watching), (Frames{0, 2}));
+    EXPECT_TRUE(some<Gone>(watching).empty());
 }
 
 TEST_F(HubTest, AnotherSessionTakesOverOnlyOnceTheOldOneIsSilent) {
-    const auto first = publisher();
-    ASSERT_TRUE(hub.take(first, header(1), start));
+    const auto first = publishing();
     const auto second = publisher();
-    const auto refused = hub.take(second, header(2), start + 1999ms);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().message, "'anna' is being published by another session; end that one, or wait");
-    ASSERT_TRUE(hub.take(publisher(), header(2), start + 2000ms));
-    EXPECT_EQ(told, std::vector<std::string>{"another session took the stream over"});
-    EXPECT_FALSE(hub.take(first, intra(0), start + 2001ms));
+    ASSERT_FALSE(hub.take(second, header(2), start + 1999ms));
+    EXPECT_EQ(closing(second), "1008 'anna' is being published by another session; end that one, or wait");
+    // A heartbeat is heard as well as a packet.
+    ASSERT_TRUE(hub.take_text(first, R"({"type":"heartbeat"})", start + 1s));
+    EXPECT_FALSE(hub.take(publisher(), header(2), start + 2999ms));
+    ASSERT_TRUE(hub.take(publisher(), header(2), start + 3s));
+    EXPECT_EQ(closing(first), "4001 another session took the stream over");
+    EXPECT_FALSE(hub.take(first, intra(0), start + 3s));
+    EXPECT_EQ(hub.counters().refused_publishers_busy, 2u);
 }
 
 TEST_F(HubTest, AfterThePublisherLeftAnotherSessionWaitsAMomentToo) {
-    const auto first = publisher();
-    ASSERT_TRUE(hub.take(first, header(1), start));
-    hub.leave(first, start + 1s);
+    const auto first = publishing();
+    hub.leave(first, false, start + 1s);
     EXPECT_FALSE(hub.take(publisher(), header(2), start + 2s));
     EXPECT_TRUE(hub.take(publisher(), header(2), start + 3s));
 }
 
-TEST_F(HubTest, AStreamWithoutAPublisherIsForgottenAndItsViewersAreTold) {
-    const auto anna = publisher();
-    ASSERT_TRUE(hub.take(anna, header(1), start));
-    int gone = 0;
-    const auto watching = viewer(&gone);
-    hub.leave(anna, start);
-    hub.tidy(start + 10s);
-    EXPECT_EQ(gone, 0);
-    hub.tidy(start + 10001ms);
-    EXPECT_EQ(gone, 1);
-    EXPECT_TRUE(hub.streams().empty());
+TEST_F(HubTest, AStreamWithoutAPublisherEndsAfterAWhile) {
+    const auto anna = publishing();
+    const auto watching = viewer();
+    hub.leave(anna, false, start);
+    const auto gone = some<Gone>(watching);
+    ASSERT_EQ(gone.size(), 1u);
+    EXPECT_EQ(gone[0].reason, "the publisher's connection ended");
+    hub.tick(start + 10s);
+    EXPECT_EQ(closing(watching), "");
+    hub.tick(start + 10001ms);
+    EXPECT_TRUE(hub.streams(start).empty());
+    EXPECT_EQ(closing(watching), "1000 the stream has ended");
     // Another stream of the same name is none of theirs.
     const auto again = publisher();
     ASSERT_TRUE(hub.take(again, header(2), start + 11s));
     const auto other = viewer();
     ASSERT_TRUE(hub.take(again, intra(0), start + 11s));
-    EXPECT_EQ(hub.next(watching), nullptr);
+    EXPECT_EQ(frames(watching), Frames{});
     hub.leave(watching);
     EXPECT_EQ(frames(other), Frames{0});
 }
 
+TEST_F(HubTest, AStreamThatItsPublisherEndedEndsWhenItsViewersHaveEverything) {
+    const auto anna = publishing();
+    const auto watching = viewer(), body = viewer({.texts = false});
+    ASSERT_TRUE(hub.take(anna, intra(0), start));
+    hub.leave(anna, true, start);
+    EXPECT_TRUE(hub.streams(start).empty());
+    auto messages = all(watching);
+    ASSERT_EQ(messages.size(), 5u);
+    EXPECT_TRUE(std::holds_alternative<Hello>(messages[0]));
+    EXPECT_EQ(std::get<SharedPacket>(messages[2])->header.kind, PacketKind::intra);
+    EXPECT_EQ(std::get<Gone>(messages[3]).reason, "the publisher ended the stream");
+    EXPECT_EQ(std::get<Closing>(messages[4]).code, CloseCode::ended);
+    messages = all(body);
+    ASSERT_EQ(messages.size(), 3u);
+    EXPECT_EQ(std::get<SharedPacket>(messages[1])->header.kind, PacketKind::intra);
+    EXPECT_EQ(std::get<Closing>(messages[2]).code, CloseCode::ended);
+    hub.leave(watching);
+    hub.leave(body);
+    EXPECT_TRUE(hub.take(publisher(), header(2), start));  // nobody has to wait
+}
+
 TEST_F(HubTest, StreamsAndViewersAreLimited) {
-    ASSERT_TRUE(hub.take(publisher("anna"), header(1), start));
+    publishing();
     const auto viewers = {viewer(), viewer()};
     EXPECT_EQ(viewers.size(), 2u);
     EXPECT_FALSE(hub.watch(
-        "anna", [] {}, [] {}, start));
+        "anna", [] {}, {}, start));
     hub.leave(*viewers.begin());
     viewer();
+    const auto carl = publisher("carl");
     ASSERT_TRUE(hub.take(publisher("ben"), header(1), start));
-    const auto third = hub.publish("carl", [](const std::string&) {});
+    const auto third = hub.publish(
+        "dora", [] {}, start);
     ASSERT_FALSE(third);
     EXPECT_EQ(third.error().kind, ErrorKind::limit);
-    EXPECT_TRUE(hub.publish("ben", [](const std::string&) {}));
+    // Of two who came while there was room for one, the second to send something is late.
+    EXPECT_FALSE(hub.take(carl, header(1), start));
+    EXPECT_EQ(closing(carl), "1013 there are as many streams as this hub carries");
+    EXPECT_TRUE(hub.publish(
+        "ben", [] {}, start));
+    EXPECT_EQ(hub.counters().refused_viewers_limit, 1u);
+    EXPECT_EQ(hub.counters().refused_publishers_limit, 2u);
+}
+
+// ---- Text messages: docs/live.md, section 2
+// ---------------------------------------------------------------------------
+
+TEST_F(HubTest, HelloComesFirst) {
+    hub.name_other_hubs({"wss://b.example"});
+    const auto anna = publisher();
+    auto hello = std::get<Hello>(hub.next(anna));
+    EXPECT_EQ(hello.version, 1u);
+    EXPECT_EQ(hello.stream, "anna");
+    EXPECT_EQ(hello.session, std::nullopt);
+    EXPECT_EQ(hello.hubs, std::vector<std::string>{"wss://b.example"});
+    EXPECT_TRUE(std::holds_alternative<std::monostate>(hub.next(anna)));
+    ASSERT_TRUE(hub.take(anna, real_header(0x1234), start));
+    ASSERT_TRUE(hub.take(anna, intra(0), start));
+    hello = std::get<Hello>(hub.next(viewer(), start));
+    EXPECT_EQ(hello.stream, "anna");
+    EXPECT_EQ(hello.session, 0x1234u);
+    EXPECT_EQ(std::get<Hello>(hub.next(publisher())).session, 0x1234u);
+    EXPECT_EQ(info().header->session, 0x1234u);
+    EXPECT_EQ(info().header->fps_numerator, 25u);
+    EXPECT_TRUE(some<Hello>(viewer({.texts = false})).empty());
+}
+
+TEST_F(HubTest, HeartbeatsGoBothWaysEachSecond) {
+    const auto anna = publisher();
+    ASSERT_TRUE(hub.take(anna, real_header(7), start));
+    const auto watching = viewer();
+    some<Hello>(anna), some<Hello>(watching);
+    std::size_t to_publisher = 0, to_viewer = 0;
+    for (auto now = start; now < start + 10s; now += 100ms) {
+        hub.heard(anna, now);
+        hub.tick(now);
+        to_publisher += some<HeartbeatToPublisher>(anna).size();
+        to_viewer += some<HeartbeatToViewer>(watching, now).size();
+    }
+    EXPECT_EQ(to_publisher, 9u);
+    EXPECT_EQ(to_viewer, 10u);
+    hub.tick(start + 10s);
+    const auto told = std::get<HeartbeatToPublisher>(hub.next(anna));
+    EXPECT_EQ(told.viewers, 1u);
+    EXPECT_EQ(told.packets, 1u);
+    EXPECT_EQ(told.bytes, real_header(7).size());
+    EXPECT_EQ(told.damaged, 0u);
+    hub.tick(start + 11s);
+    auto seen = some<HeartbeatToViewer>(watching, start + 11s).at(0);
+    EXPECT_TRUE(seen.published);
+    EXPECT_EQ(seen.clock, std::nullopt);
+    EXPECT_EQ(seen.session, 7u);
+    EXPECT_EQ(seen.viewers, 1u);
+    EXPECT_EQ(seen.dropped, 0u);
+    hub.leave(anna, false, start + 11s);
+    hub.tick(start + 12s);
+    EXPECT_FALSE(some<HeartbeatToViewer>(watching, start + 12s).at(0).published);
+}
+
+TEST_F(HubTest, ManyViewersWhoCameAtOnceAreNotAllToldAtOnce) {
+    Hub large;
+    const auto anna = large.publish(
+        "anna", [] {}, start);
+    ASSERT_TRUE(large.take(*anna, header(1), start));
+    std::vector<Hub::Viewer> viewers;
+    for (int i = 0; i < 100; ++i)
+        viewers.push_back(*large.watch(
+            "anna", [] {}, {}, start));
+    for (auto now = start + 100ms; now <= start + 1s; now += 100ms) {
+        large.tick(now);
+        int told = 0;
+        for (const auto& one : viewers)
+            for (auto message = large.next(one, now); !std::holds_alternative<std::monostate>(message);
+                 message = large.next(one, now))
+                told += std::holds_alternative<HeartbeatToViewer>(message) ? 1 : 0;
+        EXPECT_EQ(told, 10);
+    }
+}
+
+TEST_F(HubTest, ThePublishersClockGoesOnByTheHubsOwn) {
+    const auto anna = publishing();
+    const auto watching = viewer();
+    const auto clock = [&](Hub::Clock::time_point now) {
+        hub.heard(anna, now);
+        hub.tick(now);
+        const auto heartbeats = some<HeartbeatToViewer>(watching, now);
+        return heartbeats.empty() ? std::nullopt : heartbeats[0].clock;
+    };
+    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":5000000})", start + 1s));
+    EXPECT_EQ(clock(start + 1500ms), 5500000);
+    // This one was late on its way, the one after it was not.
+    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":6000000})", start + 2030ms));
+    EXPECT_EQ(clock(start + 2500ms), 6500000);
+    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":7010000})", start + 3s));
+    EXPECT_EQ(clock(start + 3500ms), 7510000);
+    // Set back.
+    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":1000000})", start + 4s));
+    EXPECT_EQ(clock(start + 4500ms), 1500000);
+    EXPECT_EQ(info(start + 5s).clock, 2000000);
+    // Another session's is another.
+    ASSERT_TRUE(hub.take(anna, header(2), start + 5s));
+    EXPECT_EQ(clock(start + 5500ms), std::nullopt);
+}
+
+TEST_F(HubTest, ASilentPublishersConnectionEndsButNotOneThatHasNoFrames) {
+    const auto silent = publishing(), without_frames = publisher("ben"), nothing = publisher("carl");
+    const auto watching = viewer();
+    ASSERT_TRUE(hub.take(without_frames, header(2), start));
+    for (auto now = start; now <= start + 2900ms; now += 100ms) hub.tick(now);
+    ASSERT_TRUE(hub.take_text(without_frames, R"({"type":"heartbeat"})", start + 2900ms));
+    EXPECT_EQ(closing(silent), "");
+    hub.tick(start + 3s);
+    EXPECT_EQ(closing(silent), "dead");
+    EXPECT_EQ(closing(nothing), "dead");
+    EXPECT_EQ(closing(without_frames), "");
+    EXPECT_FALSE(info().published);
+    EXPECT_EQ(some<Gone>(watching).at(0).reason, "the publisher has fallen silent");
+    EXPECT_EQ(hub.counters().silent_publishers, 2u);
+    // A large packet on its way is no silence.
+    hub.heard(without_frames, start + 5s);
+    hub.tick(start + 7s);
+    EXPECT_EQ(closing(without_frames), "");
+    // It comes back and goes on.
+    hub.leave(silent, false, start + 4s);
+    const auto again = publisher("anna", start + 5s);
+    ASSERT_TRUE(hub.take(again, header(1), start + 5s));
+    EXPECT_TRUE(info().published);
+}
+
+TEST_F(HubTest, AKeyFrameIsAskedForAtMostOnceASecond) {
+    const auto anna = publishing();
+    const auto watching = viewer();
+    const auto asked = [&] { return some<KeyFrameRequest>(anna).size(); };
+    const auto ask = [&](auto now) { EXPECT_TRUE(hub.take_text(watching, R"({"type":"key_frame"})", now)); };
+    EXPECT_EQ(asked(), 0u);
+    woken = 0;
+    ask(start);
+    EXPECT_EQ(woken, 1);
+    EXPECT_EQ(asked(), 1u);
+    ask(start + 500ms);
+    hub.tick(start + 900ms);
+    EXPECT_EQ(asked(), 0u);
+    hub.tick(start + 1s);  // it was not forgotten
+    EXPECT_EQ(asked(), 1u);
+    // What comes meanwhile is what was asked for.
+    ask(start + 1500ms);
+    ASSERT_TRUE(hub.take(anna, intra(0), start + 1600ms));
+    hub.tick(start + 2s);
+    EXPECT_EQ(asked(), 0u);
+    EXPECT_EQ(info().key_frame_requests, 2u);
+}
+
+TEST_F(HubTest, WhereNoFrameCanBeDecodedAKeyFrameIsAskedFor) {
+    const auto anna = publishing();
+    for (std::uint32_t frame : {0u, 1u, 2u}) ASSERT_TRUE(hub.take(anna, frame == 0 ? intra(0) : tracked(frame), start));
+    const auto watching = viewer();
+    hub.leave(anna, false, start);
+    // It comes back and knows nothing of a gap: what the hub keeps is enough to go on.
+    const auto again = publisher();
+    ASSERT_TRUE(hub.take(again, header(1), start));
+    ASSERT_TRUE(hub.take(again, tracked(3), start));
+    EXPECT_TRUE(some<KeyFrameRequest>(again).empty());
+    // Frame 4 was lost.
+    ASSERT_TRUE(hub.take(again, tracked(5), start));
+    EXPECT_EQ(some<KeyFrameRequest>(again).size(), 1u);
+    ASSERT_TRUE(hub.take(again, tracked(6), start + 100ms));
+    EXPECT_EQ(some<KeyFrameRequest>(again).size(), 0u);
+    ASSERT_TRUE(hub.take(again, intra(7), start + 200ms));
+    ASSERT_TRUE(hub.take(again, tracked(8), start + 300ms));
+    EXPECT_EQ(frames(watching), (Frames{0, 1, 2, 3, 7, 8}));
+    EXPECT_EQ(hub.counters().undecodable_frames, 2u);
+}
+
+TEST_F(HubTest, APublisherWhoComesBackMaySendAgainWhatWasKept) {
+    const auto before = publishing();
+    for (std::uint32_t frame : {0u, 1u}) ASSERT_TRUE(hub.take(before, frame == 0 ? intra(0) : tracked(frame), start));
+    const auto watching = viewer();
+    const auto again = publisher();
+    ASSERT_TRUE(hub.take(again, header(1), start));
+    for (std::uint32_t frame : {0u, 1u, 2u, 3u})  // 2 was lost with the first connection
+        ASSERT_TRUE(hub.take(again, frame == 0 ? intra(0) : tracked(frame), start));
+    EXPECT_EQ(frames(watching), (Frames{0, 1, 2, 3}));
+    EXPECT_TRUE(some<KeyFrameRequest>(again).empty());
+}
+
+TEST_F(HubTest, AListenerIsToldWhatWentToTheViewers) {
+    Frames sent;
+    std::vector<std::string> ended;
+    hub.listen({.sent = [&](const std::string& stream, const SharedPacket& packet,
+                            auto) { sent.push_back(stream == "anna" ? packet->header.frame : 999); },
+                .ended = [&](const std::string& stream) { ended.push_back(stream); }});
+    const auto anna = publishing();
+    for (const auto& one : {intra(0), intra(0), tracked(1), tracked(3), tracked(4), intra(5)})
+        ASSERT_TRUE(hub.take(anna, one, start));
+    EXPECT_EQ(sent, (Frames{0, 0, 1, 5}));  // the header's, which is 0, and those that can be decoded, once
+    EXPECT_TRUE(ended.empty());
+    hub.leave(anna, true, start);
+    EXPECT_EQ(ended, std::vector<std::string>{"anna"});
+}
+
+TEST_F(HubTest, StampsGoToThoseWhoAskedRightBeforeTheirPackets) {
+    const auto anna = publishing();
+    const auto with = viewer({.stamps = true}), without = viewer();
+    frames(with), frames(without);
+    ASSERT_TRUE(hub.take_text(anna, R"({"type":"stamp","frame":0,"sent":123})", start));
+    ASSERT_TRUE(hub.take(anna, intra(0), start));
+    ASSERT_TRUE(hub.take(anna, tracked(1), start));
+    ASSERT_TRUE(hub.take_text(anna, R"({"type":"stamp","frame":9,"sent":124})", start));  // not of the next frame
+    ASSERT_TRUE(hub.take(anna, tracked(2), start));
+    const auto messages = all(with);
+    ASSERT_EQ(messages.size(), 6u);
+    const auto stamp = std::get<Stamp>(messages[1]);
+    EXPECT_EQ(stamp.frame, 0u);
+    EXPECT_EQ(stamp.sent, 123);
+    EXPECT_GT(*stamp.hub, 1700000000000000);
+    EXPECT_EQ(std::get<SharedPacket>(messages[2])->header.kind, PacketKind::intra);
+    EXPECT_EQ(std::get<SharedPacket>(messages[3])->header.frame, 1u);
+    EXPECT_TRUE(some<Stamp>(without).empty());
+    EXPECT_EQ(hub.counters().packets_out, 8u);
+}
+
+TEST_F(HubTest, TextsComeBeforePacketsThatWait) {
+    const auto anna = publishing();
+    const auto watching = viewer();
+    for (std::uint32_t frame : {0u, 1u, 2u}) ASSERT_TRUE(hub.take(anna, frame == 0 ? intra(0) : tracked(frame), start));
+    hub.tick(start + 1s);
+    const auto messages = all(watching);
+    EXPECT_TRUE(std::holds_alternative<Hello>(messages[0]));
+    EXPECT_TRUE(std::holds_alternative<HeartbeatToViewer>(messages[1]));
+    EXPECT_TRUE(std::holds_alternative<SharedPacket>(messages[2]));
+}
+
+TEST_F(HubTest, WhoFloodsTextOrSendsWhatIsNoMessageIsClosed) {
+    const auto anna = publishing();
+    const auto flooding = viewer(), calm = viewer();
+    for (int i = 0; i < 50; ++i) ASSERT_TRUE(hub.take_text(flooding, R"({"type":"x"})", start));
+    EXPECT_FALSE(hub.take_text(flooding, R"({"type":"x"})", start));
+    EXPECT_EQ(closing(flooding), "1008 too many text messages");
+    for (int i = 0; i < 1000; ++i) ASSERT_TRUE(hub.take_text(calm, R"({"type":"x"})", start + i * 100ms));
+    EXPECT_FALSE(hub.take_text(calm, "hello", start));
+    EXPECT_EQ(closing(calm), "1008 the text message is not a JSON object");
+    EXPECT_FALSE(hub.take_text(anna, std::string(5000, ' '), start));
+    EXPECT_EQ(closing(anna), "1009 the text message is longer than 4096 bytes");
+    EXPECT_FALSE(info().published);
+    EXPECT_EQ(hub.counters().refused_viewers_message, 2u);
+    EXPECT_EQ(hub.counters().refused_publishers_message, 1u);
+}
+
+TEST_F(HubTest, AHubThatShutsDownTellsEverybody) {
+    const auto anna = publishing();
+    const auto watching = viewer();
+    hub.close_all(CloseCode::shut_down, "the hub shuts down");
+    EXPECT_EQ(closing(anna), "1001 the hub shuts down");
+    EXPECT_EQ(closing(watching), "1001 the hub shuts down");
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
+#include <boost/beast/core/buffers_to_string.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
 #include <filesystem>
@@ -43,6 +44,10 @@ Packet tracked(std::uint32_t frame, std::size_t bytes = 100) {
 
 class LiveConnectionTest : public testing::Test {
 protected:
+    // Publishers may pause, unless a test is of that.
+    LiveConnectionTest()
+        : LiveConnectionTest(HubLimits{.streams = 2, .publisher_silence = std::chrono::seconds(600)}) {}
+    explicit LiveConnectionTest(const HubLimits& limits) : hub(limits) { options.connections_per_address = 300; }
     void SetUp() override {
         options.folder = std::filesystem::temp_directory_path().string();
         options.hub = &hub;
@@ -69,28 +74,47 @@ protected:
             stream.binary(true);
             stream.write(net::buffer(bytes));
         }
-        // The next packet's header; why the server closed the connection, if it did.
-        std::optional<PacketHeader> next(std::string* reason = nullptr) {
+        void say(const std::string& text) {
+            stream.text(true);
+            stream.write(net::buffer(text));
+        }
+        // The next message of either sort; nothing once the server has closed the connection.
+        std::optional<std::string> read() {
             beast::flat_buffer buffer;
             beast::error_code error;
-            const auto bytes = stream.read(buffer, error);
-            if (error) {
-                if (reason) *reason = std::string(stream.reason().reason.c_str());
-                return std::nullopt;
-            }
+            stream.read(buffer, error);
+            if (error) return std::nullopt;
+            return beast::buffers_to_string(buffer.data());
+        }
+        // The next packet; texts on the way are passed over.
+        std::optional<std::string> next_bytes() {
+            auto message = read();
+            while (message && stream.got_text()) message = read();
+            return message;
+        }
+        std::optional<PacketHeader> next() {
+            const auto message = next_bytes();
+            if (!message) return std::nullopt;
             std::uint32_t payload = 0;
-            const auto* begin = static_cast<const std::uint8_t*>(buffer.cdata().data());
-            return read_packet_header({begin, bytes}, payload);
+            return read_packet_header({reinterpret_cast<const std::uint8_t*>(message->data()), message->size()},
+                                      payload);
+        }
+        // The next text of this type; packets and other texts on the way are passed over. "" if none comes.
+        std::string next_text(const std::string& type) {
+            for (auto message = read(); message; message = read())
+                if (stream.got_text() && message->find("\"type\":\"" + type + '"') != std::string::npos)
+                    return *message;
+            return "";
         }
         std::uint32_t next_frame() {
             const auto header = next();
             return header ? header->frame : 9999;
         }
+        // How the server closes the connection: "CODE REASON".
         std::string refusal() {
-            std::string out;
-            while (next(&out)) {
+            while (next()) {
             }
-            return out;
+            return std::to_string(stream.reason().code) + ' ' + std::string(stream.reason().reason.c_str());
         }
     };
     Socket open(const std::string& target) {
@@ -121,7 +145,7 @@ protected:
         return out;
     }
 
-    Hub hub{HubLimits{.streams = 2}};
+    Hub hub;
     FileServerOptions options;
     std::optional<FileServer> server;
     std::thread thread;
@@ -168,20 +192,20 @@ TEST_F(LiveConnectionTest, TheEndlessBodyHasTheSamePackets) {
 }
 
 TEST_F(LiveConnectionTest, WhatCannotBeIsRefusedWithAReason) {
-    EXPECT_EQ(open("/watch/nobody").refusal(), "there is no stream 'nobody'");
+    EXPECT_EQ(open("/watch/nobody").refusal(), "1013 there is no stream 'nobody'");
     EXPECT_EQ(get("/watch/nobody").substr(0, 22), "HTTP/1.1 404 Not Found");
     auto first = open("/publish/anna");
     first.send(header(1));
     wait_for_packets(1);
     auto second = open("/publish/anna");
     second.send(header(2));
-    EXPECT_EQ(second.refusal(), "'anna' is being published by another session; end that one, or wait");
+    EXPECT_EQ(second.refusal(), "1008 'anna' is being published by another session; end that one, or wait");
     auto headless = open("/publish/ben");
     headless.send(intra(0));
-    EXPECT_EQ(headless.refusal(), "the first packet must be a sequence header of version 2");
+    EXPECT_EQ(headless.refusal(), "1008 the first packet must be a sequence header of version 2");
     auto again = open("/publish/anna");
     again.send(header(1));
-    EXPECT_EQ(first.refusal(), "this session was continued by another connection");
+    EXPECT_EQ(first.refusal(), "4000 this session was continued by another connection");
     again.send(intra(0));
     wait_for_packets(3);
 }
@@ -233,17 +257,152 @@ TEST_F(LiveConnectionTest, AViewerWhoDoesNotReadDelaysNobodyAndGoesOnAtTheNewest
     EXPECT_EQ(said.find("\"dropped_frames\":0,"), std::string::npos) << said;
 }
 
-TEST_F(LiveConnectionTest, ManyViewersGetTheSame) {
+TEST_F(LiveConnectionTest, TwoHundredViewersGetExactlyWhatWasPublished) {
     auto publisher = open("/publish/anna");
     publisher.send(header(1));
     wait_for_packets(1);
     std::vector<Socket> viewers;
-    for (int i = 0; i < 50; ++i) viewers.push_back(open("/watch/anna"));
-    for (std::uint32_t i = 0; i < 10; ++i) publisher.send(i == 0 ? intra(0) : tracked(i));
-    for (auto& viewer : viewers) {
-        EXPECT_EQ(viewer.next()->kind, PacketKind::sequence);
-        for (std::uint32_t i = 0; i < 10; ++i) ASSERT_EQ(viewer.next_frame(), i);
+    for (int i = 0; i < 200; ++i) viewers.push_back(open("/watch/anna"));
+    std::vector<std::vector<std::uint8_t>> published = {write_packet(header(1))};
+    for (std::uint32_t i = 0; i < 40; ++i) {
+        const auto frame = i % 20 == 0 ? intra(i, 20000) : tracked(i, 2000);
+        publisher.send(frame);
+        published.push_back(write_packet(frame));
     }
+    for (auto& viewer : viewers)
+        for (const auto& packet : published) {
+            const auto got = viewer.next_bytes();
+            ASSERT_TRUE(got);
+            ASSERT_EQ(*got, std::string(packet.begin(), packet.end()));
+        }
+    EXPECT_NE(get("/api/streams").find("\"dropped_frames\":0,"), std::string::npos);
+}
+
+// ---- Text messages --------------------------------------------------------------------------------------------------
+
+TEST_F(LiveConnectionTest, TheHubSaysHelloAndItsHeartBeats) {
+    auto publisher = open("/publish/anna");
+    EXPECT_EQ(*publisher.read(), R"({"hubs":[],"stream":"anna","type":"hello","version":1})");
+    publisher.send(header(1));
+    publisher.send(intra(0));
+    publisher.say(R"({"type":"heartbeat","clock":1000000})");
+    wait_for_packets(2);
+    auto viewer = open("/watch/anna");
+    EXPECT_EQ(*viewer.read(), R"({"hubs":[],"stream":"anna","type":"hello","version":1})");
+    const auto to_viewer = viewer.next_text("heartbeat");
+    EXPECT_NE(to_viewer.find(R"("published":true,"type":"heartbeat","viewers":1)"), std::string::npos) << to_viewer;
+    EXPECT_NE(to_viewer.find(R"("clock":)"), std::string::npos) << to_viewer;
+    std::string to_publisher;
+    do to_publisher = publisher.next_text("heartbeat");
+    while (to_publisher.find(R"("viewers":0)") != std::string::npos);  // those from before the viewer came
+    EXPECT_NE(to_publisher.find(R"("damaged":0,"packets":2,"type":"heartbeat","viewers":1)"), std::string::npos)
+        << to_publisher;
+}
+
+TEST_F(LiveConnectionTest, AViewersRequestForAKeyFrameReachesThePublisher) {
+    auto publisher = open("/publish/anna");
+    publisher.send(header(1));
+    publisher.send(intra(0));
+    wait_for_packets(2);
+    auto viewer = open("/watch/anna");
+    viewer.say(R"({"type":"key_frame"})");
+    EXPECT_EQ(publisher.next_text("key_frame"), R"({"type":"key_frame"})");
+}
+
+TEST_F(LiveConnectionTest, StampsComeToThoseWhoAskForThem) {
+    auto publisher = open("/publish/anna");
+    publisher.send(header(1));
+    publisher.send(intra(0));
+    wait_for_packets(2);
+    auto with = open("/watch/anna?stamps"), without = open("/watch/anna");
+    EXPECT_EQ(with.next()->kind, PacketKind::sequence);
+    EXPECT_EQ(with.next_frame(), 0u);
+    publisher.say(R"({"type":"stamp","frame":1,"sent":5})");
+    publisher.send(tracked(1));
+    const auto stamp = with.next_text("stamp");
+    EXPECT_EQ(stamp.substr(0, 17), R"({"frame":1,"hub":)");
+    EXPECT_EQ(stamp.substr(stamp.size() - 25), R"(,"sent":5,"type":"stamp"})");
+    EXPECT_EQ(with.next_frame(), 1u);
+    for (std::string seen; seen.find("HTVP") == std::string::npos || seen[8] != 1; seen = *without.read())
+        EXPECT_EQ(seen.find("stamp"), std::string::npos);
+}
+
+TEST_F(LiveConnectionTest, ViewersAreToldThatAPublisherIsGoneAndWhenTheStreamEnds) {
+    auto publisher = std::make_optional(open("/publish/anna"));
+    publisher->send(header(1));
+    publisher->send(intra(0));
+    wait_for_packets(2);
+    auto viewer = open("/watch/anna");
+    publisher.reset();  // the line breaks
+    EXPECT_EQ(viewer.next_text("gone"), R"({"reason":"the publisher's connection ended","type":"gone"})");
+    std::string heartbeat;
+    do heartbeat = viewer.next_text("heartbeat");
+    while (heartbeat.find(R"("published":true)") != std::string::npos);
+    EXPECT_NE(heartbeat.find(R"("published":false)"), std::string::npos) << heartbeat;
+    publisher.emplace(open("/publish/anna"));
+    publisher->send(header(1));
+    publisher->send(tracked(1));
+    wait_for_packets(4);
+    publisher->stream.close(websocket::close_code::normal);
+    EXPECT_EQ(viewer.refusal(), "1000 the publisher ended the stream");
+}
+
+TEST_F(LiveConnectionTest, MessagesThatAreTooLargeOrNoneEndTheirConnectionAndNoOther) {
+    auto publisher = open("/publish/anna");
+    publisher.send(header(1));
+    publisher.send(intra(0));
+    wait_for_packets(2);
+    auto calm = open("/watch/anna"), large = open("/watch/anna"), rude = open("/watch/anna"),
+         flood = open("/watch/anna");
+    large.say(std::string(5000, ' '));
+    EXPECT_EQ(large.refusal().substr(0, 4), "1009");
+    rude.say("hello?");
+    EXPECT_EQ(rude.refusal(), "1008 the text message is not a JSON object");
+    beast::error_code ignored;
+    flood.stream.binary(true);
+    for (int i = 0; i < 100; ++i) flood.stream.write(net::buffer("x", 1), ignored);
+    EXPECT_EQ(flood.refusal(), "1008 too many text messages");
+    auto other = open("/publish/ben");
+    other.send(header(2));
+    other.say(std::string(5000, ' '));
+    EXPECT_EQ(other.refusal(), "1009 the text message is longer than 4096 bytes");
+    // Messages that are no packets, and a packet that no decoder accepts: counted and dropped, or passed on.
+    publisher.stream.binary(true);
+    for (const std::size_t size : {1, 35, 36, 5000}) publisher.stream.write(net::buffer(std::string(size, 'H')));
+    publisher.send(tracked(1));
+    EXPECT_EQ(calm.next()->kind, PacketKind::sequence);
+    EXPECT_EQ(calm.next_frame(), 0u);
+    EXPECT_EQ(calm.next_frame(), 1u);
+    EXPECT_NE(get("/api/streams").find("\"damaged_messages\":4,"), std::string::npos);
+}
+
+TEST_F(LiveConnectionTest, APublisherWhoseMessageIsTooLargeIsToldSo) {
+    auto publisher = open("/publish/anna");
+    beast::error_code ignored;
+    publisher.stream.binary(true);
+    publisher.stream.write(net::buffer(std::vector<char>((std::size_t{16} << 20) + 1000)), ignored);
+    EXPECT_EQ(publisher.refusal().substr(0, 4), "1009");
+}
+
+class QuickLiveConnectionTest : public LiveConnectionTest {
+protected:
+    QuickLiveConnectionTest() : LiveConnectionTest(HubLimits{.publisher_silence = std::chrono::milliseconds(300)}) {}
+};
+
+TEST_F(QuickLiveConnectionTest, ASilentPublisherIsCutOffAndOneWhoseHeartBeatsIsNot) {
+    auto silent = open("/publish/anna"), alive = open("/publish/ben");
+    silent.send(header(1));
+    alive.send(header(2));
+    std::thread cut_off([&] { EXPECT_EQ(silent.refusal(), "0 "); });
+    for (int i = 0; i < 30; ++i) {
+        alive.say(R"({"type":"heartbeat"})");
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    cut_off.join();
+    alive.send(intra(0));
+    auto viewer = open("/watch/ben");
+    EXPECT_EQ(viewer.next_frame(), 0u);  // the header's
+    EXPECT_NE(get("/api/streams").find(R"("name":"anna","packets":1,"published":false)"), std::string::npos);
 }
 
 }  // namespace
