@@ -16,6 +16,7 @@ struct Options {
     std::uint16_t port = 8080;
     bool same_site = false;
     unsigned connections = live::FileServerOptions{}.connections;
+    std::string congestion_control = "bbr";
 };
 
 Result<void> serve(const Options& options) {
@@ -25,11 +26,18 @@ Result<void> serve(const Options& options) {
     server.port = options.port;
     server.other_sites = !options.same_site;
     server.connections = options.connections;
+    if (options.congestion_control != "system") server.congestion_control = options.congestion_control;
     live::Hub hub;
     server.hub = &hub;
     auto opened = live::FileServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
     if (!live::has_player()) warn("this htvm was built without the web player: it serves streams, but has no pages");
+    if (const auto used = opened->congestion_control();
+        options.congestion_control != "system" && used != options.congestion_control)
+        warn(fmt::format(
+            "this kernel's TCP has no '{}' (modprobe tcp_bbr loads bbr): it uses {}, with which live streams "
+            "come late where packets are lost",
+            options.congestion_control, used));
     note("No publishers are known: programs on this machine may publish, under any name, and nobody else.");
     const bool six = options.address.find(':') != std::string::npos;
     fmt::print("http://{}{}{}:{}/\n", six ? "[" : "", options.address, six ? "]" : "", opened->port());
@@ -55,6 +63,11 @@ void add_serve(CLI::App& app, Run& run) {
     command->add_flag("--same-site", options->same_site, "Do not allow pages of other sites to read the streams");
     command->add_option("--connections", options->connections, "Connections at once (default 512)")
         ->check(CLI::Range(1, 100000));
+    command
+        ->add_option("--congestion-control", options->congestion_control,
+                     "How TCP finds out how fast it may send: bbr (default; where packets are lost, live streams come "
+                     "late with others: docs/live.md), another that the kernel has, or system: the kernel's choice")
+        ->type_name("NAME");
     command->footer(
         "Runs until Ctrl-C. Live streams are published to ws://ADDRESS:PORT/publish/NAME, by programs on this machine\n"
         "alone, and watched at http://ADDRESS:PORT/play/NAME by anyone who reaches it. Of the folder, symbolic links "

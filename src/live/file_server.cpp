@@ -1,5 +1,8 @@
 #include "live/file_server.h"
 
+#include <netinet/tcp.h>
+
+#include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -14,6 +17,7 @@
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <boost/beast/zlib/deflate_stream.hpp>
+#include <cstring>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -482,6 +486,10 @@ Result<FileServer> FileServer::open(const FileServerOptions& options) {
     acceptor.open(endpoint.protocol(), error);
     if (!error) acceptor.set_option(net::socket_base::reuse_address(true), error);
     if (!error) acceptor.bind(endpoint, error);
+    // Connections inherit it.
+    if (const auto& name = options.congestion_control; !error && !name.empty())
+        ::setsockopt(acceptor.native_handle(), IPPROTO_TCP, TCP_CONGESTION, name.data(),
+                     static_cast<socklen_t>(name.size()));
     if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
     if (error)
         return fail(ErrorKind::bad_input, "cannot listen on " + options.address + " port " +
@@ -490,6 +498,13 @@ Result<FileServer> FileServer::open(const FileServerOptions& options) {
 }
 
 std::uint16_t FileServer::port() const { return state_->acceptor.local_endpoint().port(); }
+
+std::string FileServer::congestion_control() const {
+    std::array<char, 16> name{};  // TCP_CA_NAME_MAX of the kernel
+    auto size = static_cast<socklen_t>(name.size());
+    ::getsockopt(state_->acceptor.native_handle(), IPPROTO_TCP, TCP_CONGESTION, name.data(), &size);
+    return {name.data(), ::strnlen(name.data(), name.size())};
+}
 
 void FileServer::run() {
     net::signal_set signals(state_->context, SIGINT, SIGTERM);

@@ -42,6 +42,8 @@ struct FileServerOptions {
     unsigned connections_per_address = 64;
     std::chrono::seconds header_time{10};  // for a whole request header, from the end of the response before
     std::chrono::seconds stall_time{30};   // for a client to take the next 64 KB
+    // Of TCP, by the kernel's name for it; the kernel's own choice if it has none of this name.
+    std::string congestion_control;
     Hub* hub = nullptr;                    // of live streams; null: there are none. It must outlive the server
 };
 
@@ -56,6 +58,8 @@ public:
     ~FileServer();
 
     std::uint16_t port() const;
+    // Of TCP, for connections from now on: what was asked for, or the kernel's own choice.
+    std::string congestion_control() const;
     // Serves until stop() is called or the process is sent SIGINT or SIGTERM.
     void run();
     // From any thread; only between open() and the end of run().

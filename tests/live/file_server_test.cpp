@@ -90,6 +90,22 @@ protected:
     net::io_context context;
 };
 
+// reno is part of every kernel.
+TEST_F(FileServerTest, UsesTheCongestionControlItIsTold) {
+    options.congestion_control = "reno";
+    start();
+    EXPECT_EQ("reno", server->congestion_control());
+}
+
+TEST_F(FileServerTest, LeavesTheKernelsCongestionControlWhereThereIsNoneOfTheNameItIsTold) {
+    start();
+    options.congestion_control = "no such";
+    auto other = FileServer::open(options);
+    ASSERT_TRUE(other);
+    EXPECT_EQ(server->congestion_control(), other->congestion_control());
+    EXPECT_NE("", other->congestion_control());
+}
+
 TEST_F(FileServerTest, GivesFilesWholeAndInParts) {
     start();
     const auto whole = get("/files/person.htvm");
