@@ -62,18 +62,20 @@ def stalls(shown, end):
     return np.concatenate(lengths)
 
 
-def joins(arrivals):
-    """Seconds from connecting to the first frame, and to the first that came live, of each time a viewer joined and
-    stayed until then."""
-    pictures, lives = [], []
+def joins(arrivals, until):
+    """Of each time a viewer joined before the moment `until`: the seconds from connecting to the first frame, and to the first that came live; and
+    how often a viewer left without one that did."""
+    pictures, lives, in_vain = [], [], 0
     for own in of_each_viewer(arrivals).values():
-        for begin in np.flatnonzero(own["kind"] == CONNECTING):
-            later = own[begin + 1:]
-            again = np.flatnonzero(later["kind"] == CONNECTING)
-            visit = frames(later[:again[0]] if len(again) else later)
-            since = own["arrived"][begin]
-            live = visit[delays_ms(visit) < LIVE_SECONDS * 1000]
+        begins = np.flatnonzero(own["kind"] == CONNECTING)
+        for visit in np.split(own, begins)[1:]:
+            since, shown = visit["arrived"][0], frames(visit)
+            if since >= until:
+                continue
+            live = shown[delays_ms(shown) < LIVE_SECONDS * 1000]
             if len(live):
-                pictures.append((visit["arrived"][0] - since) / 1e6)
+                pictures.append((shown["arrived"][0] - since) / 1e6)
                 lives.append((live["arrived"][0] - since) / 1e6)
-    return np.array(pictures), np.array(lives)
+            else:
+                in_vain += 1
+    return np.array(pictures), np.array(lives), in_vain

@@ -11,6 +11,7 @@ sys.dont_write_bytecode = True
 import numpy as np  # noqa: E402
 
 import arrivals  # noqa: E402
+import datagrams  # noqa: E402
 import publish  # noqa: E402
 import router  # noqa: E402
 
@@ -60,10 +61,12 @@ class Joining(unittest.TestCase):
                      (0, TRACKED, 2, 900, 1300), (0, TRACKED, 3, 1390, 1400),
                      # joins again, and leaves before anything came live
                      (0, arrivals.CONNECTING, 0, 0, 2000), (0, arrivals.INTRA, 4, 1500, 2100),
-                     (0, arrivals.CONNECTING, 0, 0, 3000), (0, arrivals.INTRA, 5, 3000, 3050))
-        pictures, lives = arrivals.joins(rows)
+                     (0, arrivals.CONNECTING, 0, 0, 3000), (0, arrivals.INTRA, 5, 3000, 3050),
+                     (0, arrivals.CONNECTING, 0, 0, 4000))
+        pictures, lives, in_vain = arrivals.joins(rows, 4_000_000)
         self.assertEqual([0.2, 0.05], list(np.round(pictures, 6)))
         self.assertEqual([0.4, 0.05], list(np.round(lives, 6)))
+        self.assertEqual(1, in_vain)
 
 
 class Lines(unittest.TestCase):
@@ -88,6 +91,26 @@ class Lines(unittest.TestCase):
         self.assertEqual(lost(1, "down"), lost(1, "down"))
         self.assertNotEqual(lost(1, "down"), lost(2, "down"))
         self.assertNotEqual(lost(1, "down"), lost(1, "up"))
+
+
+class Datagrams(unittest.TestCase):
+    @staticmethod
+    def stream(*frames):
+        """Of (kind, number, reference, payload bytes)."""
+        return b"".join(publish.renumbered(((b"HTVP", kind, 128, 0, number, reference, 0, size), bytes(size + 4)), 0, 0)
+                        for kind, number, reference, size in frames)
+
+    def test_a_frame_is_shown_if_all_it_needs_is_whole(self):
+        stream = self.stream((1, 0, 0, 40), (2, 0, 0, 3000), (7, 1, 0, 100), (7, 2, 1, 100))  # 3, 1 and 1 datagrams
+        self.assertAlmostEqual((0.9 ** 3 + 0.9 ** 4 + 0.9 ** 5) / 3, datagrams.shown(stream, 0.1, "none"))
+        self.assertAlmostEqual((0.99 ** 3 + 0.99 ** 4 + 0.99 ** 5) / 3, datagrams.shown(stream, 0.1, 1))
+
+    def test_parity_stands_in_for_any_one(self):
+        self.assertAlmostEqual(0.9 ** 4 + 4 * 0.1 * 0.9 ** 3, datagrams.whole(3, 0.1, "parity"))
+
+    def test_parity_takes_one_more_datagram_but_no_more_than_the_packet(self):
+        self.assertAlmostEqual((1200 + 136) / (3036 + 136), datagrams.parity_overhead(self.stream((2, 0, 0, 3000),
+                                                                                                  (7, 1, 0, 100))))
 
 
 class PublishedPackets(unittest.TestCase):

@@ -20,13 +20,14 @@ import time
 
 sys.path.insert(0, os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 import arrivals  # noqa: E402
+import datagrams  # noqa: E402
 import hub_process as hubs  # noqa: E402
 from router import Settings  # noqa: E402
 
 HUB_ADDRESS = "10.9.0.1"
 NAMES = "htvm-line-"
 AGAIN_SECONDS = 5  # after which who joins to measure joining leaves
-SETTLE_SECONDS = 3
+SETTLE_SECONDS = 3  # before and after what is measured
 
 
 @dataclasses.dataclass
@@ -167,7 +168,7 @@ def watch(options, kinds, again):
                 [*lines.inside(lines.viewers), options.live_watch, f"person-{megabits}", "-o",
                  os.path.join(folder, str(megabits)), "--host", HUB_ADDRESS, "--port", port, "--source", addresses[0],
                  "--per-source", 1, "--viewers", len(addresses), "--joins", 16,
-                 "--seconds", SETTLE_SECONDS + options.seconds + 3, *(["--again", AGAIN_SECONDS] if again else [])])))
+                 "--seconds", options.seconds + 2 * SETTLE_SECONDS, *(["--again", AGAIN_SECONDS] if again else [])])))
         for watcher in watchers:
             watcher.wait()
         for megabits in options.rate:
@@ -193,9 +194,10 @@ def result_of(kind, noted, begin, end):
             "closed": int(sum(noted["kind"] == arrivals.CLOSED))}
 
 
-def joined_of(kind, noted):
-    pictures, lives = arrivals.joins(noted)
-    return {"megabits": kind.megabits, "control": kind.control, "loss": kind.loss, "joins": len(pictures),
+def joined_of(kind, noted, end):
+    whole_visits = end - (AGAIN_SECONDS - SETTLE_SECONDS) * 10**6
+    pictures, lives, in_vain = arrivals.joins(noted, whole_visits)
+    return {"megabits": kind.megabits, "control": kind.control, "loss": kind.loss, "joins": len(pictures) + in_vain, "in_vain": in_vain,
             **{f"{name}_{percent}_s": arrivals.percentile(values, percent)
                for name, values in (("picture", pictures), ("live", lives)) for percent in (50, 95, 100)}}
 
@@ -253,14 +255,19 @@ def main():
                 f"{one['stalls'] / one['viewer_minutes']:16.1f} {one['longest_stall_s']:10.1f} "
                 f"{one['missing_percent']:7.1f}% {one['fallen_behind'] / one['viewer_minutes']:12.1f}"))
 
-    noted, _, _, _ = watch(options, kinds, again=True)
-    joined = [joined_of(kind, noted) for kind, noted in noted]
+    noted, _, end, _ = watch(options, kinds, again=True)
+    joined = [joined_of(kind, noted, end) for kind, noted in noted]
     say(f"\nJoining late, {options.round_trip:g} ms, {options.line:g} Mbit/s: seconds until the first picture, and until "
         f"one comes within {1000 * arrivals.LIVE_SECONDS:.0f} ms")
-    say("  Mbit/s control   loss   joins  picture p50   p95 worst     live p50   p95 worst")
+    say(f"  Mbit/s control   loss   joins  picture p50   p95 worst     live p50   p95 worst  not within {AGAIN_SECONDS} s")
     for one in joined:
         say(row(one, f"{one['joins']:7} {one['picture_50_s']:12.2f} {one['picture_95_s']:5.2f} {one['picture_100_s']:5.2f} "
-                f"{one['live_50_s']:12.2f} {one['live_95_s']:5.2f} {one['live_100_s']:5.2f}"))
+                f"{one['live_50_s']:12.2f} {one['live_95_s']:5.2f} {one['live_100_s']:5.2f} "
+                f"{one['in_vain']:15}"))
+    for megabits in options.rate:
+        with open(hubs.stream_of(options.htvm, megabits), "rb") as file:
+            say(f"\nIf the packets of {megabits:g} Mbit/s were datagrams of {datagrams.DATAGRAM_BYTES} bytes:")
+            datagrams.report(file.read(), [loss for loss in options.loss if loss > 0], options.round_trip, say)
     if options.json:
         hubs.print_json({"router": checked, "late_ms_p99": report["late_ms_p99"], "watched": watched, "joined": joined})
 
