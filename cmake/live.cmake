@@ -51,6 +51,7 @@ htvm_floor(live
   SOURCES
     src/live/broadcast.cpp
     src/live/control.cpp
+    src/live/event.cpp
     src/live/far_stream.cpp
     src/live/file_server.cpp
     src/live/http_request.cpp
@@ -58,9 +59,11 @@ htvm_floor(live
     src/live/hub_message.cpp
     src/live/line.cpp
     src/live/live_connection.cpp
+    src/live/metrics.cpp
+    src/live/recorder.cpp
     src/live/served_folder.cpp
     ${player_cpp}
-  LINKS htvm_decoder htvm_core Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
+  LINKS htvm_decoder htvm_core htvm_io Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
   set_source_files_properties(src/live/file_server.cpp src/live/line.cpp src/live/live_connection.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)

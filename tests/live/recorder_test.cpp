@@ -1,0 +1,280 @@
+// Live streams as files: what is in them can be decoded, whatever happens to the disk, the line or the program.
+#include "live/recorder.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <thread>
+
+#include "htvm/decoder.hpp"
+#include "htvm/stream_index.hpp"
+
+namespace htvm::live {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace packet_flag;
+namespace fs = std::filesystem;
+
+constexpr Recorder::Clock::time_point start{};
+const auto evening = std::chrono::system_clock::from_time_t(1795352751);  // 2026-11-22 13:05:51
+
+SharedPacket packet(PacketKind kind, std::uint32_t frame, std::uint32_t reference, std::uint8_t flags,
+                    std::size_t bytes) {
+    Packet out;
+    out.kind = kind;
+    out.frame = frame;
+    out.reference = reference;
+    out.flags = static_cast<std::uint8_t>(told | flags);
+    out.timestamp_us = frame * 40000;
+    out.payload.assign(bytes, static_cast<std::uint8_t>(frame));
+    return std::make_shared<LivePacket>(LivePacket{out, write_packet(out), {}});
+}
+SharedPacket header(std::uint32_t session_number) {
+    return packet(PacketKind::sequence, 0, session_number, session, 40);
+}
+SharedPacket intra(std::uint32_t frame, std::size_t bytes = 300) {
+    return packet(PacketKind::intra, frame, frame, referred | access, bytes);
+}
+SharedPacket tracked(std::uint32_t frame, std::size_t bytes = 100) {
+    return packet(PacketKind::tracked, frame, frame - 1, referred, bytes);
+}
+
+class RecorderTest : public testing::Test {
+protected:
+    void SetUp() override {
+        fs::remove_all(options.folder);
+        fs::create_directories(options.folder);
+    }
+    void TearDown() override { fs::remove_all(options.folder); }
+
+    Recorder open() {
+        auto out = Recorder::open(options);
+        EXPECT_TRUE(out);
+        return std::move(*out);
+    }
+    bool take(Recorder& recorder, const SharedPacket& packet, Recorder::Clock::duration after = 0ms) {
+        return recorder.take("anna", packet, start + after,
+                             evening + std::chrono::duration_cast<std::chrono::seconds>(after));
+    }
+    std::vector<std::string> files() const {
+        std::vector<std::string> out;
+        for (const auto& entry : fs::directory_iterator(options.folder)) out.push_back(entry.path().filename());
+        std::sort(out.begin(), out.end());
+        return out;
+    }
+    std::vector<Packet> packets(const std::string& name) const {
+        std::ifstream in(options.folder / name, std::ios::binary);
+        const std::string bytes(std::istreambuf_iterator<char>(in), {});
+        PacketReader reader;
+        reader.push({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+        std::vector<Packet> out;
+        while (auto packet = reader.pull()) out.push_back(std::move(*packet));
+        EXPECT_EQ(reader.damaged_bytes(), 0u) << name;
+        EXPECT_EQ(reader.pending_bytes(), 0u) << name;
+        return out;
+    }
+    // The frames in a file, each of which can be decoded from what comes before it there.
+    std::vector<std::uint32_t> frames(const std::string& name) const {
+        std::vector<PacketHeader> headers;
+        std::vector<std::uint32_t> out;
+        for (const auto& packet : packets(name)) {
+            headers.push_back(packet);
+            if (!frame_type(packet.kind)) continue;
+            out.push_back(packet.frame);
+            EXPECT_FALSE(closure(headers, headers.size() - 1).empty()) << name << " frame " << packet.frame;
+        }
+        return out;
+    }
+    std::vector<std::string> events(Recorder& recorder) {
+        std::vector<std::string> out;
+        for (const auto& event : recorder.take_events()) {
+            EXPECT_EQ(event.stream, "anna");
+            out.push_back(event.name);
+        }
+        return out;
+    }
+    void wait_until(const std::function<bool()>& true_now) {
+        for (int i = 0; i < 2000 && !true_now(); ++i) std::this_thread::sleep_for(5ms);
+        EXPECT_TRUE(true_now());
+    }
+
+    RecorderOptions options{.folder = fs::temp_directory_path() / ("htvm_recorder_test_" + std::to_string(getpid()))};
+};
+using Frames = std::vector<std::uint32_t>;
+using Names = std::vector<std::string>;
+
+TEST_F(RecorderTest, ASessionBecomesAFileWithItsIndexInFront) {
+    {
+        auto recorder = open();
+        EXPECT_FALSE(take(recorder, header(1)));
+        for (std::uint32_t i = 0; i < 10; ++i) EXPECT_FALSE(take(recorder, i % 5 == 0 ? intra(i) : tracked(i)));
+        wait_until([&] { return recorder.counters().packets == 11; });
+        // As it grows it has its name, and all that was written.
+        EXPECT_EQ(files(), Names{"anna-20261122-130551.htvm"});
+        EXPECT_EQ(frames("anna-20261122-130551.htvm").size(), 10u);
+        EXPECT_EQ(recorder.counters().streams, 1u);
+        recorder.end("anna");
+        EXPECT_EQ(recorder.counters().streams, 0u);
+    }
+    EXPECT_EQ(files(), Names{"anna-20261122-130551.htvm"});
+    const auto recorded = packets("anna-20261122-130551.htvm");
+    ASSERT_EQ(recorded.size(), 12u);
+    const auto index = read_index(recorded[0]);
+    ASSERT_TRUE(index);
+    EXPECT_EQ(index->frames, 10u);
+    ASSERT_EQ(index->points.size(), 2u);
+    EXPECT_EQ(index->points[1].frame, 5u);
+    EXPECT_EQ(recorded[1].kind, PacketKind::sequence);
+    EXPECT_EQ(recorded[2].payload, std::vector<std::uint8_t>(300, 0));
+}
+
+TEST_F(RecorderTest, AFileBeginsWithAFrameThatCanBeDecodedByItself) {
+    auto recorder = open();
+    EXPECT_FALSE(take(recorder, tracked(8)));  // nothing is known of the stream yet
+    take(recorder, header(1));
+    EXPECT_TRUE(take(recorder, tracked(9)));
+    EXPECT_TRUE(files().empty());
+    EXPECT_FALSE(take(recorder, intra(10)));
+    EXPECT_FALSE(take(recorder, tracked(11)));
+    wait_until([&] { return recorder.counters().packets == 3; });
+    EXPECT_EQ(frames("anna-20261122-130551.htvm"), (Frames{10, 11}));
+    EXPECT_EQ(recorder.counters().dropped_frames, 0u);
+}
+
+TEST_F(RecorderTest, AnotherSessionAndAnotherHourBeginAnotherFile) {
+    options.file_length = 1h;
+    {
+        auto recorder = open();
+        take(recorder, header(1));
+        take(recorder, intra(0));
+        take(recorder, header(1));  // repeated
+        take(recorder, tracked(1), 30min);
+        EXPECT_TRUE(take(recorder, tracked(2), 60min));  // it goes on until one that can be decoded by itself comes
+        EXPECT_FALSE(take(recorder, intra(3), 61min));
+        take(recorder, header(2), 62min);
+        take(recorder, intra(0), 62min);
+        take(recorder, header(3), 62min);
+        take(recorder, intra(0), 62min);
+    }
+    EXPECT_EQ(files(), (Names{"anna-20261122-130551.htvm", "anna-20261122-140651.htvm", "anna-20261122-140751-2.htvm",
+                              "anna-20261122-140751.htvm"}));
+    EXPECT_EQ(frames("anna-20261122-130551.htvm"), (Frames{0, 1, 2}));
+    EXPECT_EQ(frames("anna-20261122-140651.htvm"), Frames{3});
+    EXPECT_EQ(packets("anna-20261122-140751.htvm").at(1).reference, 2u);
+    EXPECT_EQ(packets("anna-20261122-140751-2.htvm").at(1).reference, 3u);
+}
+
+TEST_F(RecorderTest, WhatASlowDiskDoesNotTakeIsDroppedUpToAFrameThatCanBeDecodedByItself) {
+    options.waiting_bytes = 1;
+    constexpr std::uint32_t count = 300;
+    std::uint64_t dropped = 0;
+    {
+        auto recorder = open();
+        take(recorder, header(1));
+        for (std::uint32_t i = 0; i < count; ++i) take(recorder, i % 10 == 0 ? intra(i, 300000) : tracked(i, 100000));
+        dropped = recorder.counters().dropped_frames;
+        EXPECT_GT(dropped, 0u);
+        EXPECT_EQ(events(recorder).at(0), "recording_behind");
+    }
+    const auto names = files();
+    std::size_t recorded = 0;
+    for (const auto& name : names) recorded += frames(name).size();
+    EXPECT_LE(recorded + dropped, count);
+    EXPECT_GT(recorded, 0u);
+}
+
+TEST_F(RecorderTest, AFaultStopsTheRecordingUntilItIsTriedAgain) {
+    options.retry = 1min;
+    auto recorder = open();
+    take(recorder, header(1));
+    fs::remove_all(options.folder);
+    take(recorder, intra(0));
+    wait_until([&] { return recorder.counters().faults == 1; });
+    EXPECT_EQ(events(recorder), Names{"recording_failed"});
+    fs::create_directories(options.folder);
+    take(recorder, tracked(1), 1s);
+    EXPECT_EQ(recorder.counters().streams, 0u);
+    take(recorder, intra(2), 60s);
+    EXPECT_TRUE(files().empty());
+    take(recorder, intra(3), 61s);
+    wait_until([&] { return recorder.counters().packets == 2; });
+    EXPECT_EQ(frames("anna-20261122-130652.htvm"), Frames{3});
+    EXPECT_EQ(events(recorder), Names{"recording"});
+}
+
+// What a child process does, and how it ended.
+template <class Work>
+int status_of(const Work& work) {
+    const auto child = fork();
+    if (child == 0) {
+        work();
+        _exit(0);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    return status;
+}
+
+TEST_F(RecorderTest, AFullDiskLeavesAFileOfWholePackets) {
+    const auto status = status_of([&] {
+        std::signal(SIGXFSZ, SIG_IGN);
+        const rlimit limit{5000, 5000};
+        setrlimit(RLIMIT_FSIZE, &limit);
+        auto recorder = open();
+        take(recorder, header(1));
+        for (std::uint32_t i = 0; i < 10; ++i) take(recorder, i == 0 ? intra(i, 1000) : tracked(i, 1000));
+        while (recorder.counters().faults == 0) std::this_thread::sleep_for(1ms);
+        take(recorder, tracked(10));
+        _exit(recorder.counters().streams == 0 ? 0 : 1);
+    });
+    EXPECT_EQ(status, 0);
+    EXPECT_EQ(frames("anna-20261122-130551.htvm"), (Frames{0, 1, 2, 3}));
+}
+
+TEST_F(RecorderTest, AProgramThatIsKilledLeavesAllThatItHadWritten) {
+    const auto status = status_of([&] {
+        auto recorder = open();
+        take(recorder, header(1));
+        for (std::uint32_t i = 0; i < 50; ++i) take(recorder, i == 0 ? intra(i) : tracked(i));
+        while (recorder.counters().packets < 51) std::this_thread::sleep_for(1ms);
+        std::raise(SIGKILL);
+    });
+    EXPECT_EQ(status, SIGKILL);
+    EXPECT_EQ(files(), Names{"anna-20261122-130551.htvm"});
+    EXPECT_EQ(frames("anna-20261122-130551.htvm").size(), 50u);
+}
+
+TEST_F(RecorderTest, NoMoreStreamsAreRecordedThanAllowed) {
+    options.streams = 1;
+    auto recorder = open();
+    take(recorder, header(1));
+    EXPECT_FALSE(recorder.take("ben", header(1), start, evening));
+    EXPECT_FALSE(recorder.take("ben", intra(0), start, evening));
+    EXPECT_EQ(recorder.counters().faults, 1u);
+}
+
+TEST_F(RecorderTest, AFolderThatCannotBeWrittenToIsToldAtOnce) {
+    options.folder /= "none";
+    const auto opened = Recorder::open(options);
+    ASSERT_FALSE(opened);
+    EXPECT_EQ(opened.error().message, "streams cannot be recorded: there is no folder " + options.folder.string());
+    options.folder = options.folder.parent_path();
+}
+
+TEST(RecordingNameTest, ANameOfAStreamMakesAHarmlessNameOfAFile) {
+    EXPECT_EQ(recording_name("anna", evening), "anna-20261122-130551");
+    EXPECT_EQ(recording_name("..a b/c%\n\"", evening), "%2E.a%20b%2Fc%25%0A%22-20261122-130551");
+    EXPECT_EQ(recording_name("caf\xc3\xa9", evening), "caf\xc3\xa9-20261122-130551");
+    EXPECT_EQ(recording_name(std::string(1000, 'a'), evening), std::string(200, 'a') + "-20261122-130551");
+}
+
+}  // namespace
+}  // namespace htvm::live
