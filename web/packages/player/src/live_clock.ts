@@ -106,7 +106,12 @@ export class LiveClock {
     presentUs(nowMs: number): number {
         if (!this.started) return -Infinity;
         this.#advance(nowMs);
-        return (nowMs - this.#offsetMs) * 1000;
+        return this.timeAt(nowMs);
+    }
+
+    /** What present time was, or will be, then, if the clock stays as it is. */
+    timeAt(ms: number): number {
+        return (ms - this.#offsetMs) * 1000;
     }
 
     /** The newest frame there is was due so long ago that it is not shown. */

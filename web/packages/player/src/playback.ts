@@ -57,7 +57,7 @@ interface Live {
 const mostFrames = 12; // decoded ahead, the one shown included
 const mostFramesLive = 40; // as many as may wait in the jitter buffer
 const mostBytes = 96 << 20; // that they may take, if at least 3 can be had
-const lateFramesUs = 50000; // so much later than its end, a live frame is not shown any more
+const lateFramesUs = 50000; // a live frame that comes so much later than its end is not shown any more
 const mostTraps = 3;
 
 export class Playback {
@@ -294,7 +294,7 @@ export class Playback {
                 if (show) this.#passOver(show, next);
                 show = next;
             }
-            if (show && this.#live && !show.preview) show = this.#inTime(this.#live, show, at);
+            if (show && this.#live && !show.preview) show = this.#inTime(this.#live, show);
             if (this.#playing && this.#ring.length === 0) this.#runDry(show ?? this.#current, at);
         }
         if (show) {
@@ -345,9 +345,10 @@ export class Playback {
         this.#anchorNow = this.#now();
     }
 
-    // A live frame that is to be shown, or null if it is too late for that: it stays until one comes that is not.
-    #inTime({ clock }: Live, frame: FrameReport, at: number): FrameReport | null {
-        const lateUs = at - frame.presentUs - frame.durationUs;
+    // A live frame that is to be shown, or null if it came too late for that: it stays until one comes that did not. Where only
+    // drawing is late, the frame is shown.
+    #inTime({ clock }: Live, frame: FrameReport): FrameReport | null {
+        const lateUs = clock.timeAt(this.#fromWorker(frame.live!.readyMs)) - frame.presentUs - frame.durationUs;
         if (lateUs <= lateFramesUs) {
             clock.inTime();
             return frame;
