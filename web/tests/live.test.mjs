@@ -127,6 +127,9 @@ test('behind is by the fastest of ten heartbeats', () => {
     assert.ok(Number.isNaN(clock.behindMs(0, 0)));
     for (const [at, late] of [[1000, 50], [2000, 10], [3000, 70]]) clock.publisher(at + late, at * 1000);
     assert.equal(clock.behindMs(3200, 2.9e6), 290);
+    // Another run of the publisher is another clock.
+    clock.publisher(4000, 100e6);
+    assert.equal(clock.behindMs(4300, 100.2e6), 100);
 });
 
 // ---- words --------------------------------------------------------------------------------------------------------

@@ -217,12 +217,12 @@ export class HtvmPlayerElement extends HTMLElement {
         return !this.#wantsPlay;
     }
 
-    /** Seconds; 0 is the first frame. Setting it seeks. */
+    /** Seconds; 0 is the first frame. Setting it seeks. Of a live stream the publisher's stream time, which cannot be set. */
     get currentTime(): number {
         return this.#playback.timeUs / 1e6;
     }
     set currentTime(seconds: number) {
-        if (!Number.isFinite(seconds)) return;
+        if (!Number.isFinite(seconds) || this.#playback.liveState) return;
         this.#send('seeking');
         this.#playback.seek(seconds * 1e6);
         this.#schedule();
@@ -238,6 +238,7 @@ export class HtvmPlayerElement extends HTMLElement {
         return this.#playback.rate;
     }
     set playbackRate(rate: number) {
+        if (this.#playback.liveState) return;
         this.#playback.setRate(Math.min(2, Math.max(0.25, rate)));
         this.#send('ratechange');
         this.#invalidate();

@@ -25,6 +25,7 @@ const jumpMs = 300;
 const lateMs = 200;
 const mostTransits = 1200;
 const heartbeats = 10; // the fastest of so many tells the publisher's clock
+const otherRunMs = 1000;
 
 interface Transit {
     atMs: number;
@@ -90,7 +91,10 @@ export class LiveClock {
 
     /** The publisher's clock, as a heartbeat tells it. */
     publisher(atMs: number, presentUs: number): void {
-        this.#publisherMs.push(atMs - presentUs / 1000);
+        const ms = atMs - presentUs / 1000;
+        // Another run of the publisher, whose clock comes a little before its frames or behind them.
+        if (Math.abs(ms - (this.#publisherMs.at(-1) ?? ms)) > otherRunMs) this.#publisherMs = [];
+        this.#publisherMs.push(ms);
         if (this.#publisherMs.length > heartbeats) this.#publisherMs.shift();
     }
 
