@@ -1,5 +1,5 @@
 # What `cmake --install` installs, and where. cmake/packages.cmake makes Debian packages of it. The components are:
-# programs; runtime (the shared libraries); draco (the shared library that needs libdraco); development.
+# programs; runtime (the shared libraries); draco and live (those that need libdraco, OpenSSL); development.
 include(CMakePackageConfigHelpers)
 set(htvm_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/htvm)
 get_property(htvm_libraries GLOBAL PROPERTY htvm_libraries)
@@ -8,8 +8,8 @@ install(DIRECTORY include/htvm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT
 
 # One export file per library and kind: find_package() reads only the requested ones.
 foreach(library ${htvm_libraries})
-  if(library STREQUAL "draco")
-    set(runtime draco)
+  if(library MATCHES "^(draco|live)$")
+    set(runtime ${library})
   else()
     set(runtime runtime)
   endif()
@@ -54,14 +54,17 @@ set(description_encoder "Encoder of human time-varying meshes, for C++20 (needs 
 set(description_c_decoder "Decoder of compressed human time-varying meshes, for C")
 set(description_c "Encoder and decoder of human time-varying meshes, for C")
 set(description_draco "I-frames by Draco, for htvm's encoder and decoder")
+set(description_live "Publisher of live streams of human time-varying meshes, for C++20 (needs the header tl/expected.hpp)")
 foreach(library ${htvm_libraries})
   set(requires "")
-  if(library MATCHES "^(encoder|draco)$")
+  if(library MATCHES "^(encoder|draco|live)$")
     set(requires "htvm-decoder = ${PROJECT_VERSION}")
   endif()
   set(private "")
   if(library STREQUAL "draco")
     set(private -ldraco)
+  elseif(library STREQUAL "live")
+    set(private "-lssl -lcrypto")
   endif()
   htvm_pkg_config(${library} "${description_${library}}" "${requires}" "${private}")
 endforeach()

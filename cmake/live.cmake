@@ -47,24 +47,33 @@ std::span<const PlayerFile> player_files() {
 }  // namespace htvm::live
 " @ONLY)
 set_source_files_properties(${player_cpp} PROPERTIES OBJECT_DEPENDS "${player_paths}")
-htvm_floor(live
+# What programs of others need that publish; and what a server has besides.
+htvm_floor(live_client
   SOURCES
     src/live/broadcast.cpp
     src/live/control.cpp
+    src/live/hub_address.cpp
+    src/live/hub_client.cpp
+    src/live/line.cpp
+    src/live/publisher.cpp
+    src/live/watcher.cpp
+  LINKS htvm_decoder htvm_core Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
+htvm_library(live FLOORS live_client LINKS decoder NEEDS OpenSSL::SSL)
+htvm_floor(live
+  SOURCES
     src/live/event.cpp
     src/live/far_stream.cpp
     src/live/file_server.cpp
     src/live/http_request.cpp
     src/live/hub.cpp
     src/live/hub_message.cpp
-    src/live/line.cpp
     src/live/live_connection.cpp
     src/live/metrics.cpp
     src/live/recorder.cpp
     src/live/served_folder.cpp
     ${player_cpp}
-  LINKS htvm_decoder htvm_core htvm_io Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
+  LINKS htvm_live_client htvm_io)
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
-  set_source_files_properties(src/live/file_server.cpp src/live/line.cpp src/live/live_connection.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)
+  set_source_files_properties(src/live/file_server.cpp src/live/hub_client.cpp src/live/line.cpp src/live/live_connection.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)
 endif()

@@ -40,6 +40,7 @@ struct Options {
     unsigned threads = 0;
     bool json = false;
     DecoderOptions limits;
+    HubTrust trust;
 };
 
 struct Summary {
@@ -385,7 +386,7 @@ void begin_at_first(Decoding& d) {
 }
 
 Result<void> decode(const Options& options) {
-    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes, options.trust);
     if (!input) return tl::unexpected(input.error());
     auto output = MeshOutput::open(options);
     if (!output) return tl::unexpected(output.error());
@@ -410,6 +411,7 @@ Result<void> decode(const Options& options) {
     if (!options.timestamps.empty())
         if (auto ok = write_file(options.timestamps, frame_times_csv(summary.times)); !ok) return ok;
     if (options.json) print_json(summary, *input);
+    if (input->refusal()) return tl::unexpected(*input->refusal());
     if (!decoder.sequence() && input->oversized_packets() == 0)
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
     if (summary.written() == 0 && options.first > 0 && summary.undecodable + summary.missing == 0)
@@ -423,7 +425,10 @@ Result<void> decode(const Options& options) {
 void add_decode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("decode", "Turn an .htvm stream back into meshes");
-    command->add_option("input", options->input, "The stream: a file, or - for standard input")
+    command
+        ->add_option("input", options->input,
+                     "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
+                     "Ctrl-C ends it")
         ->type_name("FILE")
         ->required();
     command
@@ -458,6 +463,7 @@ void add_decode(CLI::App& app, Run& run) {
     command->add_option("--threads", options->threads,
                         "Threads (default: one per core); the meshes do not depend on it");
     command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output");
+    add_hub_trust(*command, options->trust, "Hubs");
     add_decoder_limits(*command, options->limits);
     command->footer(
         "If a stream is damaged or truncated, every undamaged frame is decoded, losses are reported, and the\n"
@@ -469,7 +475,8 @@ void add_decode(CLI::App& app, Run& run) {
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"
         "  htvm decode person.htvm -o person.glb\n"
-        "  htvm decode - -o - < person.htvm | viewer --ply");
+        "  htvm decode - -o - < person.htvm | viewer --ply\n"
+        "  htvm decode ws://localhost:8080/watch/person -o - | viewer --ply");
     command->callback([options, &run] {
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the meshes; choose one");

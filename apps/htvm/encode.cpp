@@ -18,6 +18,7 @@
 #include "encode_pass.h"
 #include "htvm/running_time.hpp"
 #include "io/number_text.h"
+#include "live/hub_address.h"
 #include "rate_passes.h"
 #include "rate_report.h"
 #include "stream_file.h"
@@ -53,8 +54,8 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
     } else {
         tell(layer_table(summary.totals));
         note(fmt::format("{}: {}, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s",
-                         options.output == "-" ? "standard output" : options.output, counted(frames, "frame"), bytes,
-                         megabits / seconds, fps, static_cast<double>(frames) / summary.encode_seconds));
+                         shown_place(options.output), counted(frames, "frame"), bytes, megabits / seconds, fps,
+                         static_cast<double>(frames) / summary.encode_seconds));
         if (rate.controlled()) note(rate_summary(rate, bytes, seconds));
     }
     if (dropped_late > 0)
@@ -71,6 +72,10 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
 
 // Why an encoding ended early, and what is left of it.
 tl::unexpected<Error> ended_early(Pass& pass, StreamOutput& output, const Error& error) {
+    if (auto* hub = output.publishing()) {
+        if (finish(pass)) (void)hub->finish();  // of the two errors, the first says why
+        return tl::unexpected(error);
+    }
     const auto frames = pass.summary.totals.all().frames;
     if (frames == 0 || !pass.options.keep_partial) return tl::unexpected(error);
     const bool whole = finish(pass).has_value();
@@ -86,10 +91,10 @@ tl::unexpected<Error> ended_early(Pass& pass, StreamOutput& output, const Error&
     return fail(error.kind, message);
 }
 
-// A stream that goes to a pipe or a device may be live: a session keeps it apart from a run before.
+// A stream that goes to a hub, a pipe or a device may be live: a session keeps it apart from a run before.
 bool may_be_live(const std::string& output) {
     std::error_code error;
-    return output == "-" ||
+    return output == "-" || live::looks_like_hub_address(output) ||
            (std::filesystem::exists(output, error) && !std::filesystem::is_regular_file(output, error));
 }
 
@@ -169,8 +174,10 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
     std::optional<RatePasses> passes;
     for (int number = 1;; ++number) {
         // Before the first pass, so that a place that cannot be written to does not cost one.
-        auto output = StreamOutput::open(options.output);
+        auto output = StreamOutput::open(options.output, options.publishing);
         if (!output) return tl::unexpected(output.error());
+        auto* hub = output->publishing();
+        if (!is_piped(options.capture)) output->pace();
         if (audio) output->lay(*audio);
         auto encoder = Encoder::create(settings);
         if (!encoder) return tl::unexpected(encoder.error());
@@ -181,16 +188,18 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         {
             Progress progress(most == 1 ? "encoding" : fmt::format("pass {}", number), capture.frames());
             FrameWarnings warnings;
-            Pass pass{.options = options,
-                      .capture = capture,
-                      .encoder = *encoder,
-                      .write = {},
-                      .step = [&](const std::string& text) { progress.step(text); },
-                      .is_stopped = [] { return interruption() != 0; },
-                      .warnings = number == fewest ? &warnings : nullptr,
-                      .summary = summary,
-                      .rate = rate};
+            Pass pass{
+                .options = options,
+                .capture = capture,
+                .encoder = *encoder,
+                .write = {},
+                .step = [&](const std::string& text) { progress.step(hub ? text + ", " + hub->progress() : text); },
+                .is_stopped = [] { return interruption() != 0; },
+                .warnings = number == fewest ? &warnings : nullptr,
+                .summary = summary,
+                .rate = rate};
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
+            if (hub) pass.wants_key_frame = [hub] { return hub->wants_key_frame(); };
             auto done = encode_frames(pass);
             if (!done) return writes ? ended_early(pass, *output, done.error()) : done;
             if (done = finish(pass); !done) return done;
@@ -265,9 +274,21 @@ void add_encode(CLI::App& app, Run& run) {
     auto options = std::make_shared<EncodeOptions>();
     auto* command = app.add_subcommand("encode", "Compress a sequence of meshes into an .htvm stream");
     add_capture_options(*command, options->capture);
-    command->add_option("-o,--output", options->output, "The stream: a file, or - for standard output")
+    command
+        ->add_option(
+            "-o,--output", options->output,
+            "The stream: a file, - for standard output, or a hub, for others to watch it while it is encoded:\n"
+            "ws://HOST:PORT/publish/NAME, or wss:// with TLS")
         ->type_name("FILE")
         ->required();
+    constexpr const char* hubs = "Hubs";
+    command
+        ->add_option("--other-hub", options->publishing.other_hubs,
+                     "Where to go on if the hub is lost, another address (repeatable)")
+        ->type_name("URL")
+        ->allow_extra_args(false)
+        ->group(hubs);
+    add_publishing_options(*command, options->publishing, hubs);
     add_audio_options(*command, options->audio);
     add_encoding_options(*command, options->encoding);
     command
@@ -316,7 +337,7 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --profile topology -s capture/skeleton.json -o exact.htvm\n"
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  htvm encode capture/ --jobs 8 -o person.htvm\n"
-        "  rig --ply | htvm encode - --bitrate 8 -o - | nc host 9000");
+        "  rig --ply | htvm encode - --bitrate 8 --drop-late -o wss://hub.example/publish/person");
     show_first(*command,
                {"--skeleton", "--output", "--fps", "--unit", "--height", "--frames", "--first", "--quality",
                 "--profile", "--bitrate", "--buffer", "--keyint", "--on-bad-frame", "--threads", "--jobs", "--json"});
@@ -324,6 +345,8 @@ void add_encode(CLI::App& app, Run& run) {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();
         check_jobs(*options, !sessions.empty() && sessions[0] == "random");
+        if (live::looks_like_hub_address(options->output) && options->in_groups())
+            throw CLI::ValidationError("--jobs", "encodes groups of frames at once: for files, not for what is live");
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
         if (options->capture.drop_late && !is_piped(options->capture))

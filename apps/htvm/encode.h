@@ -8,6 +8,7 @@
 #include "command_line/capture.h"
 #include "encoder_options.h"
 #include "htvm/result.hpp"
+#include "publishing.h"
 
 namespace htvm::app {
 
@@ -20,6 +21,7 @@ struct EncodeOptions {
     CaptureOptions capture;
     EncodingOptions encoding;
     std::string output;
+    PublishingOptions publishing;  // where the output is a hub
     AudioOptions audio;
     std::string on_bad_frame = "stop";  // or skip, repeat
     bool fill = false;                  // repeats the frame before in the place of missing ones

@@ -38,7 +38,8 @@ enum class Coded { yes, dropped };
 Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us) {
     auto& summary = pass.summary;
     const auto start = std::chrono::steady_clock::now();
-    const auto pushed = pass.encoder.push(mesh, pose, timestamp_us);
+    const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
+    const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
     summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const bool dropped =
         !pushed && pushed.error().kind == ErrorKind::limit && pass.rate.rate_controlled() && !pass.rate.costs.empty();

@@ -54,7 +54,8 @@ struct Pass {
     FrameWarnings* warnings;                       // null: what is wrong with the capture was said before
     Summary& summary;
     RateReport& rate;
-    bool saw_triangles = false;  // in a frame so far, or of those before
+    std::function<bool()> wants_key_frame = {};  // asked before each frame: whether it should be an I-frame
+    bool saw_triangles = false;                  // in a frame so far, or of those before
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
     std::optional<Mesh> last = {};
     std::optional<Pose> last_pose = {};

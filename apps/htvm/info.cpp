@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
+#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -23,6 +24,7 @@ struct Options {
     std::string input;
     bool json = false, summary = false;
     DecoderOptions limits;
+    HubTrust trust;
     double megabits = 0, buffer_seconds = 1;  // of the line and the receiver's buffer to check against; 0: no check
 };
 
@@ -146,7 +148,7 @@ nlohmann::json audio_json(const AudioTotals& totals) {
 }
 
 Result<void> info(const Options& options) {
-    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes);
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes, options.trust);
     if (!input) return tl::unexpected(input.error());
     Decoder headers(options.limits);  // only for the sequence header: frames are inspected, not decoded
     TotalsByType totals;
@@ -208,7 +210,9 @@ Result<void> info(const Options& options) {
         add(totals, *frame);
         if (options.json) frames.push_back(frame_json(*frame));
         if (!options.json && !options.summary) print_frame(*frame);
+        if (input->is_live()) std::fflush(stdout);
     }
+    if (input->refusal()) return tl::unexpected(*input->refusal());
     if (!headers.sequence() && input->oversized_packets() > 0) return check_whole(*input, options.input);
     if (!headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
@@ -248,11 +252,15 @@ Result<void> info(const Options& options) {
 void add_info(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("info", "Show what is in an .htvm stream: frames, sizes by layer, skeleton");
-    command->add_option("input", options->input, "The stream: a file, or - for standard input")
+    command
+        ->add_option("input", options->input,
+                     "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
+                     "Ctrl-C ends it")
         ->type_name("FILE")
         ->required();
     command->add_flag("--summary", options->summary, "The totals only, no line per frame");
     command->add_flag("--json", options->json, "Everything as JSON");
+    add_hub_trust(*command, options->trust, "Hubs");
     add_packet_limits(*command, options->limits);
     auto* bitrate = command->add_option("--bitrate", options->megabits,
                                         "Check that the stream plays without a pause over a line of this many Mbit/s,\n"

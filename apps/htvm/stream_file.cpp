@@ -13,18 +13,51 @@
 #include <iostream>
 #include <iterator>
 #include <limits>
+#include <utility>
 
+#include "command_line/interruption.h"
 #include "command_line/terminal.h"
+#include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
+#include "live/hub_address.h"
 
 namespace htvm::app {
 
 // ---- Packets --------------------------------------------------------------------------------------------------------
 
-Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max_packet_bytes) {
+namespace {
+
+// A hub that is not there, and a stream that nobody publishes yet, may come: each is said once.
+std::function<void(const std::string&)> warn_once() {
+    return [last = std::string()](const std::string& trouble) mutable {
+        if (std::exchange(last, trouble) != trouble) warn(trouble + "; trying again");
+    };
+}
+
+Result<live::Watcher> open_watcher(const std::string& address, std::size_t max_packet_bytes, const HubTrust& trust) {
+    watch_for_interruption();
+    live::WatcherOptions options;
+    options.certificates = trust.certificates;
+    options.insecure = trust.insecure;
+    options.largest_packet = std::min(max_packet_bytes, options.largest_packet);
+    options.is_stopped = [] { return interruption() != 0; };
+    options.trouble = warn_once();
+    return live::Watcher::open(address, options);
+}
+
+}  // namespace
+
+Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max_packet_bytes, const HubTrust& trust) {
     StreamInput input;
-    input.reader_ = PacketReader(
-        static_cast<std::size_t>(std::min<std::uint64_t>(max_packet_bytes, std::numeric_limits<std::size_t>::max())));
+    const auto most =
+        static_cast<std::size_t>(std::min<std::uint64_t>(max_packet_bytes, std::numeric_limits<std::size_t>::max()));
+    input.reader_ = PacketReader(most);
+    if (live::looks_like_hub_address(path)) {
+        auto watcher = open_watcher(path, most, trust);
+        if (!watcher) return tl::unexpected(watcher.error());
+        input.watcher_.emplace(std::move(*watcher));
+        return input;
+    }
     input.standard_ = path == "-";
     if (input.standard_) return input;
     if (std::filesystem::is_directory(path))
@@ -46,6 +79,12 @@ std::optional<Packet> StreamInput::next() {
         first_.pop_front();
         return packet;
     }
+    if (watcher_) {
+        auto packet = watcher_->next();
+        if (packet) return std::move(*packet);
+        refusal_ = packet.error();
+        return std::nullopt;
+    }
     std::istream& in = standard_ ? std::cin : file_;
     std::array<char, 65536> buffer;
     for (;;) {
@@ -64,6 +103,7 @@ std::optional<Packet> StreamInput::next() {
 }
 
 Result<void> check_whole(const StreamInput& input, const std::string& path, const std::string& advice) {
+    if (input.refusal()) return tl::unexpected(*input.refusal());
     if (input.oversized_packets() > 0)
         return fail(ErrorKind::limit, fmt::format("{} has {} larger than --max-packet; raise --max-packet to read all",
                                                   path, counted(input.oversized_packets(), "packet")));
@@ -75,9 +115,15 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
     return {};
 }
 
-Result<StreamOutput> StreamOutput::open(const std::string& path) {
+Result<StreamOutput> StreamOutput::open(const std::string& path, const PublishingOptions& publishing) {
     StreamOutput output;
     if (path == "-") return output;
+    if (live::looks_like_hub_address(path)) {
+        auto opened = Publishing::open(path, publishing);
+        if (!opened) return tl::unexpected(opened.error());
+        output.publishing_.emplace(std::move(*opened));
+        return output;
+    }
     if (is_mesh_file_name(path))
         return fail(ErrorKind::bad_input,
                     path + " is the name of a mesh, but a stream would be written there; give one that ends in .htvm");
@@ -106,6 +152,11 @@ Result<void> StreamOutput::write_one(const Packet& packet) {
         if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return {};
         indexer_.add(packet, bytes_);
     }
+    if (publishing_) {
+        if (pacing_ && frame_type(packet.kind)) wait_until(pacing_->due(packet.timestamp_us, Pacing::Clock::now()));
+        bytes_ += packet_overhead + packet.payload.size();
+        return publishing_->send(packet);
+    }
     const auto bytes = write_packet(packet);
     if (auto written = file_ ? file_->write(bytes) : write_standard_output(bytes); !written) return written;
     bytes_ += bytes.size();
@@ -120,6 +171,7 @@ void StreamOutput::add_bounds_of(const Packet& packet) {
 Result<void> StreamOutput::finish() {
     if (audio_)
         if (auto written = write_all(audio_->rest()); !written) return written;
+    if (publishing_) return publishing_->finish();
     if (!file_) return {};
     if (!is_indexed()) return file_->finish();
     const auto index = indexer_.finish(bytes_);

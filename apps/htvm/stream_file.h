@@ -1,5 +1,5 @@
-// Streams as the commands read and write them: packets in a file, or on standard input and output. Also the options
-// that limit what the commands accept as a stream.
+// Streams as the commands read and write them: packets in a file, on standard input and output, or from and to a hub.
+// Also the options that limit what the commands accept as a stream.
 #pragma once
 
 #include <cstdint>
@@ -15,6 +15,9 @@
 #include "htvm/result.hpp"
 #include "htvm/stream_index.hpp"
 #include "io/output_file.h"
+#include "live/watcher.h"
+#include "pacing.h"
+#include "publishing.h"
 
 namespace CLI {
 class App;
@@ -24,11 +27,18 @@ namespace htvm::app {
 
 class StreamInput {
 public:
-    // "-" is standard input. Larger packets are skipped.
-    static Result<StreamInput> open(const std::string& path, std::uint64_t max_packet_bytes);
+    // "-" is standard input, ws:// and wss:// a live stream, which ends where the program is interrupted. Larger
+    // packets are skipped.
+    static Result<StreamInput> open(const std::string& path, std::uint64_t max_packet_bytes,
+                                    const HubTrust& trust = {});
     // The next packet; nothing at the end.
     std::optional<Packet> next();
-    std::uint64_t damaged_bytes() const { return reader_.damaged_bytes(); }
+    // Of a live stream that a hub does not show: why.
+    const std::optional<Error>& refusal() const { return refusal_; }
+    bool is_live() const { return watcher_.has_value(); }
+    std::uint64_t damaged_bytes() const {
+        return reader_.damaged_bytes() + (watcher_ ? watcher_->state().damaged_bytes : 0);
+    }
     std::uint64_t oversized_packets() const { return reader_.oversized_packets(); }
     // At the end: bytes of a truncated packet.
     std::size_t cut_short_bytes() const { return at_end_ ? reader_.pending_bytes() : 0; }
@@ -37,6 +47,8 @@ public:
 
 private:
     std::ifstream file_;
+    std::optional<live::Watcher> watcher_;
+    std::optional<Error> refusal_;
     bool standard_ = false, at_end_ = false;
     PacketReader reader_;
     std::deque<Packet> first_;
@@ -47,10 +59,15 @@ Result<void> check_whole(const StreamInput& input, const std::string& path,
                          const std::string& advice = "'htvm verify' tells more");
 
 // A file is there once it is finished: until then its packets are in a file beside it, and what was there before stays.
-// It then begins with an index; those at the end of streams are left out of it.
+// It then begins with an index; those at the end of streams are left out of it. To a hub, packets go at once.
 class StreamOutput {
 public:
-    static Result<StreamOutput> open(const std::string& path);  // "-" is standard output
+    // "-" is standard output, ws:// and wss:// a hub.
+    static Result<StreamOutput> open(const std::string& path, const PublishingOptions& publishing = {});
+    // To a hub: frames wait until they are due by their timestamps, as those of files have to.
+    void pace() { pacing_.emplace(); }
+    // The hub, if there is one.
+    Publishing* publishing() { return publishing_ ? &*publishing_ : nullptr; }
     // Lays sound between the frames of the stream, in the place of its own. Before anything is written.
     void lay(AudioTrack audio) { audio_.emplace(std::move(audio)); }
     Result<void> write(const Packet& packet);
@@ -71,7 +88,9 @@ private:
     bool is_indexed() const { return file_ && file_->is_file(); }
     Result<void> write_all(const std::vector<Packet>& packets);
     Result<void> write_one(const Packet& packet);
-    std::optional<OutputFile> file_;  // none: standard output
+    std::optional<OutputFile> file_;  // none: standard output, or a hub
+    std::optional<Publishing> publishing_;
+    std::optional<Pacing> pacing_;
     std::optional<AudioTrack> audio_;
     StreamIndexer indexer_;
     std::uint64_t bytes_ = 0;

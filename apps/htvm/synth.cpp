@@ -1,4 +1,4 @@
-// htvm synth: a synthetic capture of a person, as mesh files and a skeleton.
+// htvm synth: a synthetic capture of a person, as mesh files and a skeleton, or as a camera would send it.
 #include "synth/synth.h"
 
 #include <fmt/core.h>
@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -13,11 +14,16 @@
 #include <string>
 #include <vector>
 
+#include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/parallel.h"
 #include "io/mesh_file.h"
+#include "io/output_file.h"
+#include "io/ply.h"
 #include "io/skeleton_file.h"
+#include "io/timestamps.h"
+#include "pacing.h"
 
 namespace htvm::app {
 
@@ -31,7 +37,7 @@ struct Options {
     int frames = 60, first_frame = 0;
     SynthOptions synth;
     unsigned threads = 0;
-    bool json = false;
+    bool json = false, live = false, counted = false;  // counted: the number of frames was given
 };
 
 struct Written {
@@ -138,6 +144,38 @@ Result<void> synthesise(const Options& options) {
     return {};
 }
 
+// ---- As a camera would send it --------------------------------------------------------------------------------------
+
+// A frame each time that one is due. What cannot be made or written in time is left out, as a camera would.
+Result<void> synthesise_live(const Options& options) {
+    if (auto ok = check_synth_options(options.synth); !ok) return ok;
+    watch_for_interruption();
+    const ThreadPool pool(std::min(thread_count(options.threads), 64u));
+    Progress progress("synth", 0);
+    using Clock = std::chrono::steady_clock;
+    const auto begun = Clock::now();
+    const auto due = [&](std::int64_t k) {
+        return begun + std::chrono::duration_cast<Clock::duration>(
+                           std::chrono::duration<double>(static_cast<double>(k) / options.synth.fps));
+    };
+    std::size_t late = 0;
+    for (std::int64_t k = 0; !options.counted || k < options.frames; ++k) {
+        if (Clock::now() > due(k + 1)) {
+            ++late;
+            continue;
+        }
+        const auto made = synth_frame(options.synth, options.first_frame + static_cast<int>(k), pool.threads());
+        wait_until(due(k));
+        if (interruption() != 0) break;
+        const auto bytes =
+            write_ply(made.mesh, time_text(std::llround(1e6 * static_cast<double>(k) / options.synth.fps)));
+        if (!bytes) return tl::unexpected(bytes.error());
+        if (auto ok = write_standard_output(*bytes); !ok && interruption() == 0) return ok;
+        progress.step(late > 0 ? fmt::format("{} left out, as there was no time for them", late) : "");
+    }
+    return {};
+}
+
 }  // namespace
 
 void add_synth(CLI::App& app, Run& run) {
@@ -153,11 +191,13 @@ void add_synth(CLI::App& app, Run& run) {
     command
         ->add_option("OUT_DIR,-o,--output", o.folder,
                      "Folder to write frame_00000.ply ..., skeleton.json, skeleton_true.json to")
-        ->type_name("FOLDER")
-        ->required();
-    command->add_option("--frames", o.frames, "How many frames")
-        ->check(CLI::Range(1, most_frames))
-        ->capture_default_str();
+        ->type_name("FOLDER");
+    auto* live = command->add_flag("--live", o.live,
+                                   "Instead, PLY after PLY on standard output, each when it is due, without end, as a\n"
+                                   "camera would send them: for htvm encode -");
+    auto* frames = command->add_option("--frames", o.frames, "How many frames")
+                       ->check(CLI::Range(1, most_frames))
+                       ->capture_default_str();
     command->add_option("--first-frame", o.first_frame, "The first frame's number; the motion starts at frame 0")
         ->check(CLI::Range(0, most_frames))
         ->capture_default_str();
@@ -178,13 +218,21 @@ void add_synth(CLI::App& app, Run& run) {
                       "Keep the vertices on the edges of one regular grid (by default there is no grid)");
     command->add_flag("--normals", o.synth.normals, "Write vertex normals too");
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
-    command->add_flag("--json", o.json, "Print what was written as JSON on standard output");
+    command->add_flag("--json", o.json, "Print what was written as JSON on standard output")->excludes(live);
     command->footer(
         "Example: a capture of 2 seconds, then its stream and what is in it\n"
         "  htvm synth capture --frames 60\n"
         "  htvm encode capture --skeleton capture/skeleton.json -o capture.htvm\n"
-        "  htvm info capture.htvm");
-    command->callback([options, &run] { run = [options] { return synthesise(*options); }; });
+        "  htvm info capture.htvm\n"
+        "Example: a live stream without a camera, beside a hub (htvm serve)\n"
+        "  htvm synth --live --vertices 10000 | htvm encode - -o ws://localhost:8080/publish/me");
+    command->callback([options, frames, &run] {
+        if (options->live == !options->folder.empty())
+            throw CLI::ValidationError("OUT_DIR",
+                                       "or --live: give one of them, a folder to write to or standard output");
+        options->counted = frames->count() > 0;
+        run = [options] { return options->live ? synthesise_live(*options) : synthesise(*options); };
+    });
 }
 
 }  // namespace htvm::app

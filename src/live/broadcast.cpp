@@ -114,6 +114,11 @@ SharedPacket Broadcast::next(Viewer viewer) {
     return packet;
 }
 
+Broadcast::Clock::duration Broadcast::waiting_time(Viewer viewer, Clock::time_point now) const {
+    const auto& waiting = viewers_.at(viewer).waiting;
+    return waiting.empty() ? Clock::duration{} : now - waiting.front().arrived;
+}
+
 std::size_t Broadcast::kept_bytes() const {
     std::size_t out = 0;
     for (const auto& [place, packet] : packets_) out += packet->bytes.size();

@@ -67,6 +67,11 @@ public:
     std::size_t viewers() const { return viewers_.size(); }
     const ViewerCounters& counters(Viewer viewer) const { return viewers_.at(viewer).counters; }
     std::size_t waiting_bytes(Viewer viewer) const { return viewers_.at(viewer).bytes; }
+    // For how long the next packet for it has waited.
+    Clock::duration waiting_time(Viewer viewer, Clock::time_point now) const;
+    // Whether it was given all that later frames may need; otherwise, once there are frames, it waits for one that
+    // needs little.
+    bool follows(Viewer viewer) const { return viewers_.at(viewer).in_step; }
     std::uint64_t undecodable_frames() const { return undecodable_; }
     // Memory held for viewers who may still join.
     std::size_t kept_bytes() const;

@@ -18,6 +18,7 @@
 
 namespace htvm::live {
 
+inline constexpr const char* live_protocol = "htvm.1";  // the WebSockets' subprotocol
 inline constexpr std::uint32_t protocol_version = 1;
 inline constexpr std::size_t most_text_bytes = 4096;
 

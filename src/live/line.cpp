@@ -1,5 +1,7 @@
 #include "live/line.h"
 
+#include <netinet/tcp.h>
+
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -32,6 +34,15 @@ net::awaitable<void> Line::close() {
     }
     beast::error_code ignored;
     next_layer().socket().shutdown(net::ip::tcp::socket::shutdown_both, ignored);
+}
+
+void keep_kernel_buffers_small(Line& line) {
+    constexpr int unsent = 16384, sent = 131072;
+    auto& socket = line.next_layer().socket();
+    beast::error_code ignored;
+    socket.set_option(net::ip::tcp::no_delay(true), ignored);
+    socket.set_option(net::socket_base::send_buffer_size(sent), ignored);
+    ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
 }
 
 }  // namespace htvm::live

@@ -52,6 +52,9 @@ private:
     std::variant<boost::beast::tcp_stream, Secure> stream_;
 };
 
+// So that the kernel does not hide how slow the other side is: of what it takes, little may lie unsent.
+void keep_kernel_buffers_small(Line& line);
+
 // How Boost.Beast ends the connection below a WebSocket.
 template <class Handler>
 void async_teardown(boost::beast::role_type role, Line& line, Handler&& handler) {

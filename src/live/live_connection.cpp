@@ -1,7 +1,5 @@
 #include "live/live_connection.h"
 
-#include <netinet/tcp.h>
-
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
@@ -35,16 +33,6 @@ constexpr auto awaited = net::as_tuple(net::use_awaitable);
 // A viewer who pauses for some seconds comes back; a line that is dead does not.
 constexpr std::chrono::seconds silence{30}, handshake{10};
 constexpr std::size_t piece_bytes = 65536;  // of a message that is being read
-
-// The kernel must not hide how slow a viewer is: of what it takes, little may lie unsent.
-void keep_kernel_buffers_small(Line& line) {
-    constexpr int unsent = 16384, sent = 131072;
-    auto& socket = line.next_layer().socket();
-    beast::error_code ignored;
-    socket.set_option(net::ip::tcp::no_delay(true), ignored);
-    socket.set_option(net::socket_base::send_buffer_size(sent), ignored);
-    ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
-}
 
 // What a coroutine that writes waits for: that there is something to write, or the end.
 struct News {

@@ -10,12 +10,11 @@
 #include <chrono>
 #include <string>
 
+#include "live/control.h"
 #include "live/hub.h"
 #include "live/line.h"
 
 namespace htvm::live {
-
-inline constexpr const char* live_protocol = "htvm.1";
 
 using LiveRequest = boost::beast::http::request<boost::beast::http::empty_body>;
 

@@ -77,7 +77,7 @@ works() {
         decoder) decodes "$1" ;;
         c) encodes "$1" ;;
         c_decoder) "$project/tests/c_api/examples.sh" "${1/%_decoder/}" "$1" "$conformance" >/dev/null || fail "$1" ;;
-        draco) "$1" || fail "$1" ;;
+        draco | live) "$1" || fail "$1" ;;
     esac
     programs=$((programs + 1))
 }
@@ -94,13 +94,13 @@ by_cmake() {
     done
 }
 folders=0
-draco=
-[ ! -e both/$libraries/libhtvm_draco.a ] || draco=draco
+plugged_in= # what needs libraries of others
+for name in draco live; do [ ! -e both/$libraries/libhtvm_$name.a ] || plugged_in+=" $name"; done
 without_eigen=-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON
 by_cmake static both "decoder" $without_eigen
-by_cmake static both "static encoder c c_decoder $draco" $without_eigen
+by_cmake static both "static encoder c c_decoder$plugged_in" $without_eigen
 by_cmake static static "c c_decoder" -DBUILD_SHARED_LIBS=ON # there is nothing else
-by_cmake shared both "decoder encoder c c_decoder $draco" -DBUILD_SHARED_LIBS=ON
+by_cmake shared both "decoder encoder c c_decoder$plugged_in" -DBUILD_SHARED_LIBS=ON
 by_cmake shared shared "shared decoder"
 by_cmake shared shared "c c_decoder" -DC_ALONE=ON
 # Missing components are reported.
@@ -113,7 +113,7 @@ grep -q "htvm is installed without shared libraries" missing.log || { cat missin
 by_pkg_config() {
     local kind=$1 component source compiler package flags
     mkdir "pc_$kind"
-    for component in decoder encoder c c_decoder; do
+    for component in decoder encoder c c_decoder live; do
         case $component in
             c) compiler="cc -std=c99" source=$project/examples/encode.c ;;
             c_decoder) compiler="cc -std=c99" source=$project/examples/decode.c ;;

@@ -13,8 +13,8 @@ fail() { echo "FAILED: $*"; exit 1; }
 cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work" >cpack.log 2>&1 || { cat cpack.log; exit 1; }
 version=$(sed -nE 's/^set\(CPACK_PACKAGE_VERSION "(.*)"\)/\1/p' "$build/CPackConfig.cmake")
 machine=$(dpkg --print-architecture) shared=libhtvm${version%.*}
-draco=libhtvm-draco${version%.*}
-for package in htvm "$shared" "$draco" libhtvm-dev; do
+draco=libhtvm-draco${version%.*} live=libhtvm-live${version%.*}
+for package in htvm "$shared" "$draco" "$live" libhtvm-dev; do
     file=${package}_${version}_$machine.deb
     [ -f "$file" ] || fail "$file was not made"
     dpkg-deb -c "$file" | awk '{ print $6 }' >"$package.files"
@@ -31,25 +31,29 @@ has htvm bin/htvm bin/htvm-lab share/man/man1/htvm-encode.1.gz share/bash-comple
 has "$shared" "lib/.*/libhtvm_c.so.$version" "lib/.*/libhtvm_decoder.so.${version%.*}"
 has libhtvm-dev include/htvm/htvm.h 'lib/.*/libhtvm_decoder\.(a|so)' 'lib/.*/pkgconfig/htvm-c.pc' \
     'lib/.*/cmake/htvm/htvm-config.cmake'
+has "$live" "lib/.*/libhtvm_live.so.${version%.*}"
 depends() { dpkg-deb -f "$1_${version}_$machine.deb" Depends; }
 [[ $(depends htvm) == *libc6* && $(depends htvm) == *libembree* ]] || fail "htvm depends on: $(depends htvm)"
-[[ $(depends "$shared") == *libstdc++6* && $(depends "$shared") != *draco* ]] || fail "$shared depends on: $(depends "$shared")"
+[[ $(depends "$shared") == *libstdc++6* && $(depends "$shared") != *draco* && $(depends "$shared") != *ssl* ]] ||
+    fail "$shared depends on: $(depends "$shared")"
+[[ $(depends "$live") == *libssl3* ]] || fail "$live depends on: $(depends "$live")"
 [[ $(depends libhtvm-dev) == *libexpected-dev* && $(depends libhtvm-dev) == *"$shared (= $version)"* ]] ||
     fail "libhtvm-dev depends on: $(depends libhtvm-dev)"
 
-if [ "$(id -u)" -ne 0 ] || dpkg-query -W htvm libhtvm-dev "$shared" "$draco" >/dev/null 2>&1; then
+if [ "$(id -u)" -ne 0 ] || dpkg-query -W htvm libhtvm-dev "$shared" "$draco" "$live" >/dev/null 2>&1; then
     echo "Not root, or the packages are installed already: their installation is not tried."
     exit 0
 fi
-installed=(htvm libhtvm-dev "$shared" "$draco")
+installed=(htvm libhtvm-dev "$shared" "$draco" "$live")
 dpkg -i ./*.deb >dpkg.log 2>&1 || { cat dpkg.log; exit 1; }
 [ "$(/usr/bin/htvm --version)" = "htvm $version" ] || fail "/usr/bin/htvm does not run"
 ! command -v man >/dev/null || man -w htvm-encode >/dev/null || fail "man does not find htvm-encode"
 for kind in static shared; do
     cmake -S "$project/tests/install/consumer" -B $kind -DEXAMPLES="$project/examples" \
-        "-DCOMPONENTS=$kind;decoder;encoder;c;c_decoder;draco" -DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON >$kind.log 2>&1
+        "-DCOMPONENTS=$kind;decoder;encoder;c;c_decoder;draco;live" -DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON >$kind.log 2>&1
     cmake --build $kind -j 2 >>$kind.log || { cat $kind.log; fail "programs against the package: $kind"; }
     $kind/use_draco
+    $kind/use_live
     $kind/use_encoder cpp.htvm
     $kind/use_c c.htvm
     cmp cpp.htvm c.htvm

@@ -13,7 +13,7 @@ fail() { echo "FAILED: $*"; exit 1; }
 
 # ---- man pages --------------------------------------------------------------------------------------------------------
 
-[ "$(cd man1 && echo *)" = "htvm-calibrate.1 htvm-compare.1 htvm-cut.1 htvm-decode.1 htvm-encode.1 htvm-help.1 htvm-index.1 htvm-info.1 htvm-join.1 htvm-lab-help.1 htvm-lab-rd.1 htvm-lab-reproduce.1 htvm-lab.1 htvm-play.1 htvm-render.1 htvm-serve.1 htvm-still.1 htvm-synth.1 htvm-verify.1 htvm.1" ] ||
+[ "$(cd man1 && echo *)" = "htvm-calibrate.1 htvm-compare.1 htvm-cut.1 htvm-decode.1 htvm-encode.1 htvm-help.1 htvm-index.1 htvm-info.1 htvm-join.1 htvm-lab-help.1 htvm-lab-rd.1 htvm-lab-reproduce.1 htvm-lab.1 htvm-play.1 htvm-publish.1 htvm-render.1 htvm-serve.1 htvm-still.1 htvm-synth.1 htvm-verify.1 htvm.1" ] ||
     fail "the pages are $(cd man1 && echo *)"
 for page in man1/*.1; do
     for section in NAME SYNOPSIS DESCRIPTION OPTIONS '"EXIT STATUS"' '"SEE ALSO"'; do
@@ -39,7 +39,7 @@ has_options() {
         checks=$((checks + 1))
     done
 }
-for command in synth encode decode info calibrate compare cut join index verify still render play serve; do has_options "$htvm" $command htvm; done
+for command in synth encode decode info calibrate compare cut join index verify still render play publish serve; do has_options "$htvm" $command htvm; done
 for command in rd reproduce; do has_options "$lab" $command htvm-lab; done
 [ $checks -gt 100 ] || fail "only $checks checks: the help was not read"
 grep -q '^\.SH EXAMPLES' man1/htvm-encode.1 || fail "no examples"
@@ -63,7 +63,7 @@ offers() {
     [ "$offered" = "$1" ] || fail "bash offers '$offered' for '$2', not '$1'"
     checks=$((checks + 1))
 }
-offers 'calibrate|compare|cut|decode|encode|help|index|info|join|play|render|serve|still|synth|verify' 'htvm '
+offers 'calibrate|compare|cut|decode|encode|help|index|info|join|play|publish|render|serve|still|synth|verify' 'htvm '
 offers 'decode' 'htvm d'
 offers '--help|--version' 'htvm --'
 offers 'paper|topology|tracked' 'htvm encode capture --profile '

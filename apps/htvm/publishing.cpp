@@ -1,0 +1,133 @@
+#include "publishing.h"
+
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <utility>
+
+#include "command_line/interruption.h"
+#include "command_line/terminal.h"
+#include "live/hub_address.h"
+
+namespace htvm::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A token is one line of printable characters: anything else would not pass through a request.
+Result<std::string> checked_token(std::string token, const std::string& where) {
+    while (!token.empty() && (token.back() == '\n' || token.back() == '\r' || token.back() == ' ')) token.pop_back();
+    constexpr std::size_t longest = 1024;
+    const bool fine = !token.empty() && token.size() <= longest &&
+                      std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c < 127; });
+    if (!fine) return fail(ErrorKind::bad_input, where + " has no token: one line of at most 1,024 letters and signs");
+    return token;
+}
+
+Result<std::string> token_of(const PublishingOptions& options) {
+    if (!options.token_file.empty()) {
+        std::ifstream file(options.token_file);
+        std::string line;
+        if (!file) return fail(ErrorKind::bad_input, options.token_file + " cannot be read");
+        std::getline(file, line);
+        return checked_token(line, options.token_file);
+    }
+    if (!options.token.empty()) return checked_token(options.token, "--token");
+    const char* given = std::getenv("HTVM_TOKEN");
+    if (!given || !*given) return std::string();
+    return checked_token(given, "HTVM_TOKEN");
+}
+
+}  // namespace
+
+void add_hub_trust(CLI::App& command, HubTrust& trust, const std::string& group) {
+    command
+        .add_option("--ca", trust.certificates,
+                    "wss: PEM file of the certificates that may vouch for the hub's (default: the system's)")
+        ->type_name("FILE")
+        ->check(CLI::ExistingFile)
+        ->group(group);
+    command
+        .add_flag("--insecure", trust.insecure, "wss: take any certificate, whoever may be behind it: for tests alone")
+        ->group(group);
+}
+
+void add_publishing_options(CLI::App& command, PublishingOptions& options, const std::string& group) {
+    auto* token =
+        command
+            .add_option("--token", options.token,
+                        "The token by which the hub knows who may publish. Others on this machine can see it\n"
+                        "here: the environment variable HTVM_TOKEN, or a file, keeps it")
+            ->type_name("TOKEN")
+            ->group(group);
+    command.add_option("--token-file", options.token_file, "A file whose first line is the token")
+        ->type_name("FILE")
+        ->excludes(token)
+        ->group(group);
+    add_hub_trust(command, options.trust, group);
+    command
+        .add_flag("--stamps", options.stamps,
+                  "Tell when each frame was sent, for measurements by viewers who ask for it (?stamps)")
+        ->group(group);
+}
+
+std::string shown_place(const std::string& path_or_address) {
+    if (path_or_address == "-") return "standard output";
+    if (!live::looks_like_hub_address(path_or_address)) return path_or_address;
+    return path_or_address.substr(0, path_or_address.find('?'));
+}
+
+Result<Publishing> Publishing::open(const std::string& address, const PublishingOptions& options) {
+    auto token = token_of(options);
+    if (!token) return tl::unexpected(token.error());
+    PublisherOptions settings;
+    settings.token = std::move(*token);
+    settings.other_hubs = options.other_hubs;
+    settings.certificates = options.trust.certificates;
+    settings.insecure = options.trust.insecure;
+    settings.stamps = options.stamps;
+    auto publisher = Publisher::open(address, settings);
+    if (!publisher) return tl::unexpected(publisher.error());
+    return Publishing(std::move(*publisher));
+}
+
+void Publishing::tell() {
+    const auto now = publisher_.state();
+    if (!now.trouble.empty() && now.trouble != told_) warn(now.trouble + "; trying again");
+    if (now.connected && !told_.empty()) note("connected to " + now.hub);
+    if (now.connected || !now.trouble.empty()) told_ = now.trouble;
+}
+
+Result<void> Publishing::send(const Packet& packet) {
+    tell();
+    return publisher_.send(packet);
+}
+
+std::string Publishing::progress() {
+    const auto state = publisher_.state();
+    const auto now = Clock::now();
+    constexpr std::chrono::seconds window{2};
+    if (now - looked_ >= window) {
+        const double seconds = std::chrono::duration<double>(now - looked_).count();
+        megabits_ = 8e-6 * static_cast<double>(state.sent_bytes - bytes_then_) / seconds;
+        looked_ = now;
+        bytes_then_ = state.sent_bytes;
+    }
+    if (!state.connected) return "not connected";
+    std::string out = fmt::format("{:.2f} Mbit/s", megabits_);
+    if (state.viewers) out += ", " + counted(*state.viewers, "viewer");
+    if (state.queue_bytes > 0)
+        out += fmt::format(", {:.2f} s wait", static_cast<double>(state.queue_time.count()) / 1e3);
+    if (state.dropped_frames > 0) out += fmt::format(", {} dropped", state.dropped_frames);
+    return out;
+}
+
+Result<void> Publishing::finish() {
+    constexpr std::chrono::milliseconds patience{5000}, after_interruption{1000};
+    return publisher_.finish(interruption() == 0 ? patience : after_interruption);
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,62 @@
+// What the commands that connect to hubs share: the options, and what is said of the connection.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "htvm/packet.hpp"
+#include "htvm/publisher.hpp"
+#include "htvm/result.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace htvm::app {
+
+// Whose certificates are taken of hubs that speak TLS.
+struct HubTrust {
+    std::string certificates;  // PEM file; empty: the system's
+    bool insecure = false;     // anybody's
+};
+// Adds --ca and --insecure, in a group of the help.
+void add_hub_trust(CLI::App& command, HubTrust& trust, const std::string& group);
+
+struct PublishingOptions {
+    std::string token, token_file;  // neither: what the environment variable HTVM_TOKEN has, if anything
+    std::vector<std::string> other_hubs;
+    HubTrust trust;
+    bool stamps = false;
+};
+// Adds --token, --token-file, --stamps and those of the trust.
+void add_publishing_options(CLI::App& command, PublishingOptions& options, const std::string& group);
+
+// Where a stream goes or comes from, for people: of an address what is not secret.
+std::string shown_place(const std::string& path_or_address);
+
+// Publishes, and says on the terminal when the hub is lost and found again.
+class Publishing {
+public:
+    static Result<Publishing> open(const std::string& address, const PublishingOptions& options);
+    Result<void> send(const Packet& packet);
+    bool wants_key_frame() { return publisher_.wants_key_frame(); }
+    PublisherState state() const { return publisher_.state(); }
+    // For the line of progress: the rate of the last seconds, viewers, what waits, what was dropped.
+    std::string progress();
+    // The end of the stream, once the hub has all of it.
+    Result<void> finish();
+
+private:
+    explicit Publishing(Publisher publisher) : publisher_(std::move(publisher)) {}
+    void tell();
+
+    Publisher publisher_;
+    std::string told_;                                // trouble
+    std::chrono::steady_clock::time_point looked_{};  // when the rate was last measured
+    std::uint64_t bytes_then_ = 0;
+    double megabits_ = 0;
+};
+
+}  // namespace htvm::app

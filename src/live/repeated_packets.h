@@ -1,0 +1,43 @@
+// Tells packets that came before: whoever connects again is sent what the newest frame needs, most of which it has.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "htvm/decoder.hpp"
+#include "htvm/packet.hpp"
+
+namespace htvm::live {
+
+// Takes the headers of all packets of a stream that come, as told_header() has them. In a sequence with a session,
+// packets of frames up to the last one that came are repeats; without a session such frames begin another sequence
+// (docs/bitstream.md, section 2, Order).
+class RepeatedPackets {
+public:
+    // Whether the packet came before. Else it counts as having come.
+    bool is_repeat(const PacketHeader& header) {
+        if (header.kind == PacketKind::sequence) {
+            if (header_ && header.reference == *header_ && header.has(packet_flag::session)) return true;
+            header_ = header.has(packet_flag::session) ? std::optional(header.reference) : std::nullopt;
+            frame_.reset();
+            audio_us_.reset();
+            return false;
+        }
+        if (!header_) return false;
+        if (header.kind == PacketKind::audio) {
+            if (audio_us_ && header.timestamp_us <= *audio_us_) return true;
+            audio_us_ = header.timestamp_us;
+            return false;
+        }
+        if (frame_ && header.frame <= *frame_) return true;
+        if (frame_type(header.kind)) frame_ = header.frame;
+        return false;
+    }
+
+private:
+    std::optional<std::uint32_t> header_;   // the CRC of the one in force, if it has a session
+    std::optional<std::uint32_t> frame_;    // the last one's number
+    std::optional<std::int64_t> audio_us_;  // of the last sound
+};
+
+}  // namespace htvm::live

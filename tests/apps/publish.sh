@@ -1,0 +1,114 @@
+#!/usr/bin/env bash
+# Live streams from end to end: htvm publish and htvm encode to a hub, htvm decode and htvm info from it.
+. "$(dirname "$0")/expect.sh"
+unset HTVM_TOKEN
+started=()
+trap 'kill "${started[@]}" 2>/dev/null; wait 2>/dev/null; rm -rf "$work"' EXIT
+
+# begins_to COMMAND...: until the command succeeds, for ten seconds.
+begins_to() {
+    for _ in $(seq 100); do
+        "$@" >/dev/null 2>&1 && return
+        sleep 0.1
+    done
+    fail "never: $*"
+}
+# hub LOG PORT: a hub on this port, or a free one (0); sets hub_pid and address.
+hub() {
+    "$htvm" serve --port "$2" >"$1" 2>"$1.err" &
+    hub_pid=$!
+    started+=("$hub_pid")
+    begins_to grep -q http "$1"
+    address=$(sed -E 's|.*http://([^/]*)/.*|\1|' "$1" | head -1)
+}
+
+"$htvm" synth walk --frames 12 --vertices 300 >/dev/null 2>&1
+"$htvm" encode walk --keyint 6 -o walk.htvm 2>/dev/null
+"$htvm" decode walk.htvm -o meshes 2>/dev/null
+
+hub serve 0
+
+# What is decoded from a hub is what is decoded from the file; each round of a loop is a sequence of its own.
+"$htvm" publish walk.htvm "ws://$address/publish/walk" --loop --json >published 2>published.err &
+publisher=$!
+started+=("$publisher")
+"$htvm" decode "ws://$address/watch/walk" --frames 30 -o live --json --timestamps live.csv >live.json 2>live.err ||
+    fail "decoding a live stream: $(cat live.err)"
+python3 - <<'PYTHON' || fail "the live frames are not those of the file"
+import glob, json, os
+frames = json.load(open("live.json"))["frames"]
+# The stream was joined at a frame of its own; its rounds follow each other.
+meshes = [open(f, "rb").read() for f in sorted(glob.glob("meshes/*.ply"))]
+body = lambda ply: ply[ply.index(b"end_header"):]
+first = body(open(frames[0]["file"], "rb").read())
+at = [body(m) for m in meshes].index(first)
+for k, frame in enumerate(frames):
+    got = body(open(frame["file"], "rb").read())
+    assert got == body(meshes[(at + k) % len(meshes)]), f"frame {k}"
+assert len(frames) == 30
+times = [float(line.split(",")[1]) for line in open("live.csv").read().split()[1:]]
+assert all(20000 < b - a < 50000 for a, b in zip(times, times[1:])), times
+PYTHON
+# Frames of a live stream are told as they come.
+timeout -s INT 3 "$htvm" info "ws://$address/watch/walk" >info 2>info.err
+[ "$(grep -cE '^ +[0-9]+ +[ITP]' info)" -ge 20 ] || fail "info of a live stream: $(cat info info.err)"
+
+# A hub that is killed and back costs the frames of that time, and nobody gives up.
+"$htvm" decode "ws://$address/watch/walk" --frames 60 -o again 2>again.err &
+viewer=$!
+sleep 1
+kill -9 "$hub_pid"
+sleep 0.5
+hub serve_again "${address##*:}"
+wait "$viewer"
+[ $? -le 3 ] && [ "$(find again -name '*.ply' | wc -l)" -eq 60 ] || fail "a viewer of a hub that is back: $(cat again.err)"
+grep -q 'trying again' again.err || fail "the viewer does not say that the hub was lost: $(cat again.err)"
+kill -INT "$publisher"
+wait "$publisher"
+[ $? -eq 0 ] || fail "htvm publish --loop after Ctrl-C: $(cat published.err)"
+python3 - <<'PYTHON' || fail "htvm publish --json"
+import json
+lines = [json.loads(line) for line in open("published")]
+assert lines[-1]["frames"] > 90 and lines[-1]["rounds"] >= 7 and lines[-1]["connections"] == 2, lines[-1]
+assert any(line["round_trip_ms"] is not None for line in lines)
+PYTHON
+
+# From a file at the time of its frames: twelve of them last 0.4 s.
+begun=$(date +%s%N)
+expect 0 "12 frames to ws://$address/publish/once" "$htvm" publish walk.htvm "ws://$address/publish/once"
+lasted=$((($(date +%s%N) - begun) / 1000000))
+[ $lasted -ge 366 ] || fail "12 frames were published in $lasted ms"
+"$htvm" publish - "ws://$address/publish/piped" --speed 10 <walk.htvm 2>piped.err || fail "from a pipe: $(cat piped.err)"
+
+# As a camera sends it: synth, encode, decode.
+"$htvm" synth --live --vertices 300 2>synth.err >camera.ply &
+camera=$!
+started+=("$camera")
+begins_to test -s camera.ply
+kill -INT "$camera"
+wait "$camera" || fail "synth --live after Ctrl-C: $(cat synth.err)"
+"$htvm" synth --live --vertices 300 --frames 1000 2>/dev/null |
+    "$htvm" encode - -o "ws://$address/publish/me" 2>encode.err &
+encoder=$!
+started+=("$encoder")
+"$htvm" decode "ws://$address/watch/me" --frames 20 -o me 2>me.err || fail "decoding what a camera sends: $(cat me.err)"
+[ "$(find me -name '*.ply' | wc -l)" -eq 20 ] || fail "a camera: $(ls me)"
+kill -INT "$encoder"
+wait "$encoder"
+[ $? -eq 130 ] || fail "encoding for a hub after Ctrl-C: $(cat encode.err)"
+
+# What is wrong is said.
+expect 1 "does not begin with ws://" "$htvm" publish walk.htvm "http://$address/publish/a"
+expect 1 "1 to 65535" "$htvm" decode "ws://localhost:0/watch/a" -o nothing
+expect 2 "standard input does not allow" "$htvm" publish - "ws://$address/publish/a" --loop
+expect 2 "not for what is live" "$htvm" encode walk --jobs 2 -o "ws://$address/publish/a"
+expect 1 "cannot be read" "$htvm" publish walk.htvm "ws://$address/publish/a" --token-file nowhere
+printf 'a b\n' >spaced
+expect 1 "has no token" "$htvm" publish walk.htvm "ws://$address/publish/a" --token-file spaced
+expect 3 "it has no frame" "$htvm" publish spaced "ws://$address/publish/a"
+expect 4 "encode it again" "$htvm" publish "$project/tests/data/conformance/person.htvm" "ws://$address/publish/a"
+expect 2 "a folder to write to or standard output" "$htvm" synth
+expect 2 "a folder to write to or standard output" "$htvm" synth walk --live
+# Nobody is there: the publisher looks for a hub until it is told to end.
+expect 5 "127.0.0.1:9" "$htvm" publish walk.htvm ws://127.0.0.1:9/publish/a
+done_with "publish: passed"
