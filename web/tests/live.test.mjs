@@ -7,9 +7,9 @@ import { build } from 'esbuild';
 import { conformance, packet, packetsOf, firstSequence } from './streams.mjs';
 
 const path = (relative) => fileURLToPath(new URL(relative, import.meta.url));
-const sources = ['live_clock', 'live_source', 'live_state', 'live_session'];
+const sources = ['live_clock', 'live_source', 'live_state', 'live_session', 'playback'];
 
-let LiveClock, LiveSource, LiveState, LiveSession, DecoderModule;
+let LiveClock, LiveSource, LiveState, LiveSession, Playback, DecoderModule;
 let module, stream;
 
 before(async () => {
@@ -18,7 +18,7 @@ before(async () => {
         stdin: { contents, resolveDir: path('../packages/player/src') }, bundle: true, format: 'esm', platform: 'node', write: false,
         logLevel: 'error',
     });
-    ({ LiveClock, LiveSource, LiveState, LiveSession, DecoderModule } = await import(
+    ({ LiveClock, LiveSource, LiveState, LiveSession, Playback, DecoderModule } = await import(
         `data:text/javascript;base64,${Buffer.from(outputFiles[0].contents).toString('base64')}`));
     module = await DecoderModule.load(await readFile(path('../packages/decoder/dist/htvm_decoder.wasm')));
     stream = packetsOf(firstSequence(await conformance('tracked_by_chance')));
@@ -130,6 +130,116 @@ test('behind is by the fastest of ten heartbeats', () => {
     // Another run of the publisher is another clock.
     clock.publisher(4000, 100e6);
     assert.equal(clock.behindMs(4300, 100.2e6), 100);
+});
+
+// ---- what is shown ------------------------------------------------------------------------------------------------
+
+/** A live playback whose worker is the test. */
+async function showing() {
+    const sent = [];
+    const state = { now: 1000 };
+    const worker = { postMessage: (request) => sent.push(request), terminate: () => undefined };
+    const said = [];
+    const listener = Object.fromEntries(
+        ['opened', 'extent', 'arrived', 'sound', 'jumped', 'sought', 'waiting', 'ended', 'notice', 'failed', 'restarted', 'live'].map((name) =>
+            [name, () => said.push(name)]));
+    const playback = new Playback(async () => worker, 'decoder.wasm', () => state.now, listener);
+    playback.open('ws://a.example/watch/me', true);
+    playback.play();
+    await new Promise(setImmediate);
+    const { serial } = sent[0];
+    return {
+        playback, sent, state, said,
+        take: (report) => worker.onmessage({ data: report }),
+        /** Frame n, of n / 30 s, comes now. */
+        give: (n, preview = false) => {
+            const ms = performance.timeOrigin + performance.now();
+            worker.onmessage({
+                data: {
+                    type: 'frame', serial, frame: n, timeUs: (n * 1e6) / 30, presentUs: (n * 1e6) / 30, durationUs: 1e6 / 30, preview, topology: 0,
+                    indices: null, buffer: new ArrayBuffer(16), live: { receivedMs: ms, decodedMs: ms, readyMs: ms, leftOut: 0 },
+                },
+            });
+        },
+        /** The numbers of the frames shown until then, a picture each 1/60 s. */
+        until: (ms) => {
+            const shown = [];
+            for (; state.now < ms; state.now += 1000 / 60) {
+                const frame = playback.tick();
+                if (frame) shown.push(frame.frame);
+            }
+            return shown;
+        },
+    };
+}
+
+// 100 frames as they should come, shown one after the other.
+function smoothly({ give, until }) {
+    const shown = [];
+    for (let n = 0; n < 100; ++n) {
+        give(n);
+        shown.push(...until(1000 + (n + 1) * frameMs));
+    }
+    assert.deepEqual(shown, Array.from({ length: shown.length }, (_, i) => i));
+    assert.ok(shown.length >= 98);
+}
+
+test('frames that come too late are not shown, but those behind them, which come in time', async () => {
+    const scene = await showing();
+    smoothly(scene);
+    const { give, until, playback } = scene;
+    // For half a second nothing comes, then all of it at once.
+    const begin = 1000 + 100 * frameMs;
+    assert.ok(until(begin + 500).length <= 2);
+    const shown = [];
+    for (let n = 100; n < 120; ++n) {
+        give(n);
+        shown.push(...until(Math.max(begin + 500 + (n - 99), 1000 + (n + 1) * frameMs)));
+    }
+    assert.ok(shown[0] >= 111 && shown[0] <= 114 && shown.at(-1) >= 118, `${shown}`);
+    assert.ok(playback.live.notShown >= 10);
+});
+
+test('where all frames have become late, they are shown after 0.2 s', async () => {
+    const scene = await showing();
+    smoothly(scene);
+    const { give, until } = scene;
+    const shown = [];
+    for (let n = 100; n < 130; ++n) {
+        until(1250 + n * frameMs);
+        give(n);
+        shown.push(...until(1250 + (n + 1) * frameMs));
+    }
+    assert.ok(shown[0] >= 103 && shown[0] <= 109, `${shown}`);
+    assert.deepEqual(shown, Array.from({ length: shown.length }, (_, i) => shown[0] + i));
+});
+
+test('a frame that came in time is shown however late drawing is', async () => {
+    const { give, until, state, playback } = await showing();
+    for (let n = 0; n < 10; ++n) {
+        give(n);
+        until(1000 + (n + 1) * frameMs);
+    }
+    for (let n = 10; n < 20; ++n) {
+        give(n);
+        state.now += frameMs;
+    }
+    state.now += 400; // the page was busy
+    assert.equal(playback.tick().frame, 19);
+});
+
+test('paused, the worker rests with the picture that there is; played again, it joins anew', async () => {
+    const { give, until, playback, sent } = await showing();
+    give(0, true);
+    assert.deepEqual(until(1020), [0]);
+    playback.pause();
+    assert.equal(sent.at(-1).type, 'rest');
+    playback.play();
+    assert.equal(sent.at(-1).type, 'seek');
+    playback.hide();
+    assert.equal(sent.at(-1).type, 'rest');
+    playback.show();
+    assert.equal(sent.at(-1).type, 'seek');
 });
 
 // ---- words --------------------------------------------------------------------------------------------------------

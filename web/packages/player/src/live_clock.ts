@@ -7,8 +7,8 @@
 // ten seconds, plus 10 ms. So the buffer is as long as jitter makes it, and drift needs nothing of its own.
 //
 // Playing speed stays within 2 % while offset follows: it grows by at most 20 ms a second, and shrinks by at most 10 ms.
-// Only a gap makes it jump: in the first two seconds of a connection, where what comes is still catching up; where it is
-// more than 300 ms off; or where frames have come too late for 200 ms.
+// Only a gap makes it jump: forward in the first two seconds of a connection, where what comes is still catching up, and where
+// it is more than 300 ms above what is needed; back where frames have come too late for 200 ms.
 
 const windowMs = 10000; // of transits; at the beginning half of the time since, so that what was catching up is forgotten
 const shortestWindowMs = 300;
@@ -177,7 +177,7 @@ export class LiveClock {
         this.#atMs = nowMs;
         const offMs = this.#targetMs - this.#offsetMs;
         const settling = nowMs - this.#beganMs < settlingMs;
-        if (Math.abs(offMs) > (settling ? jumpWhileSettlingMs : jumpMs)) {
+        if (offMs < -(settling ? jumpWhileSettlingMs : jumpMs)) {
             this.#offsetMs = this.#targetMs;
             this.speed = 1;
             return;

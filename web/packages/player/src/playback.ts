@@ -52,6 +52,8 @@ interface Live {
     resting: boolean;
     leftOut: number;
     notShown: number;
+    /** When the frames could be shown from, by the player's clock. */
+    readyMs: WeakMap<FrameReport, number>;
 }
 
 const mostFrames = 12; // decoded ahead, the one shown included
@@ -173,7 +175,7 @@ export class Playback {
     open(url: string, live = false): void {
         this.close();
         this.#url = url;
-        this.#live = live ? { clock: new LiveClock(), state: new LiveState(), resting: false, leftOut: 0, notShown: 0 } : null;
+        this.#live = live ? { clock: new LiveClock(), state: new LiveState(), resting: false, leftOut: 0, notShown: 0, readyMs: new WeakMap() } : null;
         this.#traps = [];
         this.#failed = false;
         this.durationUs = null;
@@ -347,8 +349,8 @@ export class Playback {
 
     // A live frame that is to be shown, or null if it came too late for that: it stays until one comes that did not. Where only
     // drawing is late, the frame is shown.
-    #inTime({ clock }: Live, frame: FrameReport): FrameReport | null {
-        const lateUs = clock.timeAt(this.#fromWorker(frame.live!.readyMs)) - frame.presentUs - frame.durationUs;
+    #inTime({ clock, readyMs }: Live, frame: FrameReport): FrameReport | null {
+        const lateUs = clock.timeAt(readyMs.get(frame) ?? NaN) - frame.presentUs - frame.durationUs;
         if (lateUs <= lateFramesUs) {
             clock.inTime();
             return frame;
@@ -573,9 +575,10 @@ export class Playback {
         this.#listener.arrived(frame);
     }
 
-    #takeLiveFrame({ clock, state }: Live, frame: FrameReport): void {
+    #takeLiveFrame(live: Live, frame: FrameReport): void {
+        const { clock, state } = live;
         state.frame();
-        this.#live!.leftOut = frame.live!.leftOut;
+        live.leftOut = frame.live!.leftOut;
         const sought = this.#awaiting;
         this.#awaiting = false;
         if (!this.#playing) frame.preview = true; // the one picture there is until somebody plays
@@ -584,10 +587,12 @@ export class Playback {
             this.#preview = frame;
         } else {
             clock.arrived(this.#fromWorker(frame.live!.receivedMs), frame.presentUs);
-            clock.ready('frame', this.#fromWorker(frame.live!.readyMs), frame.presentUs);
+            const readyMs = this.#fromWorker(frame.live!.readyMs);
+            live.readyMs.set(frame, readyMs);
+            clock.ready('frame', readyMs, frame.presentUs);
             this.#ring.push(frame);
         }
         if (sought) this.#listener.sought();
-        if (!this.#playing) this.#rest(this.#live!);
+        if (!this.#playing) this.#rest(live);
     }
 }
