@@ -161,6 +161,30 @@ test('htvm serve lists a folder with stills, and plays what is chosen', options,
         await page.waitForFunction(() => document.querySelectorAll('li').length === 4);
     }));
 
+test('htvm serve lists what is live, and shows it; the query of its address goes on to the stream', options, () =>
+    running(['serve', '--port', '0'], async (page, address) => {
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelector('.empty:not([hidden])'));
+        const hub = `${address.replace('http', 'ws')}publish/anna`;
+        const publisher = spawn(program, ['publish', '--loop', '--quiet', join(folder, 'tracked_by_chance_2.htvm'), hub], { stdio: ['ignore', 'ignore', 'inherit'] });
+        try {
+            await page.getByRole('link', { name: 'anna' }).click();
+            const live = () => page.waitForFunction(() => {
+                const { live, framesShown } = document.querySelector('htvm-player')?.statistics ?? {};
+                return live?.state === 'live' && framesShown > 10;
+            });
+            await live();
+            assert.deepEqual([await page.title(), new URL(page.url()).pathname], ['anna – htvm', '/play/anna']);
+            await page.goto(`${address}play/anna?key=1&stamps`);
+            await live();
+            assert.equal(await page.evaluate(() => document.querySelector('htvm-player').src), '/watch/anna?key=1&stamps');
+            await page.waitForFunction(() => Number.isFinite(document.querySelector('htvm-player').statistics.live.behind));
+        } finally {
+            publisher.kill('SIGINT');
+        }
+        await page.waitForFunction(() => ['gone', 'reconnecting', 'ended'].includes(document.querySelector('htvm-player').statistics.live.state));
+    }));
+
 test('the five steps of docs/player.md lead to a page that plays', options, async () => {
     const project = fileURLToPath(new URL('../..', import.meta.url));
     const manual = await readFile(join(project, 'docs', 'player.md'), 'utf8');
