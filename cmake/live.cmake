@@ -2,6 +2,24 @@
 find_package(Boost 1.81 REQUIRED)
 find_package(OpenSSL 3.0 REQUIRED)
 
+# What joins hubs on many machines.
+set(HTVM_NATS AUTO CACHE STRING "htvm serve --nats (needs libnats-dev): ON, OFF, or AUTO, which is ON where it is there")
+if(HTVM_NATS)
+  find_path(NATS_INCLUDE nats/nats.h)
+  find_library(NATS_LIBRARY nats)
+endif()
+set(nats_source src/live/nats_link_absent.cpp)
+set(nats_library "")
+if(HTVM_NATS AND NATS_INCLUDE AND NATS_LIBRARY)
+  add_library(htvm_libnats INTERFACE)
+  target_include_directories(htvm_libnats SYSTEM INTERFACE ${NATS_INCLUDE})
+  target_link_libraries(htvm_libnats INTERFACE ${NATS_LIBRARY})
+  set(nats_source src/live/nats_link.cpp)
+  set(nats_library htvm_libnats)
+elseif(HTVM_NATS AND NOT HTVM_NATS STREQUAL "AUTO")
+  message(FATAL_ERROR "HTVM_NATS: libnats-dev is not there")
+endif()
+
 set(HTVM_PLAYER "" CACHE STRING
     "Folder with the built web player to carry inside the program, or OFF; empty: web/dist, if ./dev web has built it")
 set(player "${HTVM_PLAYER}")
@@ -66,13 +84,15 @@ htvm_floor(live
     src/live/file_server.cpp
     src/live/http_request.cpp
     src/live/hub.cpp
+    src/live/hub_link.cpp
     src/live/hub_message.cpp
     src/live/live_connection.cpp
     src/live/metrics.cpp
     src/live/recorder.cpp
     src/live/served_folder.cpp
+    ${nats_source}
     ${player_cpp}
-  LINKS htvm_live_client htvm_io)
+  LINKS htvm_live_client htvm_io ${nats_library})
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
   set_source_files_properties(src/live/file_server.cpp src/live/hub_client.cpp src/live/line.cpp src/live/live_connection.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)

@@ -71,3 +71,8 @@ if(NOT HTVM_SANITIZE)
   add_test(NAME second_decoder COMMAND ${PROJECT_SOURCE_DIR}/tests/second_decoder/check.sh $<TARGET_FILE:htvm>)
   set_tests_properties(second_decoder PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 COST 100)
 endif()
+# Three hubs, a real nats-server, and what fails.
+if(NOT HTVM_SANITIZE)
+  add_test(NAME nats COMMAND ${PROJECT_SOURCE_DIR}/tests/live/nats.py $<TARGET_FILE:htvm>)
+  set_tests_properties(nats PROPERTIES TIMEOUT 180 SKIP_RETURN_CODE 77 RUN_SERIAL ON)
+endif()

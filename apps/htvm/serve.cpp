@@ -17,6 +17,7 @@ struct Options {
     bool same_site = false;
     unsigned connections = live::FileServerOptions{}.connections;
     std::string congestion_control = "bbr";
+    live::NatsOptions nats{};
 };
 
 Result<void> serve(const Options& options) {
@@ -29,6 +30,7 @@ Result<void> serve(const Options& options) {
     if (options.congestion_control != "system") server.congestion_control = options.congestion_control;
     live::Hub hub;
     server.hub = &hub;
+    server.nats = options.nats;
     auto opened = live::FileServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
     if (!live::has_player()) warn("this htvm was built without the web player: it serves streams, but has no pages");
@@ -44,6 +46,31 @@ Result<void> serve(const Options& options) {
     std::fflush(stdout);
     opened->run();
     return {};
+}
+
+void add_nats_options(CLI::App& command, live::NatsOptions& nats) {
+    auto* servers = command
+                        .add_option("--nats", nats.servers,
+                                    "Join the hubs of other machines through NATS, at nats:// or tls://"
+                                    "[USER:PASSWORD@]HOST[:PORT]; other users of this machine see the command line, "
+                                    "but not the environment's HTVM_NATS")
+                        ->type_name("URL")
+                        ->envname("HTVM_NATS");
+    command.add_option("--hub-name", nats.hub_name, "This hub's name among them (default: the machine's)")
+        ->type_name("NAME")
+        ->needs(servers);
+    command
+        .add_option("--hub-url", nats.hub_url,
+                    "Where publishers and viewers reach this hub; they are told the addresses of all hubs")
+        ->type_name("wss://HOST[:PORT]")
+        ->needs(servers);
+    command
+        .add_option("--nats-ca", nats.ca_file, "Certificates to check those of NATS by (PEM; default: the system's)")
+        ->type_name("FILE")
+        ->needs(servers);
+    command.add_option("--nats-credentials", nats.credentials_file, "A user of NATS's own accounts: JWT and seed")
+        ->type_name("FILE")
+        ->needs(servers);
 }
 
 }  // namespace
@@ -68,6 +95,7 @@ void add_serve(CLI::App& app, Run& run) {
                      "How TCP finds out how fast it may send: bbr (default; where packets are lost, live streams come "
                      "late with others: docs/live.md), another that the kernel has, or system: the kernel's choice")
         ->type_name("NAME");
+    if (live::has_nats()) add_nats_options(*command, options->nats);
     command->footer(
         "Runs until Ctrl-C. Live streams are published to ws://ADDRESS:PORT/publish/NAME, by programs on this machine\n"
         "alone, and watched at http://ADDRESS:PORT/play/NAME by anyone who reaches it. Of the folder, symbolic links "

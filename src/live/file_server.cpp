@@ -130,6 +130,7 @@ struct FileServer::State {
     std::optional<ServedFolder> folder;  // unless there are files with names
     net::io_context context{1};
     tcp::acceptor acceptor{context};
+    std::optional<NatsLink> nats;  // if the hub is joined with others
     std::map<std::string, Text, std::less<>> player;
     std::map<net::ip::address, unsigned> by_address;
     unsigned connections = 0;
@@ -197,7 +198,9 @@ std::string FileServer::State::live_listing() const {
     for (const auto& stream : options.hub->streams(Hub::Clock::now())) {
         nlohmann::json entry = {{"name", stream.name},
                                 {"published", stream.published},
+                                {"far", stream.far},
                                 {"viewers", stream.viewers},
+                                {"viewers_afar", stream.viewers_afar},
                                 {"packets", stream.publisher.packets},
                                 {"bytes", stream.publisher.bytes},
                                 {"damaged_messages", stream.publisher.damaged},
@@ -494,6 +497,11 @@ Result<FileServer> FileServer::open(const FileServerOptions& options) {
     if (error)
         return fail(ErrorKind::bad_input, "cannot listen on " + options.address + " port " +
                                               std::to_string(options.port) + ": " + error.message());
+    if (options.hub && !options.nats.servers.empty()) {
+        auto nats = NatsLink::open(options.nats, *options.hub, state->context);
+        if (!nats) return tl::unexpected(nats.error());
+        state->nats.emplace(std::move(*nats));
+    }
     return FileServer(std::move(state));
 }
 

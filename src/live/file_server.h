@@ -22,6 +22,7 @@
 
 #include "htvm/result.hpp"
 #include "live/hub.h"
+#include "live/nats_link.h"
 
 namespace htvm::live {
 
@@ -44,7 +45,8 @@ struct FileServerOptions {
     std::chrono::seconds stall_time{30};   // for a client to take the next 64 KB
     // Of TCP, by the kernel's name for it; the kernel's own choice if it has none of this name.
     std::string congestion_control;
-    Hub* hub = nullptr;                    // of live streams; null: there are none. It must outlive the server
+    NatsOptions nats{};  // joins the hub with those of other machines
+    Hub* hub = nullptr;  // of live streams; null: there are none. It must outlive the server
 };
 
 class FileServer {

@@ -94,11 +94,33 @@ Hub::Stream* Hub::published_by(const Connection& connection) {
     return connection.admitted && found != streams_.end() ? &found->second : nullptr;
 }
 
+bool Hub::is_far(const Stream& stream) const { return stream.connection && connections_.at(*stream.connection).far; }
+
+bool Hub::is_published(const Stream& stream) const {
+    return stream.connection && (!is_far(stream) || stream.alive_afar);
+}
+
+void Hub::changed(const std::string& name) const {
+    for (const auto& listener : listeners_)
+        if (listener.changed) listener.changed(name);
+}
+
 // The connection is of no use; it is told why.
 Result<void> Hub::refuse(Connection& connection, const Error& error, CloseCode code) {
     connection.closing = Closing{code, error.message};
     connection.wake();
     return tl::unexpected(error);
+}
+
+// Another connection goes on with the stream.
+void Hub::replace_publisher(Stream& stream, std::uint32_t session) {
+    if (!stream.connection) return;
+    auto& before = connections_.at(*stream.connection);
+    before.admitted = false;
+    before.closing = stream.session == session
+                         ? Closing{CloseCode::continued, "this session was continued by another connection"}
+                         : Closing{CloseCode::taken_over, "another session took the stream over"};
+    before.wake();
 }
 
 // The first packet decides whose stream it is.
@@ -128,30 +150,85 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
                             : "'" + connection.stream +
                                   "' was published by another session a moment ago; wait for two seconds");
         }
-        if (stream.connection) {
-            auto& before = connections_.at(*stream.connection);
-            before.admitted = false;
-            before.closing = same ? Closing{CloseCode::continued, "this session was continued by another connection"}
-                                  : Closing{CloseCode::taken_over, "another session took the stream over"};
-            before.wake();
-        }
+        replace_publisher(stream, header.reference);
     }
-    streams_.at(connection.stream).connection = number;
+    auto& stream = streams_.at(connection.stream);
+    stream.connection = number;
     connection.admitted = true;
+    changed(connection.stream);
     return {};
+}
+
+Result<Hub::Publisher> Hub::publish_from_afar(const std::string& name, std::uint32_t checksum, Clock::time_point now) {
+    const auto publisher = publish(
+        name, [] {}, now);
+    if (!publisher) return publisher;
+    const auto [found, first] = streams_.try_emplace(name);
+    auto& stream = found->second;
+    if (first) {
+        stream.number = next_stream_++;
+        stream.broadcast = Broadcast(limits_.broadcast);
+    }
+    replace_publisher(stream, checksum);
+    stream.connection = publisher->connection;
+    stream.alive_afar = false;
+    stream.viewers_afar = 0;
+    auto& connection = connections_.at(publisher->connection);
+    connection.far = connection.admitted = true;
+    tell_from_afar(*publisher, false, checksum, now);
+    return publisher;
+}
+
+void Hub::tell_from_afar(Publisher publisher, bool published, std::optional<std::uint32_t> checksum,
+                         Clock::time_point now) {
+    const auto found = connections_.find(publisher.connection);
+    auto* stream = found == connections_.end() ? nullptr : published_by(found->second);
+    if (!stream) return;
+    if (checksum && *checksum != stream->session) forget_session(*stream, *checksum);
+    if (published) stream->heard = now;
+    if (std::exchange(stream->alive_afar, published) && !published)
+        tell_gone(*stream, "the publisher cannot be reached");
+}
+
+void Hub::tell_viewers_afar(const std::string& name, std::size_t viewers) {
+    if (const auto found = streams_.find(name); found != streams_.end()) found->second.viewers_afar = viewers;
+}
+
+void Hub::forget_packets(const std::string& name) {
+    const auto found = streams_.find(name);
+    if (found == streams_.end()) return;
+    found->second.broadcast.forget();
+    found->second.last_packet.reset();
+}
+
+std::optional<Hub::Closure> Hub::closure(const std::string& name) const {
+    const auto found = streams_.find(name);
+    if (found == streams_.end()) return std::nullopt;
+    const auto& broadcast = found->second.broadcast;
+    auto packets = broadcast.kept();
+    if (!packets) return std::nullopt;
+    return Closure{std::move(*packets), broadcast.next_place()};
+}
+
+void Hub::forget_session(Stream& stream, std::uint32_t next) {
+    stream.session = next;
+    stream.clock.forget();
+    stream.has_frames = false;
+    stream.header.reset();
 }
 
 // What a sequence header tells of the stream. The same connection may begin another session, such as the next round of
 // a loop.
-void Hub::begin_session(Stream& stream, const PacketHeader& header, std::span<const std::uint8_t> message) {
-    if (stream.session == header.reference) return;
-    stream.session = header.reference;
-    stream.clock.forget();
-    stream.has_frames = false;
-    stream.header.reset();
+void Hub::begin_session(const std::string& name, Stream& stream, const PacketHeader& header,
+                        std::span<const std::uint8_t> message) {
+    // Of one that is published on another hub the session may be known before its header comes.
+    const bool same = stream.session == header.reference;
+    if (same && stream.header) return;
+    if (!same) forget_session(stream, header.reference);
     const auto payload = message.subspan(packet_header_bytes, message.size() - packet_overhead);
     if (const auto read = internal::read_sequence_header(payload))
         stream.header = StreamInfo::Header{read->session, read->fps_numerator, read->fps_denominator};
+    if (!same) changed(name);
 }
 
 Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now) {
@@ -181,7 +258,7 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
     ++counters_.packets_in;
     stream.counters.bytes += message.size();
     counters_.bytes_in += message.size();
-    if (header->kind == PacketKind::sequence) begin_session(stream, *header, message);
+    if (header->kind == PacketKind::sequence) begin_session(connection.stream, stream, *header, message);
     auto packet = std::make_shared<LivePacket>(LivePacket{*header, std::move(message), {}});
     const bool frame = frame_type(header->kind).has_value();
     stream.has_frames = stream.has_frames || frame;
@@ -191,7 +268,11 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
         stream.stamp.reset();
     }
     const auto undecodable = stream.broadcast.undecodable_frames();
-    const bool new_one = stream.broadcast.push(packet, now).has_value();
+    const auto place = stream.broadcast.push(packet, now);
+    const bool new_one = place.has_value();
+    if (new_one)
+        for (const auto& listener : listeners_)
+            if (listener.taken) listener.taken(connection.stream, *place, packet);
     if (stream.broadcast.undecodable_frames() > undecodable) {
         ++counters_.undecodable_frames;
         ask_for_key_frame(stream, now);
@@ -255,7 +336,8 @@ ForPublisher Hub::next(Publisher publisher) {
     if (!std::exchange(connection.heartbeat, false)) return {};
     if (!connection.admitted) return HeartbeatToPublisher{};
     const auto& counters = stream->counters;
-    return HeartbeatToPublisher{stream->watching.size(), counters.packets, counters.bytes, counters.damaged};
+    return HeartbeatToPublisher{stream->watching.size() + stream->viewers_afar, counters.packets, counters.bytes,
+                                counters.damaged};
 }
 
 // The connection publishes no more; the stream waits for it to come back.
@@ -265,6 +347,7 @@ void Hub::detach(Connection& connection, const std::string& why, Clock::time_poi
         stream->heard = now;
         stream->stamp.reset();
         tell_gone(*stream, why);
+        changed(connection.stream);
     }
     connection.admitted = false;
 }
@@ -319,6 +402,7 @@ Result<Hub::Viewer> Hub::watch(const std::string& name, std::function<void()> wa
                                              .allowance = {viewer_burst, viewer_texts_each_second},
                                              .heartbeat_at = now + first});
     stream.watching.at(viewer).wake();
+    if (stream.watching.size() == 1) changed(name);
     // What was kept was too much, or the newest frames cannot be decoded.
     if (stream.has_frames && stream.broadcast.waiting_bytes(viewer) == 0) ask_for_key_frame(stream, now);
     return Viewer{name, stream.number, viewer};
@@ -347,6 +431,7 @@ void Hub::leave(const Viewer& viewer) {
     counters_.fallen_behind += counters.fallen_behind;
     stream.broadcast.leave(viewer.viewer);
     stream.watching.erase(viewer.viewer);
+    if (stream.watching.empty() && !stream.ended) changed(viewer.stream);
     if (stream.ended && stream.watching.empty()) ended_.erase(viewer.number);
 }
 
@@ -376,10 +461,10 @@ ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {
         return Hello{.stream = viewer.stream, .session = session_of(stream.header), .hubs = other_hubs_};
     if (!stream.ended && std::exchange(watching->gone, false) && texts) return Gone{stream.gone};
     if (std::exchange(watching->heartbeat, false) && texts)
-        return HeartbeatToViewer{.published = stream.connection.has_value(),
-                                 .clock = stream.connection ? stream.clock.at(now) : std::nullopt,
+        return HeartbeatToViewer{.published = is_published(stream),
+                                 .clock = is_published(stream) ? stream.clock.at(now) : std::nullopt,
                                  .session = session_of(stream.header),
-                                 .viewers = stream.watching.size(),
+                                 .viewers = stream.watching.size() + stream.viewers_afar,
                                  .dropped = stream.broadcast.counters(viewer.viewer).dropped_frames};
     auto packet = std::exchange(watching->behind_stamp, nullptr);
     if (!packet) {
@@ -416,6 +501,7 @@ void Hub::end_stream(std::map<std::string, Stream>::iterator found, const std::s
     stream.mapped().ended = true;
     tell_gone(stream.mapped(), reason);
     if (!stream.mapped().watching.empty()) ended_.emplace(stream.mapped().number, std::move(stream.mapped()));
+    changed(stream.key());
 }
 
 void Hub::tick(Clock::time_point now) {
@@ -427,7 +513,7 @@ void Hub::tick(Clock::time_point now) {
         other.wake();
     };
     for (auto& [number, connection] : connections_) {
-        if (connection.closing) continue;
+        if (connection.closing || connection.far) continue;
         beat(connection);
         if (now - connection.heard < limits_.publisher_silence) continue;
         ++counters_.silent_publishers;
@@ -464,14 +550,19 @@ StreamInfo Hub::info(const std::string& name, const Stream& stream, Clock::time_
         return then ? std::optional(std::chrono::duration_cast<std::chrono::milliseconds>(now - *then)) : std::nullopt;
     };
     StreamInfo out{.name = name,
-                   .published = stream.connection.has_value(),
+                   .published = is_published(stream),
+                   .far = is_far(stream),
+                   .connection = stream.connection.value_or(0),
+                   .checksum = stream.session.value_or(0),
+                   .next_place = stream.broadcast.next_place(),
                    .viewers = stream.watching.size(),
+                   .viewers_afar = stream.viewers_afar,
                    .publisher = stream.counters,
                    .undecodable_frames = stream.broadcast.undecodable_frames(),
                    .kept_bytes = stream.broadcast.kept_bytes(),
                    .key_frame_requests = stream.key_frame_requests,
                    .header = stream.header,
-                   .clock = stream.connection ? stream.clock.at(now) : std::nullopt,
+                   .clock = is_published(stream) ? stream.clock.at(now) : std::nullopt,
                    .since_packet = since(stream.last_packet),
                    .since_heartbeat = since(stream.last_heartbeat)};
     for (const auto& [viewer, watching] : stream.watching) {
@@ -485,6 +576,11 @@ std::vector<StreamInfo> Hub::streams(Clock::time_point now) const {
     std::vector<StreamInfo> out;
     for (const auto& [name, stream] : streams_) out.push_back(info(name, stream, now));
     return out;
+}
+
+std::optional<StreamInfo> Hub::stream(const std::string& name, Clock::time_point now) const {
+    const auto found = streams_.find(name);
+    return found == streams_.end() ? std::nullopt : std::optional(info(name, found->second, now));
 }
 
 HubCounters Hub::counters() const {

@@ -48,8 +48,12 @@ struct PublisherCounters {
 // What is told of a stream.
 struct StreamInfo {
     std::string name;
-    bool published = false;  // whether its publisher is connected
-    std::size_t viewers = 0;
+    bool published = false;                     // whether its publisher is connected,
+    bool far = false;                           // to another hub
+    std::uint64_t connection = 0;               // the publisher's, while it is connected; each has another number
+    std::uint32_t checksum = 0;                 // of its sequence header, which tells one session from another
+    std::uint64_t next_place = 0;               // of the packet that comes next
+    std::size_t viewers = 0, viewers_afar = 0;  // here, and on other hubs
     PublisherCounters publisher;
     std::uint64_t undecodable_frames = 0;
     std::uint64_t dropped_frames = 0;      // for viewers who still watch
@@ -126,6 +130,10 @@ struct HubListener {
     // A packet went to the viewers; those that nobody could decode do not.
     std::function<void(const std::string& stream, const SharedPacket& packet, Broadcast::Clock::time_point now)> sent{};
     std::function<void(const std::string& stream)> ended{};
+    // Every packet that is new, whether it can be decoded or not. place: see Broadcast::push().
+    std::function<void(const std::string& stream, std::uint64_t place, const SharedPacket& packet)> taken{};
+    // The publisher came, went, or began another session; the first viewer came, or the last one left; or it ended.
+    std::function<void(const std::string& stream)> changed{};
 };
 
 class Hub {
@@ -159,6 +167,26 @@ public:
     // waits for them, and their connections end. Otherwise it may come back.
     void leave(Publisher publisher, bool ended_stream, Clock::time_point now);
 
+    // A stream whose publisher is connected to another hub (live/hub_link.h): it is listed and watched as those of this
+    // hub are, and given what comes from there by take(); next() has what goes to that publisher. It goes on with the
+    // stream even if a publisher is connected here, who is told. checksum: of its sequence header. limit: there are too
+    // many streams.
+    Result<Publisher> publish_from_afar(const std::string& name, std::uint32_t checksum, Clock::time_point now);
+    // Whether that publisher is connected there, and which session it has begun.
+    void tell_from_afar(Publisher publisher, bool published, std::optional<std::uint32_t> checksum,
+                        Clock::time_point now);
+    // How many watch the stream on other hubs.
+    void tell_viewers_afar(const std::string& name, std::size_t viewers);
+    // After a pause in which nobody watched and nothing was given to take(): what comes next does not go on from there.
+    void forget_packets(const std::string& name);
+    // What another hub needs to go on with the stream, and the place of the packet that comes next. Nothing if there is
+    // no such stream, or what is needed was too large to be kept.
+    struct Closure {
+        std::vector<Broadcast::Placed> packets;
+        std::uint64_t next = 0;
+    };
+    std::optional<Closure> closure(const std::string& name) const;
+
     // bad_input: there is no such stream; limit: it has too many viewers. wake: as for publish().
     Result<Viewer> watch(const std::string& name, std::function<void()> wake, const WatchOptions& options,
                          Clock::time_point now);
@@ -182,6 +210,7 @@ public:
     void close_all(CloseCode code, const std::string& reason);
 
     std::vector<StreamInfo> streams(Clock::time_point now) const;
+    std::optional<StreamInfo> stream(const std::string& name, Clock::time_point now) const;
     HubCounters counters() const;
     const HubLimits& limits() const { return limits_; }
 
@@ -199,7 +228,9 @@ private:
         std::uint64_t number = 0;
         Broadcast broadcast;
         std::optional<std::uint64_t> connection;  // of the publisher, one of connections_, if it was admitted
-        std::optional<std::uint32_t> session;     // checksum of its sequence header
+        bool alive_afar = false;                  // of a publisher on another hub: whether it is connected there
+        std::size_t viewers_afar = 0;
+        std::optional<std::uint32_t> session;  // checksum of its sequence header
         std::optional<StreamInfo::Header> header{};
         Clock::time_point heard{};
         PublisherCounters counters;
@@ -219,6 +250,7 @@ private:
         std::function<void()> wake;
         TextAllowance allowance;
         Clock::time_point heard{};
+        bool far = false;  // to another hub
         bool admitted = false;
         bool hello = true, heartbeat = false, key_frame = false;  // to be written
         Clock::time_point heartbeat_at{};
@@ -227,10 +259,16 @@ private:
     Stream* stream_of(const Viewer& viewer);
     Watching* watching(const Viewer& viewer);
     Stream* published_by(const Connection& connection);
+    bool is_far(const Stream& stream) const;
+    bool is_published(const Stream& stream) const;
+    void changed(const std::string& name) const;
+    void replace_publisher(Stream& stream, std::uint32_t session);
+    static void forget_session(Stream& stream, std::uint32_t next);
     Result<void> admit(std::uint64_t number, Connection& connection, const PacketHeader& header, Clock::time_point now);
     Result<void> refuse(Connection& connection, const Error& error, CloseCode code);
     void detach(Connection& connection, const std::string& why, Clock::time_point now);
-    void begin_session(Stream& stream, const PacketHeader& header, std::span<const std::uint8_t> message);
+    void begin_session(const std::string& name, Stream& stream, const PacketHeader& header,
+                       std::span<const std::uint8_t> message);
     void ask_for_key_frame(Stream& stream, Clock::time_point now);
     void tell_gone(Stream& stream, const std::string& reason);
     void end_stream(std::map<std::string, Stream>::iterator stream, const std::string& reason);
