@@ -13,6 +13,7 @@
 #include "htvm/mesh.hpp"             // IWYU pragma: export
 #include "htvm/option_list.hpp"      // IWYU pragma: export
 #include "htvm/packet.hpp"           // IWYU pragma: export
+#include "htvm/publisher.hpp"        // IWYU pragma: export
 #include "htvm/result.hpp"           // IWYU pragma: export
 #include "htvm/scene.hpp"            // IWYU pragma: export
 #include "htvm/skeleton.hpp"         // IWYU pragma: export

@@ -1,6 +1,6 @@
 // Sends a stream to a hub while it is made, for others to watch (docs/live.md). htvm::live has it.
 //
-//   auto publisher = htvm::Publisher::open("wss://hub.example/publish/anna", {.token = token});   // Result<Publisher>
+//   auto publisher = htvm::Publisher::open("wss://hub.example/publish/anna", {.token = token});  // Result<Publisher>
 //   for each frame:
 //       encoder->push(mesh, &pose, timestamp_us, publisher->wants_key_frame());
 //       while (auto packet = encoder->pull()) publisher->send(*packet);
@@ -25,10 +25,10 @@
 namespace htvm {
 
 struct PublisherOptions {
-    std::string token;                    // of whoever may publish this stream; empty: none is sent
-    std::vector<std::string> other_hubs;  // addresses to go on with where the hub is lost; hubs tell of others, too
-    std::string certificates;             // PEM file of those who may vouch for a hub's; empty: the system's
-    bool insecure = false;                // takes any certificate: for tests alone
+    std::string token{};                    // of whoever may publish this stream; empty: none is sent
+    std::vector<std::string> other_hubs{};  // addresses to go on with where the hub is lost; hubs tell of others, too
+    std::string certificates{};             // PEM file of those who may vouch for a hub's; empty: the system's
+    bool insecure = false;                  // takes any certificate: for tests alone
     std::size_t queue_bytes = std::size_t{4} << 20;  // that may wait to be sent
     std::chrono::milliseconds queue_time{2000};      // for how long
     bool stamps = false;                             // tells when each frame was sent, for measurement

@@ -58,6 +58,7 @@ timeout -s INT 3 "$htvm" info "ws://$address/watch/walk" >info 2>info.err
 viewer=$!
 sleep 1
 kill -9 "$hub_pid"
+wait "$hub_pid" 2>/dev/null
 sleep 0.5
 hub serve_again "${address##*:}"
 wait "$viewer"

@@ -1,0 +1,55 @@
+#include "live/hub_address.h"
+
+#include <gtest/gtest.h>
+
+namespace htvm::live {
+namespace {
+
+std::string complaint(const std::string& text) {
+    const auto address = parse_hub_address(text);
+    return address ? "" : address.error().message;
+}
+
+TEST(HubAddress, HasHostPortAndPath) {
+    EXPECT_EQ(parse_hub_address("ws://hub.example:8080/publish/anna").value(),
+              (HubAddress{false, "hub.example", 8080, "/publish/anna"}));
+}
+
+TEST(HubAddress, ThePortIsThatOfTheWebUnlessGiven) {
+    EXPECT_EQ(parse_hub_address("ws://hub/watch/anna").value().port, 80);
+    EXPECT_EQ(parse_hub_address("WSS://hub").value(), (HubAddress{true, "hub", 443, "/"}));
+}
+
+TEST(HubAddress, AnIPv6AddressStandsInBrackets) {
+    EXPECT_EQ(parse_hub_address("ws://[::1]:9000/watch/a").value(), (HubAddress{false, "::1", 9000, "/watch/a"}));
+    EXPECT_EQ(host_header({false, "::1", 9000, "/"}), "[::1]:9000");
+    EXPECT_NE(complaint("ws://::1/watch/a").find("brackets"), std::string::npos);
+    EXPECT_NE(complaint("ws://[hub]/").find("IPv6"), std::string::npos);
+    EXPECT_NE(complaint("ws://[::1").find("]"), std::string::npos);
+}
+
+TEST(HubAddress, WhatIsShownLeavesTokensOut) {
+    EXPECT_EQ(shown(parse_hub_address("wss://hub:443/publish/a?token=secret").value()), "wss://hub/publish/a");
+    EXPECT_EQ(complaint("http://hub/publish/a?token=secret").find("secret"), std::string::npos);
+}
+
+TEST(HubAddress, SaysWhatIsWrong) {
+    EXPECT_NE(complaint("http://hub/").find("does not begin with ws://"), std::string::npos);
+    EXPECT_NE(complaint("ws:///publish").find("no host"), std::string::npos);
+    EXPECT_NE(complaint("ws://hub:0/").find("1 to 65535"), std::string::npos);
+    EXPECT_NE(complaint("ws://hub:65536/").find("1 to 65535"), std::string::npos);
+    EXPECT_NE(complaint("ws://hub:/").find("1 to 65535"), std::string::npos);
+    EXPECT_NE(complaint("ws://me:pw@hub/").find("token"), std::string::npos);
+    EXPECT_NE(complaint("ws://hub/a\r\nHost: b").find("control characters"), std::string::npos);
+    EXPECT_NE(complaint("ws://hub/#a").find("#"), std::string::npos);
+    EXPECT_NE(complaint("ws://" + std::string(3000, 'a')).find("2,048"), std::string::npos);
+}
+
+TEST(HubAddress, FilesDoNotLookLikeIt) {
+    EXPECT_TRUE(looks_like_hub_address("http://hub/a"));
+    EXPECT_FALSE(looks_like_hub_address("ws"));
+    EXPECT_FALSE(looks_like_hub_address("folder/a:b.htvm"));
+}
+
+}  // namespace
+}  // namespace htvm::live
