@@ -63,8 +63,8 @@ def stalls(shown, end):
 
 
 def joins(arrivals, until):
-    """Of each time a viewer joined before the moment `until`: the seconds from connecting to the first frame, and to the first that came live; and
-    how often a viewer left without one that did."""
+    """Of each time a viewer joined before the moment `until`: the seconds from connecting to the first frame, and to
+    the first that came live; and how often a viewer left without one that did."""
     pictures, lives, in_vain = [], [], 0
     for own in of_each_viewer(arrivals).values():
         begins = np.flatnonzero(own["kind"] == CONNECTING)

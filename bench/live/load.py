@@ -11,6 +11,8 @@ import tempfile
 import threading
 import time
 
+import numpy as np
+
 import arrivals
 import hub_process as hubs
 
@@ -49,7 +51,8 @@ def measure(options, viewers):
                            "--slow", slow, "--slow-bits", options.rate * 1e6 / 3, "--joins", JOINS_PER_SECOND,
                            "--seconds", joined + options.seconds + 2]) as watch:
             time.sleep(joined)
-            begin, used, watched_used = hubs.now_us(), hubs.processor_seconds(hub.pid), hubs.processor_seconds(watch.pid)
+            begin = hubs.now_us()
+            used, watched_used = hubs.processor_seconds(hub.pid), hubs.processor_seconds(watch.pid)
             growth = Watched(hub.pid, options.minutes)
             growth.start()
             time.sleep(options.seconds)
@@ -67,12 +70,12 @@ def measure(options, viewers):
     behind = arrivals.frames(measured[measured["viewer"] < slow])
     delays, intra = arrivals.delays_ms(quick), quick["kind"] == arrivals.INTRA
     lacking, _ = arrivals.missing(quick)
-    slow_lacking, _ = arrivals.missing(behind)
+    published = len(np.unique(quick["frame"]))
     seconds = (end - begin) / 1e6
     return {
         "viewers": viewers, "slow": slow, "seconds": round(seconds, 1), "watched": len(arrivals.of_each_viewer(quick)),
         "closed": int(sum(all_["kind"] == arrivals.CLOSED)), "frames": len(quick), "missing": lacking,
-        "slow_frames": len(behind), "slow_missing": slow_lacking,
+        "slow_percent": 100 * len(behind) / max(1, slow * published),
         "megabits_each": round(float(quick["bytes"].sum()) * 8e-6 / seconds / max(1, viewers - slow), 2),
         "p50_ms": arrivals.percentile(delays, 50), "p99_ms": arrivals.percentile(delays, 99),
         "intra_p50_ms": arrivals.percentile(delays[intra], 50), "intra_p99_ms": arrivals.percentile(delays[intra], 99),
@@ -83,16 +86,24 @@ def measure(options, viewers):
     }
 
 
-HEADING = (f"{'viewers':>7} {'frames':>8} {'missing':>7} {'p50':>6} {'p99':>6} {'I p50':>6} {'I p99':>6} {'worst':>6} "
-           f"{'hub':>5} {'viewers':>7} {'memory':>8} {'kernel':>8}\n"
-           f"{'':7} {'':8} {'':7} {'ms':>6} {'ms':>6} {'ms':>6} {'ms':>6} {'ms':>6} {'CPU':>5} {'CPU':>7} "
-           f"{'KB each':>8} {'KB each':>8}")
+COLUMNS = [  # heading, unit, key of the result, digits behind the point
+    ("viewers", "", "viewers", 0), ("frames", "", "frames", 0), ("missing", "", "missing", 0),
+    ("slow get", "%", "slow_percent", 0), ("p50", "ms", "p50_ms", 1), ("p99", "ms", "p99_ms", 1),
+    ("I p50", "ms", "intra_p50_ms", 1), ("I p99", "ms", "intra_p99_ms", 1), ("worst", "ms", "worst_ms", 0),
+    ("hub CPU", "%", "hub_percent", 0), ("viewers' CPU", "%", "viewers_percent", 0),
+    ("memory", "KB each", "kilobytes_a_viewer", 1), ("kernel's", "KB each", "kernel_kilobytes_a_viewer", 1)]
+
+
+def heading():
+    return "\n".join("  ".join(f"{column[row]:>{width_of(column)}}" for column in COLUMNS) for row in (0, 1))
+
+
+def width_of(column):
+    return max(7, len(column[0]))
 
 
 def line_of(one):
-    return (f"{one['viewers']:7} {one['frames']:8} {one['missing']:7} {one['p50_ms']:6.1f} {one['p99_ms']:6.1f} "
-            f"{one['intra_p50_ms']:6.1f} {one['intra_p99_ms']:6.1f} {one['worst_ms']:6.0f} {one['hub_percent']:4.0f}% "
-            f"{one['viewers_percent']:6.0f}% {one['kilobytes_a_viewer']:8.1f} {one['kernel_kilobytes_a_viewer']:8.1f}")
+    return "  ".join(f"{one[column[2]]:{width_of(column)}.{column[3]}f}" for column in COLUMNS)
 
 
 def main():
@@ -104,8 +115,8 @@ def main():
     parser.add_argument("seconds", type=float, nargs="?", default=20, help="of each measurement (default 20)")
     parser.add_argument("--minutes", type=float, help="instead of seconds; the hub's memory is told every 10 s")
     parser.add_argument("--rate", type=float, default=1.6, help="of the stream, Mbit/s (default 1.6)")
-    parser.add_argument("--slow", type=float, default=5, help="percent of the viewers that read at a third of the rate; "
-                        "they do not count in the delays (default 5)")
+    parser.add_argument("--slow", type=float, default=5, help="percent of the viewers that read at a third of the "
+                        "rate; they do not count in the delays (default 5)")
     parser.add_argument("--most", type=float, default=50, help="milliseconds (default 50)")
     parser.add_argument("--json", action="store_true", help="the results for machines")
     options = parser.parse_args()
@@ -113,7 +124,7 @@ def main():
         options.seconds = options.minutes * 60
     results, held = [], 0
     if not options.json:
-        print(HEADING, flush=True)
+        print(heading(), flush=True)
     for viewers in map(int, options.viewers.split(",")) if options.viewers else SEARCH:
         one = measure(options, viewers)
         results.append(one)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Publishes a stream file round after round to a hub, for measurements: numbers of frames go on from round to round, and
-the timestamp of each packet is the moment it is sent, in microseconds of CLOCK_MONOTONIC (see watch.cpp).
+"""Publishes a stream file round after round to a hub, for measurements: numbers of frames go on from round to round,
+and the timestamp of each packet is the moment it is sent, in microseconds of CLOCK_MONOTONIC (see watch.cpp).
 
 usage: publish.py FILE NAME PORT [SECONDS] [--fps RATE] [--token TOKEN]
 """

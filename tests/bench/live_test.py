@@ -51,7 +51,8 @@ class WhatViewersMissed(unittest.TestCase):
 
 class Stalls(unittest.TestCase):
     def test_are_pauses_of_more_than_a_second_to_the_end_too(self):
-        rows = noted((0, TRACKED, 1, 0, 0), (0, TRACKED, 2, 0, 1000), (0, TRACKED, 3, 0, 2500), (1, TRACKED, 1, 0, 1900))
+        rows = noted((0, TRACKED, 1, 0, 0), (0, TRACKED, 2, 0, 1000), (0, TRACKED, 3, 0, 2500),
+                     (1, TRACKED, 1, 0, 1900))
         self.assertEqual([1.5, 2.5, 3.1], sorted(np.round(arrivals.stalls(rows, 5_000_000), 6)))
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Live streams over worse lines: a hub in one network namespace, viewers in another, and between them router.py, through
-which each viewer has a line of its own that delays, limits and drops packets. As root.
+"""Live streams over worse lines: a hub in one network namespace, viewers in another, and between them router.py,
+through which each viewer has a line of its own that delays, limits and drops packets. As root.
 
 First the lines themselves are measured by pings. Delays are from the publisher to a viewer; a stall is a pause of more
 than a second without a frame; missing frames are those that the hub did not send to a viewer who could not take them.
@@ -72,7 +72,8 @@ class Lines:
     def build(self):
         router = os.path.join(os.path.dirname(os.path.abspath(__file__)), "router.py")
         devices = {self.hub: f"htvmh{os.getpid()}", self.viewers: f"htvmv{os.getpid()}"}
-        self.router = subprocess.Popen([sys.executable, router], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.router = subprocess.Popen([sys.executable, router], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                       text=True)
         self.router.stdin.write(json.dumps({
             "hub": devices[self.hub], "viewers": devices[self.viewers],
             "lines": {address: dataclasses.asdict(line) for address, line in self.settings.items()}}) + "\n")
@@ -157,7 +158,8 @@ def watch(options, kinds, again):
         inside = lines.inside(lines.hub)
         _, port = stack.enter_context(hubs.hub(options.htvm, "--address", "0.0.0.0", inside=inside))
         for megabits in options.rate:
-            stack.enter_context(hubs.publisher(hubs.stream_of(options.htvm, megabits), f"person-{megabits}", port, inside))
+            stream = hubs.stream_of(options.htvm, megabits)
+            stack.enter_context(hubs.publisher(stream, f"person-{megabits}", port, inside))
         time.sleep(1.5)
         begin = hubs.now_us() + SETTLE_SECONDS * 10**6
         end = begin + int(options.seconds * 1e6)
@@ -197,7 +199,8 @@ def result_of(kind, noted, begin, end):
 def joined_of(kind, noted, end):
     whole_visits = end - (AGAIN_SECONDS - SETTLE_SECONDS) * 10**6
     pictures, lives, in_vain = arrivals.joins(noted, whole_visits)
-    return {"megabits": kind.megabits, "control": kind.control, "loss": kind.loss, "joins": len(pictures) + in_vain, "in_vain": in_vain,
+    return {"megabits": kind.megabits, "control": kind.control, "loss": kind.loss, "joins": len(pictures) + in_vain,
+            "in_vain": in_vain,
             **{f"{name}_{percent}_s": arrivals.percentile(values, percent)
                for name, values in (("picture", pictures), ("live", lives)) for percent in (50, 95, 100)}}
 
@@ -223,8 +226,8 @@ def main():
                         help="TCP's congestion control at the hub (default cubic,bbr)")
     parser.add_argument("--rate", default=[0.5, 1.6], type=numbers, help="of the streams, Mbit/s (default 0.5,1.6)")
     parser.add_argument("--line", type=float, default=10, help="Mbit/s of each viewer's line (default 10)")
-    parser.add_argument("--queue", type=float, default=100, help="milliseconds that packets may wait before it (default "
-                        "100)")
+    parser.add_argument("--queue", type=float, default=100, help="milliseconds that packets may wait before it "
+                        "(default 100)")
     parser.add_argument("--round-trip", type=float, default=50, help="milliseconds (default 50)")
     parser.add_argument("--pings", type=int, default=2000, help="for each kind of line (default 2000)")
     parser.add_argument("--seed", type=int, default=1, help="of what is lost")
@@ -241,8 +244,8 @@ def main():
     checked = check_router(options)
     say(f"The router, by {options.pings} pings:")
     for one in checked:
-        say(f"  {one['loss']:g} % each way: {one['lost_percent']:.1f} % lost of {one['expected_percent']:.1f} % expected, "
-            f"{one['least_ms']:.1f} / {one['mean_ms']:.1f} / {one['most_ms']:.1f} ms")
+        say(f"  {one['loss']:g} % each way: {one['lost_percent']:.1f} % lost of {one['expected_percent']:.1f} % "
+            f"expected, {one['least_ms']:.1f} / {one['mean_ms']:.1f} / {one['most_ms']:.1f} ms")
 
     kinds = kinds_of_lines(options)
     noted, begin, end, report = watch(options, kinds, again=False)
@@ -257,13 +260,14 @@ def main():
 
     noted, _, end, _ = watch(options, kinds, again=True)
     joined = [joined_of(kind, noted, end) for kind, noted in noted]
-    say(f"\nJoining late, {options.round_trip:g} ms, {options.line:g} Mbit/s: seconds until the first picture, and until "
-        f"one comes within {1000 * arrivals.LIVE_SECONDS:.0f} ms")
-    say(f"  Mbit/s control   loss   joins  picture p50   p95 worst     live p50   p95 worst  not within {AGAIN_SECONDS} s")
+    say(f"\nJoining late, {options.round_trip:g} ms, {options.line:g} Mbit/s: seconds until the first picture, "
+        f"and until one comes within {1000 * arrivals.LIVE_SECONDS:.0f} ms")
+    say(f"  Mbit/s control   loss   joins  picture p50   p95 worst     live p50   p95 worst  "
+        f"not within {AGAIN_SECONDS} s")
     for one in joined:
-        say(row(one, f"{one['joins']:7} {one['picture_50_s']:12.2f} {one['picture_95_s']:5.2f} {one['picture_100_s']:5.2f} "
-                f"{one['live_50_s']:12.2f} {one['live_95_s']:5.2f} {one['live_100_s']:5.2f} "
-                f"{one['in_vain']:15}"))
+        say(row(one, f"{one['joins']:7} {one['picture_50_s']:12.2f} {one['picture_95_s']:5.2f} "
+                f"{one['picture_100_s']:5.2f} {one['live_50_s']:12.2f} {one['live_95_s']:5.2f} "
+                f"{one['live_100_s']:5.2f} {one['in_vain']:15}"))
     for megabits in options.rate:
         with open(hubs.stream_of(options.htvm, megabits), "rb") as file:
             say(f"\nIf the packets of {megabits:g} Mbit/s were datagrams of {datagrams.DATAGRAM_BYTES} bytes:")
