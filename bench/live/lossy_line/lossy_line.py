@@ -229,7 +229,7 @@ def main():
     parser.add_argument("--queue", type=float, default=100, help="milliseconds that packets may wait before it "
                         "(default 100)")
     parser.add_argument("--round-trip", type=float, default=50, help="milliseconds (default 50)")
-    parser.add_argument("--pings", type=int, default=2000, help="for each kind of line (default 2000)")
+    parser.add_argument("--pings", type=int, default=5000, help="for each kind of line (default 5000)")
     parser.add_argument("--seed", type=int, default=1, help="of what is lost")
     parser.add_argument("--json", action="store_true", help="the results for machines")
     options = parser.parse_args()
