@@ -126,6 +126,33 @@ void add_refused(Metrics& metrics, const MetricsSources& sources) {
     metrics.add("refused_total", "counter", "Requests and connections that were refused or ended", "cause", samples);
 }
 
+void add_nats(Metrics& metrics, const NatsCounters& nats) {
+    const auto& hubs = nats.hubs;
+    metrics.gauge("nats_connected", "Whether NATS is", std::uint64_t{hubs.connected});
+    metrics.counter("nats_connections_total", "Connections to NATS that were made", nats.connections);
+    metrics.counter("nats_slow_consumer_total", "How often NATS or its library dropped messages for us",
+                    nats.slow_consumer);
+    metrics.add("nats_dropped_messages_total", "counter", "Messages between hubs that were dropped here", "direction",
+                {{"to", number_text(nats.dropped_to + hubs.unsent)}, {"from", number_text(nats.dropped_from)}});
+    metrics.gauge("hubs", "Other hubs that were heard of lately", std::uint64_t{hubs.hubs});
+    metrics.gauge("far_streams", "Streams published on other hubs", std::uint64_t{hubs.far_streams});
+    metrics.gauge("far_streams_watched", "Of these, watched here", std::uint64_t{hubs.watched});
+    metrics.gauge("streams_sent_to_hubs", "Streams published here and watched elsewhere",
+                  std::uint64_t{hubs.sent_streams});
+    metrics.counter("hub_messages_sent_total", "Messages to other hubs", hubs.sent);
+    metrics.counter("hub_messages_received_total", "Messages from other hubs", hubs.received);
+    metrics.counter("hub_messages_damaged_total", "Those that were no message, or not their sender's to say",
+                    hubs.damaged);
+    metrics.counter("hub_messages_incomplete_total", "Those of which parts did not come", hubs.incomplete);
+    metrics.counter("far_packets_total", "Packets from other hubs", hubs.packets);
+    metrics.counter("far_bytes_total", "Bytes of these packets", hubs.bytes);
+    metrics.counter("far_gaps_total", "How often packets from other hubs were missing", hubs.gaps);
+    metrics.counter("far_closures_total", "How often what the newest frame needs was taken from another hub",
+                    hubs.closures);
+    metrics.counter("lost_claims_total", "Publishers here who lost their stream to one on another hub",
+                    hubs.lost_claims);
+}
+
 }  // namespace
 
 std::string metrics_text(const MetricsSources& sources, Hub::Clock::time_point now) {
@@ -135,6 +162,7 @@ std::string metrics_text(const MetricsSources& sources, Hub::Clock::time_point n
     metrics.gauge("connections", "Open now", std::uint64_t{sources.connections});
     add_refused(metrics, sources);
     if (sources.hub) add_hub(metrics, *sources.hub, now);
+    if (sources.nats) add_nats(metrics, *sources.nats);
     if (sources.recorder) {
         const auto recorded = sources.recorder->counters();
         metrics.gauge("recording_streams", "Streams being recorded", recorded.streams);

@@ -5,9 +5,11 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "live/hub.h"
+#include "live/nats_link.h"
 #include "live/recorder.h"
 
 namespace htvm::live {
@@ -18,6 +20,7 @@ inline constexpr const char* metrics_type = "text/plain; version=0.0.4; charset=
 struct MetricsSources {
     const Hub* hub = nullptr;                         // null: there are no live streams
     const Recorder* recorder = nullptr;               // null: nothing is recorded
+    std::optional<NatsCounters> nats{};               // none: the hub is joined with no others
     std::map<std::string, std::uint64_t> refused{};   // requests and connections, by cause; besides the hub's own
     unsigned connections = 0;                         // open now
     std::chrono::steady_clock::time_point started{};  // of the program

@@ -42,6 +42,7 @@ public:
     NatsLink& operator=(NatsLink&&) noexcept;
     ~NatsLink();
 
+    // On the context's thread.
     NatsCounters counters() const;
 
 private:
