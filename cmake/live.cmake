@@ -79,6 +79,7 @@ htvm_floor(live_client
 htvm_library(live FLOORS live_client LINKS decoder NEEDS OpenSSL::SSL)
 htvm_floor(live
   SOURCES
+    src/live/access.cpp
     src/live/event.cpp
     src/live/far_stream.cpp
     src/live/file_server.cpp

@@ -139,6 +139,7 @@ Result<void> play(const PlayOptions& options) {
     live::FileServerOptions server;
     server.port = options.port;
     server.loopback_names = true;
+    server.drain_time = {};
     TemporaryFolder temporary, beside_temporary;
     std::string query;
     if (options.beside.empty() && inputs.size() == 1 && fs::is_directory(inputs[0], error) &&

@@ -1,36 +1,94 @@
 // htvm serve: a hub of live streams, and a folder of streams, for others to watch, with a page that plays them.
 #include <fmt/core.h>
+#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
 #include <memory>
 
 #include "command_line/terminal.h"
 #include "commands.h"
+#include "live/access.h"
 #include "live/file_server.h"
 
 namespace htvm::app {
 namespace {
 
 struct Options {
-    std::string folder, address = "127.0.0.1";
-    std::uint16_t port = 8080;
-    bool same_site = false;
-    unsigned connections = live::FileServerOptions{}.connections;
-    std::string congestion_control = "bbr";
-    live::NatsOptions nats{};
+    live::FileServerOptions server;
+    live::HubLimits hub;
+    std::string add_publisher, congestion_control = "bbr";
+    bool same_site = false, add_link_key = false, json = false;
+    Options() {
+        server.port = 8080;
+        server.connections = 4096;
+        server.connections_per_address = 256;
+        server.viewers_per_address = 200;
+    }
 };
 
+// Each connection needs a file descriptor, and each file that is being sent another.
+void allow_files(std::size_t connections) {
+    constexpr std::size_t others = 64;
+    rlimit limit{};
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+    const auto wanted = std::min<rlim_t>(2 * connections + others, limit.rlim_max);
+    if (limit.rlim_cur >= wanted) return;
+    limit.rlim_cur = wanted;
+    setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+// For people on standard error, for machines on standard output.
+void write_event(const live::Event& event, bool json) {
+    const auto now = std::chrono::system_clock::now();
+    if (json) {
+        fmt::print("{}\n", json_line(event, now));
+        std::fflush(stdout);
+    } else if (event.warning) {
+        warn(text_line(event, now));
+    } else {
+        note(text_line(event, now));
+    }
+}
+
+// Where to open it in a browser.
+std::string address_of(const live::FileServerOptions& server, std::uint16_t port) {
+    const bool six = server.address.find(':') != std::string::npos;
+    return fmt::format("{}://{}{}{}:{}/", server.certificate.empty() ? "http" : "https", six ? "[" : "", server.address,
+                       six ? "]" : "", port);
+}
+
+Result<void> add_publisher(const Options& options) {
+    const auto token = live::add_publisher(options.server.publishers, options.add_publisher);
+    if (!token) return tl::unexpected(token.error());
+    note(fmt::format(
+        "The token of {}, which is shown only now: {} keeps no more than a hash of it. A hub that runs reads "
+        "the file again when it is sent SIGHUP.",
+        options.add_publisher, options.server.publishers));
+    fmt::print("{}\n", *token);
+    return {};
+}
+
+Result<void> add_link_key(const Options& options) {
+    const auto number = live::add_link_key(options.server.link_keys);
+    if (!number) return tl::unexpected(number.error());
+    note(fmt::format(
+        "{} has key {} now; links by the one before stay good until another is added. A hub that runs reads "
+        "the file again when it is sent SIGHUP.",
+        options.server.link_keys, *number));
+    return {};
+}
+
 Result<void> serve(const Options& options) {
-    live::FileServerOptions server;
-    server.folder = options.folder;
-    server.address = options.address;
-    server.port = options.port;
-    server.other_sites = !options.same_site;
-    server.connections = options.connections;
+    const auto log = [json = options.json](const live::Event& event) { write_event(event, json); };
+    live::Hub hub(options.hub, log);
+    auto server = options.server;
+    server.other_sites = !options.same_site && server.origins.empty();
     if (options.congestion_control != "system") server.congestion_control = options.congestion_control;
-    live::Hub hub;
     server.hub = &hub;
-    server.nats = options.nats;
+    server.log = log;
+    allow_files(server.connections);
     auto opened = live::FileServer::open(server);
     if (!opened) return tl::unexpected(opened.error());
     if (!live::has_player()) warn("this htvm was built without the web player: it serves streams, but has no pages");
@@ -40,11 +98,18 @@ Result<void> serve(const Options& options) {
             "this kernel's TCP has no '{}' (modprobe tcp_bbr loads bbr): it uses {}, with which live streams "
             "come late where packets are lost",
             options.congestion_control, used));
-    note("No publishers are known: programs on this machine may publish, under any name, and nobody else.");
-    const bool six = options.address.find(':') != std::string::npos;
-    fmt::print("http://{}{}{}:{}/\n", six ? "[" : "", options.address, six ? "]" : "", opened->port());
-    std::fflush(stdout);
+    const auto address = address_of(server, opened->port());
+    if (options.json) {
+        log({.name = "listening", .text = "listening at " + address, .numbers = {{"port", opened->port()}}});
+    } else {
+        fmt::print("{}\n", address);
+        std::fflush(stdout);
+    }
+    if (server.publishers.empty())
+        log({.name = "publishing_open",
+             .text = "no publishers are known: programs on this machine may publish, under any name, and nobody else"});
     opened->run();
+    log({.name = "stopped", .text = "stopped"});
     return {};
 }
 
@@ -73,42 +138,135 @@ void add_nats_options(CLI::App& command, live::NatsOptions& nats) {
         ->needs(servers);
 }
 
+// The options of the command as lines "name = value". What the command line has given already stays.
+void read_options(CLI::App& command, const std::string& path) {
+    CLI::ConfigTOML format;
+    for (const auto& item : format.from_file(path)) {
+        auto* option = item.parents.empty() ? command.get_option_no_throw("--" + item.name) : nullptr;
+        if (!option || !option->get_configurable()) throw CLI::ConfigError::Extras(item.fullname());
+        if (!option->empty()) continue;
+        if (option->get_expected_min() == 0)
+            option->add_result(option->get_flag_value(item.name, format.to_flag(item)));
+        else
+            for (const auto& value : item.inputs) option->add_result(value);
+    }
+}
+
+void add_access_options(CLI::App& command, Options& options) {
+    auto& server = options.server;
+    auto* certificate = command
+                            .add_option("--cert", server.certificate,
+                                        "With TLS: the certificate, and those between it and its root (PEM)")
+                            ->type_name("FILE");
+    auto* key =
+        command.add_option("--key", server.private_key, "The certificate's private key (PEM)")->type_name("FILE");
+    certificate->needs(key);
+    key->needs(certificate);
+    auto* publishers =
+        command
+            .add_option("--publishers", server.publishers,
+                        "Who may publish: a file that --add-publisher writes (default: programs on this machine)")
+            ->type_name("FILE");
+    command
+        .add_option("--add-publisher", options.add_publisher,
+                    "Make a token for the stream of this name, print it, keep its hash in the file, and end")
+        ->type_name("NAME")
+        ->needs(publishers)
+        ->configurable(false);
+    auto* keys = command
+                     .add_option("--link-keys", server.link_keys,
+                                 "Watching needs a link that htvm link signs with a key of this file, which "
+                                 "--add-link-key writes (default: anyone may watch)")
+                     ->type_name("FILE");
+    command
+        .add_flag("--add-link-key", options.add_link_key, "Add a key to the file, drop all but the newest two, and end")
+        ->needs(keys)
+        ->configurable(false);
+    auto* origins = command
+                        .add_option("--origin", server.origins,
+                                    "Pages of this site may read and watch, and no other site's; may be given more "
+                                    "than once (default: pages of all sites)")
+                        ->type_name("https://SITE")
+                        ->allow_extra_args(false);
+    command.add_flag("--same-site", options.same_site, "Pages of no other site may read and watch")->excludes(origins);
+}
+
+void add_limits(CLI::App& command, Options& options) {
+    const auto add = [&](const char* name, auto& limit, const std::string& text) {
+        command.add_option(name, limit, fmt::format("{} (default {})", text, limit))->check(CLI::Range(1, 1000000));
+    };
+    auto& server = options.server;
+    add("--connections", server.connections, "Connections at once");
+    add("--connections-per-address", server.connections_per_address,
+        "Of these from one address; an IPv6 network /64 is one");
+    add("--streams", options.hub.streams, "Live streams at once");
+    add("--viewers", options.hub.viewers, "Viewers of one live stream");
+    add("--viewers-per-address", server.viewers_per_address, "Viewers of live streams from one address");
+    command
+        .add_option("--message-bytes", options.hub.packet_bytes,
+                    fmt::format("A publisher's largest message (default {} MiB)", options.hub.packet_bytes >> 20))
+        ->transform(CLI::AsSizeValue(false));
+    command
+        .add_option_function<unsigned>(
+            "--header-time", [&server](unsigned seconds) { server.header_time = std::chrono::seconds(seconds); },
+            fmt::format("Seconds for a request's header, and for agreeing on TLS (default {})",
+                        server.header_time.count()))
+        ->check(CLI::Range(1, 3600));
+}
+
 }  // namespace
 
 void add_serve(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command =
         app.add_subcommand("serve", "Carry live streams and serve a folder of streams, with a page that plays them");
+    // The first option, since options are taken in this order, and it sets others.
     command
-        ->add_option("--files", options->folder,
+        ->add_option_function<std::string>(
+            "--config", [command](const std::string& path) { read_options(*command, path); },
+            "Read options from a file, a line each: port = 8443. Those of the command line come before its own")
+        ->type_name("FILE")
+        ->check(CLI::ExistingFile)
+        ->configurable(false);
+    auto& server = options->server;
+    command
+        ->add_option("--files", server.folder,
                      "A folder: its .htvm, .png and .jpg files can be read by anyone (default: live streams only)")
         ->type_name("FOLDER");
-    command->add_option("--address", options->address,
+    command->add_option("--address", server.address,
                         "Address to listen on (default 127.0.0.1: this machine alone; 0.0.0.0 or ::: all networks)");
-    command->add_option("--port", options->port, "Port to listen on; 0: a free one (default 8080)")
+    command->add_option("--port", server.port, "Port to listen on; 0: a free one (default 8080)")
         ->check(CLI::Range(0, 65535));
-    command->add_flag("--same-site", options->same_site, "Do not allow pages of other sites to read the streams");
-    command->add_option("--connections", options->connections, "Connections at once (default 512)")
-        ->check(CLI::Range(1, 100000));
     command
         ->add_option("--congestion-control", options->congestion_control,
                      "How TCP finds out how fast it may send: bbr (default; where packets are lost, live streams come "
                      "late with others: docs/live.md), another that the kernel has, or system: the kernel's choice")
         ->type_name("NAME");
-    if (live::has_nats()) add_nats_options(*command, options->nats);
+    if (live::has_nats()) add_nats_options(*command, server.nats);
+    add_access_options(*command, *options);
+    add_limits(*command, *options);
+    command->add_flag("--json", options->json,
+                      "Log as JSON, an object a line, on standard output (default: for people, on standard error)");
+    show_first(*command, {"--config", "--files", "--address", "--port", "--cert", "--key", "--publishers",
+                          "--add-publisher", "--link-keys", "--add-link-key", "--origin", "--json"});
     command->footer(
-        "Runs until Ctrl-C. Live streams are published to ws://ADDRESS:PORT/publish/NAME, by programs on this machine\n"
-        "alone, and watched at http://ADDRESS:PORT/play/NAME by anyone who reaches it. Of the folder, symbolic links "
-        "and\n"
-        "hidden files are not served; the page shows NAME.png or NAME.jpg as the still of NAME.htvm if it lies beside "
-        "it\n"
-        "(htvm still makes one). It speaks HTTP without TLS: across other people's networks put a web server with TLS "
-        "in\n"
-        "front of it.\n"
+        "Runs until Ctrl-C or SIGTERM, which give viewers and publishers 5 seconds to be told and to leave; a second "
+        "one\n"
+        "ends it at once. SIGHUP makes it read certificate, publishers and keys again. Live streams are published to\n"
+        "ws://ADDRESS:PORT/publish/NAME and watched at http://ADDRESS:PORT/play/NAME (wss and https with --cert). Of "
+        "the\n"
+        "folder, symbolic links and hidden files are not served; the page shows NAME.png or NAME.jpg as the still of\n"
+        "NAME.htvm if it lies beside it (htvm still makes one).\n"
         "Examples:\n"
         "  htvm serve --files streams/ --address 0.0.0.0\n"
-        "  htvm serve");
-    command->callback([options, &run] { run = [options] { return serve(*options); }; });
+        "  htvm serve --publishers publishers.json --add-publisher anna\n"
+        "  htvm serve --address :: --cert chain.pem --key key.pem --publishers publishers.json");
+    command->callback([options, &run] {
+        run = [options] {
+            if (!options->add_publisher.empty()) return add_publisher(*options);
+            return options->add_link_key ? add_link_key(*options) : serve(*options);
+        };
+    });
 }
 
 }  // namespace htvm::app

@@ -2,6 +2,7 @@
 
 #include <netinet/tcp.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
@@ -10,6 +11,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
@@ -23,8 +25,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <utility>
 
 #include "core/crc32.h"
+#include "live/access.h"
+#include "live/control.h"
 #include "live/http_request.h"
 #include "live/live_connection.h"
 #include "live/player_files.h"
@@ -39,6 +44,7 @@ namespace http = beast::http;
 using tcp = net::ip::tcp;
 
 constexpr std::size_t header_limit = 8192, piece_bytes = 65536;
+constexpr std::uint64_t most_told_refusals = 10;  // a second, in the log
 constexpr auto awaited = net::as_tuple(net::use_awaitable);
 
 // What the player's pages may do; inline scripts and other sites' are forbidden.
@@ -123,17 +129,93 @@ struct LiveTarget {
     std::string name;
 };
 
+// Why a request is not answered as its sender wishes.
+struct Refusal {
+    std::string cause;  // a word, to count by
+    std::string why;    // a sentence for the other side
+    http::status status = http::status::forbidden;
+    CloseCode code = CloseCode::refused;  // instead, of a WebSocket that is opened only to say why
+};
+
+void say_why(Response& response, const Refusal& refusal) {
+    response.header.result(refusal.status);
+    response.header.set(http::field::content_type, "text/plain; charset=utf-8");
+    response.header.set(http::field::cache_control, "no-store");
+    response.own = refusal.why + '\n';
+}
+
+// Who may do what, as the files say.
+struct Access {
+    std::optional<Publishers> publishers;  // none: programs on this machine
+    std::optional<LinkKeys> link_keys;     // none: anyone may watch
+    std::optional<net::ssl::context> tls;
+};
+
+Result<Access> read_access(const FileServerOptions& options) {
+    Access out;
+    if (!options.publishers.empty()) {
+        auto publishers = read_publishers(options.publishers);
+        if (!publishers) return tl::unexpected(publishers.error());
+        out.publishers = std::move(*publishers);
+    }
+    if (!options.link_keys.empty()) {
+        auto keys = read_link_keys(options.link_keys);
+        if (!keys) return tl::unexpected(keys.error());
+        out.link_keys = std::move(*keys);
+    }
+    if (!options.certificate.empty()) {
+        auto tls = server_context(options.certificate, options.private_key);
+        if (!tls) return tl::unexpected(tls.error());
+        out.tls = std::move(*tls);
+    }
+    return out;
+}
+
+// What counts as one address: of IPv6 a network of 2^64, which is what one customer has at least.
+net::ip::address counted_address(const net::ip::address& address) {
+    if (!address.is_v6()) return address;
+    auto bytes = address.to_v6().to_bytes();
+    if (address.to_v6().is_v4_mapped()) return net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
+    std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
+    return net::ip::address_v6(bytes);
+}
+
+// One more at this place of a table of counts, as long as this lives. Entries of none are removed.
+class Counted {
+public:
+    using Counts = std::map<net::ip::address, unsigned>;
+    Counted(Counts& counts, const net::ip::address& address) : counts_(counts), address_(address) {
+        ++counts_[address_];
+    }
+    Counted(const Counted&) = delete;
+    Counted& operator=(const Counted&) = delete;
+    ~Counted() {
+        if (--counts_[address_] == 0) counts_.erase(address_);
+    }
+
+private:
+    Counts& counts_;
+    net::ip::address address_;
+};
+
 }  // namespace
 
 struct FileServer::State {
     FileServerOptions options;
     std::optional<ServedFolder> folder;  // unless there are files with names
-    net::io_context context{1};
+    Counted::Counts by_address, viewers_by_address;
+    net::io_context context{1};  // what its coroutines count by lives longer
     tcp::acceptor acceptor{context};
     std::optional<NatsLink> nats;  // if the hub is joined with others
+    std::uint16_t port = 0;
     std::map<std::string, Text, std::less<>> player;
-    std::map<net::ip::address, unsigned> by_address;
     unsigned connections = 0;
+    Access access;
+    std::set<Line*> idle;  // that wait for a request
+    bool draining = false;
+    std::map<std::string, std::uint64_t> refused;    // how many, by cause
+    std::uint64_t refusals = 0;                      // in this second
+    std::size_t told_joined = 0, told_watching = 0;  // viewers, as the log says
 
     explicit State(const FileServerOptions& given) : options(given) {}
 
@@ -147,13 +229,28 @@ struct FileServer::State {
     Result<ServedFile> served_file(const std::vector<std::string>& segments) const;
     bool host_is_loopback(std::string_view host) const;
 
+    bool origin_allowed(const Request& request) const;
+    void let_others_read(const Request& request, Header& header) const;
+    std::string publishing_refused(const Request& request, const LiveTarget& target,
+                                   const net::ip::address& address) const;
+    std::optional<Refusal> link_refused(const std::string& path, const Request& request) const;
+    void tell_refused(const Refusal& refusal, const std::string& stream, const net::ip::address& address);
+    void tell(const Event& event) const {
+        if (options.log) options.log(event);
+    }
+
     net::awaitable<void> accept();
     net::awaitable<void> serve(Line line, net::ip::address address);
+    net::awaitable<std::optional<std::pair<Request, LiveTarget>>> answer_requests(Line& line);
     std::optional<LiveTarget> live_target(const Request& request) const;
-    std::string publishing_refused(const Request& request, const net::ip::address& address) const;
-    net::awaitable<void> serve_live(Line line, Request request, LiveTarget target, net::ip::address address);
-    net::awaitable<void> refuse(Line line, Header header, http::status status, std::string why);
+    net::awaitable<void> publish(Line line, Request request, LiveTarget target, net::ip::address address);
+    net::awaitable<void> watch(Line line, Request request, LiveTarget target, net::ip::address address);
+    net::awaitable<void> refuse(Line line, Header header, Refusal refusal);
     net::awaitable<void> tick_hub();
+    void tell_viewers();
+    net::awaitable<void> each_second();
+    net::awaitable<void> reload_on_hangup();
+    net::awaitable<void> drain_on_signal();
     net::awaitable<bool> send(Line& line, Response& response, bool with_body);
 };
 
@@ -169,8 +266,8 @@ Result<ServedFile> FileServer::State::served_file(const std::vector<std::string>
 
 // A page of another site whose name was made to point here (DNS rebinding) sends that name.
 bool FileServer::State::host_is_loopback(std::string_view host) const {
-    const auto port = ':' + std::to_string(acceptor.local_endpoint().port());
-    if (host.ends_with(port)) host.remove_suffix(port.size());
+    const auto suffix = ':' + std::to_string(port);
+    if (host.ends_with(suffix)) host.remove_suffix(suffix.size());
     return host == "127.0.0.1" || host == "localhost" || host == "[::1]";
 }
 
@@ -240,10 +337,16 @@ Response FileServer::State::answer_text(const Request& request, const Text& text
 Response FileServer::State::answer_file(const Request& request, std::vector<std::string> segments, Header header) {
     Response out;
     out.header = std::move(header);
+    std::string path = "files";
     segments.erase(segments.begin());
-    if (options.other_sites) {
-        out.header.set(http::field::access_control_allow_origin, "*");
+    for (const auto& segment : segments) path += '/' + segment;
+    let_others_read(request, out.header);
+    if (out.header.count(http::field::access_control_allow_origin))
         out.header.set(http::field::access_control_expose_headers, "Content-Range, ETag");
+    if (const auto refusal = link_refused(path, request)) {
+        ++refused[refusal->cause];
+        say_why(out, *refusal);
+        return out;
     }
     auto file = served_file(segments);
     if (!file) {
@@ -292,7 +395,8 @@ Header FileServer::State::common_header() const {
     Header header{http::status::ok, 11};
     header.set("X-Content-Type-Options", "nosniff");
     header.set("Referrer-Policy", "no-referrer");
-    header.set("Cross-Origin-Resource-Policy", options.other_sites ? "cross-origin" : "same-origin");
+    const bool others = options.other_sites || !options.origins.empty();
+    header.set("Cross-Origin-Resource-Policy", others ? "cross-origin" : "same-origin");
     return header;
 }
 
@@ -314,6 +418,13 @@ Response FileServer::State::answer(const Request& request) {
     if (!segments) return refuse(http::status::bad_request);
     const auto& path = *segments;
     if (path.size() > 1 && path[0] == "files") return answer_file(request, std::move(*segments), header);
+    const bool list = path.size() == 2 && path[0] == "api" && (path[1] == "files" || path[1] == "streams");
+    if (list && access.link_keys) {
+        Response out;
+        out.header = header;
+        say_why(out, {"link_missing", "this hub tells nobody what there is: it asks for links"});
+        return out;
+    }
     if (path.size() == 2 && path[0] == "api" && path[1] == "files") return answer_json(listing(), header);
     if (path.size() == 2 && path[0] == "api" && path[1] == "streams")
         return answer_json(options.hub ? live_listing() : "null", header);
@@ -366,9 +477,37 @@ std::optional<LiveTarget> FileServer::State::live_target(const Request& request)
     return LiveTarget{publish, socket, std::move((*path)[1])};
 }
 
-// Why somebody may not publish; "" if they may. A web page in a browser of this machine is somebody else, and so is who
-// comes through a web server on this machine.
-std::string FileServer::State::publishing_refused(const Request& request, const net::ip::address& address) const {
+// Whether a page, if it is one that asks, may do so; other programs name no origin.
+bool FileServer::State::origin_allowed(const Request& request) const {
+    const auto origin = request[http::field::origin];
+    if (origin.empty() || host_of_origin(origin) == request[http::field::host]) return true;
+    if (options.origins.empty()) return options.other_sites;
+    return std::find(options.origins.begin(), options.origins.end(), origin) != options.origins.end();
+}
+
+// Tells the browser whether pages of other sites may read the response (CORS).
+void FileServer::State::let_others_read(const Request& request, Header& header) const {
+    if (options.origins.empty()) {
+        if (options.other_sites) header.set(http::field::access_control_allow_origin, "*");
+        return;
+    }
+    header.set(http::field::vary, "Origin");
+    const auto origin = request[http::field::origin];
+    if (std::find(options.origins.begin(), options.origins.end(), origin) != options.origins.end())
+        header.set(http::field::access_control_allow_origin, origin);
+}
+
+// Why somebody may not publish; "" if they may.
+std::string FileServer::State::publishing_refused(const Request& request, const LiveTarget& target,
+                                                  const net::ip::address& address) const {
+    if (access.publishers) {
+        auto token = std::string(bearer_token(request[http::field::authorization]));
+        if (token.empty()) token = query_value(request.target(), "token").value_or("");
+        if (token.empty()) return "publishing needs a token: Authorization: Bearer TOKEN";
+        return may_publish(*access.publishers, target.name, token) ? ""
+                                                                   : "this token is not that of the stream's publisher";
+    }
+    // A web page in a browser of this machine is somebody else, and so is who comes through a web server on it.
     const auto origin = request[http::field::origin];
     const bool page_elsewhere = !origin.empty() && !host_is_loopback(host_of_origin(origin));
     const bool forwarded = request.count("Forwarded") || request.count("X-Forwarded-For") || request.count("Via");
@@ -376,16 +515,73 @@ std::string FileServer::State::publishing_refused(const Request& request, const 
     return "this hub knows no publishers: only programs on its own machine may publish";
 }
 
-net::awaitable<void> FileServer::State::serve_live(Line line, Request request, LiveTarget target,
-                                                   net::ip::address address) {
+// Nothing if this hub asks for no links, or the request has a good one to this path.
+std::optional<Refusal> FileServer::State::link_refused(const std::string& path, const Request& request) const {
+    if (!access.link_keys) return std::nullopt;
+    const auto check = check_link(*access.link_keys, path, request.target(), std::chrono::system_clock::now());
+    if (check == LinkCheck::good) return std::nullopt;
+    const char* cause = check == LinkCheck::missing   ? "link_missing"
+                        : check == LinkCheck::expired ? "link_expired"
+                                                      : "link_forged";
+    return Refusal{cause, link_sentence(check)};
+}
+
+// Counts and logs; of very many in a second only the first are logged, and how many there were.
+void FileServer::State::tell_refused(const Refusal& refusal, const std::string& stream,
+                                     const net::ip::address& address) {
+    ++refused[refusal.cause];
+    if (++refusals > most_told_refusals) return;
+    tell({.name = "refused",
+          .text = "refused: " + refusal.why,
+          .stream = is_stream_name(stream) ? stream : "",
+          .address = address.to_string()});
+}
+
+net::awaitable<void> FileServer::State::publish(Line line, Request request, LiveTarget target,
+                                                net::ip::address address) {
     auto header = common_header();
-    if (options.other_sites) header.set(http::field::access_control_allow_origin, "*");
-    if (target.publish) {
-        if (const auto why = publishing_refused(request, address); !why.empty())
-            co_await refuse(std::move(line), std::move(header), http::status::forbidden, why);
+    std::optional<Refusal> refusal;
+    if (!is_stream_name(target.name))
+        refusal = {"name", "a stream's name has 1 to 64 letters, digits, '-', '_' and '.'", http::status::bad_request};
+    else if (!origin_allowed(request))
+        refusal = {"origin", "pages of this site may not publish here"};
+    else if (const auto why = publishing_refused(request, target, address); !why.empty())
+        refusal = {"token", why, access.publishers ? http::status::unauthorized : http::status::forbidden};
+    if (!refusal) {
+        co_await publish_by_socket(std::move(line), request, target.name, *options.hub);
+        co_return;
+    }
+    tell_refused(*refusal, target.name, address);
+    if (refusal->status == http::status::unauthorized) {
+        header.set(http::field::www_authenticate, "Bearer");
+        net::steady_timer delay(context, options.refusal_delay);
+        co_await delay.async_wait(awaited);
+    }
+    co_await refuse(std::move(line), std::move(header), *refusal);
+}
+
+net::awaitable<void> FileServer::State::watch(Line line, Request request, LiveTarget target, net::ip::address address) {
+    auto header = common_header();
+    let_others_read(request, header);
+    const auto who = counted_address(address);
+    const auto same = viewers_by_address.find(who);
+    auto refusal = link_refused("watch/" + target.name, request);
+    if (target.socket && !origin_allowed(request))
+        refusal = {"origin", "pages of this site may not watch here"};
+    else if (!refusal && same != viewers_by_address.end() && same->second >= options.viewers_per_address)
+        refusal = {"address", "this address has as many viewers as it may", http::status::service_unavailable,
+                   CloseCode::try_later};
+    if (refusal) {
+        tell_refused(*refusal, target.name, address);
+        // A browser tells a page nothing of a WebSocket that was refused before it was opened.
+        if (target.socket)
+            co_await refuse_socket(std::move(line), request, refusal->code, refusal->why);
         else
-            co_await publish_by_socket(std::move(line), request, target.name, *options.hub);
-    } else if (target.socket) {
+            co_await refuse(std::move(line), std::move(header), *refusal);
+        co_return;
+    }
+    const Counted counted(viewers_by_address, who);
+    if (target.socket) {
         co_await watch_by_socket(std::move(line), request, target.name, *options.hub);
     } else {
         co_await watch_by_body(line, std::move(header), target.name, *options.hub);
@@ -394,13 +590,11 @@ net::awaitable<void> FileServer::State::serve_live(Line line, Request request, L
 }
 
 // Answers with a sentence and ends the connection.
-net::awaitable<void> FileServer::State::refuse(Line line, Header header, http::status status, std::string why) {
+net::awaitable<void> FileServer::State::refuse(Line line, Header header, Refusal refusal) {
     Response response;
     response.header = std::move(header);
-    response.header.result(status);
     response.header.keep_alive(false);
-    response.header.set(http::field::content_type, "text/plain; charset=utf-8");
-    response.own = std::move(why) + '\n';
+    say_why(response, refusal);
     co_await send(line, response, true);
     co_await line.close();
 }
@@ -415,41 +609,57 @@ net::awaitable<void> FileServer::State::tick_hub() {
 }
 
 net::awaitable<void> FileServer::State::serve(Line line, net::ip::address address) {
+    const Counted counted(by_address, counted_address(address));
+    ++connections;
+    line.next_layer().expires_after(options.header_time);
+    if (!co_await line.handshake(net::ssl::stream_base::server)) {
+        if (auto live = co_await answer_requests(line)) {
+            auto& [request, target] = *live;
+            if (target.publish)
+                co_await publish(std::move(line), std::move(request), std::move(target), address);
+            else
+                co_await watch(std::move(line), std::move(request), std::move(target), address);
+        } else {
+            co_await line.close();
+        }
+    }
+    --connections;
+    if (draining && connections == 0) context.stop();
+}
+
+// Until the connection is of no further use, or a request is for a live stream: that one.
+net::awaitable<std::optional<std::pair<Request, LiveTarget>>> FileServer::State::answer_requests(Line& line) {
     beast::flat_buffer buffer(header_limit);
-    bool open = true;
-    while (open) {
+    while (!draining) {
         http::request_parser<http::empty_body> parser;
         parser.header_limit(header_limit);
         line.next_layer().expires_after(options.header_time);
+        idle.insert(&line);
         const auto [error, bytes] = co_await http::async_read_header(line, buffer, parser, awaited);
+        idle.erase(&line);
         if (error) break;
         // No request here has a body; one that does would be read as the next request.
         const bool body = !parser.is_done();
-        const auto& request = parser.get();
-        if (auto live = body ? std::nullopt : live_target(request)) {
-            open = false;
-            co_await serve_live(std::move(line), request, std::move(*live), address);
-            break;
-        }
+        auto& request = parser.get();
+        if (auto live = body ? std::nullopt : live_target(request))
+            co_return std::pair(std::move(request), std::move(*live));
         Response response;
         if (body)
             response.header.result(http::status::bad_request);
         else
             response = answer(request);
-        const bool alive = request.keep_alive() && !body;
+        const bool alive = request.keep_alive() && !body && !draining;
         response.header.keep_alive(alive);
         const bool sent = co_await send(line, response, request.method() != http::verb::head);
         if (!alive || !sent) break;
     }
-    if (open) co_await line.close();
-    --connections;
-    if (--by_address[address] == 0) by_address.erase(address);
+    co_return std::nullopt;
 }
 
 net::awaitable<void> FileServer::State::accept() {
     for (;;) {
         auto [error, socket] = co_await acceptor.async_accept(awaited);
-        if (error == net::error::operation_aborted) co_return;
+        if (error == net::error::operation_aborted || draining) co_return;
         if (error) {
             // Out of file descriptors, most likely: others have to end first.
             net::steady_timer pause(context, std::chrono::milliseconds(100));
@@ -458,13 +668,89 @@ net::awaitable<void> FileServer::State::accept() {
         }
         beast::error_code unknown;
         const auto address = socket.remote_endpoint(unknown).address();
-        const auto found = by_address.find(address);
+        const auto found = by_address.find(counted_address(address));
         const unsigned same = found == by_address.end() ? 0 : found->second;
-        if (unknown || connections >= options.connections || same >= options.connections_per_address) continue;
-        ++connections;
-        by_address[address] = same + 1;
-        net::co_spawn(context, serve(Line(beast::tcp_stream(std::move(socket))), address), net::detached);
+        if (unknown || connections >= options.connections || same >= options.connections_per_address) {
+            ++refused["connections"];
+            continue;
+        }
+        beast::tcp_stream tcp(std::move(socket));
+        Line line = access.tls ? Line(std::move(tcp), *access.tls) : Line(std::move(tcp));
+        net::co_spawn(context, serve(std::move(line), address), net::detached);
     }
+}
+
+// How many watch, if others came or some left since this was last told.
+void FileServer::State::tell_viewers() {
+    std::size_t watching = 0;
+    const auto streams = options.hub->streams(Hub::Clock::now());
+    for (const auto& stream : streams) watching += stream.viewers;
+    const auto joined = options.hub->counters().joined;
+    const auto came = joined - told_joined;
+    if (came == 0 && watching == told_watching) return;
+    const auto left = told_watching + came - watching;
+    told_joined = joined;
+    told_watching = watching;
+    const auto number = [](std::size_t value) { return static_cast<std::int64_t>(value); };
+    tell({.name = "viewers",
+          .text = std::to_string(watching) + " watch " + std::to_string(streams.size()) +
+                  " streams; since the last time " + std::to_string(came) + " came and " + std::to_string(left) +
+                  " left",
+          .numbers = {{"viewers", number(watching)},
+                      {"streams", number(streams.size())},
+                      {"came", number(came)},
+                      {"left", number(left)}}});
+}
+
+net::awaitable<void> FileServer::State::each_second() {
+    constexpr int seconds_between_viewers = 60;
+    int seconds_to_viewers = seconds_between_viewers;
+    net::steady_timer timer(context);
+    for (;;) {
+        timer.expires_after(std::chrono::seconds(1));
+        co_await timer.async_wait(awaited);
+        if (refusals > most_told_refusals)
+            tell({.name = "refused",
+                  .text = std::to_string(refusals - most_told_refusals) + " more were refused in this second"});
+        refusals = 0;
+        if (options.hub && --seconds_to_viewers == 0) {
+            seconds_to_viewers = seconds_between_viewers;
+            tell_viewers();
+        }
+    }
+}
+
+net::awaitable<void> FileServer::State::reload_on_hangup() {
+    net::signal_set hangup(context, SIGHUP);
+    for (;;) {
+        co_await hangup.async_wait(awaited);
+        auto read = read_access(options);
+        if (read) {
+            access = std::move(*read);
+            tell({.name = "reloaded", .text = "certificate, publishers and keys were read again"});
+        } else {
+            tell({.name = "reload_failed",
+                  .text = read.error().message + "; certificate, publishers and keys stay as they were",
+                  .warning = true});
+        }
+    }
+}
+
+net::awaitable<void> FileServer::State::drain_on_signal() {
+    net::signal_set signals(context, SIGINT, SIGTERM);
+    co_await signals.async_wait(awaited);
+    draining = true;
+    beast::error_code ignored;
+    acceptor.close(ignored);
+    for (auto* line : idle) line->next_layer().cancel();
+    if (options.hub) options.hub->close_all(CloseCode::shut_down, "the hub shuts down");
+    if (connections == 0) context.stop();
+    net::steady_timer timer(context, options.drain_time);
+    timer.async_wait([this](const beast::error_code& cancelled) {
+        if (!cancelled) context.stop();
+    });
+    co_await signals.async_wait(awaited);
+    context.stop();
 }
 
 FileServer::FileServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -474,6 +760,9 @@ FileServer::~FileServer() = default;
 
 Result<FileServer> FileServer::open(const FileServerOptions& options) {
     auto state = std::make_unique<State>(options);
+    auto access = read_access(options);
+    if (!access) return tl::unexpected(access.error());
+    state->access = std::move(*access);
     if (options.files.empty() && !options.folder.empty()) {
         auto folder = ServedFolder::open(options.folder);
         if (!folder) return tl::unexpected(folder.error());
@@ -502,10 +791,11 @@ Result<FileServer> FileServer::open(const FileServerOptions& options) {
         if (!nats) return tl::unexpected(nats.error());
         state->nats.emplace(std::move(*nats));
     }
+    state->port = acceptor.local_endpoint().port();
     return FileServer(std::move(state));
 }
 
-std::uint16_t FileServer::port() const { return state_->acceptor.local_endpoint().port(); }
+std::uint16_t FileServer::port() const { return state_->port; }
 
 std::string FileServer::congestion_control() const {
     std::array<char, 16> name{};  // TCP_CA_NAME_MAX of the kernel
@@ -515,11 +805,15 @@ std::string FileServer::congestion_control() const {
 }
 
 void FileServer::run() {
-    net::signal_set signals(state_->context, SIGINT, SIGTERM);
-    signals.async_wait([this](const beast::error_code&, int) { state_->context.stop(); });
-    net::co_spawn(state_->context, state_->accept(), net::detached);
-    if (state_->options.hub) net::co_spawn(state_->context, state_->tick_hub(), net::detached);
-    state_->context.run();
+    auto& state = *state_;
+    net::co_spawn(state.context, state.accept(), net::detached);
+    net::co_spawn(state.context, state.each_second(), net::detached);
+    if (state.options.hub) net::co_spawn(state.context, state.tick_hub(), net::detached);
+    net::co_spawn(state.context, state.drain_on_signal(), net::detached);
+    const auto& options = state.options;
+    if (!options.certificate.empty() || !options.publishers.empty() || !options.link_keys.empty())
+        net::co_spawn(state.context, state.reload_on_hangup(), net::detached);
+    state.context.run();
 }
 
 void FileServer::stop() { state_->context.stop(); }

@@ -78,6 +78,8 @@ std::optional<std::string> query_value(std::string_view target, std::string_view
     return std::nullopt;
 }
 
+std::optional<std::uint64_t> whole_number(std::string_view text) { return number<std::uint64_t>(text); }
+
 FilePart requested_part(std::string_view range, std::uint64_t size) {
     const FilePart whole{FilePart::Kind::whole, 0, size};
     constexpr std::string_view unit = "bytes=";

@@ -18,6 +18,9 @@ std::optional<std::vector<std::string>> path_segments(std::string_view target);
 // the query has no such member, its escapes are wrong, or it holds a control character. Of several the first counts.
 std::optional<std::string> query_value(std::string_view target, std::string_view name);
 
+// All of the text, decimal digits only; nothing if it is no such number or 2^64 or more.
+std::optional<std::uint64_t> whole_number(std::string_view text);
+
 // Which bytes of a file to send.
 struct FilePart {
     enum class Kind { whole, part, beyond };  // answered by 200, 206, 416

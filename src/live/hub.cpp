@@ -15,6 +15,8 @@ namespace {
 constexpr double viewer_burst = 50, viewer_texts_each_second = 10;
 constexpr double publisher_burst = 1000, publisher_texts_each_second = 500;
 
+constexpr const char* memory_used_up = "this hub's memory for packets is used up";
+
 // The header of a message that is exactly one sound packet.
 std::optional<PacketHeader> header_of(std::span<const std::uint8_t> message, std::size_t most_bytes) {
     std::uint32_t payload_bytes = 0;
@@ -75,9 +77,10 @@ bool TextAllowance::take(Clock::time_point now) {
 // ---- Publishers -----------------------------------------------------------------------------------------------------
 
 Result<Hub::Publisher> Hub::publish(const std::string& name, std::function<void()> wake, Clock::time_point now) {
-    if (!streams_.contains(name) && streams_.size() >= limits_.streams) {
+    const bool full = streams_.size() >= limits_.streams;
+    if (!streams_.contains(name) && (full || !has_memory_for(1))) {
         ++counters_.refused_publishers_limit;
-        return fail(ErrorKind::limit, "there are as many streams as this hub carries");
+        return fail(ErrorKind::limit, full ? "there are as many streams as this hub carries" : memory_used_up);
     }
     const auto number = next_connection_++;
     connections_.emplace(number, Connection{.stream = name,
@@ -109,6 +112,7 @@ void Hub::changed(const std::string& name) const {
 Result<void> Hub::refuse(Connection& connection, const Error& error, CloseCode code) {
     connection.closing = Closing{code, error.message};
     connection.wake();
+    tell({.name = "refused", .text = "refused: " + error.message, .stream = connection.stream});
     return tl::unexpected(error);
 }
 
@@ -156,6 +160,7 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
     stream.connection = number;
     connection.admitted = true;
     changed(connection.stream);
+    tell({.name = "published", .text = "a publisher is connected", .stream = connection.stream});
     return {};
 }
 
@@ -231,6 +236,16 @@ void Hub::begin_session(const std::string& name, Stream& stream, const PacketHea
     if (!same) changed(name);
 }
 
+// It counts as memory as long as anybody holds it, which may be longer than the hub.
+std::shared_ptr<LivePacket> Hub::counted(LivePacket packet) const {
+    const auto bytes = packet.bytes.size();
+    *memory_ += bytes;
+    return {new LivePacket(std::move(packet)), [memory = memory_, bytes](const LivePacket* held) {
+                *memory -= bytes;
+                delete held;
+            }};
+}
+
 Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end() || found->second.closing)
@@ -252,6 +267,16 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
         ++counters_.damaged_messages;
         return {};
     }
+    if (!has_memory_for(message.size())) {
+        ++counters_.dropped_for_memory;
+        // Without its header nothing of the stream can be shown.
+        if (header->kind == PacketKind::sequence) {
+            detach(connection, "the hub has no memory for it", now);
+            return refuse(connection, {ErrorKind::limit, memory_used_up}, CloseCode::try_later);
+        }
+        ask_for_key_frame(stream, now);
+        return {};
+    }
     stream.heard = now;
     stream.last_packet = now;
     ++stream.counters.packets;
@@ -259,7 +284,7 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
     stream.counters.bytes += message.size();
     counters_.bytes_in += message.size();
     if (header->kind == PacketKind::sequence) begin_session(connection.stream, stream, *header, message);
-    auto packet = std::make_shared<LivePacket>(LivePacket{*header, std::move(message), {}});
+    auto packet = counted({*header, std::move(message), {}});
     const bool frame = frame_type(header->kind).has_value();
     stream.has_frames = stream.has_frames || frame;
     if (frame && stream.stamp) {
@@ -348,6 +373,13 @@ void Hub::detach(Connection& connection, const std::string& why, Clock::time_poi
         stream->stamp.reset();
         tell_gone(*stream, why);
         changed(connection.stream);
+        const auto& counters = stream->counters;
+        tell({.name = "left",
+              .text = why + " (" + std::to_string(counters.packets) + " packets of the stream so far)",
+              .stream = connection.stream,
+              .numbers = {{"packets", static_cast<std::int64_t>(counters.packets)},
+                          {"bytes", static_cast<std::int64_t>(counters.bytes)},
+                          {"damaged", static_cast<std::int64_t>(counters.damaged)}}});
     }
     connection.admitted = false;
 }
@@ -394,6 +426,11 @@ Result<Hub::Viewer> Hub::watch(const std::string& name, std::function<void()> wa
         ++counters_.refused_viewers_limit;
         return fail(ErrorKind::limit, "'" + name + "' has as many viewers as this hub serves");
     }
+    if (!has_memory_for(1)) {
+        ++counters_.refused_viewers_limit;
+        return fail(ErrorKind::limit, memory_used_up);
+    }
+    ++counters_.joined;
     const auto viewer = stream.broadcast.join(wake, now);
     // Heartbeats of many who came at once are spread over the second.
     const auto first = limits_.heartbeat * static_cast<int>(1 + viewer % 10) / 10;
@@ -585,6 +622,7 @@ std::optional<StreamInfo> Hub::stream(const std::string& name, Clock::time_point
 
 HubCounters Hub::counters() const {
     auto out = counters_;
+    out.memory = *memory_;
     const auto add = [&](const Stream& stream) {
         for (const auto& [viewer, watching] : stream.watching) {
             out.dropped_frames += stream.broadcast.counters(viewer).dropped_frames;

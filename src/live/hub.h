@@ -15,24 +15,30 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "htvm/result.hpp"
 #include "live/broadcast.h"
 #include "live/control.h"
+#include "live/event.h"
 
 namespace htvm::live {
 
 struct HubLimits {
     BroadcastLimits broadcast{};
     std::size_t streams = 256;
-    std::size_t viewers = 4096;                         // of one stream
-    std::size_t packet_bytes = std::size_t{16} << 20;   // of one packet
+    std::size_t viewers = 4096;                        // of one stream
+    std::size_t packet_bytes = std::size_t{16} << 20;  // of one packet
+    // Of all packets together, each counted once: kept for those who may join, and waiting for viewers. Beyond it
+    // nobody new is let in, and what publishers send is dropped.
+    std::size_t memory = std::size_t{1} << 30;
     std::chrono::milliseconds silence{2000};            // after which another session may take a stream over
     std::chrono::milliseconds publisher_silence{3000};  // after which its connection is ended
     std::chrono::milliseconds remembered_without_publisher{10000};  // then the stream is gone
@@ -81,7 +87,10 @@ struct HubCounters {
     std::uint64_t key_frame_requests = 0;  // passed to publishers
     std::uint64_t refused_publishers_busy = 0, refused_publishers_limit = 0, refused_publishers_message = 0;
     std::uint64_t refused_viewers_no_stream = 0, refused_viewers_limit = 0, refused_viewers_message = 0;
-    std::uint64_t silent_publishers = 0;  // whose connections were ended
+    std::uint64_t silent_publishers = 0;   // whose connections were ended
+    std::uint64_t dropped_for_memory = 0;  // packets that came when HubLimits::memory was used up
+    std::uint64_t joined = 0;              // viewers who were let in
+    std::size_t memory = 0;                // of all packets, now
 };
 
 // The publisher's clock, carried on by our own. What it tells is late by the time on the way, which varies: of the last
@@ -148,7 +157,7 @@ public:
         Broadcast::Viewer viewer = 0;
     };
 
-    explicit Hub(const HubLimits& limits = {}) : limits_(limits) {}
+    explicit Hub(const HubLimits& limits = {}, Log log = {}) : limits_(limits), log_(std::move(log)) {}
 
     // A connection that wants to publish under this name. wake: called when there is something for it to be written
     // after there was nothing. limit: there are too many streams.
@@ -213,6 +222,10 @@ public:
     std::optional<StreamInfo> stream(const std::string& name, Clock::time_point now) const;
     HubCounters counters() const;
     const HubLimits& limits() const { return limits_; }
+    // To the log, if there is one.
+    void tell(const Event& event) const {
+        if (log_) log_(event);
+    }
 
 private:
     struct Watching {
@@ -256,6 +269,8 @@ private:
         Clock::time_point heartbeat_at{};
         std::optional<Closing> closing{};
     };
+    std::shared_ptr<LivePacket> counted(LivePacket packet) const;
+    bool has_memory_for(std::size_t bytes) const { return *memory_ + bytes <= limits_.memory; }
     Stream* stream_of(const Viewer& viewer);
     Watching* watching(const Viewer& viewer);
     Stream* published_by(const Connection& connection);
@@ -275,6 +290,8 @@ private:
     StreamInfo info(const std::string& name, const Stream& stream, Clock::time_point now) const;
 
     HubLimits limits_;
+    Log log_;
+    std::shared_ptr<std::size_t> memory_ = std::make_shared<std::size_t>(0);  // of packets, wherever they are held
     std::map<std::string, Stream> streams_;
     std::map<std::uint64_t, Stream> ended_;  // by number: until their last viewers have been sent what waits
     std::map<std::uint64_t, Connection> connections_;

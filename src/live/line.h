@@ -7,8 +7,11 @@
 #include <boost/beast/ssl/ssl_stream.hpp>
 #include <boost/beast/websocket/ssl.hpp>
 #include <boost/beast/websocket/teardown.hpp>
+#include <string>
 #include <utility>
 #include <variant>
+
+#include "htvm/result.hpp"
 
 namespace htvm::live {
 
@@ -54,6 +57,10 @@ private:
 
 // So that the kernel does not hide how slow the other side is: of what it takes, little may lie unsent.
 void keep_kernel_buffers_small(Line& line);
+
+// For the side that others connect to: TLS 1.2 and 1.3, with the certificate chain and the private key of two PEM
+// files. bad_input if they cannot be read or do not belong together.
+Result<boost::asio::ssl::context> server_context(const std::string& certificate, const std::string& private_key);
 
 // How Boost.Beast ends the connection below a WebSocket.
 template <class Handler>

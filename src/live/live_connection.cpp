@@ -198,6 +198,11 @@ net::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string
     co_await write_messages(*connection, [&] { return hub.next(*viewer, Hub::Clock::now()); });
 }
 
+net::awaitable<void> refuse_socket(Line line, LiveRequest request, CloseCode code, std::string why) {
+    const auto connection = std::make_shared<Connection>(std::move(line));
+    if (co_await accepted(*connection, request, most_text_bytes)) co_await close(*connection, code, why);
+}
+
 net::awaitable<void> watch_by_body(Line& line, http::response<http::empty_body> header, std::string name, Hub& hub) {
     keep_kernel_buffers_small(line);
     News news(line.get_executor());

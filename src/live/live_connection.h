@@ -21,6 +21,8 @@ using LiveRequest = boost::beast::http::request<boost::beast::http::empty_body>;
 // The request asks for a WebSocket; `name` is the stream's.
 boost::asio::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::string name, Hub& hub);
 boost::asio::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string name, Hub& hub);
+// Opens a WebSocket, which the request asks for, only to close it with this code and reason.
+boost::asio::awaitable<void> refuse_socket(Line line, LiveRequest request, CloseCode code, std::string why);
 // Sends response and body. header: what every response has; the status is 404 or 503 if the stream cannot be watched.
 boost::asio::awaitable<void> watch_by_body(Line& line,
                                            boost::beast::http::response<boost::beast::http::empty_body> header,

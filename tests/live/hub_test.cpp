@@ -253,6 +253,55 @@ TEST_F(HubTest, StreamsAndViewersAreLimited) {
 // ---- Text messages: docs/live.md, section 2
 // ---------------------------------------------------------------------------
 
+TEST_F(HubTest, MemoryForPacketsIsBounded) {
+    // A header and one frame fit, and no other frame; the frame before is kept until another has come.
+    const auto size = header(1).size();
+    hub = Hub(HubLimits{.streams = 2, .viewers = 2, .memory = 2 * size + size / 2});
+    const auto publisher = publishing();
+    EXPECT_TRUE(hub.take(publisher, intra(0), start));
+    EXPECT_EQ(hub.counters().memory, 2 * size);
+    const auto watching = viewer();
+    EXPECT_TRUE(hub.take(publisher, tracked(1), start));
+    EXPECT_EQ(hub.counters().dropped_for_memory, 1u);
+    EXPECT_EQ(hub.counters().memory, 2 * size);
+    EXPECT_EQ(frames(watching), std::vector<std::uint32_t>{0});
+    const auto held = hub.take(publisher, header(2), start);  // without its header nothing can be shown
+    EXPECT_FALSE(held);
+    EXPECT_EQ(closing(publisher), "1013 this hub's memory for packets is used up");
+}
+
+TEST_F(HubTest, WhereNoMemoryIsLeftNobodyIsLetIn) {
+    hub = Hub(HubLimits{.memory = header(1).size()});
+    publishing();
+    EXPECT_EQ(hub.watch(
+                     "anna", [] {}, {}, start)
+                  .error()
+                  .kind,
+              ErrorKind::limit);
+    EXPECT_EQ(hub.publish(
+                     "ben", [] {}, start)
+                  .error()
+                  .kind,
+              ErrorKind::limit);
+}
+
+TEST_F(HubTest, PacketsThatAreForgottenFreeTheirMemory) {
+    const auto publisher = publishing();
+    for (std::uint32_t i = 0; i < 10; ++i) EXPECT_TRUE(hub.take(publisher, intra(i), start));
+    EXPECT_EQ(hub.counters().memory, 2 * header(1).size());  // the header and the newest frame
+    hub.leave(publisher, true, start);
+    EXPECT_EQ(hub.counters().memory, 0u);
+}
+
+TEST_F(HubTest, TheLogSaysWhoPublishedLeftAndWasRefused) {
+    std::vector<std::string> names;
+    hub = Hub({}, [&](const Event& event) { names.push_back(event.stream + ' ' + event.name); });
+    const auto first = publishing(1), second = publisher();
+    EXPECT_FALSE(hub.take(second, header(2), start));
+    hub.leave(first, true, start);
+    EXPECT_EQ(names, (std::vector<std::string>{"anna published", "anna refused", "anna left", "anna ended"}));
+}
+
 TEST_F(HubTest, HelloComesFirst) {
     hub.name_other_hubs({"wss://b.example"});
     const auto anna = publisher();

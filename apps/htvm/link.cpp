@@ -1,0 +1,75 @@
+// htvm link: addresses that let others watch for a while what a hub shows by link alone.
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "live/access.h"
+
+namespace htvm::app {
+namespace {
+
+struct Options {
+    std::string name, keys, hub = "http://127.0.0.1:8080";
+    std::uint64_t seconds = 0;
+    bool file = false, packets = false;
+};
+
+Result<void> link(const Options& options) {
+    if (!options.file && !live::is_stream_name(options.name))
+        return fail(ErrorKind::bad_input, fmt::format("'{}' is no name of a live stream: letters, digits, '-', '_' and "
+                                                      "'.'; --file makes a link to a file",
+                                                      options.name));
+    const auto keys = live::read_link_keys(options.keys);
+    if (!keys) return tl::unexpected(keys.error());
+    auto hub = options.hub;
+    while (hub.ends_with('/')) hub.pop_back();
+    if (!hub.starts_with("http://") && !hub.starts_with("https://"))
+        return fail(ErrorKind::bad_input,
+                    fmt::format("{} is no address of a hub: https://HOST or http://HOST:PORT", hub));
+    const auto path = (options.file ? "files/" : "watch/") + options.name;
+    const auto query =
+        live::link_query(*keys, path, std::chrono::system_clock::now() + std::chrono::seconds(options.seconds));
+    if (options.packets) hub.replace(0, 4, "ws");  // https becomes wss
+    const auto shown = options.file || options.packets ? path : "play/" + options.name;
+    fmt::print("{}/{}?{}\n", hub, shown, query);
+    return {};
+}
+
+}  // namespace
+
+void add_link(CLI::App& app, Run& run) {
+    auto options = std::make_shared<Options>();
+    auto* command = app.add_subcommand("link", "Write a link by which to watch a stream of a hub for a while");
+    command->add_option("name", options->name, "The live stream, or with --file a file below /files/")->required();
+    command->add_option("--for", options->seconds, "How long the link is good: 90s, 30m, 2h or 7d")
+        ->type_name("TIME")
+        ->transform(
+            CLI::AsNumberWithUnit(std::map<std::string, std::uint64_t>{{"s", 1}, {"m", 60}, {"h", 3600}, {"d", 86400}},
+                                  CLI::AsNumberWithUnit::UNIT_REQUIRED))
+        ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{3660} * 86400))
+        ->required();
+    command
+        ->add_option("--keys", options->keys, "The hub's file of keys (htvm serve --link-keys); the newest one signs")
+        ->type_name("FILE")
+        ->required();
+    command->add_option("--url", options->hub, "The hub's address (default http://127.0.0.1:8080)")
+        ->type_name("https://HOST");
+    auto* file =
+        command->add_flag("--file", options->file, "To a file, whose name may have folders, instead of a live stream");
+    command
+        ->add_flag("--packets", options->packets, "The address for programs, such as htvm decode, instead of the page")
+        ->excludes(file);
+    command->footer(
+        "Nobody can change the name or the time in a link. Whoever has it can pass it on; one that has expired ends\n"
+        "no viewer who is already watching.\n"
+        "Example:\n"
+        "  htvm link anna --for 2h --keys keys.json --url https://hub.example");
+    command->callback([options, &run] { run = [options] { return link(*options); }; });
+}
+
+}  // namespace htvm::app

@@ -1,0 +1,125 @@
+#!/usr/bin/env bash
+# htvm serve and htvm link as their operator meets them: options, files of tokens and keys, links, TLS, the end.
+. "$(dirname "$0")/expect.sh"
+mkdir streams && echo person >streams/person.htvm
+
+# ask URL [CA]: the status and the body, on one line.
+ask() {
+    python3 - "$@" <<'PYTHON'
+import ssl, sys, urllib.error, urllib.request
+context = ssl.create_default_context(cafile=sys.argv[2]) if len(sys.argv) > 2 else None
+try:
+    with urllib.request.urlopen(sys.argv[1], timeout=10, context=context) as response:
+        print(response.status, response.read().decode().strip())
+except urllib.error.HTTPError as error:
+    print(error.code, error.read().decode().strip())
+PYTHON
+}
+# start OPTIONS...: a server in the background; $server is its process, $url its address.
+start() {
+    "$htvm" serve --port 0 "$@" >out 2>err &
+    server=$!
+    for _ in $(seq 200); do [ -s out ] && break; sleep 0.05; done
+    url=$(grep -oE 'https?://[^ "/]+' out | head -1)
+    [ -n "$url" ] || fail "serve $*: says no address: $(cat out err)"
+}
+# stop SIGNAL: it ends with 0, within 5 seconds.
+stop() {
+    kill -"$1" $server
+    timeout 5 tail --pid=$server -f /dev/null || { fail "still there 5 s after SIG$1"; kill -9 $server; }
+    wait $server || fail "SIG$1: exit $?"
+}
+
+# ---- what it is told ----------------------------------------------------------------------------------------------------
+
+expect 2 "--cert requires --key" "$htvm" serve --cert a.pem
+expect 2 "--add-publisher requires --publishers" "$htvm" serve --add-publisher anna
+expect 1 "cannot read none.json" "$htvm" serve --publishers none.json
+expect 1 "a.pem" "$htvm" serve --cert a.pem --key a.key
+expect 2 "--viewers" "$htvm" serve --viewers 0
+expect 0 "--viewers-per-address" "$htvm" serve --help-all
+printf 'port = 0\nfiles = "streams"\njson = true\n' >serve.conf
+start --config serve.conf
+grep -q '"event":"listening"' out || fail "--json from the file of options: $(cat out)"
+[ "$(ask "$url/files/person.htvm")" = "200 person" ] || fail "files from the file of options: $(ask "$url/files/person.htvm")"
+stop TERM
+grep -q '"event":"stopped"' out || fail "no last line: $(cat out)"
+printf 'speed = 3\n' >odd.conf
+expect 2 "speed" "$htvm" serve --config odd.conf
+printf 'files = "none"\n' >files.conf
+expect 1 "none" "$htvm" serve --port 0 --config files.conf
+start --config files.conf --files streams # the command line counts
+stop INT
+start
+grep -q "programs on this machine may publish" err || fail "does not say who may publish: $(cat err)"
+[ "$(ask "$url/files/person.htvm")" = "404 " ] || fail "serves files without a folder"
+stop TERM
+
+# ---- tokens and links ---------------------------------------------------------------------------------------------------
+
+token=$("$htvm" serve --publishers publishers.json --add-publisher anna 2>said)
+[[ $token =~ ^[0-9a-f]{64}$ ]] || fail "the token is $token"
+grep -q "shown only now" said || fail "says nothing of the token: $(cat said)"
+[ "$(stat -c %a publishers.json)" = 600 ] || fail "others may read the publishers"
+expect 1 "a name has 1 to 64" "$htvm" serve --publishers publishers.json --add-publisher ../anna
+"$htvm" serve --link-keys keys.json --add-link-key 2>said || fail "no key"
+grep -q "has key 1 now" said || fail "says nothing of the key: $(cat said)"
+expect 2 "--for" "$htvm" link anna --keys keys.json
+expect 2 "--for" "$htvm" link anna --keys keys.json --for 2
+expect 1 "no name of a live stream" "$htvm" link a/b --keys keys.json --for 2h
+expect 0 "https://hub.example/play/anna?expires=" "$htvm" link anna --keys keys.json --for 2h --url https://hub.example/
+expect 0 "wss://hub.example/watch/anna?expires=" "$htvm" link anna --keys keys.json --for 2h --url https://hub.example --packets
+start --files streams --link-keys keys.json --publishers publishers.json
+link=$("$htvm" link person.htvm --file --keys keys.json --for 1h --url "$url")
+[ "$(ask "$link")" = "200 person" ] || fail "a good link: $(ask "$link")"
+[ "$(ask "${link/person/people}")" = "403 this link is not one that this hub knows: it is incomplete, changed, or by a key no longer in use" ] ||
+    fail "another file's link: $(ask "${link/person/people}")"
+[ "$(ask "$url/files/person.htvm")" = "403 this hub asks for a link: htvm link writes one" ] || fail "without a link"
+short=$("$htvm" link person.htvm --file --keys keys.json --for 1s --url "$url")
+sleep 2
+[ "$(ask "$short")" = "403 this link has expired: ask for a new one" ] || fail "an expired link: $(ask "$short")"
+watch=$("$htvm" link anna --packets --keys keys.json --for 1h --url "$url")
+[[ $(ask "http${watch#ws}") =~ ^404 ]] || fail "a good link to what is not there yet: $(ask "http${watch#ws}")"
+# Two more keys: that of the link is no longer among the newest two, once the server has read them.
+"$htvm" serve --quiet --link-keys keys.json --add-link-key
+"$htvm" serve --quiet --link-keys keys.json --add-link-key
+kill -HUP $server
+for _ in $(seq 100); do grep -q "were read again" err && break; sleep 0.05; done
+[[ $(ask "$link") =~ ^403 ]] || fail "a link by a key of before: $(ask "$link")"
+link=$("$htvm" link person.htvm --file --keys keys.json --for 1h --url "$url")
+[ "$(ask "$link")" = "200 person" ] || fail "a link by the new key: $(ask "$link")"
+echo '{' >keys.json
+kill -HUP $server
+for _ in $(seq 100); do grep -q "stay as they were" err && break; sleep 0.05; done
+[ "$(ask "$link")" = "200 person" ] || fail "keys that cannot be read are taken: $(cat err)"
+stop TERM
+
+# ---- TLS ----------------------------------------------------------------------------------------------------------------
+
+if command -v openssl >/dev/null; then
+    openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -keyout key.pem -out cert.pem -days 1 \
+        -subj /CN=localhost -addext subjectAltName=IP:127.0.0.1 2>/dev/null
+    start --files streams --cert cert.pem --key key.pem
+    [ "${url%%:*}" = https ] || fail "its address is $url"
+    [ "$(ask "$url/files/person.htvm" cert.pem)" = "200 person" ] || fail "TLS: $(ask "$url/files/person.htvm" cert.pem)"
+    stop TERM
+else
+    echo "openssl is not installed: TLS is not tried"
+fi
+
+# ---- as a service -------------------------------------------------------------------------------------------------------
+
+if command -v systemd-analyze >/dev/null; then
+    sed -e "s|/usr/bin/htvm|$htvm|" -e '/^Documentation/d' "$project/examples/systemd/htvm-serve.service" >htvm-serve.service
+    said=$(systemd-analyze verify "$PWD/htvm-serve.service" 2>&1) && [ -z "$said" ] || fail "systemd: $said"
+else
+    echo "systemd-analyze is not installed: the unit is not checked"
+fi
+sed -E 's|/etc/htvm/|./|; s|^port.*|port = 0|; s|^address.*|address = "127.0.0.1"|; s|^#([a-z-]+ = )|\1|' \
+    "$project/examples/systemd/serve.conf" >serve.conf
+cp cert.pem chain.pem 2>/dev/null && "$htvm" serve --quiet --link-keys ./fresh.json --add-link-key && sed -i 's|./keys.json|./fresh.json|' serve.conf && {
+    start --config serve.conf
+    stop TERM
+}
+
+done_with "serve and link do what their help says"

@@ -1,0 +1,417 @@
+// Who is let in by the server: tokens, links, origins, TLS, and its end. On this machine's loopback address.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
+
+#include <algorithm>
+#include <boost/asio.hpp>
+#include <boost/asio/ssl.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/websocket.hpp>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "htvm/packet.hpp"
+#include "live/access.h"
+#include "live/file_server.h"
+#include "live/live_connection.h"
+
+namespace htvm::live {
+namespace {
+
+namespace fs = std::filesystem;
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace websocket = beast::websocket;
+using tcp = net::ip::tcp;
+using std::chrono::seconds;
+using std::chrono::system_clock;
+using testing::HasSubstr;
+
+// A certificate of its own for this name, with its key.
+void write_certificate(const std::string& certificate, const std::string& private_key, const std::string& name) {
+    EVP_PKEY* key = EVP_EC_gen("P-256");
+    X509* x509 = X509_new();
+    X509_set_version(x509, X509_VERSION_3);
+    ASN1_INTEGER_set(X509_get_serialNumber(x509), 1);
+    X509_gmtime_adj(X509_getm_notBefore(x509), -3600);
+    X509_gmtime_adj(X509_getm_notAfter(x509), 3600);
+    X509_set_pubkey(x509, key);
+    X509_NAME* subject = X509_get_subject_name(x509);
+    X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_ASC, reinterpret_cast<const unsigned char*>(name.c_str()), -1,
+                               -1, 0);
+    X509_set_issuer_name(x509, subject);
+    X509_sign(x509, key, EVP_sha256());
+    std::FILE* file = std::fopen(certificate.c_str(), "w");
+    PEM_write_X509(file, x509);
+    std::fclose(file);
+    file = std::fopen(private_key.c_str(), "w");
+    PEM_write_PrivateKey(file, key, nullptr, nullptr, 0, nullptr, nullptr);
+    std::fclose(file);
+    X509_free(x509);
+    EVP_PKEY_free(key);
+}
+
+Packet packet(PacketKind kind, std::uint32_t frame, std::uint8_t flags) {
+    Packet out;
+    out.kind = kind;
+    out.frame = out.reference = frame;
+    out.flags = static_cast<std::uint8_t>(packet_flag::told | flags);
+    out.payload.assign(100, 7);
+    return out;
+}
+
+class ServerAccessTest : public testing::Test {
+protected:
+    void SetUp() override {
+        auto name = (fs::temp_directory_path() / "htvm-access-XXXXXX").string();
+        ASSERT_TRUE(mkdtemp(name.data()));
+        root = name;
+        fs::create_directory(root / "served");
+        std::ofstream(root / "served" / "person.htvm") << "person";
+        options.folder = (root / "served").string();
+        options.hub = &hub;
+        options.header_time = seconds(1);
+        options.refusal_delay = {};
+        options.log = [this](const Event& event) {
+            const std::lock_guard lock(mutex);
+            events.push_back(event);
+        };
+    }
+    void TearDown() override {
+        if (server && !ended) server->stop();
+        if (thread.joinable()) thread.join();
+        fs::remove_all(root);
+    }
+    void start() {
+        auto opened = FileServer::open(options);
+        ASSERT_TRUE(opened) << opened.error().message;
+        server.emplace(std::move(*opened));
+        thread = std::thread([this] { server->run(); });
+    }
+    std::string file(const std::string& name) const { return (root / name).string(); }
+
+    tcp::socket connect() {
+        tcp::socket socket(context);
+        socket.connect({net::ip::make_address("127.0.0.1"), server->port()});
+        return socket;
+    }
+    // The response to one request; headers end in \r\n each.
+    std::string get(const std::string& target, const std::string& headers = "") {
+        auto socket = connect();
+        net::write(socket, net::buffer("GET " + target + " HTTP/1.1\r\nHost: hub.example\r\nConnection: close\r\n" +
+                                       headers + "\r\n"));
+        std::string out;
+        beast::error_code error;
+        net::read(socket, net::dynamic_buffer(out), error);
+        return out;
+    }
+    static std::string status(const std::string& response) { return response.substr(9, 3); }
+    static std::string body(const std::string& response) { return response.substr(response.find("\r\n\r\n") + 4); }
+
+    struct Socket {
+        websocket::stream<tcp::socket> stream;
+        unsigned status = 0;
+        void send(const Packet& packet) {
+            const auto bytes = write_packet(packet);
+            stream.binary(true);
+            stream.write(net::buffer(bytes));
+        }
+        // The next packet's frame number; nothing once the server has closed the connection.
+        std::optional<std::uint32_t> next() {
+            for (;;) {
+                beast::flat_buffer buffer;
+                beast::error_code error;
+                const auto bytes = stream.read(buffer, error);
+                if (error) return std::nullopt;
+                std::uint32_t payload = 0;
+                const auto* begin = static_cast<const std::uint8_t*>(buffer.cdata().data());
+                if (!stream.got_binary()) continue;
+                if (const auto header = read_packet_header({begin, bytes}, payload)) return header->frame;
+            }
+        }
+        // The code by which the server closes it.
+        unsigned code() {
+            while (next()) {
+            }
+            return stream.reason().code;
+        }
+        std::string reason() const { return stream.reason().reason.c_str(); }
+    };
+    Socket open(const std::string& target, const std::string& name = "", const std::string& value = "") {
+        Socket out{websocket::stream<tcp::socket>(connect())};
+        out.stream.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {
+            request.set(beast::http::field::sec_websocket_protocol, live_protocol);
+            if (!name.empty()) request.set(name, value);
+        }));
+        websocket::response_type response;
+        beast::error_code error;
+        out.stream.handshake(response, "hub.example", target, error);
+        out.status = response.result_int();
+        return out;
+    }
+    // A stream of one frame.
+    static void begin(Socket& publisher) {
+        publisher.send(packet(PacketKind::sequence, 0, packet_flag::session));
+        publisher.send(packet(PacketKind::intra, 0, packet_flag::referred | packet_flag::access));
+    }
+    unsigned opened(const std::string& target, const std::string& name = "", const std::string& value = "") {
+        return open(target, name, value).status;
+    }
+
+    std::size_t count_of(const std::string& name) {
+        const std::lock_guard lock(mutex);
+        return static_cast<std::size_t>(
+            std::count_if(events.begin(), events.end(), [&](const Event& event) { return event.name == name; }));
+    }
+    void wait_for_stream(const std::string& name) {
+        for (int i = 0; i < 1000; ++i) {
+            if (get("/api/streams").find("\"name\":\"" + name + "\",\"packets\":2") != std::string::npos) return;
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+        FAIL() << get("/api/streams");
+    }
+    // Sent to this process; the server must be running, since it takes the signal.
+    void hang_up_and_wait_for(const std::string& name) {
+        const auto before = count_of(name);
+        get("/");
+        std::raise(SIGHUP);
+        for (int i = 0; i < 1000 && count_of(name) == before; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        ASSERT_GT(count_of(name), before);
+    }
+
+    fs::path root;
+    // Nobody sends heartbeats here, and the machine may be slow.
+    Hub hub{HubLimits{.publisher_silence = std::chrono::minutes(1)}};
+    FileServerOptions options;
+    std::optional<FileServer> server;
+    bool ended = false;
+    std::thread thread;
+    net::io_context context;
+    std::mutex mutex;
+    std::vector<Event> events;
+};
+
+TEST_F(ServerAccessTest, PublishingNeedsTheTokenOfTheStreamAndRefusalsHurtNobody) {
+    options.publishers = file("publishers.json");
+    const auto anna = add_publisher(options.publishers, "anna").value();
+    const auto ben = add_publisher(options.publishers, "ben").value();
+    start();
+    auto publisher = open("/publish/anna", "Authorization", "Bearer " + anna);
+    ASSERT_EQ(publisher.status, 101u);
+    begin(publisher);
+    wait_for_stream("anna");
+    EXPECT_EQ(opened("/publish/anna"), 401u);
+    EXPECT_EQ(opened("/publish/anna", "Authorization", "Bearer " + ben), 401u);
+    EXPECT_EQ(opened("/publish/anna", "Authorization", "Basic " + anna), 401u);
+    EXPECT_EQ(opened("/publish/anna?token=" + ben), 401u);
+    EXPECT_EQ(opened("/publish/nobody", "Authorization", "Bearer " + anna), 401u);
+    EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
+    EXPECT_EQ(count_of("refused"), 5u);
+    auto viewer = open("/watch/anna");
+    EXPECT_EQ(viewer.next(), 0u);  // the sequence header
+    publisher.send(packet(PacketKind::intra, 1, packet_flag::referred | packet_flag::access));
+    std::optional<std::uint32_t> frame = 0;
+    while (frame == 0u) frame = viewer.next();
+    EXPECT_EQ(frame, 1u);
+}
+
+TEST_F(ServerAccessTest, AWrongTokenIsAnsweredLate) {
+    options.publishers = file("publishers.json");
+    ASSERT_TRUE(add_publisher(options.publishers, "anna"));
+    options.refusal_delay = seconds(1);
+    start();
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_EQ(opened("/publish/anna?token=guess"), 401u);
+    EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(990));
+}
+
+TEST_F(ServerAccessTest, APublisherWhoIsAddedIsKnownAfterAHangup) {
+    options.publishers = file("publishers.json");
+    ASSERT_TRUE(add_publisher(options.publishers, "anna"));
+    start();
+    const auto ben = add_publisher(options.publishers, "ben").value();
+    EXPECT_EQ(opened("/publish/ben?token=" + ben), 401u);
+    hang_up_and_wait_for("reloaded");
+    EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
+    std::ofstream(options.publishers) << "{";
+    hang_up_and_wait_for("reload_failed");
+    EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
+}
+
+TEST_F(ServerAccessTest, NamesThatAreNoNamesOfStreamsAreNotPublished) {
+    start();
+    for (const char* name : {"a%20b", "a%7cb", "a*", "%c3%bc", "x%3e"})
+        EXPECT_EQ(opened("/publish/" + std::string(name)), 400u);
+    EXPECT_EQ(opened("/publish/" + std::string(65, 'a')), 400u);
+    for (const char* path :
+         {"/publish/%2e%2e", "/publish/..", "/publish/a%2fb", "/publish/a%5cb", "/publish/%00", "/publish/"})
+        EXPECT_NE(opened(path), 101u) << path;
+    EXPECT_EQ(body(get("/api/streams")), "[]");
+}
+
+TEST_F(ServerAccessTest, WhatIsShownByLinkAloneNeedsOne) {
+    options.link_keys = file("keys.json");
+    ASSERT_TRUE(add_link_key(options.link_keys));
+    start();
+    auto publisher = open("/publish/anna");
+    begin(publisher);
+    const auto keys = read_link_keys(options.link_keys).value();
+    const auto link = [&](const std::string& path, int seconds_left) {
+        return '/' + path + '?' + link_query(keys, path, system_clock::now() + seconds(seconds_left));
+    };
+    // The stream begins when its first packet comes.
+    std::optional<Socket> viewer;
+    for (int i = 0; i < 1000; ++i) {
+        viewer.emplace(open(link("watch/anna", 60)));
+        if (viewer->next()) break;
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    const auto expired = link("watch/anna", -1), forged = link("watch/ben", 60).replace(7, 3, "anna");
+    EXPECT_EQ(status(get("/watch/anna")), "403");
+    EXPECT_EQ(body(get("/watch/anna")), "this hub asks for a link: htvm link writes one\n");
+    EXPECT_EQ(status(get(expired)), "403");
+    EXPECT_EQ(body(get(expired)), "this link has expired: ask for a new one\n");
+    EXPECT_EQ(status(get(forged)), "403");
+    for (const auto& target : {std::string("/watch/anna"), expired, forged}) {
+        auto refused = open(target);
+        EXPECT_EQ(refused.status, 101u);  // else a page could not read why
+        EXPECT_EQ(refused.code(), 1008u);
+        EXPECT_NE(refused.reason(), "");
+    }
+    EXPECT_EQ(body(get(link("files/person.htvm", 60))), "person");
+    EXPECT_EQ(status(get("/files/person.htvm")), "403");
+    EXPECT_EQ(status(get(link("watch/person.htvm", 60).replace(1, 5, "files"))), "403");
+    EXPECT_EQ(status(get("/api/files")), "403");
+    EXPECT_EQ(status(get("/api/streams")), "403");
+    EXPECT_GE(count_of("refused"), 7u);
+    publisher.send(packet(PacketKind::intra, 1, packet_flag::referred | packet_flag::access));
+    std::optional<std::uint32_t> frame = 0;
+    while (frame == 0u) frame = viewer->next();
+    EXPECT_EQ(frame, 1u);  // goes on
+}
+
+TEST_F(ServerAccessTest, OnlyPagesOfTheGivenSitesWatchAndRead) {
+    options.origins = {"https://a.example", "https://b.example:8443"};
+    start();
+    auto publisher = open("/publish/anna");
+    begin(publisher);
+    wait_for_stream("anna");
+    const auto allowed = [&](const std::string& origin) {
+        const auto response = get("/files/person.htvm", "Origin: " + origin + "\r\n");
+        EXPECT_THAT(response, HasSubstr("\r\nVary: Origin\r\n"));
+        const bool read = response.find("Access-Control-Allow-Origin: " + origin + "\r\n") != std::string::npos;
+        EXPECT_EQ(open("/watch/anna", "Origin", origin).next().has_value(), read) << origin;
+        return read;
+    };
+    EXPECT_TRUE(allowed("https://a.example"));
+    EXPECT_TRUE(allowed("https://b.example:8443"));
+    EXPECT_FALSE(allowed("https://b.example"));
+    EXPECT_FALSE(allowed("http://a.example"));
+    EXPECT_FALSE(allowed("https://a.example.evil.example"));
+    EXPECT_FALSE(allowed("null"));
+    EXPECT_EQ(open("/watch/anna", "Origin", "https://evil.example").code(), 1008u);
+    EXPECT_TRUE(open("/watch/anna", "Origin", "http://hub.example").next());  // the hub's own page
+    EXPECT_TRUE(open("/watch/anna").next());                                  // no page at all
+    EXPECT_EQ(opened("/publish/ben", "Origin", "https://evil.example"), 403u);
+}
+
+TEST_F(ServerAccessTest, AnAddressHasAFewViewers) {
+    options.viewers_per_address = 2;
+    start();
+    auto publisher = open("/publish/anna");
+    begin(publisher);
+    wait_for_stream("anna");
+    auto first = open("/watch/anna"), second = open("/watch/anna");
+    EXPECT_TRUE(first.next() && second.next());
+    EXPECT_EQ(open("/watch/anna").code(), 1013u);
+    EXPECT_EQ(status(get("/watch/anna")), "503");
+    first.stream.next_layer().close();
+    for (int i = 0; i < 1000 && !open("/watch/anna").next(); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_TRUE(open("/watch/anna").next());
+}
+
+TEST_F(ServerAccessTest, ItEndsWhenItIsToldToAndSaysSo) {
+    options.header_time = seconds(60);
+    start();
+    auto publisher = open("/publish/anna");
+    begin(publisher);
+    wait_for_stream("anna");
+    auto viewer = open("/watch/anna");
+    EXPECT_TRUE(viewer.next());
+    auto idle = connect();
+    const auto begin = std::chrono::steady_clock::now();
+    std::raise(SIGTERM);
+    EXPECT_EQ(viewer.code(), 1001u);
+    EXPECT_EQ(publisher.code(), 1001u);
+    std::array<char, 8> piece{};
+    beast::error_code error;
+    EXPECT_EQ(idle.read_some(net::buffer(piece), error), 0u);
+    thread.join();
+    ended = true;
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds(3));
+}
+
+TEST_F(ServerAccessTest, TlsIsAgreedOnAndItsCertificateReadAgain) {
+    options.certificate = file("a.pem");
+    options.private_key = file("a.key");
+    write_certificate(options.certificate, options.private_key, "first.example");
+    start();
+    const auto presented = [&](int version) {
+        net::ssl::context client(net::ssl::context::tls_client);
+        SSL_CTX_set_max_proto_version(client.native_handle(), version);
+        SSL_CTX_set_security_level(client.native_handle(), 0);
+        net::ssl::stream<tcp::socket> stream(connect(), client);
+        beast::error_code error;
+        stream.handshake(net::ssl::stream_base::client, error);
+        if (error) return std::string();
+        net::write(stream,
+                   net::buffer(std::string("GET /files/person.htvm HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")));
+        std::string response;
+        net::read(stream, net::dynamic_buffer(response), error);
+        EXPECT_EQ(body(response), "person");
+        EXPECT_EQ(error, net::error::eof);  // not cut off: the server took leave
+        X509* certificate = SSL_get1_peer_certificate(stream.native_handle());
+        std::array<char, 64> name{};
+        X509_NAME_get_text_by_NID(X509_get_subject_name(certificate), NID_commonName, name.data(), name.size());
+        X509_free(certificate);
+        return std::string(name.data());
+    };
+    EXPECT_EQ(presented(TLS1_3_VERSION), "first.example");
+    EXPECT_EQ(presented(TLS1_2_VERSION), "first.example");
+    EXPECT_EQ(presented(TLS1_1_VERSION), "");
+    EXPECT_THAT(get("/files/person.htvm"), testing::Not(HasSubstr("person")));  // without TLS
+    auto silent = connect();
+    std::array<char, 8> piece{};
+    beast::error_code error;
+    EXPECT_EQ(silent.read_some(net::buffer(piece), error), 0u);  // until header_time is over
+    write_certificate(options.certificate, options.private_key, "second.example");
+    EXPECT_EQ(presented(TLS1_3_VERSION), "first.example");
+    get("/");
+    hang_up_and_wait_for("reloaded");
+    EXPECT_EQ(presented(TLS1_3_VERSION), "second.example");
+    std::ofstream(options.certificate) << "no certificate";
+    hang_up_and_wait_for("reload_failed");
+    EXPECT_EQ(presented(TLS1_3_VERSION), "second.example");
+}
+
+TEST_F(ServerAccessTest, ACertificateAndAKeyThatDoNotBelongTogetherAreRefused) {
+    write_certificate(file("a.pem"), file("a.key"), "a.example");
+    write_certificate(file("b.pem"), file("b.key"), "b.example");
+    options.certificate = file("a.pem");
+    options.private_key = file("b.key");
+    EXPECT_THAT(FileServer::open(options).error().message, HasSubstr("b.key"));
+    options.certificate = file("none.pem");
+    EXPECT_THAT(FileServer::open(options).error().message, HasSubstr("none.pem"));
+}
+
+}  // namespace
+}  // namespace htvm::live
