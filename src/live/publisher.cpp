@@ -61,10 +61,11 @@ struct Publisher::State {
     Broadcast broadcast;
     std::optional<Broadcast::Viewer> line;  // while there is a connection
     StreamClock clock;
-    ViewerCounters before;                 // of connections that ended
-    std::optional<std::uint32_t> session;  // of the last sequence header sent over this connection: its CRC
-    bool announced = true;                 // whether its clock was told behind its first frame
-    bool asked = false;                    // for a key frame, by the hub
+    ViewerCounters before;                           // of connections that ended
+    std::uint64_t alone_from = 0, alone_frames = 0;  // since there is no connection: the first place, and frames
+    std::optional<std::uint32_t> session;            // of the last sequence header sent over this connection: its CRC
+    bool announced = true;                           // whether its clock was told behind its first frame
+    bool asked = false;                              // for a key frame, by the hub
     Clock::time_point asked_at{};
     std::optional<std::uint64_t> viewers;
     std::string trouble;
@@ -79,6 +80,7 @@ struct Publisher::State {
 
     ViewerCounters counters() const {
         auto out = before;
+        out.dropped_frames += alone_frames;
         if (!line) return out;
         const auto& now = broadcast.counters(*line);
         out.packets += now.packets;
@@ -86,10 +88,22 @@ struct Publisher::State {
         out.dropped_frames += now.dropped_frames;
         return out;
     }
+    // Of the frames that found no connection, the hub is sent those that the newest needs.
+    void connect() {
+        line = broadcast.join([this] { client->wake(); }, Clock::now());
+        if (const auto sent = broadcast.kept())
+            alone_frames -= static_cast<std::uint64_t>(std::count_if(sent->begin(), sent->end(), [&](const auto& one) {
+                return one.place >= alone_from && frame_type(one.packet->header.kind);
+            }));
+        before.dropped_frames += std::exchange(alone_frames, 0);
+    }
     void disconnect(const std::string& reason) {
         const std::lock_guard lock(mutex);
-        before = counters();
-        if (line) broadcast.leave(*std::exchange(line, std::nullopt));
+        if (line) {
+            before = counters();
+            broadcast.leave(*std::exchange(line, std::nullopt));
+            alone_from = broadcast.next_place();
+        }
         viewers.reset();
         trouble = reason;
     }
@@ -121,7 +135,7 @@ HubTalk Publisher::State::talk() {
         const std::lock_guard lock(mutex);
         trouble.clear();
         session.reset();
-        line = broadcast.join([this] { client->wake(); }, Clock::now());
+        connect();
     };
     out.next = [this]() -> SharedPacket {
         const std::lock_guard lock(mutex);
@@ -184,11 +198,9 @@ Result<void> Publisher::send(const Packet& packet) {
     const auto now = Clock::now();
     const std::lock_guard lock(state.mutex);
     if (state.ending) return fail(ErrorKind::bad_input, state.ending->reason);
-    if (frame_type(packet.kind)) {
-        state.clock.take(packet.timestamp_us, now);
-        if (!state.line) ++state.before.dropped_frames;
-    }
-    state.broadcast.push(std::move(shared), now);
+    const bool frame = frame_type(packet.kind).has_value();
+    if (frame) state.clock.take(packet.timestamp_us, now);
+    if (state.broadcast.push(std::move(shared), now) && frame && !state.line) ++state.alone_frames;
     return {};
 }
 
