@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <optional>
 
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "live/access.h"
 #include "live/file_server.h"
+#include "live/recorder.h"
 
 namespace htvm::app {
 namespace {
@@ -18,6 +20,7 @@ namespace {
 struct Options {
     live::FileServerOptions server;
     live::HubLimits hub;
+    live::RecorderOptions recorder;
     std::string add_publisher, congestion_control = "bbr";
     bool same_site = false, add_link_key = false, json = false;
     Options() {
@@ -87,6 +90,12 @@ Result<void> serve(const Options& options) {
     server.other_sites = !options.same_site && server.origins.empty();
     if (options.congestion_control != "system") server.congestion_control = options.congestion_control;
     server.hub = &hub;
+    std::optional<live::Recorder> recorder;
+    if (!options.recorder.folder.empty()) {
+        auto opened = live::Recorder::open(options.recorder);
+        if (!opened) return tl::unexpected(opened.error());
+        server.recorder = &recorder.emplace(std::move(*opened));
+    }
     server.log = log;
     allow_files(server.connections);
     auto opened = live::FileServer::open(server);
@@ -109,6 +118,10 @@ Result<void> serve(const Options& options) {
         log({.name = "publishing_open",
              .text = "no publishers are known: programs on this machine may publish, under any name, and nobody else"});
     opened->run();
+    if (recorder) {
+        recorder->finish();
+        for (const auto& event : recorder->take_events()) log(event);
+    }
     log({.name = "stopped", .text = "stopped"});
     return {};
 }
@@ -191,6 +204,22 @@ void add_access_options(CLI::App& command, Options& options) {
     command.add_flag("--same-site", options.same_site, "Pages of no other site may read and watch")->excludes(origins);
 }
 
+void add_recording(CLI::App& command, Options& options) {
+    auto* folder = command
+                       .add_option("--record", options.recorder.folder,
+                                   "Keep each session of a live stream in this folder, as NAME-YYYYMMDD-HHMMSS.htvm")
+                       ->type_name("FOLDER");
+    command
+        .add_option_function<unsigned>(
+            "--record-minutes",
+            [&options](unsigned minutes) { options.recorder.file_length = std::chrono::minutes(minutes); },
+            "Begin another file after so many minutes (default: a file a session)")
+        ->check(CLI::Range(1, 100000))
+        ->needs(folder);
+    command.add_flag("--metrics-anyone", options.server.metrics_anyone,
+                     "Show /metrics to everybody (default: to programs on this machine)");
+}
+
 void add_limits(CLI::App& command, Options& options) {
     const auto add = [&](const char* name, auto& limit, const std::string& text) {
         command.add_option(name, limit, fmt::format("{} (default {})", text, limit))->check(CLI::Range(1, 1000000));
@@ -244,11 +273,12 @@ void add_serve(CLI::App& app, Run& run) {
         ->type_name("NAME");
     if (live::has_nats()) add_nats_options(*command, server.nats);
     add_access_options(*command, *options);
+    add_recording(*command, *options);
     add_limits(*command, *options);
     command->add_flag("--json", options->json,
                       "Log as JSON, an object a line, on standard output (default: for people, on standard error)");
     show_first(*command, {"--config", "--files", "--address", "--port", "--cert", "--key", "--publishers",
-                          "--add-publisher", "--link-keys", "--add-link-key", "--origin", "--json"});
+                          "--add-publisher", "--link-keys", "--add-link-key", "--origin", "--record", "--json"});
     command->footer(
         "Runs until Ctrl-C or SIGTERM, which give viewers and publishers 5 seconds to be told and to leave; a second "
         "one\n"

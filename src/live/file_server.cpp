@@ -32,7 +32,9 @@
 #include "live/control.h"
 #include "live/http_request.h"
 #include "live/live_connection.h"
+#include "live/metrics.h"
 #include "live/player_files.h"
+#include "live/recorder.h"
 #include "live/served_folder.h"
 
 namespace htvm::live {
@@ -44,6 +46,7 @@ namespace http = beast::http;
 using tcp = net::ip::tcp;
 
 constexpr std::size_t header_limit = 8192, piece_bytes = 65536;
+constexpr const char* json_type = "application/json";
 constexpr std::uint64_t most_told_refusals = 10;  // a second, in the log
 constexpr auto awaited = net::as_tuple(net::use_awaitable);
 
@@ -198,6 +201,14 @@ private:
     net::ip::address address_;
 };
 
+// What goes to the viewers of the hub's streams is recorded.
+void record(Hub& hub, Recorder& recorder) {
+    const auto sent = [&](const std::string& stream, const SharedPacket& packet, Hub::Clock::time_point now) {
+        if (recorder.take(stream, packet, now, std::chrono::system_clock::now())) hub.ask_for_key_frame(stream, now);
+    };
+    hub.listen({.sent = sent, .ended = [&](const std::string& stream) { recorder.end(stream); }});
+}
+
 }  // namespace
 
 struct FileServer::State {
@@ -213,21 +224,24 @@ struct FileServer::State {
     Access access;
     std::set<Line*> idle;  // that wait for a request
     bool draining = false;
-    std::map<std::string, std::uint64_t> refused;    // how many, by cause
-    std::uint64_t refusals = 0;                      // in this second
-    std::size_t told_joined = 0, told_watching = 0;  // viewers, as the log says
+    const Hub::Clock::time_point started = Hub::Clock::now();
+    std::map<std::string, std::uint64_t> refused{{"connections", 0}};  // how many, by cause
+    std::uint64_t refusals = 0;                                        // in this second
+    std::size_t told_joined = 0, told_watching = 0;                    // viewers, as the log says
 
     explicit State(const FileServerOptions& given) : options(given) {}
 
     Header common_header() const;
-    Response answer(const Request& request);
+    Response answer(const Request& request, const net::ip::address& address);
     Response answer_file(const Request& request, std::vector<std::string> segments, Header header);
     Response answer_text(const Request& request, const Text& text, Header header);
-    Response answer_json(std::string json, Header header) const;
+    Response answer_own(std::string text, const char* type, Header header) const;
+    std::string metrics() const;
     std::string listing() const;
     std::string live_listing() const;
     Result<ServedFile> served_file(const std::vector<std::string>& segments) const;
     bool host_is_loopback(std::string_view host) const;
+    bool by_program_here(const Request& request, const net::ip::address& address) const;
 
     bool origin_allowed(const Request& request) const;
     void let_others_read(const Request& request, Header& header) const;
@@ -241,7 +255,8 @@ struct FileServer::State {
 
     net::awaitable<void> accept();
     net::awaitable<void> serve(Line line, net::ip::address address);
-    net::awaitable<std::optional<std::pair<Request, LiveTarget>>> answer_requests(Line& line);
+    net::awaitable<std::optional<std::pair<Request, LiveTarget>>> answer_requests(Line& line,
+                                                                                  const net::ip::address& address);
     std::optional<LiveTarget> live_target(const Request& request) const;
     net::awaitable<void> publish(Line line, Request request, LiveTarget target, net::ip::address address);
     net::awaitable<void> watch(Line line, Request request, LiveTarget target, net::ip::address address);
@@ -381,13 +396,23 @@ Response FileServer::State::answer_file(const Request& request, std::vector<std:
     return out;
 }
 
-Response FileServer::State::answer_json(std::string json, Header header) const {
+Response FileServer::State::answer_own(std::string text, const char* type, Header header) const {
     Response out;
     out.header = std::move(header);
-    out.own = std::move(json);
-    out.header.set(http::field::content_type, "application/json");
+    out.own = std::move(text);
+    out.header.set(http::field::content_type, type);
     out.header.set(http::field::cache_control, "no-store");
     return out;
+}
+
+std::string FileServer::State::metrics() const {
+    return metrics_text({.hub = options.hub,
+                         .recorder = options.recorder,
+                         .nats = nats ? std::optional(nats->counters()) : std::nullopt,
+                         .refused = refused,
+                         .connections = connections,
+                         .started = started},
+                        Hub::Clock::now());
 }
 
 // What every response has.
@@ -400,7 +425,7 @@ Header FileServer::State::common_header() const {
     return header;
 }
 
-Response FileServer::State::answer(const Request& request) {
+Response FileServer::State::answer(const Request& request, const net::ip::address& address) {
     Header header = common_header();
     const auto refuse = [&](http::status status) {
         header.result(status);
@@ -418,6 +443,13 @@ Response FileServer::State::answer(const Request& request) {
     if (!segments) return refuse(http::status::bad_request);
     const auto& path = *segments;
     if (path.size() > 1 && path[0] == "files") return answer_file(request, std::move(*segments), header);
+    if (path.size() == 1 && path[0] == "healthz") {
+        if (draining) header.result(http::status::service_unavailable);
+        return answer_own(draining ? "ending\n" : "ok\n", "text/plain; charset=utf-8", header);
+    }
+    if (path.size() == 1 && path[0] == "metrics")
+        return options.metrics_anyone || by_program_here(request, address) ? answer_own(metrics(), metrics_type, header)
+                                                                           : refuse(http::status::forbidden);
     const bool list = path.size() == 2 && path[0] == "api" && (path[1] == "files" || path[1] == "streams");
     if (list && access.link_keys) {
         Response out;
@@ -425,9 +457,9 @@ Response FileServer::State::answer(const Request& request) {
         say_why(out, {"link_missing", "this hub tells nobody what there is: it asks for links"});
         return out;
     }
-    if (path.size() == 2 && path[0] == "api" && path[1] == "files") return answer_json(listing(), header);
+    if (path.size() == 2 && path[0] == "api" && path[1] == "files") return answer_own(listing(), json_type, header);
     if (path.size() == 2 && path[0] == "api" && path[1] == "streams")
-        return answer_json(options.hub ? live_listing() : "null", header);
+        return answer_own(options.hub ? live_listing() : "null", json_type, header);
     // /play/NAME: the page finds the live stream of that name by itself.
     const bool page = path.empty() || (path.size() == 2 && path[0] == "play" && options.hub);
     const bool script = path.size() == 2 && path[0] == "player";
@@ -497,6 +529,15 @@ void FileServer::State::let_others_read(const Request& request, Header& header) 
         header.set(http::field::access_control_allow_origin, origin);
 }
 
+// Whether it comes from a program on this machine. A web page in a browser here is somebody else, and so is who comes
+// through a web server here.
+bool FileServer::State::by_program_here(const Request& request, const net::ip::address& address) const {
+    const auto origin = request[http::field::origin];
+    const bool page_elsewhere = !origin.empty() && !host_is_loopback(host_of_origin(origin));
+    const bool forwarded = request.count("Forwarded") || request.count("X-Forwarded-For") || request.count("Via");
+    return counted_address(address).is_loopback() && !page_elsewhere && !forwarded;
+}
+
 // Why somebody may not publish; "" if they may.
 std::string FileServer::State::publishing_refused(const Request& request, const LiveTarget& target,
                                                   const net::ip::address& address) const {
@@ -507,11 +548,7 @@ std::string FileServer::State::publishing_refused(const Request& request, const 
         return may_publish(*access.publishers, target.name, token) ? ""
                                                                    : "this token is not that of the stream's publisher";
     }
-    // A web page in a browser of this machine is somebody else, and so is who comes through a web server on it.
-    const auto origin = request[http::field::origin];
-    const bool page_elsewhere = !origin.empty() && !host_is_loopback(host_of_origin(origin));
-    const bool forwarded = request.count("Forwarded") || request.count("X-Forwarded-For") || request.count("Via");
-    if (address.is_loopback() && !page_elsewhere && !forwarded) return "";
+    if (by_program_here(request, address)) return "";
     return "this hub knows no publishers: only programs on its own machine may publish";
 }
 
@@ -605,6 +642,8 @@ net::awaitable<void> FileServer::State::tick_hub() {
         timer.expires_after(std::chrono::milliseconds(100));
         co_await timer.async_wait(awaited);
         options.hub->tick(Hub::Clock::now());
+        if (options.recorder)
+            for (const auto& event : options.recorder->take_events()) tell(event);
     }
 }
 
@@ -613,7 +652,7 @@ net::awaitable<void> FileServer::State::serve(Line line, net::ip::address addres
     ++connections;
     line.next_layer().expires_after(options.header_time);
     if (!co_await line.handshake(net::ssl::stream_base::server)) {
-        if (auto live = co_await answer_requests(line)) {
+        if (auto live = co_await answer_requests(line, address)) {
             auto& [request, target] = *live;
             if (target.publish)
                 co_await publish(std::move(line), std::move(request), std::move(target), address);
@@ -628,7 +667,8 @@ net::awaitable<void> FileServer::State::serve(Line line, net::ip::address addres
 }
 
 // Until the connection is of no further use, or a request is for a live stream: that one.
-net::awaitable<std::optional<std::pair<Request, LiveTarget>>> FileServer::State::answer_requests(Line& line) {
+net::awaitable<std::optional<std::pair<Request, LiveTarget>>> FileServer::State::answer_requests(
+    Line& line, const net::ip::address& address) {
     beast::flat_buffer buffer(header_limit);
     while (!draining) {
         http::request_parser<http::empty_body> parser;
@@ -647,7 +687,7 @@ net::awaitable<std::optional<std::pair<Request, LiveTarget>>> FileServer::State:
         if (body)
             response.header.result(http::status::bad_request);
         else
-            response = answer(request);
+            response = answer(request, address);
         const bool alive = request.keep_alive() && !body && !draining;
         response.header.keep_alive(alive);
         const bool sent = co_await send(line, response, request.method() != http::verb::head);
@@ -792,6 +832,7 @@ Result<FileServer> FileServer::open(const FileServerOptions& options) {
         state->nats.emplace(std::move(*nats));
     }
     state->port = acceptor.local_endpoint().port();
+    if (options.hub && options.recorder) record(*options.hub, *options.recorder);
     return FileServer(std::move(state));
 }
 

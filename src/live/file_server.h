@@ -14,6 +14,10 @@
 //   /watch/NAME      packets for viewers
 //   /api/streams     the live streams as JSON; null where there is no hub
 //   /play/NAME       the page, which plays the live stream of that name
+//
+// For those who run it:
+//   /healthz         "ok", or 503 once the server is ending
+//   /metrics         what it counts (live/metrics.h)
 #pragma once
 
 #include <chrono>
@@ -27,6 +31,8 @@
 #include "live/nats_link.h"
 
 namespace htvm::live {
+
+class Recorder;
 
 // A file under a name of its own, wherever it lies.
 struct NamedFile {
@@ -57,6 +63,8 @@ struct FileServerOptions {
     std::string publishers;                // who may publish what; "": programs on this machine, anything
     std::string link_keys;                 // of links (live/access.h), without which nothing can be watched; "": anyone
     Hub* hub = nullptr;                    // of live streams; null: there are none. It must outlive the server
+    Recorder* recorder = nullptr;          // keeps the live streams as files; null: none. It must outlive the server
+    bool metrics_anyone = false;           // /metrics for everybody, not for programs on this machine alone
     Log log{};                             // of what happens; run() calls it
 };
 

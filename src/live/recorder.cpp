@@ -267,7 +267,9 @@ struct Recorder::State {
 Recorder::Recorder(const RecorderOptions& options) : state_(std::make_unique<State>()) { state_->options = options; }
 Recorder::Recorder(Recorder&&) noexcept = default;
 Recorder& Recorder::operator=(Recorder&&) noexcept = default;
-Recorder::~Recorder() = default;
+Recorder::~Recorder() {
+    if (state_) finish();
+}
 
 Result<Recorder> Recorder::open(const RecorderOptions& options) {
     std::error_code error;
@@ -329,6 +331,14 @@ void Recorder::end(const std::string& name) {
         state_->ending.push_back(std::move(recording));
     }
     state_->streams.erase(found);
+}
+
+void Recorder::finish() {
+    // All at the same time: each waits for its own thread when it is destroyed.
+    for (auto& [name, stream] : state_->streams)
+        if (stream.recording) stream.recording->end();
+    state_->streams.clear();
+    state_->ending.clear();
 }
 
 RecorderCounters Recorder::counters() const {

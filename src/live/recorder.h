@@ -48,13 +48,15 @@ public:
     static Result<Recorder> open(const RecorderOptions& options);
     Recorder(Recorder&&) noexcept;
     Recorder& operator=(Recorder&&) noexcept;
-    // Finishes all files.
+    // Like finish().
     ~Recorder();
 
     // The next packet that went to the viewers of this stream. time: of the system clock, for the file's name. Returns
     // whether a frame that can be decoded by itself is wanted, since a file can only begin or go on with one.
     bool take(const std::string& stream, const SharedPacket& packet, Clock::time_point now,
               std::chrono::system_clock::time_point time);
+    // All have ended; waits until their files are finished.
+    void finish();
     // The stream has ended; its file is finished in the background.
     void end(const std::string& stream);
 

@@ -37,6 +37,8 @@ expect 2 "--add-publisher requires --publishers" "$htvm" serve --add-publisher a
 expect 1 "cannot read none.json" "$htvm" serve --publishers none.json
 expect 1 "a.pem" "$htvm" serve --cert a.pem --key a.key
 expect 2 "--viewers" "$htvm" serve --viewers 0
+expect 2 "--record-minutes requires --record" "$htvm" serve --record-minutes 5
+expect 1 "there is no folder none" "$htvm" serve --port 0 --record none
 expect 0 "--viewers-per-address" "$htvm" serve --help-all
 printf 'port = 0\nfiles = "streams"\njson = true\n' >serve.conf
 start --config serve.conf
@@ -50,6 +52,11 @@ printf 'files = "none"\n' >files.conf
 expect 1 "none" "$htvm" serve --port 0 --config files.conf
 start --config files.conf --files streams # the command line counts
 stop INT
+mkdir recordings
+start --record recordings --record-minutes 60
+[ "$(ask "$url/healthz")" = "200 ok" ] || fail "is not well: $(ask "$url/healthz")"
+ask "$url/metrics" | grep -q '^htvm_recording_faults_total 0$' || fail "no metrics of recordings: $(ask "$url/metrics")"
+stop TERM
 start
 grep -q "programs on this machine may publish" err || fail "does not say who may publish: $(cat err)"
 [ "$(ask "$url/files/person.htvm")" = "404 " ] || fail "serves files without a folder"

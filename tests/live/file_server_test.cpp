@@ -272,6 +272,24 @@ TEST_F(FileServerTest, ThePageForbidsWhatItDoesNotNeed) {
     EXPECT_EQ(status(get("/", "If-None-Match: " + header(page, "ETag") + "\r\n")), 304);
 }
 
+TEST_F(FileServerTest, TellsProgramsOnThisMachineWhatItCounts) {
+    start();
+    EXPECT_EQ(body(get("/healthz")), "ok\n");
+    const auto metrics = get("/metrics");
+    EXPECT_EQ(header(metrics, "Content-Type"), "text/plain; version=0.0.4; charset=utf-8");
+    EXPECT_NE(body(metrics).find("\nhtvm_connections 1\n"), std::string::npos) << metrics;
+    EXPECT_NE(body(metrics).find("\nhtvm_refused_total{cause=\"connections\"} 0\n"), std::string::npos) << metrics;
+    // Who comes through a web server on this machine may be anybody.
+    EXPECT_EQ(status(get("/metrics", "X-Forwarded-For: 192.0.2.1\r\n")), 403);
+    EXPECT_EQ(status(get("/metrics", "Origin: https://a.example\r\n")), 403);
+}
+
+TEST_F(FileServerTest, TellsEverybodyWhatItCountsIfAllowed) {
+    options.metrics_anyone = true;
+    start();
+    EXPECT_EQ(status(get("/metrics", "X-Forwarded-For: 192.0.2.1\r\n")), 200);
+}
+
 TEST_F(FileServerTest, AFolderThatIsNotThereIsAnError) {
     options.folder = (root / "nowhere").string();
     EXPECT_FALSE(FileServer::open(options));

@@ -2,6 +2,7 @@
 #include "live/live_connection.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
@@ -9,12 +10,15 @@
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/websocket.hpp>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <thread>
 
 #include "htvm/decoder.hpp"
 #include "htvm/dependency.hpp"
 #include "live/file_server.h"
+#include "live/recorder.h"
 
 namespace htvm::live {
 namespace {
@@ -47,7 +51,9 @@ protected:
     // Publishers may pause, unless a test is of that.
     LiveConnectionTest()
         : LiveConnectionTest(HubLimits{.streams = 2, .publisher_silence = std::chrono::seconds(600)}) {}
-    explicit LiveConnectionTest(const HubLimits& limits) : hub(limits) { options.connections_per_address = 300; }
+    explicit LiveConnectionTest(const HubLimits& limits) : hub(limits) {
+        options.connections_per_address = options.viewers_per_address = 300;
+    }
     void SetUp() override {
         options.folder = std::filesystem::temp_directory_path().string();
         options.hub = &hub;
@@ -219,7 +225,7 @@ TEST_F(LiveConnectionTest, WithoutKnownPublishersOnlyProgramsOnThisMachineMayPub
         }));
         websocket::response_type response;
         beast::error_code error;
-        stream.handshake(response, "127.0.0.1", "/publish/anna", error);
+        stream.handshake(response, "127.0.0.1:" + std::to_string(server->port()), "/publish/anna", error);
         return response.result_int();
     };
     EXPECT_EQ(status(""), 101u);
@@ -382,6 +388,51 @@ TEST_F(LiveConnectionTest, APublisherWhoseMessageIsTooLargeIsToldSo) {
     publisher.stream.binary(true);
     publisher.stream.write(net::buffer(std::vector<char>((std::size_t{16} << 20) + 1000)), ignored);
     EXPECT_EQ(publisher.refusal().substr(0, 4), "1009");
+}
+
+class RecordedLiveConnectionTest : public LiveConnectionTest {
+protected:
+    RecordedLiveConnectionTest() {
+        std::filesystem::create_directories(folder);
+        recorder.emplace(std::move(*Recorder::open({.folder = folder})));
+        options.recorder = &*recorder;
+    }
+    ~RecordedLiveConnectionTest() override { std::filesystem::remove_all(folder); }
+    std::filesystem::path folder =
+        std::filesystem::temp_directory_path() / ("htvm_recorded_test_" + std::to_string(getpid()));
+    std::optional<Recorder> recorder;
+};
+
+TEST_F(RecordedLiveConnectionTest, WhatGoesToTheViewersIsRecorded) {
+    auto publisher = open("/publish/anna");
+    publisher.send(header(1));
+    publisher.send(tracked(4));  // nobody can decode it: a key frame is asked for
+    EXPECT_EQ(publisher.next_text("key_frame"), R"({"type":"key_frame"})");
+    publisher.send(intra(5));
+    publisher.send(tracked(6));
+    publisher.send(tracked(6));  // again
+    wait_for_packets(5);
+    const auto metrics = get("/metrics");
+    EXPECT_NE(metrics.find("htvm_recording_faults_total 0\n"), std::string::npos) << metrics;
+    publisher.stream.close(websocket::close_code::normal);
+    for (int i = 0; i < 1000 && get("/api/streams").find("anna") != std::string::npos; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    server->stop();
+    thread.join();
+    thread = std::thread([] {});
+    recorder->finish();
+    EXPECT_EQ(recorder->counters().packets, 3u);
+    std::vector<std::filesystem::path> files(std::filesystem::directory_iterator(folder), {});
+    ASSERT_EQ(files.size(), 1u);
+    std::ifstream in(files[0], std::ios::binary);
+    const std::string bytes(std::istreambuf_iterator<char>(in), {});
+    std::string expected;
+    for (const auto& packet : {header(1), intra(5), tracked(6)}) {
+        const auto written = write_packet(packet);
+        expected.append(written.begin(), written.end());
+    }
+    EXPECT_TRUE(bytes.ends_with(expected));
+    EXPECT_GT(bytes.size(), expected.size());  // the index
 }
 
 class QuickLiveConnectionTest : public LiveConnectionTest {
