@@ -10,6 +10,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "io/sequence.h"
+#include "metrics/drift.h"
 #include "picture_options.h"
 #include "sequences.h"
 #include "stream_file.h"
@@ -232,6 +234,7 @@ struct Options {
     std::vector<std::string> originals;  // of these
     std::string decoded;                 // and the last
     std::string unit = "auto", timestamps;
+    std::string truth;       // folder; empty: no drift
     std::size_t frames = 0;  // 0: all
     std::vector<std::string> only;
     CompareOptions compare;
@@ -388,15 +391,52 @@ void warn_of_sizes(const Sources& sources, const Mesh& original, const Mesh& dec
         larger ? sources.decoded.name : sources.original.name));
 }
 
+// The marks of a true surface (htvm synth --truth), as they go with the originals: by number, else in order.
+struct Marks {
+    MeshSource source;
+    std::vector<std::size_t> place_of;  // of each original; the number of frames: none
+};
+
+Result<Marks> open_marks(const Options& options, const MeshSource& original) {
+    auto source = open_meshes({(std::filesystem::path(options.truth) / "marks").string()}, {"mm", "", options.limits});
+    if (!source) return tl::unexpected(source.error());
+    Marks marks{std::move(*source), std::vector<std::size_t>(original.frames)};
+    std::ranges::fill(marks.place_of, marks.source.frames);
+    const bool by_number = !original.numbers.empty() && !marks.source.numbers.empty();
+    std::vector<FramePair> pairs;
+    if (by_number)
+        pairs = pair_by_number(original.numbers, marks.source.numbers);
+    else
+        for (std::size_t k = 0; k < std::min(original.frames, marks.source.frames); ++k) pairs.push_back({k, k});
+    for (const auto& pair : pairs) marks.place_of[pair.original] = pair.decoded;
+    return marks;
+}
+
 struct Measured {
     SequenceComparison sums;
+    DriftMeter drift;                // if the truth is given
+    std::vector<FrameDrift> drifts;  // of each frame, likewise
     std::vector<FrameComparison> frames;
     std::vector<std::size_t> places;  // the position of each among the originals
 };
 
+Result<FrameDrift> measure_drift(Marks& marks, DriftMeter& meter, std::size_t original, const Mesh& decoded) {
+    if (marks.place_of[original] == marks.source.frames)
+        return fail(ErrorKind::bad_input, fmt::format("{} has no frame for frame {}", marks.source.name, original));
+    const auto mesh = marks.source.mesh_at(marks.source, marks.place_of[original]);
+    if (!mesh) return tl::unexpected(mesh.error());
+    return meter.add(*mesh, decoded);
+}
+
 Result<Measured> measure(const Options& options, Sources& sources, const std::vector<FramePair>& pairs) {
     auto& [original, decoded] = sources;
     Measured out;
+    std::optional<Marks> marks;
+    if (!options.truth.empty()) {
+        auto opened = open_marks(options, original);
+        if (!opened) return tl::unexpected(opened.error());
+        marks = std::move(*opened);
+    }
     Progress progress("compare", pairs.size());
     for (const auto& pair : pairs) {
         const auto first = original.mesh_at(original, pair.original);
@@ -411,6 +451,11 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         out.sums += *comparison;
         out.frames.push_back(*comparison);
         out.places.push_back(pair.original);
+        if (marks) {
+            const auto drift = measure_drift(*marks, out.drift, pair.original, *second);
+            if (!drift) return tl::unexpected(drift.error());
+            out.drifts.push_back(*drift);
+        }
         if (!options.pictures.empty())
             if (const auto ok = write_pictures(options, *first, *second, pair.original); !ok)
                 return tl::unexpected(ok.error());
@@ -425,13 +470,44 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
 
 Result<void> write_csv(const Options& options, const Measured& measured, double peak_mm) {
     std::string text = csv_header(options.compare);
-    for (std::size_t i = 0; i < measured.frames.size(); ++i)
+    if (!measured.drifts.empty()) {
+        text.pop_back();
+        text += ",drift_age,drift_mean_mm,drift_p95_mm\n";
+    }
+    for (std::size_t i = 0; i < measured.frames.size(); ++i) {
         text += csv_line(measured.places[i], measured.frames[i], options.compare, peak_mm);
+        if (measured.drifts.empty()) continue;
+        text.pop_back();
+        const FrameDrift& drift = measured.drifts[i];
+        text += fmt::format(",{},{:.8g},{:.8g}\n", drift.age, drift.mean_mm, drift.p95_mm);
+    }
     if (options.csv == "-") {
         fmt::print("{}", text);
         return {};
     }
     return write_file(options.csv, text);
+}
+
+nlohmann::json drift_json(const FrameDrift& drift) {
+    return {{"age", drift.age}, {"marks", drift.marks}, {"mean_mm", drift.mean_mm}, {"p95_mm", drift.p95_mm}};
+}
+
+// Overall, and at some ages.
+std::string drift_rows(const DriftMeter& meter) {
+    const auto by_age = meter.by_age();
+    const FrameDrift all = meter.overall();
+    std::string out = fmt::format("\n  {:<34}{:>12}{:>12}\n", "drift along the surface, mm", "mean", "95 %");
+    const auto add = [&](const std::string& what, const FrameDrift& drift) {
+        out += fmt::format("  {:<34}{:>12.3f}{:>12.3f}\n", what, drift.mean_mm, drift.p95_mm);
+    };
+    for (const std::size_t age : {0, 1, 2, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000})
+        if (age < by_age.size())
+            add(age == 0 ? "  at the reference" : fmt::format("  after {}", counted(age, "frame")), by_age[age]);
+    if (all.marks > 0)
+        add("  all frames but references", all);
+    else
+        out += "  no frame has the same triangles as the one before: nothing slides\n";
+    return out;
 }
 
 nlohmann::json as_json(const Options& options, const Measured& measured, double peak_mm) {
@@ -446,11 +522,17 @@ nlohmann::json as_json(const Options& options, const Measured& measured, double 
             line["original_topology"] = topology_json(frame.original_topology);
             line["decoded_topology"] = topology_json(frame.decoded_topology);
         }
+        if (!measured.drifts.empty()) line["drift"] = drift_json(measured.drifts[i]);
         frames.push_back(std::move(line));
     }
     nlohmann::json out = {
         {"original", options.originals.front()}, {"decoded", options.decoded}, {"frames", std::move(frames)}};
     out["sequence"] = summary_json(summarise(measured.sums, peak_mm), options.compare);
+    if (!measured.drifts.empty()) {
+        auto& drift = out["sequence"]["drift"] = drift_json(measured.drift.overall());
+        drift.erase("age");
+        for (const FrameDrift& of_age : measured.drift.by_age()) drift["by_age"].push_back(drift_json(of_age));
+    }
     return out;
 }
 
@@ -485,6 +567,7 @@ Result<void> compare(Options options) {
         fmt::print("{}\n", as_json(options, *measured, peak_mm).dump(2));
     } else if (options.csv != "-") {
         fmt::print("{}", comparison_table(measured->sums, options.compare, options.peak_mm));
+        if (!measured->drifts.empty()) fmt::print("{}", drift_rows(measured->drift));
     }
     return {};
 }
@@ -561,6 +644,11 @@ void add_compare(CLI::App& app, Run& run) {
             "--timestamps", o.timestamps,
             "When each original was captured, as for 'htvm encode', if frames of a stream are to find theirs by it")
         ->type_name("FILE");
+    command
+        ->add_option("--truth", o.truth,
+                     "What 'htvm synth --truth' wrote beside the originals: measures how far the decoded surface\n"
+                     "slides along the true one while its triangles stay the same, by frames since they were new")
+        ->type_name("FOLDER");
     command->add_option("--samples", o.compare.surface_options.samples,
                         "Samples for M2, in each direction (default: 10 times the triangles, like METRO)");
     command->add_option("--seed", o.compare.surface_options.seed, "Seed of M2's samples")->capture_default_str();

@@ -8,8 +8,10 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -24,6 +26,7 @@
 #include "io/skeleton_file.h"
 #include "io/timestamps.h"
 #include "pacing.h"
+#include "synth_truth.h"
 
 namespace htvm::app {
 
@@ -32,9 +35,14 @@ namespace {
 
 constexpr int most_frames = 1000000;
 
+const std::map<std::string, SynthMotion> motions = {{"tour", SynthMotion::tour},
+                                                    {"calm", SynthMotion::calm},
+                                                    {"everyday", SynthMotion::everyday},
+                                                    {"fast", SynthMotion::fast}};
+
 struct Options {
-    std::string folder;
-    int frames = 60, first_frame = 0;
+    std::string folder, truth;  // truth: empty for none
+    int frames = 60, first_frame = 0, marks = 1000;
     SynthOptions synth;
     unsigned threads = 0;
     bool json = false, live = false, counted = false;  // counted: the number of frames was given
@@ -63,7 +71,7 @@ void add_pose(SkeletonTrack& track, Pose pose) {
 }
 
 // Generates as many frames at once as there are threads, so that memory does not grow with the number of frames.
-Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, SkeletonTrack& exact) {
+Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, SkeletonTrack& exact, TruthFiles* truth) {
     const ThreadPool pool(std::min(thread_count(options.threads), 64u));
     const Threads threads = pool.threads();
     Written written;
@@ -71,12 +79,17 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
     for (int done = 0; done < options.frames;) {
         const int count = std::min(static_cast<int>(threads.count), options.frames - done);
         std::vector<SynthFrame> made(static_cast<std::size_t>(count));
+        std::vector<TrueFrame> known(made.size());
         const Threads inner = threads.at_most(std::max(1u, threads.count / static_cast<unsigned>(count)));
         parallel_for(made.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i)
-                made[i] = synth_frame(options.synth, options.first_frame + done + static_cast<int>(i), inner);
+            for (std::size_t i = begin; i < end; ++i) {
+                const int number = options.first_frame + done + static_cast<int>(i);
+                made[i] = synth_frame(options.synth, number, inner);
+                if (truth) known[i] = true_frame(options.synth, truth->marks(), number, inner);
+            }
         });
-        for (auto& frame : made) {
+        for (std::size_t i = 0; i < made.size(); ++i) {
+            SynthFrame& frame = made[i];
             const auto path = frame_path(options, options.first_frame + done++);
             if (auto ok = write_mesh(path, frame.mesh); !ok) return tl::unexpected(ok.error());
             written.names.insert(path.filename().string());
@@ -84,6 +97,9 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
             written.triangles += frame.mesh.triangles.size();
             add_pose(noisy, std::move(frame.pose));
             add_pose(exact, std::move(frame.true_pose));
+            if (truth)
+                if (auto ok = truth->add(path.filename().string(), std::move(frame), std::move(known[i])); !ok)
+                    return tl::unexpected(ok.error());
             progress.step();
         }
     }
@@ -133,8 +149,16 @@ Result<void> synthesise(const Options& options) {
     std::filesystem::create_directories(options.folder, error);
     if (error) return fail(ErrorKind::bad_input, options.folder + " cannot be made: " + error.message());
     SkeletonTrack noisy = empty_track(options.synth.fps), exact = noisy;
-    auto written = write_frames(options, noisy, exact);
+    std::optional<TruthFiles> truth;
+    if (!options.truth.empty()) {
+        auto made = TruthFiles::create(options.truth, options.synth, options.first_frame, options.marks);
+        if (!made) return tl::unexpected(made.error());
+        truth = std::move(*made);
+    }
+    auto written = write_frames(options, noisy, exact, truth ? &*truth : nullptr);
     if (!written) return tl::unexpected(written.error());
+    if (truth)
+        if (auto ok = truth->finish(); !ok) return ok;
     const std::filesystem::path folder(options.folder);
     if (auto ok = write_skeleton((folder / "skeleton.json").string(), noisy); !ok) return ok;
     if (auto ok = write_skeleton((folder / "skeleton_true.json").string(), exact); !ok) return ok;
@@ -184,8 +208,9 @@ void add_synth(CLI::App& app, Run& run) {
     CLI::App* command = app.add_subcommand("synth", "Make a synthetic capture of a person: meshes and skeleton");
     command->description(
         "Make a synthetic capture of a person, to try the codec on: a dressed, coloured body, 1.75 m tall, that\n"
-        "starts in a T-pose, then walks, waves, turns and jumps in a cycle of 8 seconds. The surface is meshed anew\n"
-        "in every frame, as reconstructions are: the number and positions of the vertices and the triangles\n"
+        "starts in a T-pose, then walks, waves, turns and jumps in a cycle of 8 seconds (--motion has others,\n"
+        "which go on without repeating). The surface is meshed anew in every frame, as reconstructions are: the number "
+        "and positions of the vertices and the triangles\n"
         "all change.\n"
         "The same options give the same bytes, and every frame can be made on its own (--first-frame).");
     command
@@ -201,9 +226,20 @@ void add_synth(CLI::App& app, Run& run) {
     command->add_option("--first-frame", o.first_frame, "The first frame's number; the motion starts at frame 0")
         ->check(CLI::Range(0, most_frames))
         ->capture_default_str();
+    command
+        ->add_option("--motion", o.synth.motion,
+                     "What the person does: a tour (default), calm, everyday (walks, sits down, hands in pockets, a\n"
+                     "ball; somebody comes in), or fast (dances, kicks, jumps)")
+        ->transform(CLI::CheckedTransformer(motions, CLI::ignore_case))
+        ->option_text("tour|calm|everyday|fast");
+    command->add_option("--people", o.synth.people, "2: a second person moves beside; not in the tour")
+        ->check(CLI::Range(1, 2))
+        ->capture_default_str();
     command->add_option("--fps", o.synth.fps, "Frames per second")->capture_default_str();
     command->add_option("--vertices", o.synth.vertices, "Vertices per frame, within 3 %")->capture_default_str();
-    command->add_option("--seed", o.synth.seed, "Seed of the noise and the sampling; the motion stays the same")
+    command
+        ->add_option("--seed", o.synth.seed,
+                     "Seed of the noise and the sampling, and of the order of moves (the tour stays the same)")
         ->capture_default_str();
     command
         ->add_option("--surface-noise", o.synth.surface_noise_power,
@@ -213,6 +249,14 @@ void add_synth(CLI::App& app, Run& run) {
         ->add_option("--joint-noise", o.synth.joint_noise_power,
                      "Power of the noise on each joint coordinate in skeleton.json, mm^2 (25 is 5 mm RMS);\n"
                      "skeleton_true.json has none")
+        ->capture_default_str();
+    command
+        ->add_option("--truth", o.truth,
+                     "Folder for what no real capture knows: the surface without noise, points fixed on it in every\n"
+                     "frame, and when limbs are fast, touch or come off ('htvm compare --truth' reads it)")
+        ->type_name("FOLDER");
+    command->add_option("--truth-marks", o.marks, "How many points of the surface are followed there")
+        ->check(CLI::Range(1, 20000))
         ->capture_default_str();
     command->add_flag("--lattice", o.synth.lattice,
                       "Keep the vertices on the edges of one regular grid (by default there is no grid)");
@@ -224,12 +268,18 @@ void add_synth(CLI::App& app, Run& run) {
         "  htvm synth capture --frames 60\n"
         "  htvm encode capture --skeleton capture/skeleton.json -o capture.htvm\n"
         "  htvm info capture.htvm\n"
+        "A dancer, and how far the decoded surface slides along the true one\n"
+        "  htvm synth dance --motion fast --truth truth\n"
+        "  htvm encode dance -o dance.htvm\n"
+        "  htvm compare dance dance.htvm --only m2 --truth truth\n"
         "Example: a live stream without a camera, beside a hub (htvm serve)\n"
         "  htvm synth --live --vertices 10000 | htvm encode - -o ws://localhost:8080/publish/me");
     command->callback([options, frames, &run] {
         if (options->live == !options->folder.empty())
             throw CLI::ValidationError("OUT_DIR",
                                        "or --live: give one of them, a folder to write to or standard output");
+        if (options->live && !options->truth.empty())
+            throw CLI::ValidationError("--truth", "goes with a folder of frames, not with --live");
         options->counted = frames->count() > 0;
         run = [options] { return options->live ? synthesise_live(*options) : synthesise(*options); };
     });

@@ -201,9 +201,7 @@ Vector3d shoe_colour(const Vector3d& q) {
 
 std::uint8_t to_byte(double value) { return static_cast<std::uint8_t>(std::clamp(std::lround(value), 0l, 255l)); }
 
-}  // namespace
-
-double surface_relief(const Vector3d& q) {
+double person_relief(const Vector3d& q) {
     if (on_arm(q)) return arm_relief(q);
     // The reliefs of the regions fade into each other over a few millimetres: steep, like a hem, but without a jump.
     if (q.y() > collar_height) return mix({head_relief(q), 0, 0}, {2, 0, 0}, (collar_height + 4 - q.y()) / 4).x();
@@ -217,7 +215,12 @@ double surface_relief(const Vector3d& q) {
     return w > 0 ? w * leg_relief(q) + (1 - w) * shoe_relief(q) : shoe_relief(q);
 }
 
-Colour surface_colour(const Vector3d& q) {
+// Clothes of other colours: what is coloured strongly or dark is, skin and hair are not.
+Vector3d other_clothes(const Vector3d& colour) {
+    return {0.75 * colour.z() + 30, colour.y() + 8, 0.8 * colour.x() + 12};
+}
+
+Vector3d person_colour(const Vector3d& q, bool second) {
     Vector3d colour;
     if (on_arm(q)) {
         colour = std::abs(q.x()) < sleeve_end ? shirt_colour(q) : skin_colour(q);
@@ -228,9 +231,36 @@ Colour surface_colour(const Vector3d& q) {
     } else {
         colour = q.y() > cuff_height - 3 ? trouser_colour(q) : shoe_colour(q);
     }
-    // Hollows are darker, as in the texture of a capture.
     const bool cloth = on_arm(q) ? std::abs(q.x()) < sleeve_end : q.y() < collar_height && q.y() > cuff_height;
-    if (cloth) colour *= std::clamp(0.94 + 0.025 * (surface_relief(q) - 3.0), 0.82, 1.06);
+    if (cloth && second) colour = other_clothes(colour);
+    // Hollows are darker, as in the texture of a capture.
+    if (cloth) colour *= std::clamp(0.94 + 0.025 * (person_relief(q) - 3.0), 0.82, 1.06);
+    return colour;
+}
+
+Vector3d wood_colour(const Vector3d& q) {
+    const double grain =
+        smooth_noise(q.x() / 14, q.y() / 90, q.z() / 90) + 0.5 * smooth_noise(q.x() / 5, q.y() / 60, q.z() / 60);
+    return Vector3d(168, 118, 72) + grain * Vector3d(18, 16, 12);
+}
+
+// Eight panels in turn yellow and blue, and a white ring round the middle.
+Vector3d ball_colour(const Vector3d& q) {
+    const double panel = std::sin(4 * std::atan2(q.z(), q.x()));
+    const Vector3d colour = mix({232, 184, 52}, {38, 84, 170}, smooth_step(6 * panel + 0.5));
+    return mix(colour, {236, 234, 228}, smooth_step((16 - std::abs(q.y())) / 4));
+}
+
+}  // namespace
+
+double surface_relief(Figure figure, const Vector3d& q) {
+    return figure == Figure::person || figure == Figure::other_person ? person_relief(q) : 0.0;
+}
+
+Colour surface_colour(Figure figure, const Vector3d& q) {
+    const Vector3d colour = figure == Figure::chair  ? wood_colour(q)
+                            : figure == Figure::ball ? ball_colour(q)
+                                                     : person_colour(q, figure == Figure::other_person);
     return {to_byte(colour.x()), to_byte(colour.y()), to_byte(colour.z())};
 }
 

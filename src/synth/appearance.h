@@ -1,10 +1,11 @@
-// Fine relief and colour of the synthetic person's body, as functions of rest coordinates (mm, T-pose), so that they
-// move with the limbs.
+// Fine relief and colour of the synthetic people and things, as functions of rest coordinates (mm, T-pose), so that
+// they move with the limbs.
 #pragma once
 
 #include <Eigen/Core>
 
 #include "htvm/mesh.hpp"
+#include "synth/scene.h"
 
 namespace htvm::synth {
 
@@ -12,10 +13,11 @@ namespace htvm::synth {
 inline constexpr double relief_bound = 17.0;
 
 // How far the dressed surface stands out from the smooth shape of the body, mm: folds of shirt and trousers, their
-// hems, hair, brows, eyes and lips.
-double surface_relief(const Eigen::Vector3d& rest);
+// hems, hair, brows, eyes and lips. Things have none.
+double surface_relief(Figure figure, const Eigen::Vector3d& rest);
 
-// Skin, hair, a patterned shirt, trousers, shoes, a face.
-Colour surface_colour(const Eigen::Vector3d& rest);
+// Skin, hair, a patterned shirt, trousers, shoes, a face; the second person's clothes have other colours. A wooden
+// chair, a ball in two colours.
+Colour surface_colour(Figure figure, const Eigen::Vector3d& rest);
 
 }  // namespace htvm::synth

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -27,6 +28,7 @@ struct Shape {
 };
 
 using Body = std::array<Shape, part_count>;
+using Shapes = std::array<Shape, scene_part_count>;
 
 Primitive tapered(const Vector3d& start, const Vector3d& end, double start_radius, double end_radius,
                   const Vector3d& scale = Vector3d::Ones()) {
@@ -114,15 +116,45 @@ void build_limbs(Body& body) {
     for (Part foot : {Part::left_foot, Part::right_foot}) body[static_cast<std::size_t>(foot)].flat_sole = true;
 }
 
-const Body& rest_body() {
-    static const Body body = [] {
-        Body built;
-        build_trunk(built);
-        build_head(built);
-        build_limbs(built);
+Primitive rod(const Vector3d& start, const Vector3d& end, double radius) { return tapered(start, end, radius, radius); }
+
+// A chair that faces +z, with the middle of its seat over the origin: rods, as far from thin as a coarse grid needs.
+void build_chair(Shape& seat, Shape& frame) {
+    seat.blend = frame.blend = 6;
+    constexpr double top = chair_seat_height - 22, half = 190;
+    for (int slat = -5; slat <= 5; ++slat)
+        seat.primitives.push_back(rod({slat * 38.0, top, -half}, {slat * 38.0, top, half}, 22));
+    for (const double x : {-half, half}) {
+        frame.primitives.push_back(rod({x, 24, half}, {x, top, half - 10}, 24));
+        frame.primitives.push_back(rod({x, 24, -half - 30}, {x, top, -half - 10}, 24));
+        frame.primitives.push_back(rod({x, top, -half - 10}, {x, 880, -half - 60}, 22));
+    }
+    for (const double y : {660.0, 750.0, 850.0})
+        frame.primitives.push_back(
+            rod({-half, y, -half - 10 - (y - top) * 0.11}, {half, y, -half - 10 - (y - top) * 0.11}, 24));
+}
+
+// The cloth over a hand in a pocket: in front of the hip, flat.
+void build_pockets(Shape& left, Shape& right) {
+    left.primitives = {tapered({158, 905, 30}, {160, 770, 36}, 52, 40, {0.62, 1, 1})};
+    right.primitives = {tapered({-158, 905, 30}, {-160, 770, 36}, 52, 40, {0.62, 1, 1})};
+}
+
+const Shapes& rest_shapes() {
+    static const Shapes shapes = [] {
+        Body body;
+        build_trunk(body);
+        build_head(body);
+        build_limbs(body);
+        Shapes built;
+        std::ranges::copy(body, built.begin());
+        std::ranges::copy(body, built.begin() + second_person);
+        build_pockets(built[left_pocket], built[right_pocket]);
+        build_chair(built[chair_seat], built[chair_frame]);
+        built[ball_part].primitives = {rod(Vector3d::Zero(), Vector3d::Zero(), ball_radius)};
         return built;
     }();
-    return body;
+    return shapes;
 }
 
 // A weight that falls from 1 at 0 to exactly 0 at reach * blend, with the slope of exp(-difference / blend) at 0. What
@@ -166,92 +198,114 @@ Vector3d to_rest(const PartFrame& frame, const Vector3d& world) {
 
 constexpr double part_blend = 9.0;
 
-PartSet bit(std::size_t part) { return PartSet{1} << part; }
+// Calls visit(part) for every part of a set, in ascending order.
+template <class Visit>
+void for_each_part(PartSet parts, const Visit& visit) {
+    for (; parts != 0; parts &= parts - 1) visit(static_cast<std::size_t>(std::countr_zero(parts)));
+}
 
-// The parts whose rest coordinates may be mixed with those of a part: itself and its ancestors. Where a hand touches a
-// leg, each keeps its own.
-PartSet joined_parts(std::size_t part) {
-    static const std::array<PartSet, part_count> joined = [] {
-        std::array<PartSet, part_count> sets{};
-        const auto join = [&](Part a, Part b) {
-            sets[static_cast<std::size_t>(a)] |= bit(static_cast<std::size_t>(b));
-            sets[static_cast<std::size_t>(b)] |= bit(static_cast<std::size_t>(a));
-        };
-        for (std::size_t i = 0; i < part_count; ++i) sets[i] |= bit(i);
-        join(Part::pelvis, Part::chest);
-        join(Part::chest, Part::neck);
-        join(Part::neck, Part::head);
+std::array<PartSet, scene_part_count> joined_sets() {
+    std::array<PartSet, scene_part_count> sets{};
+    const auto join = [&](std::size_t a, std::size_t b) {
+        sets[a] |= part_bit(b);
+        sets[b] |= part_bit(a);
+    };
+    for (std::size_t i = 0; i < scene_part_count; ++i) sets[i] |= part_bit(i);
+    for (const std::size_t person : {std::size_t{0}, second_person}) {
+        const auto of = [&](Part part, std::size_t side = 0) { return person + static_cast<std::size_t>(part) + side; };
+        join(of(Part::pelvis), of(Part::chest));
+        join(of(Part::chest), of(Part::neck));
+        join(of(Part::neck), of(Part::head));
         for (std::size_t side = 0; side < 2; ++side) {
-            const auto of = [&](Part left) { return static_cast<Part>(static_cast<std::size_t>(left) + side); };
-            join(Part::chest, of(Part::left_upper_arm));
-            join(of(Part::left_upper_arm), of(Part::left_forearm));
-            join(of(Part::left_forearm), of(Part::left_hand));
-            join(Part::pelvis, of(Part::left_thigh));
-            join(of(Part::left_thigh), of(Part::left_shin));
-            join(of(Part::left_shin), of(Part::left_foot));
+            join(of(Part::chest), of(Part::left_upper_arm, side));
+            join(of(Part::left_upper_arm, side), of(Part::left_forearm, side));
+            join(of(Part::left_forearm, side), of(Part::left_hand, side));
+            join(of(Part::pelvis), of(Part::left_thigh, side));
+            join(of(Part::left_thigh, side), of(Part::left_shin, side));
+            join(of(Part::left_shin, side), of(Part::left_foot, side));
         }
-        return sets;
-    }();
-    return joined[part];
+    }
+    for (std::size_t side = 0; side < 2; ++side) {
+        join(left_pocket + side, static_cast<std::size_t>(Part::pelvis));
+        join(left_pocket + side, static_cast<std::size_t>(Part::left_thigh) + side);
+    }
+    join(chair_seat, chair_frame);
+    return sets;
 }
 
 struct PartDistances {
-    std::array<double, part_count> distance;
-    std::array<Vector3d, part_count> rest;
+    std::array<double, scene_part_count> distance;
+    std::array<Vector3d, scene_part_count> rest;
     std::size_t nearest = 0;
     double blended = 0;  // over all parts, without relief
 };
 
-PartDistances part_distances(const PosedBody& body, PartSet candidates, const Vector3d& world) {
-    const Body& shapes = rest_body();
+PartDistances part_distances(const PosedScene& scene, PartSet candidates, const Vector3d& world) {
+    const Shapes& shapes = rest_shapes();
     PartDistances result;
     double nearest = std::numeric_limits<double>::max();
-    for (std::size_t i = 0; i < part_count; ++i) {
-        if (!(candidates & bit(i))) continue;
-        result.rest[i] = to_rest(body.parts[i], world);
+    for_each_part(candidates, [&](std::size_t i) {
+        result.rest[i] = to_rest(scene.parts[i], world);
         result.distance[i] = shape_distance(shapes[i], result.rest[i]);
         if (result.distance[i] < nearest) {
             nearest = result.distance[i];
             result.nearest = i;
         }
-    }
+    });
     double sum = 0;
-    for (std::size_t i = 0; i < part_count; ++i)
-        if (candidates & bit(i)) sum += fading_weight(result.distance[i] - nearest, part_blend);
+    for_each_part(candidates, [&](std::size_t i) { sum += fading_weight(result.distance[i] - nearest, part_blend); });
     result.blended = sum > 1.0 ? nearest - part_blend * std::log(sum) : nearest;
     return result;
 }
 
 }  // namespace
 
-SurfacePoint evaluate_body(const PosedBody& body, PartSet candidates, const Vector3d& world) {
-    const PartDistances parts = part_distances(body, candidates, world);
-    const PartSet mixed = candidates & joined_parts(parts.nearest);
+PartSet joined_parts(std::size_t part) {
+    static const std::array<PartSet, scene_part_count> joined = joined_sets();
+    return joined[part];
+}
+
+double part_distance(std::size_t part, const Vector3d& rest) { return shape_distance(rest_shapes()[part], rest); }
+
+SurfacePoint evaluate_surface(const PosedScene& scene, PartSet candidates, const Vector3d& world) {
+    const PartDistances parts = part_distances(scene, candidates, world);
     SurfacePoint point;
+    point.part = parts.nearest;
     point.rest.setZero();
     double sum = 0;
-    for (std::size_t i = 0; i < part_count; ++i) {
-        if (!(mixed & bit(i))) continue;
+    for_each_part(candidates & joined_parts(parts.nearest), [&](std::size_t i) {
         const double weight = fading_weight(parts.distance[i] - parts.distance[parts.nearest], part_blend);
-        if (weight <= 0) continue;
+        if (weight <= 0) return;
         sum += weight;
         point.rest += weight * parts.rest[i];
-    }
+    });
     point.rest /= sum;
     point.distance = parts.blended;
     // Far from the surface the relief cannot change the sign, so it is not computed there.
-    if (std::abs(parts.blended) < 2 * relief_bound) point.distance -= surface_relief(point.rest);
+    if (std::abs(parts.blended) < 2 * relief_bound)
+        point.distance -= surface_relief(figure_of(parts.nearest), point.rest);
+    point.distance = std::max(point.distance, world.x() - scene.border);
     return point;
 }
 
-BallBounds bound_body(const PosedBody& body, PartSet candidates, const Vector3d& centre, double radius) {
-    const PartDistances parts = part_distances(body, candidates, centre);
+Vector3d surface_gradient(const PosedScene& scene, PartSet candidates, const Vector3d& world) {
+    const double distance = evaluate_surface(scene, candidates, world).distance, width = 0.5;
+    Vector3d gradient;
+    for (int axis = 0; axis < 3; ++axis)
+        gradient[axis] =
+            (evaluate_surface(scene, candidates, world + width * Vector3d::Unit(axis)).distance - distance) / width;
+    return gradient;
+}
+
+BallBounds bound_surface(const PosedScene& scene, PartSet candidates, const Vector3d& centre, double radius) {
+    const PartDistances parts = part_distances(scene, candidates, centre);
     BallBounds bounds;
     const double change = steepness * radius;
-    bounds.crosses = std::abs(parts.blended) <= change + relief_bound;
+    bounds.crosses = std::abs(std::max(parts.blended, centre.x() - scene.border)) <= change + relief_bound;
     const double limit = parts.distance[parts.nearest] + 2 * change + reach * part_blend;
-    for (std::size_t i = 0; i < part_count; ++i)
-        if ((candidates & bit(i)) && parts.distance[i] <= limit) bounds.candidates |= bit(i);
+    for_each_part(candidates, [&](std::size_t i) {
+        if (parts.distance[i] <= limit) bounds.candidates |= part_bit(i);
+    });
     return bounds;
 }
 

@@ -50,13 +50,13 @@ int edge_index(int x, int y, int z, int direction) {
 
 // Descends an octree whose nodes of level n have 2^n bricks along a side, and collects the bricks that the surface
 // enters.
-void find_bricks(const PosedBody& body, const Grid& grid, const Vector3i& first, int level, PartSet candidates,
+void find_bricks(const PosedScene& scene, const Grid& grid, const Vector3i& first, int level, PartSet candidates,
                  std::vector<Brick>& bricks) {
     const int cells = brick_cells << level;
     const Vector3d centre =
         grid.origin + grid.rotation * (grid.cell * (first.cast<double>().array() + 0.5 * cells).matrix());
     // A quarter more than the node, so that vertices that later move along the surface still find their parts.
-    const BallBounds bounds = bound_body(body, candidates, centre, 1.25 * grid.cell * cells * std::sqrt(0.75));
+    const BallBounds bounds = bound_surface(scene, candidates, centre, 1.25 * grid.cell * cells * std::sqrt(0.75));
     if (!bounds.crosses) return;
     if (level == 0) {
         Brick& brick = bricks.emplace_back();
@@ -66,18 +66,18 @@ void find_bricks(const PosedBody& body, const Grid& grid, const Vector3i& first,
     }
     const int half = cells / 2;
     for (int octant = 0; octant < 8; ++octant)
-        find_bricks(body, grid, first + half * Vector3i(octant & 1, octant >> 1 & 1, octant >> 2), level - 1,
+        find_bricks(scene, grid, first + half * Vector3i(octant & 1, octant >> 1 & 1, octant >> 2), level - 1,
                     bounds.candidates, bricks);
 }
 
-std::vector<Brick> find_all_bricks(const PosedBody& body, const Grid& grid) {
+std::vector<Brick> find_all_bricks(const PosedScene& scene, const Grid& grid) {
     Vector3d low = Vector3d::Constant(std::numeric_limits<double>::max()), high = -low;
-    for (const auto& joint : body.joints) {
-        const Vector3d local = grid.rotation.transpose() * (joint - grid.origin) / grid.cell;
+    for (const auto& landmark : scene.landmarks) {
+        const Vector3d local = grid.rotation.transpose() * (landmark - grid.origin) / grid.cell;
         low = low.cwiseMin(local);
         high = high.cwiseMax(local);
     }
-    const double margin = 260.0 / grid.cell;  // mm, no part reaches further from the joints
+    const double margin = 260.0 / grid.cell;  // mm, no part reaches further from the landmarks
     const Vector3i first = (low.array() - margin).floor().cast<int>().matrix();
     const double extent = (high - low).maxCoeff() + 2 * margin + 2;
     // Bricks start at multiples of their size, so that the brick follows from the position.
@@ -85,16 +85,17 @@ std::vector<Brick> find_all_bricks(const PosedBody& body, const Grid& grid) {
     int level = 0;
     while ((brick_cells << level) < extent + brick_cells) ++level;
     std::vector<Brick> bricks;
-    find_bricks(body, grid, Vector3i(align(first.x()), align(first.y()), align(first.z())), level, all_parts, bricks);
+    find_bricks(scene, grid, Vector3i(align(first.x()), align(first.y()), align(first.z())), level, scene.present,
+                bricks);
     return bricks;
 }
 
-void evaluate_brick(const PosedBody& body, const Grid& grid, Brick& brick) {
+void evaluate_brick(const PosedScene& scene, const Grid& grid, Brick& brick) {
     for (int z = 0; z < brick_side; ++z)
         for (int y = 0; y < brick_side; ++y)
             for (int x = 0; x < brick_side; ++x)
                 brick.values[corner_index(x, y, z)] = static_cast<float>(
-                    evaluate_body(body, brick.candidates, corner_position(grid, brick.first + Vector3i(x, y, z)))
+                    evaluate_surface(scene, brick.candidates, corner_position(grid, brick.first + Vector3i(x, y, z)))
                         .distance);
 }
 
@@ -197,11 +198,11 @@ void triangulate_brick(const std::vector<Brick>& bricks, Brick& brick) {
 PartSet BrickMap::at(const Vector3d& world) const {
     const Vector3d local = grid.rotation.transpose() * (world - grid.origin) / (grid.cell * brick_cells);
     const auto found = candidates.find(brick_key(local.array().floor().cast<int>().matrix()));
-    return found == candidates.end() ? all_parts : found->second;
+    return found == candidates.end() ? present : found->second;
 }
 
-Extraction extract_surface(const PosedBody& body, const Grid& grid, Threads threads) {
-    std::vector<Brick> bricks = find_all_bricks(body, grid);
+Extraction extract_surface(const PosedScene& scene, const Grid& grid, Threads threads) {
+    std::vector<Brick> bricks = find_all_bricks(scene, grid);
     std::unordered_map<std::uint64_t, std::int32_t> index;
     index.reserve(2 * bricks.size());
     const auto brick_of = [](const Vector3i& first) { return Vector3i(first / brick_cells); };
@@ -209,7 +210,7 @@ Extraction extract_surface(const PosedBody& body, const Grid& grid, Threads thre
         index.emplace(brick_key(brick_of(bricks[i].first)), static_cast<std::int32_t>(i));
     parallel_for(bricks.size(), threads, 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            evaluate_brick(body, grid, bricks[i]);
+            evaluate_brick(scene, grid, bricks[i]);
             place_vertices(grid, bricks[i]);
             for (int side = 0; side < 8; ++side) {
                 const Vector3i offset(side & 1, side >> 1 & 1, side >> 2);
@@ -230,6 +231,7 @@ Extraction extract_surface(const PosedBody& body, const Grid& grid, Threads thre
         for (std::size_t i = begin; i < end; ++i) triangulate_brick(bricks, bricks[i]);
     });
     result.bricks.grid = grid;
+    result.bricks.present = scene.present;
     result.bricks.candidates.reserve(2 * bricks.size());
     for (const Brick& brick : bricks) {
         result.triangles.insert(result.triangles.end(), brick.triangles.begin(), brick.triangles.end());

@@ -1,4 +1,4 @@
-// Turns the body's function into a triangle mesh: marching tetrahedra over a regular grid, visiting only the bricks
+// Turns the scene's function into a triangle mesh: marching tetrahedra over a regular grid, visiting only the bricks
 // that the surface enters.
 #pragma once
 
@@ -20,12 +20,13 @@ struct Grid {
     double cell = 10;  // mm
 };
 
-// For each brick of the grid that the surface enters, the parts of the body that have an effect there.
+// For each brick of the grid that the surface enters, the parts that have an effect there.
 struct BrickMap {
     Grid grid;
     std::unordered_map<std::uint64_t, PartSet> candidates;  // indexed by brick_key
+    PartSet present = 0;                                    // all parts of the scene
 
-    PartSet at(const Eigen::Vector3d& world) const;  // all parts if there is no brick
+    PartSet at(const Eigen::Vector3d& world) const;  // all that are present if there is no brick
 };
 
 // The position of a vertex on a grid edge: at share * edge from the lower corner of the edge.
@@ -41,8 +42,8 @@ struct Extraction {
     BrickMap bricks;
 };
 
-// The surface of the posed body over a grid; the same for any number of threads. About 4.5 vertices per squared cell of
+// The surface of the scene over a grid; the same for any number of threads. About 4.5 vertices per squared cell of
 // surface. Details thinner than a cell are lost.
-Extraction extract_surface(const PosedBody& body, const Grid& grid, internal::Threads threads);
+Extraction extract_surface(const PosedScene& scene, const Grid& grid, internal::Threads threads);
 
 }  // namespace htvm::synth

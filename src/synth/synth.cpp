@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "synth/appearance.h"
 #include "synth/body.h"
+#include "synth/choreography.h"
 #include "synth/extract.h"
 #include "synth/motion.h"
 #include "synth/random.h"
@@ -49,13 +50,10 @@ Grid free_grid(RandomKey key, double vertices) {
 }
 
 // Moves a point towards the surface by its distance, in the direction of steepest descent of the distance.
-void descend(Vector3d& position, const PosedBody& body, const BrickMap& bricks, double longest_step) {
+void descend(Vector3d& position, const PosedScene& scene, const BrickMap& bricks, double longest_step) {
     const PartSet candidates = bricks.at(position);
-    const double distance = evaluate_body(body, candidates, position).distance, width = 0.5;
-    Vector3d gradient;
-    for (int axis = 0; axis < 3; ++axis)
-        gradient[axis] =
-            (evaluate_body(body, candidates, position + width * Vector3d::Unit(axis)).distance - distance) / width;
+    const double distance = evaluate_surface(scene, candidates, position).distance;
+    const Vector3d gradient = surface_gradient(scene, candidates, position);
     const double steepness2 = std::max(gradient.squaredNorm(), 0.25);
     const double step = std::clamp(distance / std::sqrt(steepness2), -longest_step, longest_step);
     position -= step * gradient / std::sqrt(steepness2);
@@ -63,7 +61,7 @@ void descend(Vector3d& position, const PosedBody& body, const BrickMap& bricks, 
 
 // Moves every vertex onto the surface: along its normal, or, if the normal of a crumpled neighbourhood does not lead
 // there, along the gradient of the distance.
-void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, int rounds, Threads threads) {
+void project(HalfEdgeMesh& mesh, const PosedScene& scene, const BrickMap& bricks, int rounds, Threads threads) {
     const auto normals = vertex_normals(mesh, threads);
     const double longest_step = 0.5 * bricks.grid.cell;
     constexpr double near_enough = 0.5;  // mm
@@ -72,7 +70,7 @@ void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, 
         for (std::size_t v = begin; v < end; ++v) {
             const Vector3d start = mesh.positions[v];
             Vector3d position = start;
-            const auto distance_here = [&] { return evaluate_body(body, bricks.at(position), position).distance; };
+            const auto distance_here = [&] { return evaluate_surface(scene, bricks.at(position), position).distance; };
             double distance = distance_here(), before = distance;
             for (int round = 0; round < rounds; ++round) {
                 position -= std::clamp(distance, -longest_step, longest_step) * normals[v];
@@ -82,7 +80,7 @@ void project(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, 
             }
             if (std::abs(distance) > near_enough && std::abs(distance) > 0.7 * std::abs(before)) {
                 position = start;
-                for (int round = 0; round < most_descents; ++round) descend(position, body, bricks, longest_step);
+                for (int round = 0; round < most_descents; ++round) descend(position, scene, bricks, longest_step);
             }
             mesh.positions[v] = position;
         }
@@ -117,7 +115,7 @@ void jitter(HalfEdgeMesh& mesh, double share, RandomKey key) {
 }
 
 // The wanted number of vertices, spread evenly but randomly over the surface.
-void remesh(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, std::size_t vertices, RandomKey key,
+void remesh(HalfEdgeMesh& mesh, const PosedScene& scene, const BrickMap& bricks, std::size_t vertices, RandomKey key,
             Threads threads) {
     // Which edges are collapsed depends on their lengths. Once the vertices have moved, these no longer depend on the
     // grid.
@@ -128,13 +126,13 @@ void remesh(HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks, s
     jitter(mesh, 0.2, derive_key(key, 1));
     flip_to_delaunay(mesh);
     relax(mesh, 0.7, threads);
-    project(mesh, body, bricks, 1, threads);
+    project(mesh, scene, bricks, 1, threads);
     flip_to_delaunay(mesh);
     relax(mesh, 0.5, threads);
     jitter(mesh, 0.1, derive_key(key, 2));
-    project(mesh, body, bricks, 2, threads);
+    project(mesh, scene, bricks, 2, threads);
     flip_to_delaunay(mesh);
-    project(mesh, body, bricks, 1, threads);
+    project(mesh, scene, bricks, 1, threads);
 }
 
 void scale_to_power(std::vector<double>& values, double power) {
@@ -192,19 +190,21 @@ Vector3f to_float(const Vector3d& p) {
     return {static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
 }
 
-std::vector<Colour> sample_colours(const HalfEdgeMesh& mesh, const PosedBody& body, const BrickMap& bricks,
+std::vector<Colour> sample_colours(const HalfEdgeMesh& mesh, const PosedScene& scene, const BrickMap& bricks,
                                    Threads threads) {
     std::vector<Colour> colours(mesh.positions.size());
     parallel_for(colours.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             const Vector3d& position = mesh.positions[v];
-            colours[v] = surface_colour(evaluate_body(body, bricks.at(position), position).rest);
+            const SurfacePoint point = evaluate_surface(scene, bricks.at(position), position);
+            colours[v] = surface_colour(figure_of(point.part), point.rest);
         }
     });
     return colours;
 }
 
-Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey key, Threads threads) {
+void make_surface(SynthFrame& frame, const SynthOptions& options, const PosedScene& scene, RandomKey key,
+                  Threads threads) {
     const double vertices = std::clamp(options.vertices, fewest_vertices, most_vertices);
     const double wanted = vertices * (0.97 + 0.06 * random_uniform(derive_key(key, count_stream), 0));
     Grid grid;
@@ -212,17 +212,18 @@ Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey ke
         grid.cell = synth_lattice_cell(options);
     else
         grid = free_grid(derive_key(key, grid_stream), wanted);
-    const Extraction extraction = extract_surface(body, grid, threads);
+    const Extraction extraction = extract_surface(scene, grid, threads);
     // A reconstruction drops specks; in lattice mode every vertex stays on its edge.
     const std::size_t fewest = options.lattice ? 0 : extraction.triangles.size() / 100;
     HalfEdgeMesh surface = build_half_edges(extraction.positions, extraction.triangles, fewest);
     if (!options.lattice)
-        remesh(surface, body, extraction.bricks, static_cast<std::size_t>(wanted), derive_key(key, jitter_stream),
+        remesh(surface, scene, extraction.bricks, static_cast<std::size_t>(wanted), derive_key(key, jitter_stream),
                threads);
 
-    Mesh mesh;
+    Mesh& mesh = frame.mesh;
     mesh.triangles = triangles_of(surface);
-    if (options.colours) mesh.colours = sample_colours(surface, body, extraction.bricks, threads);
+    if (options.colours) mesh.colours = sample_colours(surface, scene, extraction.bricks, threads);
+    for (const auto& position : surface.positions) frame.true_positions.push_back(to_float(position));
     const auto noise =
         reconstruction_noise(surface, std::max(0.0, options.surface_noise_power), derive_key(key, surface_stream));
     if (options.lattice)
@@ -232,7 +233,6 @@ Mesh frame_mesh(const SynthOptions& options, const PosedBody& body, RandomKey ke
     for (const auto& position : surface.positions) mesh.positions.push_back(to_float(position));
     if (options.normals)
         for (const auto& normal : vertex_normals(surface, threads)) mesh.normals.push_back(to_float(normal));
-    return mesh;
 }
 
 }  // namespace
@@ -262,22 +262,27 @@ Result<void> check_synth_options(const SynthOptions& options) {
         return fail(ErrorKind::bad_input, "the surface noise power must be between 0 and 100 mm^2");
     if (!(options.joint_noise_power >= 0 && options.joint_noise_power <= 1e6))
         return fail(ErrorKind::bad_input, "the joint noise power must be between 0 and 1000000 mm^2");
+    if (options.people < 1 || options.people > 2)
+        return fail(ErrorKind::bad_input,
+                    "a synthetic capture can have 1 or 2 people, not " + std::to_string(options.people));
+    if (options.people == 2 && options.motion == SynthMotion::tour)
+        return fail(ErrorKind::bad_input, "the tour has one person; choose another motion for two");
     return {};
 }
 
 SynthFrame synth_frame(const SynthOptions& options, int frame, Threads threads) {
     const double fps = options.fps >= 0.1 ? std::min(options.fps, 10000.0) : 0.1;
-    const PosedBody body = pose_body(std::max(0, frame) / fps);
+    const PosedScene scene = pose_scene(options.motion, options.people, options.seed, std::max(0, frame) / fps);
     const RandomKey key = frame_key(options, frame);
     SynthFrame result;
-    for (const auto& joint : body.joints) result.true_pose.joints.push_back({joint.x(), joint.y(), joint.z()});
+    for (const auto& joint : scene.joints) result.true_pose.joints.push_back({joint.x(), joint.y(), joint.z()});
     result.pose = result.true_pose;
     const RandomKey joint_key = derive_key(key, joint_stream);
     const double deviation = std::sqrt(std::max(0.0, options.joint_noise_power));
     for (std::size_t j = 0; j < result.pose.joints.size(); ++j)
         for (std::size_t axis = 0; axis < 3; ++axis)
             result.pose.joints[j][axis] += deviation * random_gaussian(joint_key, 3 * j + axis);
-    result.mesh = frame_mesh(options, body, key, threads);
+    make_surface(result, options, scene, key, threads);
     return result;
 }
 

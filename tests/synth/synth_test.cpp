@@ -218,10 +218,10 @@ TEST(Synth, WithoutNoiseEveryVertexIsOnTheSurface) {
         SynthOptions options = small(vertices);
         options.surface_noise_power = 0;
         const Mesh mesh = synth_frame(options, 12).mesh;
-        const synth::PosedBody body = synth::pose_body(12 / options.fps);
+        const synth::PosedScene scene = synth::scene_of(synth::pose_body(12 / options.fps));
         std::size_t away = 0;
         for (const auto& p : mesh.positions) {
-            const double distance = synth::evaluate_body(body, synth::all_parts, {p[0], p[1], p[2]}).distance;
+            const double distance = synth::evaluate_surface(scene, scene.present, {p[0], p[1], p[2]}).distance;
             EXPECT_LT(std::abs(distance), 8.0) << "mm";
             if (std::abs(distance) > 0.5) ++away;
         }

@@ -1,0 +1,91 @@
+#include "synth_truth.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
+
+#include "io/mesh_file.h"
+#include "io/output_file.h"
+#include "synth/synth.h"
+
+namespace htvm::app {
+namespace {
+
+const char* name_of(LimbEventKind kind) {
+    switch (kind) {
+        case LimbEventKind::fast:
+            return "fast";
+        case LimbEventKind::touch:
+            return "touch";
+        case LimbEventKind::release:
+            return "release";
+        case LimbEventKind::occluded:
+            return "occluded";
+    }
+    return "";
+}
+
+double hundredths(double value) { return std::round(100 * value) / 100; }
+
+nlohmann::ordered_json mark_json(const SurfaceMark& mark) {
+    return {{"of", figure_name(mark.part)},
+            {"part", part_name(mark.part)},
+            {"rest", {hundredths(mark.rest[0]), hundredths(mark.rest[1]), hundredths(mark.rest[2])}}};
+}
+
+nlohmann::ordered_json event_json(const LimbEvent& event) {
+    nlohmann::ordered_json out = {{"event", name_of(event.kind)},
+                                  {"of", figure_name(event.part)},
+                                  {"limb", part_name(event.part)},
+                                  {"first", event.first},
+                                  {"last", event.last}};
+    if (event.kind == LimbEventKind::fast) out["largest_step_mm"] = hundredths(event.largest_step);
+    if (event.kind == LimbEventKind::touch || event.kind == LimbEventKind::release) {
+        out["with"] = part_name(event.other);
+        out["with_of"] = figure_name(event.other);
+    }
+    return out;
+}
+
+}  // namespace
+
+Result<TruthFiles> TruthFiles::create(const std::filesystem::path& folder, const SynthOptions& options, int first_frame,
+                                      int marks) {
+    for (const char* name : {"surface", "marks"}) {
+        std::error_code error;
+        std::filesystem::create_directories(folder / name, error);
+        if (error) return fail(ErrorKind::bad_input, (folder / name).string() + " cannot be made: " + error.message());
+    }
+    TruthFiles files;
+    files.folder_ = folder;
+    files.options_ = options;
+    files.first_frame_ = first_frame;
+    files.marks_ = surface_marks(options, static_cast<std::size_t>(marks));
+    return files;
+}
+
+Result<void> TruthFiles::add(const std::string& file_name, SynthFrame frame, TrueFrame truth) {
+    Mesh surface = std::move(frame.mesh);
+    surface.positions = std::move(frame.true_positions);
+    surface.normals.clear();  // they are those of the noisy surface
+    if (auto ok = write_mesh(folder_ / "surface" / file_name, surface); !ok) return ok;
+    Mesh marks;
+    marks.positions = std::move(truth.positions);
+    marks.normals = std::move(truth.normals);
+    if (auto ok = write_mesh(folder_ / "marks" / file_name, marks); !ok) return ok;
+    limbs_.push_back(std::move(truth.limbs));
+    return {};
+}
+
+Result<void> TruthFiles::finish() const {
+    nlohmann::ordered_json out = {
+        {"fps", options_.fps}, {"first_frame", first_frame_}, {"frames", limbs_.size()}, {"seed", options_.seed}};
+    auto& marks = out["marks"] = nlohmann::ordered_json::array();
+    for (const SurfaceMark& mark : marks_) marks.push_back(mark_json(mark));
+    auto& events = out["events"] = nlohmann::ordered_json::array();
+    for (const LimbEvent& event : limb_events(limbs_, first_frame_, options_.fps)) events.push_back(event_json(event));
+    return write_file(folder_ / "truth.json", out.dump(1) + "\n");
+}
+
+}  // namespace htvm::app
