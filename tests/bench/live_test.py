@@ -1,4 +1,5 @@
 """What the measurements of live streams rest on: python3 live_test.py (needs numpy)."""
+import math
 import os
 import sys
 import unittest
@@ -95,6 +96,9 @@ class Lines(unittest.TestCase):
 
 
 class Datagrams(unittest.TestCase):
+    # I-frame of 3 datagrams, T-frames of one each
+    FRAMES = ((1, 0, 0, 40), (2, 0, 0, 3000), (7, 1, 0, 100), (7, 2, 1, 100))
+
     @staticmethod
     def stream(*frames):
         """Of (kind, number, reference, payload bytes)."""
@@ -102,16 +106,23 @@ class Datagrams(unittest.TestCase):
                         for kind, number, reference, size in frames)
 
     def test_a_frame_is_shown_if_all_it_needs_is_whole(self):
-        stream = self.stream((1, 0, 0, 40), (2, 0, 0, 3000), (7, 1, 0, 100), (7, 2, 1, 100))  # 3, 1 and 1 datagrams
-        self.assertAlmostEqual((0.9 ** 3 + 0.9 ** 4 + 0.9 ** 5) / 3, datagrams.shown(stream, 0.1, "none"))
-        self.assertAlmostEqual((0.99 ** 3 + 0.99 ** 4 + 0.99 ** 5) / 3, datagrams.shown(stream, 0.1, 1))
+        self.assertAlmostEqual((0.9 ** 3 + 0.9 ** 4 + 0.9 ** 5) / 3,
+                               datagrams.shown(self.stream(*self.FRAMES), 0.1, datagrams.Repair()))
 
-    def test_parity_stands_in_for_any_one(self):
-        self.assertAlmostEqual(0.9 ** 4 + 4 * 0.1 * 0.9 ** 3, datagrams.whole(3, 0.1, "parity"))
+    def test_sending_again_squares_the_loss(self):
+        self.assertAlmostEqual((0.99 ** 3 + 0.99 ** 4 + 0.99 ** 5) / 3,
+                               datagrams.shown(self.stream(*self.FRAMES), 0.1, datagrams.Repair(again=1)))
 
-    def test_parity_takes_one_more_datagram_but_no_more_than_the_packet(self):
-        self.assertAlmostEqual((1200 + 136) / (3036 + 136), datagrams.parity_overhead(self.stream((2, 0, 0, 3000),
-                                                                                                  (7, 1, 0, 100))))
+    def test_parity_stands_in_for_as_many_as_there_are(self):
+        self.assertAlmostEqual(0.9 ** 4 + 4 * 0.1 * 0.9 ** 3,
+                               datagrams.whole(3, 0.1, datagrams.Repair(parity=0.1, least_parity=1)))
+        self.assertAlmostEqual(sum(math.comb(24, lost) * 0.1 ** lost * 0.9 ** (24 - lost) for lost in range(5)),
+                               datagrams.whole(20, 0.1, datagrams.Repair(parity=0.2, least_parity=1)))
+
+    def test_parity_is_as_large_as_the_largest_piece(self):
+        stream = self.stream((2, 0, 0, 3000), (7, 1, 0, 100))
+        self.assertAlmostEqual((1200 + 136) / (3036 + 136),
+                               datagrams.parity_bytes(stream, datagrams.Repair(least_parity=1)))
 
 
 class PublishedPackets(unittest.TestCase):

@@ -1,5 +1,6 @@
 """What would become of a stream that is sent as datagrams, each lost by itself: computed from its packets' sizes and
 references. Of the packets only headers are read (docs/bitstream.md, section 2)."""
+import dataclasses
 import math
 import os
 import sys
@@ -30,13 +31,26 @@ def sizes_by_kind(data):
              datagrams(percentile(of_kind, 50)), datagrams(max(of_kind))) for kind, of_kind in sorted(sizes.items())]
 
 
+@dataclasses.dataclass(frozen=True)
+class Repair:
+    again: int = 0  # how often what is missing is sent again, a round trip each
+    parity: float = 0  # datagrams more, as a part of a packet's, any of which stands in for one that is missing,
+    least_parity: int = 0  # but at least so many
+
+    def parity_of(self, count):
+        return max(self.least_parity, math.ceil(self.parity * count))
+
+
+REPAIRS = {"none": Repair(), "parity of a tenth, at least 1": Repair(parity=0.1, least_parity=1),
+           "of a fifth, at least 2": Repair(parity=0.2, least_parity=2), "sent again once": Repair(again=1),
+           "sent again twice": Repair(again=2)}
+
+
 def whole(count, loss, repair):
-    """The probability that all of a packet's datagrams are there in the end. repair: "none"; "parity": one more
-    datagram, from which any one of them follows; or how often those that are missing are sent again."""
-    if repair == "parity":
-        return (1 - loss) ** count * (1 + count * loss)  # of count + 1, at most one is lost
-    again = 0 if repair == "none" else repair
-    return (1 - loss ** (1 + again)) ** count
+    """The probability that a packet of so many datagrams can be put together in the end."""
+    lost, spare = loss ** (1 + repair.again), repair.parity_of(count)
+    return sum(math.comb(count + spare, missing) * lost ** missing * (1 - lost) ** (count + spare - missing)
+               for missing in range(spare + 1))
 
 
 def shown(data, loss, repair):
@@ -55,18 +69,17 @@ def shown(data, loss, repair):
     return sum_ / len(frames)
 
 
-def parity_overhead(data):
-    """How many more bytes one parity datagram for each packet takes, as a part."""
+def parity_bytes(data, repair):
+    """How many more bytes the parity takes, as a part. A parity datagram is as large as the packet's largest."""
     sizes = [packet_bytes(packet) for frame in frames_of(data) for packet in frame]
-    return sum(min(DATAGRAM_BYTES, size) for size in sizes) / sum(sizes)
+    return sum(repair.parity_of(datagrams(size)) * min(DATAGRAM_BYTES, size) for size in sizes) / sum(sizes)
 
 
-def report(data, losses, round_trip_ms, say):
+def report(data, losses, say):
     say("  packets            number  bytes p50     p99     max   datagrams p50  max")
     for name, number, median, most, largest, count, most_count in sizes_by_kind(data):
         say(f"  {name:16} {number:8} {median:10.0f} {most:7.0f} {largest:7} {count:15} {most_count:4}")
-    say(f"  frames shown   no repair   parity (+{100 * parity_overhead(data):.0f} % bytes)   sent again once "
-        f"(+{round_trip_ms:g} ms)   twice (+{2 * round_trip_ms:g} ms)")
-    for loss in losses:
-        none, parity, once, twice = (100 * shown(data, loss / 100, repair) for repair in ("none", "parity", 1, 2))
-        say(f"  {loss:8g} % lost {none:8.1f} % {parity:17.1f} % {once:23.1f} % {twice:18.2f} %")
+    say("  frames shown with repair: " + " ".join(f"{f'at {loss:g} % lost':>14}" for loss in losses))
+    for name, repair in REPAIRS.items():
+        more = f" (+{100 * parity_bytes(data, repair):.0f} % bytes)" if repair.least_parity else ""
+        say(f"  {name + more:46}" + " ".join(f"{100 * shown(data, loss / 100, repair):12.2f} %" for loss in losses))

@@ -271,7 +271,7 @@ def main():
     for megabits in options.rate:
         with open(hubs.stream_of(options.htvm, megabits), "rb") as file:
             say(f"\nIf the packets of {megabits:g} Mbit/s were datagrams of {datagrams.DATAGRAM_BYTES} bytes:")
-            datagrams.report(file.read(), [loss for loss in options.loss if loss > 0], options.round_trip, say)
+            datagrams.report(file.read(), [loss for loss in options.loss if loss > 0], say)
     if options.json:
         hubs.print_json({"router": checked, "late_ms_p99": report["late_ms_p99"], "watched": watched, "joined": joined})
 
