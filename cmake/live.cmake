@@ -90,6 +90,7 @@ htvm_floor(live
     src/live/live_connection.cpp
     src/live/metrics.cpp
     src/live/recorder.cpp
+    src/live/repeated_packets.cpp
     src/live/served_folder.cpp
     ${nats_source}
     ${player_cpp}

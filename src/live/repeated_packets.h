@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 
-#include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 
 namespace htvm::live {
@@ -15,24 +14,7 @@ namespace htvm::live {
 class RepeatedPackets {
 public:
     // Whether the packet came before. Else it counts as having come.
-    bool is_repeat(const PacketHeader& header) {
-        if (header.kind == PacketKind::sequence) {
-            if (header_ && header.reference == *header_ && header.has(packet_flag::session)) return true;
-            header_ = header.has(packet_flag::session) ? std::optional(header.reference) : std::nullopt;
-            frame_.reset();
-            audio_us_.reset();
-            return false;
-        }
-        if (!header_) return false;
-        if (header.kind == PacketKind::audio) {
-            if (audio_us_ && header.timestamp_us <= *audio_us_) return true;
-            audio_us_ = header.timestamp_us;
-            return false;
-        }
-        if (frame_ && header.frame <= *frame_) return true;
-        if (frame_type(header.kind)) frame_ = header.frame;
-        return false;
-    }
+    bool is_repeat(const PacketHeader& header);
 
 private:
     std::optional<std::uint32_t> header_;   // the CRC of the one in force, if it has a session

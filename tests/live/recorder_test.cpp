@@ -273,7 +273,7 @@ TEST(RecordingNameTest, ANameOfAStreamMakesAHarmlessNameOfAFile) {
     EXPECT_EQ(recording_name("anna", evening), "anna-20261122-130551");
     EXPECT_EQ(recording_name("..a b/c%\n\"", evening), "%2E.a%20b%2Fc%25%0A%22-20261122-130551");
     EXPECT_EQ(recording_name("caf\xc3\xa9", evening), "caf\xc3\xa9-20261122-130551");
-    EXPECT_EQ(recording_name(std::string(1000, 'a'), evening), std::string(200, 'a') + "-20261122-130551");
+    EXPECT_EQ(recording_name(std::string(1000, 'a'), evening), std::string(200, 'a').append("-20261122-130551"));
 }
 
 }  // namespace
