@@ -74,6 +74,7 @@ htvm_floor(live_client
     src/live/hub_client.cpp
     src/live/line.cpp
     src/live/publisher.cpp
+    src/live/repeated_packets.cpp
     src/live/watcher.cpp
   LINKS htvm_decoder htvm_core Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
 htvm_library(live FLOORS live_client LINKS decoder NEEDS OpenSSL::SSL)
@@ -90,7 +91,6 @@ htvm_floor(live
     src/live/live_connection.cpp
     src/live/metrics.cpp
     src/live/recorder.cpp
-    src/live/repeated_packets.cpp
     src/live/served_folder.cpp
     ${nats_source}
     ${player_cpp}
