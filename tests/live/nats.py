@@ -44,7 +44,7 @@ def header_packet():
 def frame_packet(number):
     payload = hashlib.sha512(struct.pack("<I", number)).digest() * (100 if number % GROUP == 0 else 20)
     if number % (5 * GROUP) == 0:
-        payload *= 200  # more than a part of a message between hubs
+        payload *= 110  # more than a part of a message between hubs, less than may wait for a viewer
     if number % GROUP == 0:
         return packet(INTRA, REFERRED | ACCESS, number, number, payload)
     return packet(TRACKED, REFERRED, number, number - 1, payload)
