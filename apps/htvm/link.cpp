@@ -57,8 +57,8 @@ void add_link(CLI::App& app, Run& run) {
         ->add_option("--keys", options->keys, "The hub's file of keys (htvm serve --link-keys); the newest one signs")
         ->type_name("FILE")
         ->required();
-    command->add_option("--url", options->hub, "The hub's address (default http://127.0.0.1:8080)")
-        ->type_name("https://HOST");
+    command->add_option("--url", options->hub, "The hub's address, https or http (default http://127.0.0.1:8080)")
+        ->type_name("ADDRESS");
     auto* file =
         command->add_flag("--file", options->file, "To a file, whose name may have folders, instead of a live stream");
     command

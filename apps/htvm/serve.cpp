@@ -139,8 +139,9 @@ void add_nats_options(CLI::App& command, live::NatsOptions& nats) {
         ->needs(servers);
     command
         .add_option("--hub-url", nats.hub_url,
-                    "Where publishers and viewers reach this hub; they are told the addresses of all hubs")
-        ->type_name("wss://HOST[:PORT]")
+                    "Where publishers and viewers reach this hub, such as wss://hub.example:8080; they are told "
+                    "the addresses of all hubs")
+        ->type_name("ADDRESS")
         ->needs(servers);
     command
         .add_option("--nats-ca", nats.ca_file, "Certificates to check those of NATS by (PEM; default: the system's)")
@@ -197,9 +198,9 @@ void add_access_options(CLI::App& command, Options& options) {
         ->configurable(false);
     auto* origins = command
                         .add_option("--origin", server.origins,
-                                    "Pages of this site may read and watch, and no other site's; may be given more "
-                                    "than once (default: pages of all sites)")
-                        ->type_name("https://SITE")
+                                    "Pages of this site, such as https://a.example, may read and watch, and no other "
+                                    "site's; may be given more than once (default: pages of all sites)")
+                        ->type_name("SITE")
                         ->allow_extra_args(false);
     command.add_flag("--same-site", options.same_site, "Pages of no other site may read and watch")->excludes(origins);
 }

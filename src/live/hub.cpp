@@ -536,6 +536,7 @@ void Hub::end_stream(std::map<std::string, Stream>::iterator found, const std::s
     for (const auto& listener : listeners_)
         if (listener.ended) listener.ended(stream.key());
     stream.mapped().ended = true;
+    tell({.name = "ended", .text = reason, .stream = stream.key()});
     tell_gone(stream.mapped(), reason);
     if (!stream.mapped().watching.empty()) ended_.emplace(stream.mapped().number, std::move(stream.mapped()));
     changed(stream.key());

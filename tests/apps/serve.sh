@@ -17,6 +17,7 @@ PYTHON
 }
 # start OPTIONS...: a server in the background; $server is its process, $url its address.
 start() {
+    rm -f out err
     "$htvm" serve --port 0 "$@" >out 2>err &
     server=$!
     for _ in $(seq 200); do [ -s out ] && break; sleep 0.05; done
