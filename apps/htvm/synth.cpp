@@ -273,7 +273,7 @@ void add_synth(CLI::App& app, Run& run) {
         "  htvm encode dance -o dance.htvm\n"
         "  htvm compare dance dance.htvm --only m2 --truth truth\n"
         "Example: a live stream without a camera, beside a hub (htvm serve)\n"
-        "  htvm synth --live --vertices 10000 | htvm encode - -o ws://localhost:8080/publish/me");
+        "  htvm synth --live --vertices 10000 --fps 10 | htvm encode - -o ws://localhost:8080/publish/me");
     command->callback([options, frames, &run] {
         if (options->live == !options->folder.empty())
             throw CLI::ValidationError("OUT_DIR",

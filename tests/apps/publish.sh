@@ -13,13 +13,13 @@ begins_to() {
     done
     fail "never: $*"
 }
-# hub LOG PORT: a hub on this port, or a free one (0); sets hub_pid and address.
+# hub LOG PORT OPTIONS...: a hub on this port, or a free one (0); sets hub_pid and address.
 hub() {
-    "$htvm" serve --port "$2" >"$1" 2>"$1.err" &
+    "$htvm" serve --port "$2" "${@:3}" >"$1" 2>"$1.err" &
     hub_pid=$!
     started+=("$hub_pid")
     begins_to grep -q http "$1"
-    address=$(sed -E 's|.*http://([^/]*)/.*|\1|' "$1" | head -1)
+    address=$(sed -E 's|.*https?://([^/]*)/.*|\1|' "$1" | head -1)
 }
 
 "$htvm" synth walk --frames 12 --vertices 300 >/dev/null 2>&1
@@ -97,6 +97,26 @@ started+=("$encoder")
 kill -INT "$encoder"
 wait "$encoder"
 [ $? -eq 130 ] || fail "encoding for a hub after Ctrl-C: $(cat encode.err)"
+
+# With TLS and a token: the hub's certificate is checked, and its answer ends what it refuses.
+if command -v openssl >/dev/null; then
+    openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -keyout key.pem -out cert.pem -days 1 \
+        -subj /CN=hub -addext subjectAltName=IP:127.0.0.1 2>/dev/null
+    "$htvm" serve --publishers publishers.json --add-publisher walk >token 2>/dev/null
+    hub secure 0 --cert cert.pem --key key.pem --publishers publishers.json
+    "$htvm" publish walk.htvm "wss://$address/publish/walk" --ca cert.pem --token-file token --loop 2>wss.err &
+    publisher=$!
+    started+=("$publisher")
+    "$htvm" decode "wss://$address/watch/walk" --ca cert.pem --frames 12 -o secure_meshes 2>secure.err ||
+        fail "decoding over TLS: $(cat secure.err wss.err)"
+    expect 1 "is not trusted" "$htvm" publish walk.htvm "wss://$address/publish/walk" --token-file token
+    expect 1 "is not trusted" "$htvm" decode "wss://localhost:${address##*:}/watch/walk" --ca cert.pem -o nothing
+    expect 1 "401" env HTVM_TOKEN=wrong "$htvm" publish walk.htvm "wss://$address/publish/walk" --ca cert.pem
+    expect 1 "401" "$htvm" publish walk.htvm "wss://$address/publish/walk" --insecure
+    kill -INT "$publisher"
+else
+    echo "openssl is not installed: TLS is not tried"
+fi
 
 # What is wrong is said.
 expect 1 "does not begin with ws://" "$htvm" publish walk.htvm "http://$address/publish/a"
