@@ -25,10 +25,15 @@ interrupt() { # interrupt SIGNAL CODE
     local encoder=$!
     exec 3>pipe
     cat capture/frame_0000[0-3].ply >&3
-    for try in $(seq 100); do
-        # Stands where all four frames are encoded: what is buffered is written at the end.
-        [ -e out.htvm.partial ] && [ "$(ps -o stat= -p $encoder)" ] && sleep 0.1
-        [ "$try" -ge 15 ] && break
+    # All four frames are encoded once the encoder, which has begun, has had nothing to do for two seconds.
+    local try idle=0 before=none now
+    for try in $(seq 600); do
+        sleep 0.1
+        [ -e out.htvm.partial ] || continue
+        now=$(awk '{ print $14 + $15 }' "/proc/$encoder/stat")
+        if [ "$now" = "$before" ]; then idle=$((idle + 1)); else idle=0; fi
+        before=$now
+        [ $idle -lt 20 ] || break
     done
     kill -s "$1" $encoder
     wait $encoder
