@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 namespace htvm::live {
@@ -251,6 +252,11 @@ Result<ToViewer> read_to_viewer(std::string_view text) {
     if (members.type() == "gone") out = Gone{members.words("reason").value_or("")};
     if (members.type() == "stamp") out = read_stamp(members);
     return members.result(std::move(out));
+}
+
+std::int64_t system_microseconds() {
+    return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+        .count();
 }
 
 }  // namespace htvm::live

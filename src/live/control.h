@@ -69,6 +69,9 @@ struct Gone {
     std::string reason{};  // why the publisher's connection, or the stream, ended
 };
 
+// Now by the system clock: microseconds since 1970, as stamps tell it, and claims of hubs.
+std::int64_t system_microseconds();
+
 // Of a frame, for measurement; it comes right before the frame's packet. By the system clocks, since 1970.
 struct Stamp {
     std::uint32_t frame = 0;            // the number in the packet's header

@@ -32,11 +32,6 @@ std::int64_t microseconds(Hub::Clock::duration time) {
     return std::chrono::duration_cast<std::chrono::microseconds>(time).count();
 }
 
-std::int64_t system_microseconds() {
-    return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-        .count();
-}
-
 CloseCode code_of(const Error& error) {
     return error.kind == ErrorKind::limit ? CloseCode::try_later : CloseCode::refused;
 }

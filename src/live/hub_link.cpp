@@ -4,17 +4,14 @@
 #include <set>
 #include <utility>
 
+#include "live/control.h"
+
 namespace htvm::live {
 namespace {
 
 // Whoever may send messages can take memory here, but not without bound.
 constexpr std::size_t most_hubs = 1000, most_streams = 10000;
 constexpr std::chrono::milliseconds answer_again{50};  // between two closures for one hub
-
-std::int64_t system_microseconds() {
-    return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-        .count();
-}
 
 void add(HubLinkCounters& sum, const FarStreamCounters& stream) {
     sum.packets += stream.packets;

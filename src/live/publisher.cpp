@@ -146,9 +146,7 @@ HubTalk Publisher::State::talk() {
     if (options.stamps)
         out.before = [](const LivePacket& packet) {
             if (!frame_type(packet.header.kind)) return std::string();
-            const auto now = std::chrono::system_clock::now().time_since_epoch();
-            return write_text(
-                Stamp{packet.header.frame, std::chrono::duration_cast<std::chrono::microseconds>(now).count(), {}});
+            return write_text(Stamp{packet.header.frame, system_microseconds(), {}});
         };
     out.take_text = [this](const std::string& text) { take_text(text); };
     out.heartbeat = [this] {
