@@ -6,4 +6,4 @@ if(benchmark_sources)
 endif()
 # Viewers for ./dev live-load and lossy-line.
 add_executable(live_watch bench/live/watch.cpp)
-target_link_libraries(live_watch PRIVATE htvm_decoder CLI11::CLI11 fmt::fmt)
+target_link_libraries(live_watch PRIVATE htvm_live_client htvm_decoder CLI11::CLI11 fmt::fmt)

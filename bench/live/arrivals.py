@@ -2,7 +2,7 @@
 import numpy as np
 
 ARRIVAL = np.dtype([("arrived", "<i8"), ("sent", "<i8"), ("viewer", "<u4"), ("frame", "<u4"), ("bytes", "<u4"),
-                    ("kind", "u1"), ("unused", "u1", 3)])
+                    ("kind", "u1"), ("lacking", "u1"), ("unused", "u1", 2)])
 CONNECTING, CLOSED = 200, 201
 INTRA = 2
 FRAMES = (2, 3, 6, 7)  # kinds of packets that hold a frame

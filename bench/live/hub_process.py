@@ -3,9 +3,11 @@ import contextlib
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 import time
+import urllib.request
 
 FOLDER = os.path.dirname(os.path.abspath(__file__))
 WORK = os.path.join("out", "live")  # streams are kept here; removing it makes them anew
@@ -51,7 +53,7 @@ def started(words, **options):
 @contextlib.contextmanager
 def hub(htvm, *options, inside=()):
     """(process, port) of htvm serve. inside: words before the command, such as ip netns exec NAME."""
-    with started([*inside, htvm, "serve", "--files", WORK, "--port", 0, *options],
+    with started([*inside, htvm, "serve", "--files", WORK, *([] if "--port" in options else ["--port", 0]), *options],
                  stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         line = process.stdout.readline()
         address = re.search(r":(\d+)/", line)
@@ -60,8 +62,46 @@ def hub(htvm, *options, inside=()):
         yield process, int(address.group(1))
 
 
-def publisher(stream, name, port, inside=()):
-    return started([*inside, sys.executable, os.path.join(FOLDER, "publish.py"), stream, name, port])
+def certificate(folder):
+    """htvm serve's options for TLS, by a certificate that is made in this folder."""
+    paths = [os.path.join(folder, name) for name in ("chain.pem", "key.pem")]
+    run("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", 2,
+        "-subj", "/CN=127.0.0.1", "-out", paths[0], "-keyout", paths[1])
+    return ["--cert", paths[0], "--key", paths[1]]
+
+
+def publisher(stream, name, port, inside=(), tls=False):
+    return started([*inside, sys.executable, os.path.join(FOLDER, "publish.py"), stream, name, port,
+                    *(["--tls"] if tls else [])])
+
+
+def free_port():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        return taken.getsockname()[1]
+
+
+def streams(port):
+    """What the hub tells of its streams, by name."""
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/streams", timeout=5) as answer:
+        return {stream["name"]: stream for stream in json.load(answer)}
+
+
+def nats_server(port):
+    return started(["nats-server", "-a", "127.0.0.1", "-p", port], stderr=subprocess.DEVNULL)
+
+
+@contextlib.contextmanager
+def joined_hubs(htvm, count, nats_port, *options):
+    """[(process, port)] of hubs that are joined through NATS and tell of each other."""
+    with contextlib.ExitStack() as stack:
+        hubs = []
+        for i in range(count):
+            port = free_port()
+            hubs.append(stack.enter_context(
+                hub(htvm, "--port", port, "--hub-url", f"ws://127.0.0.1:{port}", "--hub-name", f"hub{i}", "--nats",
+                    f"nats://127.0.0.1:{nats_port}", *options)))
+        yield hubs
 
 
 def memory_bytes(pid):

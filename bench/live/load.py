@@ -14,6 +14,7 @@ import time
 import numpy as np
 
 import arrivals
+import hub_lost
 import hub_process as hubs
 
 JOINS_PER_SECOND = 400
@@ -41,15 +42,16 @@ def measure(options, viewers):
     stream = hubs.stream_of(options.htvm, options.rate)
     slow = round(viewers * options.slow / 100)
     with tempfile.TemporaryDirectory() as folder, \
-            hubs.hub(options.htvm, "--connections", viewers + 16) as (hub, port), \
-            hubs.publisher(stream, "person", port) as publisher:
+            hubs.hub(options.htvm, "--connections", viewers + 16,
+                     *(hubs.certificate(folder) if options.tls else [])) as (hub, port), \
+            hubs.publisher(stream, "person", port, tls=options.tls) as publisher:
         time.sleep(1.5)
         memory, sockets = hubs.memory_bytes(hub.pid), hubs.socket_bytes()
         noted = os.path.join(folder, "arrivals")
         joined = viewers / JOINS_PER_SECOND + SETTLE_SECONDS
         with hubs.started([options.live_watch, "person", "-o", noted, "--port", port, "--viewers", viewers,
                            "--slow", slow, "--slow-bits", options.rate * 1e6 / 3, "--joins", JOINS_PER_SECOND,
-                           "--seconds", joined + options.seconds + 2]) as watch:
+                           "--seconds", joined + options.seconds + 2, *(["--tls"] if options.tls else [])]) as watch:
             time.sleep(joined)
             begin = hubs.now_us()
             used, watched_used = hubs.processor_seconds(hub.pid), hubs.processor_seconds(watch.pid)
@@ -118,10 +120,18 @@ def main():
     parser.add_argument("--slow", type=float, default=5, help="percent of the viewers that read at a third of the "
                         "rate; they do not count in the delays (default 5)")
     parser.add_argument("--most", type=float, default=50, help="milliseconds (default 50)")
+    parser.add_argument("--tls", action="store_true", help="publisher and viewers connect by TLS")
+    parser.add_argument("--lost", choices=[*hub_lost.CASES, "each"], help="instead, what these viewers (default 1000) "
+                        "watch through is lost, one of three hubs that NATS joins, or NATS itself: how soon they are "
+                        "back. " + "; ".join(f"{name}: {case.what}" for name, case in hub_lost.CASES.items()))
     parser.add_argument("--json", action="store_true", help="the results for machines")
     options = parser.parse_args()
     if options.minutes:
         options.seconds = options.minutes * 60
+    if options.lost and (options.tls or (options.viewers and not options.viewers.isdigit())):
+        parser.error("--lost takes one number of viewers, and no --tls")
+    if options.lost:
+        sys.exit(0 if hub_lost.main(options) else 1)
     results, held = [], 0
     if not options.json:
         print(heading(), flush=True)

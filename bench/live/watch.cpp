@@ -2,11 +2,13 @@
 // take what a hub sends as WebSockets, decode nothing, and note when each packet came. bench/live/publish.py writes the
 // time of sending into each packet's timestamp (CLOCK_MONOTONIC, which all processes of a machine share, in other
 // network namespaces too), so the delay is known without any other message. bench/live/arrivals.py reads what is noted.
+// A viewer who loses its hub goes to another one by the rule of all clients (docs/live.md, section 2), if asked to.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <openssl/ssl.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -20,11 +22,16 @@
 #include <cstring>
 #include <ctime>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "htvm/dependency.hpp"
 #include "htvm/packet.hpp"
+#include "live/control.h"
+#include "live/hub_list.h"
 
 namespace htvm::live_bench {
 namespace {
@@ -34,6 +41,7 @@ struct Options {
     std::uint16_t port = 8080;
     unsigned viewers = 1, per_source = 32, slow = 0;
     double seconds = 10, joins_per_second = 400, watch_seconds = 0, slow_bits = 533000;
+    bool tls = false, follow = false;
 };
 
 // What one arrival is noted as; arrivals.py has the same fields.
@@ -41,10 +49,11 @@ struct Arrival {
     std::int64_t arrived;  // microseconds by CLOCK_MONOTONIC
     std::int64_t sent;     // by the publisher; 0 for what is no packet
     std::uint32_t viewer;
-    std::uint32_t frame;  // of `closed`: the reason, as a WebSocket's code
+    std::uint32_t frame;  // of `closed`: the reason, as a WebSocket's code; of `connecting`: the hub's port
     std::uint32_t bytes;
-    std::uint8_t kind;  // a PacketKind, or one of these:
-    std::uint8_t unused[3] = {};
+    std::uint8_t kind;         // a PacketKind, or one of these:
+    std::uint8_t lacking = 0;  // 1: a frame that what came over this connection is not enough to decode (if `follow`)
+    std::uint8_t unused[2] = {};
     static constexpr std::uint8_t connecting = 200, closed = 201;
 };
 static_assert(sizeof(Arrival) == 32);
@@ -56,18 +65,23 @@ std::int64_t microseconds_now() {
 }
 
 // Opcodes of RFC 6455, section 5.2.
-constexpr std::uint8_t binary_message = 2, close_message = 8, ping_message = 9, pong_message = 10;
+constexpr std::uint8_t text_message = 1, binary_message = 2, close_message = 8, ping_message = 9, pong_message = 10;
 
-// A message of which the beginning is kept.
+// A message of which the beginning is kept: of packets the header, of others all that may be needed.
 struct Message {
     std::uint8_t opcode = 0;
     std::size_t bytes = 0;
-    std::array<std::uint8_t, packet_header_bytes> begin{};
+    std::vector<std::uint8_t> begin{};
     void add(std::span<const std::uint8_t> piece) {
-        if (bytes < begin.size())
-            std::copy_n(piece.begin(), std::min(piece.size(), begin.size() - bytes),
-                        begin.begin() + static_cast<std::ptrdiff_t>(bytes));
+        const auto most = opcode == binary_message ? packet_header_bytes : live::most_text_bytes;
+        if (begin.size() < most)
+            begin.insert(begin.end(), piece.begin(),
+                         piece.begin() + static_cast<std::ptrdiff_t>(std::min(piece.size(), most - begin.size())));
         bytes += piece.size();
+    }
+    void clear() {
+        bytes = 0;
+        begin.clear();
     }
 };
 
@@ -91,7 +105,7 @@ public:
             if (left_ > 0) continue;
             if (final_) {
                 take(message());
-                message() = {};
+                message().clear();
             }
             in_payload_ = false;
             header_bytes_ = 0;
@@ -123,14 +137,25 @@ private:
     Message data_message_, control_message_;
 };
 
+struct FreeTls {
+    void operator()(SSL* tls) const { SSL_free(tls); }
+    void operator()(SSL_CTX* context) const { SSL_CTX_free(context); }
+};
+
 struct Viewer {
     std::uint32_t number = 0;
+    live::HubList hubs;
     int socket = -1;
+    std::unique_ptr<SSL, FreeTls> tls{};
     bool slow = false;
     bool asked = false, accepted = false;  // the HTTP request was sent, and answered
     std::size_t line_ends = 0;             // of the answer's end, "\r\n\r\n", so many bytes came
-    std::int64_t since = 0;                // when it began to connect
-    MessageReader reader;
+    std::int64_t since = 0;                // when it began to connect,
+    std::int64_t stood_since = 0;          // and when it was connected
+    std::int64_t heard = 0;
+    std::optional<std::int64_t> comes_again{};  // when it connects to the next hub
+    Dependencies dependencies{};                // of what came over this connection
+    MessageReader reader{};
 };
 
 class Viewers {
@@ -141,9 +166,18 @@ public:
         epoll_ = ::epoll_create1(0);
         output_ = std::fopen(options_.output.c_str(), "wb");
         if (epoll_ < 0 || !output_) return fail(options_.output);
+        if (options_.tls) {
+            tls_.reset(SSL_CTX_new(TLS_client_method()));
+            SSL_CTX_set_mode(tls_.get(), SSL_MODE_RELEASE_BUFFERS);
+        }
+        const auto first = live::parse_hub_address(fmt::format("{}://{}:{}/watch/{}", options_.tls ? "wss" : "ws",
+                                                               options_.host, options_.port, options_.stream));
+        if (!first) {
+            fmt::print(stderr, "live_watch: {}\n", first.error().message);
+            return false;
+        }
         for (unsigned i = 0; i < options_.viewers; ++i) {
-            viewers_.push_back(std::make_unique<Viewer>());
-            viewers_.back()->number = i;
+            viewers_.push_back(std::make_unique<Viewer>(Viewer{.number = i, .hubs = live::HubList({*first})}));
             viewers_.back()->slow = i < options_.slow;
         }
         const auto begin = microseconds_now();
@@ -155,6 +189,8 @@ public:
             const double due = static_cast<double>(now - begin) * 1e-6 * options_.joins_per_second;
             for (; joined < viewers_.size() && static_cast<double>(joined) <= due; ++joined)
                 if (!connect(*viewers_[joined])) return false;
+            for (auto& viewer : viewers_)
+                if (viewer->comes_again && now >= *viewer->comes_again && !connect(*viewer)) return false;
             if (now - ticked >= tick_us) {
                 tick(now, static_cast<double>(now - ticked) * 1e-6);
                 ticked = now;
@@ -171,18 +207,28 @@ public:
 
 private:
     static constexpr std::int64_t tick_us = 50000, pause_us = 1000;
+    static constexpr std::int64_t silence_us = 3000000, handshake_us = 5000000;  // as in live/hub_client.h
 
     static bool fail(const std::string& what) {
         fmt::print(stderr, "live_watch: {}: {}\n", what, std::strerror(errno));
         return false;
     }
     void note(const Arrival& arrival) { std::fwrite(&arrival, sizeof arrival, 1, output_); }
+    void wait_for(Viewer& viewer, std::uint32_t events) {
+        epoll_event event{};
+        event.events = events;
+        event.data.ptr = &viewer;
+        ::epoll_ctl(epoll_, EPOLL_CTL_MOD, viewer.socket, &event);
+    }
 
     bool connect(Viewer& viewer) {
+        const auto& address = viewer.hubs.current();
         viewer.socket = ::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
         if (viewer.socket < 0) return fail("socket");
-        viewer.since = microseconds_now();
+        viewer.since = viewer.heard = microseconds_now();
+        viewer.comes_again.reset();
         viewer.reader = {};
+        viewer.dependencies = Dependencies();
         viewer.asked = viewer.accepted = false;
         viewer.line_ends = 0;
         constexpr int yes = 1, small = 16384;
@@ -190,14 +236,18 @@ private:
         if (viewer.slow) ::setsockopt(viewer.socket, SOL_SOCKET, SO_RCVBUF, &small, sizeof small);
         sockaddr_in source{}, hub{};
         source.sin_family = hub.sin_family = AF_INET;
-        hub.sin_port = htons(options_.port);
+        hub.sin_port = htons(address.port);
         ::inet_pton(AF_INET, options_.source.c_str(), &source.sin_addr);
-        ::inet_pton(AF_INET, options_.host.c_str(), &hub.sin_addr);
+        ::inet_pton(AF_INET, address.host.c_str(), &hub.sin_addr);
         source.sin_addr.s_addr = htonl(ntohl(source.sin_addr.s_addr) + viewer.number / options_.per_source);
         if (::bind(viewer.socket, reinterpret_cast<const sockaddr*>(&source), sizeof source) != 0)
             return fail("bind " + options_.source);
         if (::connect(viewer.socket, reinterpret_cast<const sockaddr*>(&hub), sizeof hub) != 0 && errno != EINPROGRESS)
-            return fail("connect " + options_.host);
+            return fail("connect " + address.host);
+        if (tls_) {
+            viewer.tls.reset(SSL_new(tls_.get()));
+            SSL_set_fd(viewer.tls.get(), viewer.socket);
+        }
         epoll_event event{};
         event.events = EPOLLOUT;
         event.data.ptr = &viewer;
@@ -205,24 +255,57 @@ private:
         note({.arrived = viewer.since,
               .sent = 0,
               .viewer = viewer.number,
-              .frame = 0,
+              .frame = address.port,
               .bytes = 0,
               .kind = Arrival::connecting});
         return true;
     }
 
+    // What is written is a few bytes on a line that is not full: it goes at once or the line is lost.
+    static bool write(Viewer& viewer, std::string_view bytes) {
+        if (viewer.tls) return SSL_write(viewer.tls.get(), bytes.data(), static_cast<int>(bytes.size())) > 0;
+        return ::send(viewer.socket, bytes.data(), bytes.size(), MSG_NOSIGNAL) >= 0;
+    }
+
+    // Reads into the buffer; how many bytes; 0: there are none yet; nothing: the line is lost.
+    std::optional<std::size_t> read(Viewer& viewer, std::size_t most) {
+        if (viewer.tls) {
+            std::size_t count = 0;
+            while (count < most) {
+                const int more = SSL_read(viewer.tls.get(), buffer_.data() + count, static_cast<int>(most - count));
+                if (more > 0)
+                    count += static_cast<std::size_t>(more);
+                else if (SSL_get_error(viewer.tls.get(), more) == SSL_ERROR_WANT_READ || count > 0)
+                    return count;
+                else
+                    return std::nullopt;
+            }
+            return count;
+        }
+        const auto count = ::recv(viewer.socket, buffer_.data(), most, 0);
+        if (count > 0) return static_cast<std::size_t>(count);
+        return count < 0 && errno == EAGAIN ? std::optional<std::size_t>(0) : std::nullopt;
+    }
+
+    // The line stands: agrees on keys, and asks for the stream.
     void ask(Viewer& viewer) {
+        if (viewer.tls) {
+            const int done = SSL_connect(viewer.tls.get());
+            if (done <= 0) {
+                const int why = SSL_get_error(viewer.tls.get(), done);
+                if (why != SSL_ERROR_WANT_READ && why != SSL_ERROR_WANT_WRITE) return close(viewer, 0);
+                return wait_for(viewer, why == SSL_ERROR_WANT_READ ? EPOLLIN : EPOLLOUT);
+            }
+        }
+        const auto& address = viewer.hubs.current();
         const auto request = fmt::format(
-            "GET /watch/{} HTTP/1.1\r\nHost: {}:{}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            "GET {} HTTP/1.1\r\nHost: {}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
             "Sec-WebSocket-Key: aHR2bSBsaXZlIGJlbmNoIQ==\r\nSec-WebSocket-Version: 13\r\n"
-            "Sec-WebSocket-Protocol: htvm.1\r\n\r\n",
-            options_.stream, options_.host, options_.port);
-        if (::send(viewer.socket, request.data(), request.size(), MSG_NOSIGNAL) < 0) return close(viewer, 0);
+            "Sec-WebSocket-Protocol: {}\r\n\r\n",
+            address.target, live::host_header(address), live::live_protocol);
+        if (!write(viewer, request)) return close(viewer, 0);
         viewer.asked = true;
-        epoll_event event{};
-        event.events = EPOLLIN;
-        event.data.ptr = &viewer;
-        ::epoll_ctl(epoll_, EPOLL_CTL_MOD, viewer.socket, &event);
+        wait_for(viewer, EPOLLIN);
     }
 
     // Reads at most so many bytes of what came.
@@ -233,60 +316,83 @@ private:
             ::epoll_ctl(epoll_, EPOLL_CTL_DEL, viewer.socket, nullptr);  // tick() reads from now on
             return;
         }
-        const auto count = ::recv(viewer.socket, buffer_.data(), most, 0);
-        if (count == 0 || (count < 0 && errno != EAGAIN)) return close(viewer, 0);
-        if (count < 0) return;
-        std::span<const std::uint8_t> bytes(buffer_.data(), static_cast<std::size_t>(count));
+        const auto count = read(viewer, most);
+        if (!count) return close(viewer, 0);
+        std::span<const std::uint8_t> bytes(buffer_.data(), *count);
+        const auto now = microseconds_now();
+        if (!bytes.empty()) viewer.heard = now;
         while (!viewer.accepted && !bytes.empty()) {
             constexpr std::array<std::uint8_t, 4> ending = {'\r', '\n', '\r', '\n'};
             viewer.line_ends = bytes.front() == ending[viewer.line_ends] ? viewer.line_ends + 1 : bytes.front() == '\r';
             viewer.accepted = viewer.line_ends == ending.size();
+            viewer.stood_since = now;
             bytes = bytes.subspan(1);
         }
-        const auto now = microseconds_now();
         viewer.reader.push(bytes, [&](const Message& message) { take(viewer, message, now); });
     }
 
     void take(Viewer& viewer, const Message& message, std::int64_t now) {
-        if (message.opcode == close_message) return close(viewer, message.begin[0] << 8 | message.begin[1]);
+        if (viewer.socket < 0) return;
+        if (message.opcode == close_message)
+            return close(viewer, message.bytes < 2 ? 0 : message.begin[0] << 8 | message.begin[1]);
         if (message.opcode == ping_message) {
-            constexpr std::array<std::uint8_t, 6> pong = {128 | pong_message, 128, 0, 0, 0, 0};
-            ::send(viewer.socket, pong.data(), pong.size(), MSG_NOSIGNAL);
+            constexpr std::array<char, 6> pong = {static_cast<char>(128 | pong_message), static_cast<char>(128)};
+            write(viewer, {pong.data(), pong.size()});
+        }
+        if (message.opcode == text_message && options_.follow) {
+            const auto text =
+                live::read_to_viewer({reinterpret_cast<const char*>(message.begin.data()), message.begin.size()});
+            if (const auto* hello = text ? std::get_if<live::Hello>(&*text) : nullptr) viewer.hubs.learn(hello->hubs);
         }
         if (message.opcode != binary_message) return;
         std::uint32_t payload_bytes = 0;
         const auto header = read_packet_header(message.begin, payload_bytes);
         if (!header) return;
+        if (options_.follow) viewer.dependencies.push(*header);
         note({.arrived = now,
               .sent = header->timestamp_us,
               .viewer = viewer.number,
               .frame = header->frame,
               .bytes = static_cast<std::uint32_t>(message.bytes),
-              .kind = static_cast<std::uint8_t>(header->kind)});
+              .kind = static_cast<std::uint8_t>(header->kind),
+              .lacking = options_.follow && viewer.dependencies.closure().empty()});
     }
 
-    void close(Viewer& viewer, int code) {
-        if (viewer.socket < 0) return;
+    void hang_up(Viewer& viewer) {
+        viewer.tls.reset();
         ::close(viewer.socket);
         viewer.socket = -1;
-        note({.arrived = microseconds_now(),
+    }
+
+    // code: the WebSocket's; 0: the line was lost.
+    void close(Viewer& viewer, int code) {
+        if (viewer.socket < 0) return;
+        hang_up(viewer);
+        const auto now = microseconds_now();
+        note({.arrived = now,
               .sent = 0,
               .viewer = viewer.number,
               .frame = static_cast<std::uint32_t>(code),
               .bytes = 0,
               .kind = Arrival::closed});
+        const bool lost = code == 0 || code == static_cast<int>(live::CloseCode::shut_down) ||
+                          code == static_cast<int>(live::CloseCode::try_later);
+        if (!options_.follow || !lost) return;
+        if (viewer.accepted && now - viewer.stood_since >= silence_us) viewer.hubs.held();
+        viewer.comes_again = now + std::chrono::microseconds(viewer.hubs.next()).count();
     }
 
-    // Slow viewers read a little; who watched long enough comes anew.
+    // Slow viewers read a little; who watched long enough comes anew; a line on which nothing was heard is lost.
     void tick(std::int64_t now, double seconds) {
         const auto most = std::min(buffer_.size() - 1, static_cast<std::size_t>(options_.slow_bits / 8 * seconds));
         for (auto& viewer : viewers_) {
             if (viewer->socket < 0) continue;
             if (viewer->slow && viewer->accepted) hear(*viewer, most);
-            if (options_.watch_seconds > 0 &&
+            if (options_.follow && now - viewer->heard > (viewer->accepted ? silence_us : handshake_us))
+                close(*viewer, 0);
+            if (viewer->socket >= 0 && options_.watch_seconds > 0 &&
                 static_cast<double>(now - viewer->since) * 1e-6 > options_.watch_seconds) {
-                ::close(viewer->socket);
-                viewer->socket = -1;
+                hang_up(*viewer);
                 connect(*viewer);
             }
         }
@@ -295,6 +401,7 @@ private:
     Options options_;
     int epoll_ = -1;
     std::FILE* output_ = nullptr;
+    std::unique_ptr<SSL_CTX, FreeTls> tls_{};
     std::vector<std::unique_ptr<Viewer>> viewers_;
     std::vector<std::uint8_t> buffer_;
 };
@@ -315,6 +422,8 @@ int main(int count, char** words) {
     app.add_option("--seconds", options.seconds, "How long");
     app.add_option("--joins", options.joins_per_second, "Viewers that join in a second (default 400)");
     app.add_option("--again", options.watch_seconds, "Seconds after which a viewer leaves and joins again");
+    app.add_flag("--tls", options.tls, "By TLS; any certificate is taken");
+    app.add_flag("--follow", options.follow, "Who loses the hub goes to the next of those that it told of");
     app.add_option("--source", options.source, "Address of the first viewers (default 127.1.0.1); later ones count on");
     app.add_option("--per-source", options.per_source, "Viewers at each address (default 32)");
     CLI11_PARSE(app, count, words);

@@ -40,6 +40,14 @@ std::optional<std::uint64_t> session_of(const std::optional<StreamInfo::Header>&
     return header && header->session != 0 ? std::optional(header->session) : std::nullopt;
 }
 
+// Beginning with another one for each viewer: clients try them in this order, and those who lose a hub at the same
+// moment spread over all others instead of falling upon the first.
+std::vector<std::string> in_turn(std::vector<std::string> hubs, std::uint64_t viewer) {
+    if (!hubs.empty())
+        std::rotate(hubs.begin(), hubs.begin() + static_cast<std::ptrdiff_t>(viewer % hubs.size()), hubs.end());
+    return hubs;
+}
+
 }  // namespace
 
 // ---- Clocks and allowances ------------------------------------------------------------------------------------------
@@ -490,7 +498,8 @@ ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {
     auto& stream = *stream_of(viewer);
     const bool texts = watching->options.texts;
     if (std::exchange(watching->hello, false) && texts)
-        return Hello{.stream = viewer.stream, .session = session_of(stream.header), .hubs = other_hubs_};
+        return Hello{
+            .stream = viewer.stream, .session = session_of(stream.header), .hubs = in_turn(other_hubs_, viewer.viewer)};
     if (!stream.ended && std::exchange(watching->gone, false) && texts) return Gone{stream.gone};
     if (std::exchange(watching->heartbeat, false) && texts)
         return HeartbeatToViewer{.published = is_published(stream),

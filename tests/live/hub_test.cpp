@@ -1,7 +1,10 @@
 // Who may publish a stream, and what of a publisher's messages goes on.
 #include "live/hub.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
 
 #include "codec/stream/sequence.h"
 
@@ -320,6 +323,21 @@ TEST_F(HubTest, HelloComesFirst) {
     EXPECT_EQ(info().header->session, 0x1234u);
     EXPECT_EQ(info().header->fps_numerator, 25u);
     EXPECT_TRUE(some<Hello>(viewer({.texts = false})).empty());
+}
+
+TEST_F(HubTest, ViewersAreToldOfTheOtherHubsInTurn) {
+    hub.name_other_hubs({"wss://b.example", "wss://c.example", "wss://d.example"});
+    publishing();
+    std::vector<std::string> firsts;
+    for (int i = 0; i < 6; ++i) {
+        const auto watching = viewer();
+        const auto hubs = std::get<Hello>(hub.next(watching, start)).hubs;
+        hub.leave(watching);
+        EXPECT_THAT(hubs, testing::UnorderedElementsAre("wss://b.example", "wss://c.example", "wss://d.example"));
+        firsts.push_back(hubs.front());
+    }
+    for (const auto* address : {"wss://b.example", "wss://c.example", "wss://d.example"})
+        EXPECT_EQ(std::count(firsts.begin(), firsts.end(), address), 2) << address;
 }
 
 TEST_F(HubTest, HeartbeatsGoBothWaysEachSecond) {
