@@ -35,6 +35,28 @@ void add_codebook(LayerBytes& bytes, const Packet& packet) {
         bytes[packet.payload[0] == 0 ? Layer::geometry : Layer::colour] += packet.payload.size();
 }
 
+// A T-frame tells what its layers take only to who decodes it, and the I-frame that it needs; the other kinds by their
+// tables. Of one that cannot be decoded, all is overhead.
+class FrameInspector {
+public:
+    explicit FrameInspector(Decoder& decoder) : decoder_(decoder) {}
+    Result<FrameInfo> inspect(const Packet& packet) {
+        const auto type = frame_type(packet.kind);
+        const bool for_itself = packet.has(packet_flag::told) && !packet.has(packet_flag::referred);
+        if (type == FrameType::intra && !for_itself) intra_ = packet;
+        if (type == FrameType::tracked) {
+            if (intra_) static_cast<void>(decoder_.decode(*intra_));
+            intra_.reset();
+            if (const auto decoded = decoder_.decode(packet); decoded && *decoded) return (*decoded)->info;
+        }
+        return htvm::inspect(packet);
+    }
+
+private:
+    Decoder& decoder_;
+    std::optional<Packet> intra_;  // the last that may be referred to, as long as nothing needed it
+};
+
 void print_frame(const FrameInfo& f) {
     auto bpv = [&](std::size_t bytes) { return bits_per_vertex(bytes, f.source_vertices); };
     const auto& b = f.bytes;
@@ -150,7 +172,8 @@ nlohmann::json audio_json(const AudioTotals& totals) {
 Result<void> info(const Options& options) {
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes, options.trust);
     if (!input) return tl::unexpected(input.error());
-    Decoder headers(options.limits);  // only for the sequence header: frames are inspected, not decoded
+    Decoder headers(options.limits);  // takes the sequence headers, and frames where the inspector asks for it
+    FrameInspector inspector(headers);
     TotalsByType totals;
     std::size_t count = 0;
     LayerBytes codebooks;
@@ -193,7 +216,7 @@ Result<void> info(const Options& options) {
         }
         if (packet->kind == PacketKind::index || packet->kind == PacketKind::front_index) index = true;
         if (!frame_type(packet->kind)) continue;
-        auto frame = inspect(*packet);
+        auto frame = inspector.inspect(*packet);
         if (!frame) return tl::unexpected(frame.error());
         frame->bytes += codebooks;
         codebooks = {};
@@ -275,6 +298,7 @@ void add_info(CLI::App& app, Run& run) {
         "Columns: pose is the skeleton (I), transforms are the bones' (EP); fans and distance order are the\n"
         "connectivity's two parts; texcoords are texture coordinates; bpv is the frame's total, with packet and layer\n"
         "headers (overhead, below). All in bits per vertex of the captured mesh.\n"
+        "T-frames are decoded to tell their parts; one that cannot be counts as overhead.\n"
         "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.");
     command->callback([options, &run] { run = [options] { return info(*options); }; });
 }

@@ -65,13 +65,19 @@ void check_node_motion(const std::vector<QuantisedTransform>& wanted, fuzz::Fuzz
         if (temporal) before.push_back(any_transform(input));
     }
     NodeMotionOptions options;
-    options.rotation_exponent = static_cast<int>(input.below(11));
-    options.shift_exponent = static_cast<int>(input.below(21));
+    options.steps.rotation_exponent = static_cast<int>(input.below(11));
+    options.steps.shift_exponent = static_cast<int>(input.below(21));
     options.still_along = input.below(100);
     const auto encoded = encode_node_motion(wanted, graph, before, options);
-    const auto again = decode_node_motion(encoded.bytes, graph, before);
+    const auto decoded_from = [&](std::span<const std::uint8_t> run, NodeMotionSyntax syntax) {
+        RangeDecoder decoder(run);
+        return decode_node_motion(decoder, options.steps, graph, before, syntax);
+    };
+    const auto run = encoded.decisions.run();
+    const auto again = decoded_from(run, NodeMotionSyntax::surface);
     require(again && *again == encoded.transforms, "the motion that the encoder promised");
-    const auto bad = decode_node_motion(fuzz::damaged(encoded.bytes, input), graph, before);
+    const auto syntax = input.flag() ? NodeMotionSyntax::surface : NodeMotionSyntax::axes_of_space;
+    const auto bad = decoded_from(fuzz::damaged(run, input), syntax);
     if (!bad) return;
     for (const auto& transform : *bad) {
         for (const auto c : transform.rotation.others)

@@ -117,8 +117,8 @@ private:
 // The type of the frame in a packet; nothing if the packet is not a frame.
 std::optional<FrameType> frame_type(PacketKind kind);
 
-// The layer sizes of a frame packet, for inspection without decoding. For an EP-frame with motion-based coding, the
-// vertices and triangles are those coded; DecodedFrame::info has those of the whole mesh.
+// A frame packet's layer sizes, without decoding. Of an EP-frame with motion-based coding, the counts are of what is
+// coded; of a T-frame neither they nor its layers can be told, and all is overhead. DecodedFrame::info has the whole.
 Result<FrameInfo> inspect(const Packet& packet);
 
 }  // namespace htvm

@@ -39,8 +39,8 @@ constexpr const FrameKind* kind_of_letter(std::string_view letter) {
     return nullptr;
 }
 
-// The parts of a frame's payload, each of which can be decoded by itself. The numbers are those of the stream;
-// docs/bitstream.md, section 4, describes the contents for each kind of frame.
+// The parts of a frame's payload. But for a T-frame's, each can be decoded by itself. The numbers are those of the
+// stream; docs/bitstream.md, section 4, describes the contents for each kind of frame.
 enum class Layer : std::uint8_t {
     pose = 1,
     transforms = 2,

@@ -127,7 +127,9 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
 // The payload of a frame, once its header shows that this decoder may decode it.
 Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
     if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
-    auto payload = read_frame_payload(packet.payload);
+    // A T-frame's own has no header: its counts are its reference's.
+    const bool is_run = rules.type == FrameType::tracked && state.header->version >= tracked_run_version;
+    auto payload = is_run ? Result<FramePayloadView>() : read_frame_payload(packet.payload);
     if (!payload) return payload;
     const auto& header = payload->header;
     if (rules.codes_mesh && packet.payload.size() < least_payload(header.vertices, header.triangles))
@@ -145,18 +147,34 @@ Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& pac
     return payload;
 }
 
-FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload) {
+// What the packet itself says.
+FrameInfo describe(const Packet& packet, FrameType type) {
     FrameInfo out;
     out.type = type;
     out.frame = packet.frame;
     out.reference = packet.reference;
     out.timestamp_us = packet.timestamp_us;
+    out.bytes.overhead = packet.payload.size() + packet_overhead;
+    return out;
+}
+
+FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload) {
+    auto out = describe(packet, type);
     out.source_vertices = payload.header.source_vertices;
     out.source_triangles = payload.header.source_triangles;
     out.vertices = payload.header.vertices;
     out.triangles = payload.header.triangles;
-    for (const auto& [layer, name] : frame_layers) out.bytes[layer] = payload.of(layer).size();
-    out.bytes.overhead = packet.payload.size() + packet_overhead - out.bytes.total();
+    LayerBytes layers;
+    for (const auto& [layer, name] : frame_layers) layers[layer] = payload.of(layer).size();
+    out.bytes = with_overhead(layers, packet);
+    return out;
+}
+
+FrameInfo describe(const Packet& packet, const DecodedTrackedFrame& decoded) {
+    auto out = describe(packet, FrameType::tracked);
+    out.source_vertices = decoded.state.head.captured.vertices;
+    out.source_triangles = decoded.state.head.captured.triangles;
+    out.bytes = with_overhead(decoded.shares, packet);
     return out;
 }
 
@@ -189,7 +207,8 @@ Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet)
         if (!payload) return tl::unexpected(payload.error());
         if (auto ok = rules.decode(state, packet, *payload); !ok) return tl::unexpected(ok.error());
         if (!stands_alone(*type)) state.alone.reset();
-        auto info = describe(packet, *type, *payload);
+        auto info = *type == FrameType::tracked ? describe(packet, state.tracked.of_newest())
+                                                : describe(packet, *type, *payload);
         info.sequence = state.sequences - 1;
         return Taken{lend(state.shown, info)};
     }
@@ -276,6 +295,7 @@ const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->in
 Result<FrameInfo> inspect(const Packet& packet) {
     const auto type = frame_type(packet.kind);
     if (!type) return fail(ErrorKind::bad_input, "the packet is not a frame");
+    if (*type == FrameType::tracked) return describe(packet, *type);
     const auto payload = read_frame_payload(packet.payload);
     if (!payload) return tl::unexpected(payload.error());
     return describe(packet, *type, *payload);

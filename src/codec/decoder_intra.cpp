@@ -29,9 +29,11 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
         return {};
     }
     // T-frames need the nodes at once; what depends on bones is built when a frame asks for it.
-    auto reference = make_reference(header, packet.frame, std::move(*mesh), std::move(*pose),
-                                    static_cast<std::int32_t>(payload.header.geometry_step),
-                                    {.bones = false, .nodes = true}, state.threads);
+    const ReferenceFacts facts{.number = packet.frame,
+                               .step = static_cast<std::int32_t>(payload.header.geometry_step),
+                               .captured = {payload.header.source_vertices, payload.header.source_triangles}};
+    auto reference = make_reference(header, facts, std::move(*mesh), std::move(*pose), {.bones = false, .nodes = true},
+                                    state.threads);
     if (!reference) return tl::unexpected(reference.error());
     show(state, view_of(reference->mesh()), topology, std::move(shown));
     // Nothing can fail from here on.

@@ -55,6 +55,7 @@ struct DecodedNodes {
     DecodedTrackedFrame last, next;
     enum class Newest : std::uint8_t { none, last, next } newest = Newest::none;
     Pose pose;  // of the newest
+    const DecodedTrackedFrame& of_newest() const { return newest == Newest::last ? last : next; }
 };
 
 // An I-frame that nothing refers to: kept only to be shown again where the frame behind it is missing.

@@ -49,8 +49,11 @@ Result<void> decode_tracked(DecoderState& state, const Packet& packet, const Fra
     if (auto ok = derive_nodes(*state.reference, *state.header, state.threads); !ok) return tl::unexpected(ok.error());
     using enum DecodedNodes::Newest;
     if (history.newest == next) history.newest = history.frame ? last : none;  // its arrays are written over
-    if (auto ok = decode_tracked_frame(payload, *state.reference->tracked,
-                                       of_frame_before ? &history.last.state : nullptr, state.threads, history.next);
+    const auto& reference = *state.reference->tracked;
+    const auto* before = of_frame_before ? &history.last.state : nullptr;
+    if (auto ok = state.header->version >= tracked_run_version
+                      ? decode_tracked_frame(packet.payload, reference, before, state.threads, history.next)
+                      : decode_tracked_layers(payload, reference, before, state.threads, history.next);
         !ok)
         return tl::unexpected(ok.error());
     auto pose = tracked_pose(state, history.next.state.transforms);
@@ -68,7 +71,7 @@ bool show_last_tracked(DecoderState& state) {
     const auto& history = state.tracked;
     using enum DecodedNodes::Newest;
     if (history.newest == none) return false;
-    show_tracked(state, history.newest == last ? history.last : history.next, history.pose);
+    show_tracked(state, history.of_newest(), history.pose);
     return true;
 }
 

@@ -186,6 +186,11 @@ void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us) {
         }
         packet.flags |= flags_of(candidate);
         state.info = *inspect(packet);
+        if (state.info.type == FrameType::tracked) {
+            state.info.source_vertices = candidate.captured.vertices;
+            state.info.source_triangles = candidate.captured.triangles;
+            state.info.bytes = with_overhead(candidate.shares, packet);
+        }
         state.info.vertices = static_cast<std::uint32_t>(candidate.decoded.positions.size());
         state.info.triangles = static_cast<std::uint32_t>(candidate.decoded.triangles.size());
         state.info.bytes += codebooks;

@@ -15,14 +15,21 @@ namespace {
 enum class IntraUse : std::uint8_t { reference, alone };       // whether later frames may refer to it
 enum class TrackedParts : std::uint8_t { all, motion_alone };  // what of a T-frame is sent
 
-Packet frame_packet(PacketKind kind, const FramePayload& payload) {
+Packet frame_packet(PacketKind kind, std::vector<std::uint8_t> payload) {
     Packet packet;
     packet.kind = kind;
-    packet.payload = write_frame_payload(payload);
+    packet.payload = std::move(payload);
     return packet;
+}
+Packet frame_packet(PacketKind kind, const FramePayload& payload) {
+    return frame_packet(kind, write_frame_payload(payload));
 }
 
 std::uint32_t count(std::size_t n) { return static_cast<std::uint32_t>(n); }
+
+CapturedCounts counts_of(const LatticeMesh& captured) {
+    return {count(captured.positions.size()), count(captured.triangles.size())};
+}
 
 // If EP-frames refer to an I-frame, its step is at most half an edge: EP-frames then save more than the finer step
 // costs. Their quantiser starts from the same cells, but the price of a bit stays that of the step asked for, so that
@@ -159,13 +166,15 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     FramePayload payload;
     auto decoded = encode_intra_frame(mesh, options, payload);
     if (!decoded) return tl::unexpected(decoded.error());
-    payload.header.source_vertices = count(work.mesh.positions.size());
-    payload.header.source_triangles = count(work.mesh.triangles.size());
+    const auto captured = counts_of(work.mesh);
+    payload.header.source_vertices = captured.vertices;
+    payload.header.source_triangles = captured.triangles;
     payload.set(Layer::pose, encode_pose(work.pose));
     Candidate out;
     out.type = FrameType::intra;
     out.reference = work.sequence.next_frame;
     out.decoded = std::move(*decoded);
+    out.captured = captured;
     // Under rate control also what stands in for a frame that does not fit may refer to it.
     out.referred = work.carries_surface() && !(tracked && out.decoded.triangles.empty()) &&
                    (!configuration.intra_alone() || configuration.options.rate.bits_per_second > 0);
@@ -223,8 +232,10 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     out.reference = from_last ? *nodes.frame : reference.number;
     out.referred = configuration.options.tracked.references == TrackedReferences::previous;
     out.access = !from_last;
-    out.packets.push_back(frame_packet(PacketKind::tracked, encoded->payload));
+    out.packets.push_back(frame_packet(PacketKind::tracked, std::move(encoded->payload)));
     out.decoded = std::move(encoded->mesh);
+    out.captured = counts_of(work.mesh);
+    out.shares = encoded->shares;
     auto& history = out.nodes.emplace();
     history.frame = work.sequence.next_frame;
     history.before_last = nodes.last;

@@ -60,8 +60,8 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         out.nodes = sent.nodes ? std::move(*sent.nodes) : before.nodes;
         return out;
     }
-    auto decoded = make_reference(configuration.header, before.next_frame, sent.decoded, std::move(sent.pose),
-                                  sent.intra->step, derived_of(configuration), configuration.threads);
+    auto decoded = make_reference(configuration.header, {before.next_frame, sent.intra->step, sent.captured},
+                                  sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto in_use = std::make_shared<ReferenceInUse>();
     in_use->decoded = std::move(*decoded);

@@ -91,6 +91,8 @@ struct Candidate {
     bool referred = false;        // whether later frames may refer to it; an I-frame then becomes the reference
     bool access = true;           // whether it is an I-frame or refers to one
     LatticeMesh decoded;          // the mesh that the decoder will have
+    CapturedCounts captured;      // of the mesh that it was made of
+    LayerBytes shares;            // T: its layers' of its bytes, which its packet does not tell
     double quality = 50;          // the quality setting used, under rate or error control
     bool stands_in = false;       // a P- or T-frame of motion alone, because nothing better fits the buffer
     // What it leaves for the sequence; one of the first three is set.

@@ -16,12 +16,20 @@
 
 namespace htvm::internal {
 
+// Below this a range has used up more than half of the byte that is shifted out or in next.
+inline constexpr std::uint32_t half_a_byte = 1u << 28;
+
 class RangeEncoder {
 public:
     void bit(BinaryModel& model, bool bit);
     void raw(std::uint32_t value, int n);
     // Flushes and returns the bytes; the encoder cannot be used afterwards. Without any decision there are no bytes.
     std::vector<std::uint8_t> finish();
+    // Where in the run the decisions so far end, in bytes, to the nearest: so that the parts of a run can be told from
+    // each other. The decoder says the same after the same decisions.
+    std::size_t position() const {
+        return bytes_.size() + static_cast<std::size_t>(pending_ones_) + (started_ ? 1 : 0) + (range_ < half_a_byte);
+    }
 
 private:
     void shift_low();
@@ -85,6 +93,8 @@ public:
         return value;
     }
     bool exhausted() const { return past_end_ > allowed_past_end; }
+    // As RangeEncoder's; beyond the data where the encoder cut zeros off.
+    std::size_t position() const { return position_ + past_end_ - 4 + (range_ < half_a_byte); }
 
 private:
     static constexpr std::size_t allowed_past_end = 4;  // the zeros that the encoder may cut off at the end

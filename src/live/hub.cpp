@@ -135,7 +135,7 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
                         Clock::time_point now) {
     if (header.kind != PacketKind::sequence || !header.has(packet_flag::told)) {
         ++counters_.refused_publishers_message;
-        return fail(ErrorKind::bad_input, "the first packet must be a sequence header of version 2");
+        return fail(ErrorKind::bad_input, "the first packet must be a sequence header of version 2 or later");
     }
     const auto known = streams_.find(connection.stream);
     if (known == streams_.end()) {

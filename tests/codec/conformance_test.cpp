@@ -1,7 +1,7 @@
 // Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
-// tests/data/conformance. Those whose names have no number are of the stream's version 1, and no encoder writes them
-// any more; the others are NAME_2, of version 2. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of version 2
-// that are there; NAME_2 writes that one, whether it is there or not.
+// tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 of version 2, and no
+// encoder writes them any more; NAME_3 are of version 3. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of
+// version 3 that are there; NAME_3 writes that one, whether it is there or not.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -20,9 +20,9 @@ struct ChanceMotion {
     FieldOptions fields;
 };
 
-// before: state of the frame that it refers to, or null.
-inline FramePayload tracked_by_chance(const TrackedReference& reference, const TrackedState* before,
-                                      const ChanceMotion& motion, std::mt19937& random) {
+// The payload. before: state of the frame that it refers to, or null.
+inline std::vector<std::uint8_t> tracked_by_chance(const TrackedReference& reference, const TrackedState* before,
+                                                   const ChanceMotion& motion, std::mt19937& random) {
     const auto number = [&](double size) {
         std::uniform_real_distribution<double> any(-size, size);
         return static_cast<std::int32_t>(any(random));
@@ -36,15 +36,19 @@ inline FramePayload tracked_by_chance(const TrackedReference& reference, const T
         transform.shift = {number(motion.shift), number(motion.shift) + 500, number(motion.shift)};
         wanted.push_back(transform);
     }
-    NodeMotionOptions steps;
-    steps.rotation_exponent = static_cast<int>(random() % 11);
-    steps.shift_exponent = static_cast<int>(random() % 9);
-    FramePayload out;
-    out.header.vertices = static_cast<std::uint32_t>(reference.mesh.positions.size());
-    out.header.triangles = static_cast<std::uint32_t>(reference.mesh.triangles.size());
+    NodeMotionOptions options;
+    options.steps.rotation_exponent = static_cast<int>(random() % 11);
+    options.steps.shift_exponent = static_cast<int>(random() % 9);
+    TrackedHead head;
+    head.captured = {static_cast<std::uint32_t>(random() % 70000), static_cast<std::uint32_t>(random() % 140000)};
+    if (before && random() % 2 == 0) {
+        head.captured = before->head.captured;
+        options.steps = before->head.motion;
+    }
+    head.motion = options.steps;
     const std::span<const QuantisedTransform> transforms_before =
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{};
-    out.set(Layer::transforms, encode_node_motion(wanted, reference.graph, transforms_before, steps).bytes);
+    const auto coded_motion = encode_node_motion(wanted, reference.graph, transforms_before, options);
     std::vector<std::int32_t> displacement, colour;
     for (std::size_t v = 0; v < reference.mesh.positions.size(); ++v) {
         displacement.push_back(number(motion.displacement) + 30);
@@ -52,14 +56,21 @@ inline FramePayload tracked_by_chance(const TrackedReference& reference, const T
     }
     auto fields = motion.fields;
     fields.turned = false;
-    out.set(
-        Layer::geometry,
-        encode_field(reference.hierarchy, displacement, 1, fields, before ? &before->displacement : nullptr)->bytes);
+    const auto coded_displacement =
+        *encode_field(reference.hierarchy, displacement, 1, fields, before ? &before->displacement : nullptr);
+    head.displacement = coded_displacement.steps;
     fields.turned = motion.fields.turned;
-    if (!reference.mesh.colours.empty())
-        out.set(Layer::colour,
-                encode_field(reference.hierarchy, colour, 3, fields, before ? &before->colour : nullptr)->bytes);
-    return out;
+    const bool coloured = !reference.mesh.colours.empty();
+    EncodedField coded_colour;
+    if (coloured)
+        coded_colour = *encode_field(reference.hierarchy, colour, 3, fields, before ? &before->colour : nullptr);
+    head.colour = coded_colour.steps;
+    RangeEncoder run;
+    write_tracked_head(run, head, {before ? &before->head : nullptr, reference.captured, coloured});
+    coded_motion.decisions.write(run);
+    coded_displacement.decisions.write(run);
+    coded_colour.decisions.write(run);
+    return run.finish();
 }
 
 // A stream of I-frames with a few T-frames after each: one from the I-frame, two from the previous frame, one more from
@@ -85,20 +96,20 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
         }
         if (packet.kind != PacketKind::intra) continue;
         const auto payload = *read_frame_payload(packet.payload);
-        const auto reference = *make_tracked_reference(*decode_intra_frame(payload, nullptr), node_spacing,
-                                                       static_cast<std::int32_t>(payload.header.geometry_step));
+        auto reference = *make_tracked_reference(*decode_intra_frame(payload, nullptr), node_spacing,
+                                                 static_cast<std::int32_t>(payload.header.geometry_step));
+        reference.captured = {payload.header.source_vertices, payload.header.source_triangles};
         const std::uint32_t key = frame;
         add(packet, key);
         TrackedState state;
         for (const bool refers_to_last : {false, true, true, false}) {
-            const auto tracked = tracked_by_chance(reference, refers_to_last ? &state : nullptr, motion, random);
+            auto tracked = tracked_by_chance(reference, refers_to_last ? &state : nullptr, motion, random);
             DecodedTrackedFrame decoded;
-            if (!decode_tracked_frame(view_of(tracked), reference, refers_to_last ? &state : nullptr, {}, decoded))
-                break;
+            if (!decode_tracked_frame(tracked, reference, refers_to_last ? &state : nullptr, {}, decoded)) break;
             state = std::move(decoded.state);
             Packet next = packet;
             next.kind = PacketKind::tracked;
-            next.payload = write_frame_payload(tracked);
+            next.payload = std::move(tracked);
             add(std::move(next), refers_to_last ? frame - 1 : key);
         }
     }

@@ -51,6 +51,13 @@ void expect_same(const FieldHistory& a, const FieldHistory& b) {
     }
 }
 
+Result<DecodedField> decoded_from(std::span<const std::uint8_t> run, const FieldSteps& steps,
+                                  const VertexHierarchy& hierarchy, std::size_t components,
+                                  const FieldHistory* before = nullptr) {
+    RangeDecoder decoder(run);
+    return decode_field(decoder, steps, hierarchy, components, before);
+}
+
 TEST(VertexField, DecodesToWhatTheEncoderSawWhateverTheMesh) {
     unsigned seed = 0;
     for (const auto& mesh : intra_test::awkward()) {
@@ -63,7 +70,8 @@ TEST(VertexField, DecodesToWhatTheEncoderSawWhateverTheMesh) {
             const auto values = field(mesh.vertex_count, components, seed + (seed % 2 ? frame : 0));
             const auto encoded = encode_field(hierarchy, values, components, options, sent ? &*sent : nullptr);
             ASSERT_TRUE(encoded) << encoded.error().message;
-            const auto decoded = decode_field(encoded->bytes, hierarchy, components, received ? &*received : nullptr);
+            const auto decoded = decoded_from(encoded->decisions.run(), encoded->steps, hierarchy, components,
+                                              received ? &*received : nullptr);
             ASSERT_TRUE(decoded) << decoded.error().message;
             EXPECT_EQ(decoded->values, encoded->values);
             expect_same(decoded->history, encoded->history);
@@ -113,7 +121,7 @@ TEST(VertexField, AFieldOfZerosCostsAboutAByteALevel) {
     const std::vector<std::int32_t> values(mesh.vertex_count, 0);
     const auto encoded = encode_field(hierarchy, values, 1);
     EXPECT_EQ(encoded->values, values);
-    EXPECT_LE(encoded->bytes.size(), 16u);
+    EXPECT_LE(encoded->decisions.run().size(), 12u);
 }
 
 TEST(VertexField, NoiseBelowTheStepCostsNextToNothing) {
@@ -123,7 +131,7 @@ TEST(VertexField, NoiseBelowTheStepCostsNextToNothing) {
     std::vector<std::int32_t> values(mesh.vertex_count);
     for (auto& value : values) value = test::between(random, -12, 12);
     const auto encoded = encode_field(hierarchy, values, 1, options_of(32, 0.15));
-    EXPECT_LT(static_cast<double>(encoded->bytes.size()) * 8, 0.01 * static_cast<double>(mesh.vertex_count));
+    EXPECT_LT(encoded->decisions.bits(), 0.01 * static_cast<double>(mesh.vertex_count));
 }
 
 TEST(VertexField, AHigherLambdaSparesBits) {
@@ -132,7 +140,7 @@ TEST(VertexField, AHigherLambdaSparesBits) {
     const auto values = field(mesh.vertex_count, 1, 1);
     const auto exact = encode_field(hierarchy, values, 1, options_of(16, 0));
     const auto spared = encode_field(hierarchy, values, 1, options_of(16, 0.2));
-    EXPECT_LT(spared->bytes.size(), exact->bytes.size());
+    EXPECT_LT(spared->decisions.bits(), exact->decisions.bits());
 }
 
 TEST(VertexField, ARepeatedFrameCostsNextToNothing) {
@@ -141,10 +149,10 @@ TEST(VertexField, ARepeatedFrameCostsNextToNothing) {
     const auto values = field(mesh.vertex_count, 1, 1);
     const auto first = encode_field(hierarchy, values, 1, options_of(8, 0.1));
     const auto second = encode_field(hierarchy, values, 1, options_of(8, 0.1), &first->history);
-    EXPECT_LT(second->bytes.size() * 10, first->bytes.size());
+    EXPECT_LT(second->decisions.bits() * 10, first->decisions.bits());
 }
 
-TEST(VertexField, HasTheSameBytesFromTwoThreadsAndDoesTheOtherWorkBesideOnce) {
+TEST(VertexField, HasTheSameDecisionsFromTwoThreadsAndDoesTheOtherWorkBesideOnce) {
     const auto mesh = intra_test::grid(40);
     const VertexHierarchy hierarchy = hierarchy_of(mesh);
     for (std::size_t components = 1; components <= 3; ++components)
@@ -157,7 +165,7 @@ TEST(VertexField, HasTheSameBytesFromTwoThreadsAndDoesTheOtherWorkBesideOnce) {
                 int beside = 0;
                 const auto both = encode_field(hierarchy, values, components, options, &first->history,
                                                ThreadPool(threads), [&] { ++beside; });
-                EXPECT_EQ(both->bytes, alone->bytes);
+                EXPECT_EQ(both->decisions.run(), alone->decisions.run());
                 expect_same(both->history, alone->history);
                 EXPECT_EQ(beside, 1);
             }
@@ -183,12 +191,13 @@ TEST(VertexField, AComponentOfStepZeroIsNotCoded) {
     EXPECT_LE(largest_difference(values, encoded->values), 300);
 }
 
-TEST(VertexField, NoVerticesTakeTheHeaderAlone) {
+TEST(VertexField, NoVerticesTakeNothing) {
     const VertexHierarchy hierarchy;
     const auto encoded = encode_field(hierarchy, {}, 3);
     ASSERT_TRUE(encoded);
-    EXPECT_LE(encoded->bytes.size(), 8u);
-    EXPECT_TRUE(decode_field(encoded->bytes, hierarchy, 3)->values.empty());
+    EXPECT_TRUE(encoded->decisions.run().empty());
+    RangeDecoder nothing({});
+    EXPECT_TRUE(decode_field(nothing, encoded->steps, hierarchy, 3)->values.empty());
 }
 
 TEST(VertexField, RefusesWhatDoesNotFit) {
@@ -208,15 +217,15 @@ TEST(VertexField, RefusesWhatDoesNotFit) {
     EXPECT_FALSE(encode_field(hierarchy, values, 1, {}, &other));
 }
 
-TEST(VertexField, AMissingOrForeignFrameBeforeIsAnError) {
+TEST(VertexField, AForeignFrameBeforeIsAnError) {
     const auto mesh = intra_test::grid(6);
     const VertexHierarchy hierarchy = hierarchy_of(mesh), other = hierarchy_of(intra_test::grid(7));
     const auto values = field(mesh.vertex_count, 1, 1);
     const auto first = encode_field(hierarchy, values, 1);
     const auto second = encode_field(hierarchy, values, 1, {}, &first->history);
-    EXPECT_EQ(decode_field(second->bytes, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
     const auto foreign = encode_field(other, field(other.vertex_count, 1, 1), 1);
-    EXPECT_EQ(decode_field(second->bytes, hierarchy, 1, &foreign->history).error().kind, ErrorKind::bad_input);
+    const auto run = second->decisions.run();
+    EXPECT_EQ(decoded_from(run, second->steps, hierarchy, 1, &foreign->history).error().kind, ErrorKind::bad_input);
 }
 
 TEST(VertexField, DamagedBytesGiveErrorsOrBoundedValues) {
@@ -228,8 +237,8 @@ TEST(VertexField, DamagedBytesGiveErrorsOrBoundedValues) {
         const auto first = encode_field(hierarchy, field(mesh.vertex_count, components, 1), components, options);
         const auto second =
             encode_field(hierarchy, field(mesh.vertex_count, components, 3), components, options, &first->history);
-        hostile::try_everything(second->bytes, [&](const std::vector<std::uint8_t>& bytes) {
-            const auto decoded = decode_field(bytes, hierarchy, components, &first->history);
+        hostile::try_everything(second->decisions.run(), [&](const std::vector<std::uint8_t>& bytes) {
+            const auto decoded = decoded_from(bytes, second->steps, hierarchy, components, &first->history);
             if (!decoded) return;
             for (const std::int32_t value : decoded->values) EXPECT_LE(std::abs(value), 4 * field_limit);
         });
@@ -242,11 +251,12 @@ TEST(VertexField, DecodesToTheSameOnEveryMachine) {
     std::uint32_t digest = 0;
     std::optional<FieldHistory> before;
     for (unsigned frame = 0; frame < 4; ++frame) {
-        // Steps of 16, then bytes that no encoder wrote but that form a field all the same.
-        std::vector<std::uint8_t> bytes{static_cast<std::uint8_t>(1 + (frame > 0 ? 2 : 0)), 128, 32, 128, 32, 128, 32};
+        // Bytes that no encoder wrote but that form a field all the same.
+        const FieldSteps steps{.turned = true, .step = {4096, 4096, 4096}};
+        std::vector<std::uint8_t> bytes;
         std::mt19937 random(frame);
         for (int i = 0; i < 8000; ++i) bytes.push_back(static_cast<std::uint8_t>(random()));
-        auto decoded = decode_field(bytes, hierarchy, 3, before ? &*before : nullptr);
+        auto decoded = decoded_from(bytes, steps, hierarchy, 3, before ? &*before : nullptr);
         ASSERT_TRUE(decoded) << decoded.error().message;
         ByteWriter writer;
         writer.u32(digest);
@@ -257,14 +267,14 @@ TEST(VertexField, DecodesToTheSameOnEveryMachine) {
     EXPECT_EQ(digest, 2382717585u);
 }
 
-TEST(VertexField, AShortenedLayerIsAnError) {
+TEST(VertexField, AShortenedRunIsAnError) {
     const auto mesh = intra_test::grid(15);
     const VertexHierarchy hierarchy = hierarchy_of(mesh);
     const auto encoded = encode_field(hierarchy, field(mesh.vertex_count, 1, 1), 1, options_of(1, 0));
-    auto half = encoded->bytes;
+    auto half = encoded->decisions.run();
     half.resize(half.size() / 2);
-    EXPECT_EQ(decode_field(half, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
-    EXPECT_EQ(decode_field({}, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
+    EXPECT_EQ(decoded_from(half, encoded->steps, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
+    EXPECT_EQ(decoded_from({}, encoded->steps, hierarchy, 1).error().kind, ErrorKind::corrupt_stream);
 }
 
 }  // namespace

@@ -87,6 +87,34 @@ TEST(RangeCoder, ADecoderWithoutEnoughBytesSaysSo) {
     EXPECT_TRUE(decoder.exhausted());
 }
 
+TEST(RangeCoder, BothSidesSayWhereInTheRunTheyAreAndThatIsWhatTheDecisionsSoFarTake) {
+    std::mt19937 random(5);
+    for (int skew : {2, 20, 2000}) {
+        RangeEncoder encoder;
+        CostCounter counter;
+        BinaryModel model, counted, decoded;
+        std::vector<bool> bits;
+        std::vector<std::size_t> positions;
+        for (int i = 0; i < 4000; ++i) {
+            bits.push_back(random() % static_cast<unsigned>(skew) == 0);
+            encoder.bit(model, bits.back());
+            counter.bit(counted, bits.back());
+            if (i % 7 == 0) encoder.raw(static_cast<std::uint32_t>(i) & 63, 6), counter.raw(0, 6);
+            positions.push_back(encoder.position());
+            ASSERT_NEAR(static_cast<double>(positions.back()), counter.bits() / 8, 1 + 0.01 * counter.bits() / 8);
+        }
+        const auto bytes = encoder.finish();
+        EXPECT_LE(positions.back(), bytes.size() + 4);
+        RangeDecoder decoder(bytes);
+        EXPECT_EQ(decoder.position(), 0u);
+        for (std::size_t i = 0; i < bits.size(); ++i) {
+            ASSERT_EQ(decoder.bit(decoded), bits[i]);
+            if (i % 7 == 0) decoder.raw(6);
+            ASSERT_EQ(decoder.position(), positions[i]);
+        }
+    }
+}
+
 TEST(CostCounter, AgreesWithTheEncoderWithinOnePercent) {
     std::mt19937 random(7);
     std::geometric_distribution<int> values(0.2);

@@ -125,7 +125,7 @@ TEST_F(HubTest, WhatIsPublishedIsWatched) {
 TEST_F(HubTest, AStreamBeginsWithASequenceHeader) {
     const auto headless = publisher(), garbage = publisher();
     EXPECT_FALSE(hub.take(headless, intra(0), start));
-    EXPECT_EQ(closing(headless), "1008 the first packet must be a sequence header of version 2");
+    EXPECT_EQ(closing(headless), "1008 the first packet must be a sequence header of version 2 or later");
     EXPECT_FALSE(hub.take(garbage, {1, 2, 3}, start));
     EXPECT_EQ(closing(garbage), "1008 the first message is not a packet");
     EXPECT_FALSE(hub.watch(

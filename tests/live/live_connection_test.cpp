@@ -208,7 +208,7 @@ TEST_F(LiveConnectionTest, WhatCannotBeIsRefusedWithAReason) {
     EXPECT_EQ(second.refusal(), "1008 'anna' is being published by another session; end that one, or wait");
     auto headless = open("/publish/ben");
     headless.send(intra(0));
-    EXPECT_EQ(headless.refusal(), "1008 the first packet must be a sequence header of version 2");
+    EXPECT_EQ(headless.refusal(), "1008 the first packet must be a sequence header of version 2 or later");
     auto again = open("/publish/anna");
     again.send(header(1));
     EXPECT_EQ(first.refusal(), "4000 this session was continued by another connection");

@@ -59,10 +59,13 @@ void expect_within_estimate(const std::vector<Packet>& packets, const std::strin
         if (packet.kind == PacketKind::sequence) tracking = read_sequence_header(packet.payload)->node_spacing > 0;
         const auto type = frame_type(packet.kind);
         if (!type) continue;
-        const auto header = read_frame_payload(packet.payload)->header;
-        const MeshCounts coded{header.vertices, header.triangles};
         const auto& rules = rules_of(*type);
         const bool refers = rules.refers_to != RefersTo::nothing;
+        auto coded = reference;
+        if (*type != FrameType::tracked) {
+            const auto header = read_frame_payload(packet.payload)->header;
+            coded = {header.vertices, header.triangles};
+        }
         const auto kept =
             memory_of_reference(reference) +
             (tracking ? memory_of_tracking(reference) + memory_of_tracking(refers ? MeshCounts{} : coded) : 0);

@@ -35,16 +35,17 @@ def digest(mesh):
 class Group:
     """An I-frame and what T-frames make of it (8.11)."""
 
-    def __init__(self, mesh, geometry_step, frame):
-        self.mesh, self.geometry_step, self.frame = mesh, geometry_step, frame
+    def __init__(self, mesh, intra, frame):
+        self.mesh, self.intra, self.frame = mesh, intra, frame
         self.reference = self.state = self.last = None
 
-    def decode(self, packet, spacing):
-        check(spacing > 0, "the header allows no tracked frames")
+    def decode(self, packet, header):
+        check(header.node_spacing > 0, "the header allows no tracked frames")
         before = self.state if self.last == packet.reference else None
         check(before or self.frame == packet.reference, "its reference is not there")
-        self.reference = self.reference or TrackedReference(self.mesh, self.geometry_step, spacing)
-        mesh, state = decode_tracked_mesh(read_frame_payload(packet.payload), self.reference, before)
+        self.reference = self.reference or TrackedReference(
+            self.mesh, self.intra.captured, self.intra.geometry_step, header.node_spacing)
+        mesh, state = decode_tracked_mesh(packet.payload, header.version, self.reference, before)
         if packet.referred():
             self.state, self.last = state, packet.frame
         return mesh
@@ -80,11 +81,11 @@ def decode_stream(data):
                     yield packet, header, mesh
                     continue
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
-                group = Group(mesh, frame.geometry_step, packet.frame)
+                group = Group(mesh, frame, packet.frame)
                 yield packet, header, mesh
             elif packet.kind == TRACKED:
                 check(group, "its I-frame is not there")
-                yield packet, header, group.decode(packet, header.node_spacing)
+                yield packet, header, group.decode(packet, header)
             elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
                 check(reference and reference.frame == packet.reference, "its I-frame is not there")

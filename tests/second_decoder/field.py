@@ -125,20 +125,26 @@ def values_of(components, turned):
     return out
 
 
-def decode_field(data, vertices, levels, number, before):
-    """number: of components. before: the previous frame's field, or None."""
+def decode_field_layer(data, vertices, levels, number, before):
+    """As in versions 1 and 2. number: of components. before: the previous frame's field, or None."""
     read = Bytes(data)
     flags = read.field("B")
     steps = [read.varint() for _ in range(number)]
     check(flags < 4 and max(steps) <= 1 << 28, "a field's header is out of range")
-    field = Field()
-    field.turned = flags & 1 != 0
-    check(number == 3 or not field.turned, "a field of one component is turned")
+    turned = flags & 1 != 0
+    check(number == 3 or not turned, "a field of one component is turned")
     if flags & 2:
-        check(before and before.turned == field.turned, "a field needs one of the previous frame")
+        check(before and before.turned == turned, "a field needs one of the previous frame")
     else:
         before = None
-    decoder = Decoder(read.rest())
+    return decode_field(Decoder(read.rest()), turned, steps, vertices, levels, before)
+
+
+def decode_field(decoder, turned, steps, vertices, levels, before):
+    """steps: one per component. before: the field that predicts it, or None."""
+    number = len(steps)
+    field = Field()
+    field.turned = turned
     field.components = components = [Component(vertices, levels) for _ in range(number)]
     befores = before.components if before else [None] * number
     same, coded_models = Model(), Models()

@@ -61,19 +61,25 @@ def surface_axes(normal, transform):
     return across, along, unit_product(across, along)
 
 
-def decode_node_motion(data, nodes, normals, before):
-    """The transforms. normals: one per node. before: the frame before's transforms, or None."""
+def decode_node_motion_layer(data, nodes, normals, before):
+    """As in versions 1 and 2."""
     check(len(data) >= 3 and data[0] <= 3 and data[1] <= 10 and data[2] <= 20, "the flags or steps of a motion are wrong")
     history, surface = data[0] & 1, data[0] & 2
     check(not history or before is not None or not nodes.pivots, "a motion needs the previous frame")
-    decoder = Decoder(data[3:])
+    return decode_node_motion(Decoder(data[3:]), data[1:3], nodes, normals, before if history else None, surface)
+
+
+def decode_node_motion(decoder, steps, nodes, normals, before, surface=True):
+    """The transforms. steps: the exponents of rotations' and of shifts'. normals: one per node. before: the transforms
+    that predict them, or None."""
+    turn, slide = steps
     same, rotation, across = Model(), SignedModel(), SignedModel()
     along = SignedModel() if surface else across
     transforms = []
     for n, lower in enumerate(nodes.lower):
         if not surface:
             lower = lower[:1]
-        if history:
+        if before:
             transform = from_before(n, lower, transforms, before)
         else:
             transform = from_reference(n, lower, transforms, nodes.pivots)
@@ -81,8 +87,8 @@ def decode_node_motion(data, nodes, normals, before):
         if not decoder.bit(same):
             transform.largest, transform.others = decoder.raw(2), [0, 0, 0]
         for i in range(3):
-            transform.others[i] = clamp(transform.others[i] + (decoder.signed(rotation) << data[1]), -8192, 8192)
-        s = [float(decoder.signed(model)) * float(1 << data[2]) for model in (across, along, along)]
+            transform.others[i] = clamp(transform.others[i] + (decoder.signed(rotation) << turn), -8192, 8192)
+        s = [float(decoder.signed(model)) * float(1 << slide) for model in (across, along, along)]
         for i in range(3):
             by = axes[0][i] * s[0] + axes[1][i] * s[1] + axes[2][i] * s[2]
             transform.shift[i] = clamp(transform.shift[i] + math.floor(by + 0.5), -2 * L, 2 * L)

@@ -54,8 +54,9 @@ def read_sequence_header(payload):
     header = Header()
     check(read.take(4) == b"htvm", "this is no htvm stream")
     version = read.field("H")
-    if version not in (1, 2):
-        raise Unsupported("version %d; this decoder reads 1 and 2" % version)
+    if version not in (1, 2, 3):
+        raise Unsupported("version %d; this decoder reads 1 to 3" % version)
+    header.version = version
     header.bits = read.field("B")
     header.origin = [read.field("i") for _ in range(3)]
     header.fps = (read.field("I"), read.field("I"))
@@ -126,6 +127,7 @@ def read_frame_payload(payload):
     fields = [read.varint() for _ in range(9)]
     check(max(fields) < 1 << 31, "a number is out of range")
     frame = Frame()
+    frame.captured = fields[0:2]
     frame.vertices, frame.triangles, frame.geometry_step, frame.colour_step = fields[2:6]
     frame.intra_coder, frame.geometry_codebook, frame.colour_codebook = fields[6:9]
     check(1 <= frame.geometry_step <= 1 << 24 and 1 <= frame.colour_step <= 255, "a step is out of range")

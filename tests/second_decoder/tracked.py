@@ -1,22 +1,23 @@
-"""Chapter 8.11 of docs/bitstream.md: T-frames, the reference mesh moved by nodes, displaced along its normals and
-recoloured."""
+"""Chapters 8.11 and 8.16 of docs/bitstream.md: T-frames, the reference mesh moved by nodes, displaced along its normals
+and recoloured; their payload."""
 import math
 
+from arithmetic import Decoder, SignedModel
 from conventions import L, add, check, clamp, sub
-from field import decode_field
+from field import decode_field, decode_field_layer
 from hierarchy import cross, dot, vertex_hierarchy
 from intra import Mesh
-from node_motion import decode_node_motion
+from node_motion import decode_node_motion, decode_node_motion_layer
 from nodes import Nodes, smoothed
 from reference import matrix
-from stream import COLOUR, GEOMETRY, TRANSFORMS
+from stream import COLOUR, GEOMETRY, TRANSFORMS, read_frame_payload
 
 
 class TrackedReference:
     """What all T-frames of an I-frame share."""
 
-    def __init__(self, mesh, geometry_step, spacing):
-        self.mesh = mesh
+    def __init__(self, mesh, captured, geometry_step, spacing):
+        self.mesh, self.captured = mesh, captured
         self.positions = smoothed(mesh.positions, mesh.triangles, geometry_step)
         self.nodes = Nodes(self.positions, mesh.triangles, spacing)
         normals = normals_of(self.positions, mesh.triangles)
@@ -53,16 +54,79 @@ def normals_of(positions, triangles):
     return [tuple(x / length for x in n) if length > 0 else (0.0, 0.0, 0.0) for n, length in zip(out, lengths)]
 
 
-def decode_tracked_mesh(frame, reference, before):
-    """The mesh and the state that it leaves. before: the previous frame's state, or None."""
+def decode_layers(payload, reference, before):
+    """The layers of a payload of versions 1 and 2."""
+    frame = read_frame_payload(payload)
     source = reference.mesh
     vertices = len(source.positions)
     check(frame.vertices == vertices and frame.triangles == len(source.triangles), "its counts are not the I-frame's")
     state = TrackedState()
-    state.transforms = decode_node_motion(
+    state.transforms = decode_node_motion_layer(
         frame.layer(TRANSFORMS), reference.nodes, reference.node_normals, before and before.transforms)
-    state.displacement = decode_field(
+    state.displacement = decode_field_layer(
         frame.layer(GEOMETRY), vertices, reference.levels, 1, before and before.displacement)
+    if source.colours:
+        state.change = decode_field_layer(
+            frame.layer(COLOUR), vertices, reference.levels, 3, before and before.change)
+    return state
+
+
+def decode_captured(decoder, before):
+    """The counts of the captured mesh, from those before."""
+    most = (1 << 31) - 1
+    vertices = clamp(before[0] + decoder.signed(SignedModel()), 0, most)
+    expected = clamp(before[1] + 2 * (vertices - before[0]), 0, most)
+    return vertices, clamp(expected + decoder.signed(SignedModel()), 0, most)
+
+
+def decode_steps(decoder, number):
+    """Of a field of so many components."""
+    steps = []
+    for c in range(number):
+        if c > 0 and decoder.raw(1):
+            steps.append(steps[-1])
+            continue
+        width = decoder.raw(5)
+        steps.append(1 << (width - 1) | decoder.raw(width - 1) if width else 0)
+    check(max(steps) <= 1 << 28, "a field's step is out of range")
+    return steps
+
+
+def decode_run(payload, reference, before):
+    """The layers of a payload that is one run (8.16)."""
+    decoder = Decoder(payload)
+    state = TrackedState()
+    state.captured = decode_captured(decoder, before.captured if before else reference.captured)
+    if before and decoder.raw(1):
+        state.motion_steps = before.motion_steps
+    else:
+        state.motion_steps = decoder.raw(4), decoder.raw(5)
+        check(state.motion_steps[0] <= 10 and state.motion_steps[1] <= 20, "the steps of a motion are wrong")
+    if before and decoder.raw(1):
+        state.steps = before.steps
+    else:
+        state.steps = decode_steps(decoder, 1)
+    if reference.mesh.colours:
+        if before and decoder.raw(1):
+            state.turned, state.change_steps = before.turned, before.change_steps
+        else:
+            state.turned = before.turned if before else decoder.raw(1) != 0
+            state.change_steps = decode_steps(decoder, 3)
+    vertices = len(reference.mesh.positions)
+    state.transforms = decode_node_motion(
+        decoder, state.motion_steps, reference.nodes, reference.node_normals, before and before.transforms)
+    state.displacement = decode_field(
+        decoder, False, state.steps, vertices, reference.levels, before and before.displacement)
+    if reference.mesh.colours:
+        state.change = decode_field(
+            decoder, state.turned, state.change_steps, vertices, reference.levels, before and before.change)
+    return state
+
+
+def decode_tracked_mesh(payload, version, reference, before):
+    """The mesh and the state that it leaves. before: the previous frame's state, or None."""
+    source = reference.mesh
+    state = (decode_run if version >= 3 else decode_layers)(payload, reference, before)
     mesh = Mesh()
     mesh.triangles, mesh.texcoords = source.triangles, source.texcoords
     mesh.colours = mesh.normals = None
@@ -71,7 +135,6 @@ def decode_tracked_mesh(frame, reference, before):
     for p, n, (d,) in zip(moved, normals_of(moved, mesh.triangles), state.displacement.values):
         mesh.positions.append(tuple(clamp(x + math.floor(y * d + 0.5), -L, L) for x, y in zip(p, n)))
     if source.colours:
-        state.change = decode_field(frame.layer(COLOUR), vertices, reference.levels, 3, before and before.change)
         mesh.colours = [tuple(clamp(x + y, 0, 255) for x, y in zip(*pair))
                         for pair in zip(source.colours, state.change.values)]
     if source.normals:

@@ -15,18 +15,20 @@ Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Th
     auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads);
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
+    reference.tracked->captured = reference.captured;
     return {};
 }
 
-Result<Reference> make_reference(const SequenceHeader& header, std::uint32_t number, LatticeMesh mesh, CodedPose pose,
-                                 std::int32_t step, Derived derived, Threads threads) {
+Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFacts& facts, LatticeMesh mesh,
+                                 CodedPose pose, Derived derived, Threads threads) {
     Reference out;
-    out.number = number;
-    out.step = step;
+    out.number = facts.number;
+    out.step = facts.step;
+    out.captured = facts.captured;
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);
     out.skinned.orientations = std::move(pose.orientations);
-    out.skinned.frame = number;
+    out.skinned.frame = facts.number;
     if (derived.nodes && header.node_spacing > 0)
         if (auto ok = derive_nodes(out, header, threads); !ok) return tl::unexpected(ok.error());
     if (derived.bones) derive_bones(out, header, threads);

@@ -17,6 +17,7 @@ namespace htvm::internal {
 struct Reference {
     std::uint32_t number = 0;  // of the I-frame
     std::int32_t step = 1;     // of its positions, in lattice units
+    CapturedCounts captured;   // what the I-frame was captured with
     ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
     bool has_bones = false;    // whether it was derived
     std::optional<TrackedReference> tracked;  // what depends on the nodes, if it was derived
@@ -29,9 +30,16 @@ struct Derived {
     bool nodes = false;  // no effect if the header has no node spacing
 };
 
+// What the I-frame's packet tells, beside its mesh and pose.
+struct ReferenceFacts {
+    std::uint32_t number = 0;
+    std::int32_t step = 1;
+    CapturedCounts captured;
+};
+
 // mesh: as decoded. Errors: those of make_tracked_reference().
-Result<Reference> make_reference(const SequenceHeader& header, std::uint32_t number, LatticeMesh mesh, CodedPose pose,
-                                 std::int32_t step, Derived derived, Threads threads);
+Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFacts& facts, LatticeMesh mesh,
+                                 CodedPose pose, Derived derived, Threads threads);
 
 // Derive later what was not derived at once. No effect if it exists already.
 void derive_bones(Reference& reference, const SequenceHeader& header, Threads threads);

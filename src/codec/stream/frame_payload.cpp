@@ -27,6 +27,12 @@ std::vector<std::uint8_t> write_frame_payload(const FramePayload& payload) {
     return bytes;
 }
 
+LayerBytes with_overhead(LayerBytes layers, const Packet& packet) {
+    layers.overhead = 0;
+    layers.overhead = packet.payload.size() + packet_overhead - layers.total();
+    return layers;
+}
+
 FramePayloadView view_of(const FramePayload& payload) {
     FramePayloadView out{payload.header, {}, payload.present};
     for (std::size_t i = 0; i < layer_count; ++i) out.layers[i] = payload.layers[i];

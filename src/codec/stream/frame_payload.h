@@ -1,4 +1,5 @@
-// The payload of a frame packet: a few numbers, then layers that can each be decoded, or skipped, by themselves.
+// The payload of a frame packet: a few numbers, then layers that can each be decoded, or skipped, by themselves. A
+// T-frame's is another (tracked/tracked_payload.h), but for versions 1 and 2 of the stream.
 #pragma once
 
 #include <algorithm>
@@ -8,12 +9,19 @@
 #include <vector>
 
 #include "htvm/frame.hpp"
+#include "htvm/packet.hpp"
 #include "htvm/result.hpp"
 
 namespace htvm::internal {
 
 inline constexpr std::uint8_t intra_coder_tfan = 0;
 inline constexpr std::uint8_t intra_coder_draco = 1;
+
+// Of the mesh that a frame was captured with.
+struct CapturedCounts {
+    std::uint32_t vertices = 0, triangles = 0;
+    bool operator==(const CapturedCounts&) const = default;
+};
 
 struct FrameHeader {
     std::uint32_t source_vertices = 0, source_triangles = 0;   // of the captured mesh
@@ -47,6 +55,9 @@ struct FramePayloadView {
 };
 FramePayloadView view_of(const FramePayload& payload);
 FramePayload copy_of(const FramePayloadView& payload);
+
+// The layers' bytes of a packet, and as overhead all its other bytes.
+LayerBytes with_overhead(LayerBytes layers, const Packet& packet);
 
 // The fewest bytes that the payload of an I- or EP-frame of so many vertices and triangles may have: it bounds what a
 // few bytes can make a decoder do.

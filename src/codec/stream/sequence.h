@@ -18,8 +18,11 @@ namespace htvm::internal {
 
 // Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version on are
 // read.
-inline constexpr std::uint16_t stream_version = 2;
+inline constexpr std::uint16_t stream_version = 3;
 inline constexpr std::uint16_t oldest_version = 1;
+
+// From this version on a T-frame's payload is one run (tracked/tracked_payload.h).
+inline constexpr std::uint16_t tracked_run_version = 3;
 
 // The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (paper/mtfan.h). The
 // paper's are 8, 16 and 32.

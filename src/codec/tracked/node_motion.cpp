@@ -6,14 +6,12 @@
 
 #include "codec/reference/transforms.h"
 #include "entropy/models.h"
-#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 
 namespace {
 
 constexpr std::int32_t shift_limit = 2 * lattice_limit, rotation_limit = 1 << rotation_bits;
-constexpr std::uint8_t history_flag = 1, along_flag = 2;
 
 using Transforms = std::span<const QuantisedTransform>;
 
@@ -176,13 +174,13 @@ QuantisedRotation start_of(const QuantisedRotation& predicted, const MotionSteps
 }
 
 QuantisedTransform moved_on(const QuantisedTransform& predicted, const MotionSteps& steps, const Axes& axes,
-                            int rotation_exponent, int shift_exponent) {
+                            const NodeMotionSteps& exponents) {
     QuantisedTransform out{start_of(predicted.rotation, steps), {}};
     for (std::size_t c = 0; c < 3; ++c)
-        out.rotation.others[c] = static_cast<std::int16_t>(
-            within(out.rotation.others[c] + std::int64_t{steps.rotation[c]} * (std::int64_t{1} << rotation_exponent),
-                   rotation_limit));
-    out.shift = moved_along(predicted.shift, axes, steps.shift, shift_exponent);
+        out.rotation.others[c] = static_cast<std::int16_t>(within(
+            out.rotation.others[c] + std::int64_t{steps.rotation[c]} * (std::int64_t{1} << exponents.rotation_exponent),
+            rotation_limit));
+    out.shift = moved_along(predicted.shift, axes, steps.shift, exponents.shift_exponent);
     return out;
 }
 
@@ -201,14 +199,14 @@ MotionSteps steps_between(const QuantisedTransform& predicted, const QuantisedTr
     out.same_largest = predicted.rotation.largest == out.largest;
     const auto start = start_of(predicted.rotation, out);
     for (std::size_t c = 0; c < 3; ++c)
-        out.rotation[c] = quantised(wanted.rotation.others[c] - start.others[c], options.rotation_exponent);
+        out.rotation[c] = quantised(wanted.rotation.others[c] - start.others[c], options.steps.rotation_exponent);
     const Vector3d off = {static_cast<double>(wanted.shift.x) - predicted.shift.x,
                           static_cast<double>(wanted.shift.y) - predicted.shift.y,
                           static_cast<double>(wanted.shift.z) - predicted.shift.z};
     std::array<double, 3> part{};
     for (std::size_t k = 0; k < 3; ++k) part[k] = off[0] * axes[k][0] + off[1] * axes[k][1] + off[2] * axes[k][2];
     if (std::hypot(part[1], part[2]) < options.still_along) part[1] = part[2] = 0;
-    for (std::size_t k = 0; k < 3; ++k) out.shift[k] = quantised(part[k], options.shift_exponent);
+    for (std::size_t k = 0; k < 3; ++k) out.shift[k] = quantised(part[k], options.steps.shift_exponent);
     return out;
 }
 
@@ -217,35 +215,24 @@ MotionSteps steps_between(const QuantisedTransform& predicted, const QuantisedTr
 EncodedNodeMotion encode_node_motion(std::span<const QuantisedTransform> wanted, const NodeGraph& graph,
                                      std::span<const QuantisedTransform> before, const NodeMotionOptions& options) {
     EncodedNodeMotion out;
-    RangeEncoder encoder;
-    WritingCoder<RangeEncoder> coder{encoder};
+    WritingCoder<DecisionLog> coder{out.decisions};
     MotionModels models;
     models.of_axis = surface_models;
     for (std::size_t node = 0; node < wanted.size(); ++node) {
         const auto predicted = predict(node, out.transforms, before, graph);
         const auto axes = surface_axes(graph.normals[node], predicted.rotation);
         const auto steps = code_steps(coder, models, steps_between(predicted, wanted[node], axes, options));
-        out.transforms.push_back(moved_on(predicted, steps, axes, options.rotation_exponent, options.shift_exponent));
+        out.transforms.push_back(moved_on(predicted, steps, axes, options.steps));
     }
-    out.bytes = {static_cast<std::uint8_t>(along_flag | (before.empty() ? 0 : history_flag)),
-                 static_cast<std::uint8_t>(options.rotation_exponent),
-                 static_cast<std::uint8_t>(options.shift_exponent)};
-    const auto coded = encoder.finish();
-    out.bytes.insert(out.bytes.end(), coded.begin(), coded.end());
     return out;
 }
 
-Result<std::vector<QuantisedTransform>> decode_node_motion(std::span<const std::uint8_t> bytes, const NodeGraph& graph,
-                                                           std::span<const QuantisedTransform> before) {
+Result<std::vector<QuantisedTransform>> decode_node_motion(RangeDecoder& decoder, const NodeMotionSteps& steps,
+                                                           const NodeGraph& graph,
+                                                           std::span<const QuantisedTransform> before,
+                                                           NodeMotionSyntax syntax) {
     const std::size_t nodes = graph.pivots.size();
-    if (bytes.size() < 3 || bytes[0] > (history_flag | along_flag) || bytes[1] > 10 || bytes[2] > 20)
-        return fail(ErrorKind::corrupt_stream, "node motion layer: its flags or steps are out of range");
-    if ((bytes[0] & history_flag) == 0)
-        before = {};
-    else if (before.size() != nodes)
-        return fail(ErrorKind::corrupt_stream, "node motion layer: the frame that it refers to is not there");
-    const bool along = (bytes[0] & along_flag) != 0;
-    RangeDecoder decoder(bytes.subspan(3));
+    const bool along = syntax == NodeMotionSyntax::surface;
     ReadingCoder<RangeDecoder> coder{decoder};
     MotionModels models;
     if (along) models.of_axis = surface_models;
@@ -254,8 +241,8 @@ Result<std::vector<QuantisedTransform>> decode_node_motion(std::span<const std::
     for (std::size_t node = 0; node < nodes; ++node) {
         const auto predicted = along ? predict(node, out, before, graph) : predict_by_one(node, out, before, graph);
         const auto axes = along ? surface_axes(graph.normals[node], predicted.rotation) : axes_of_space;
-        out.push_back(moved_on(predicted, code_steps(coder, models, {}), axes, bytes[1], bytes[2]));
-        if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "node motion layer: it ends too early");
+        out.push_back(moved_on(predicted, code_steps(coder, models, {}), axes, steps));
+        if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "node motion: its run ends too early");
     }
     return out;
 }

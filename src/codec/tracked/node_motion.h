@@ -7,10 +7,8 @@
 // This keeps the registration's jitter along the surface, which would otherwise be most of the layer, out of the
 // stream.
 //
-// Layer: a byte of flags (bit 0: refers to the previous frame; bit 1: predicted and coded as described above, without
-// it as in version 1 of the stream, by one neighbour and in space), a byte for the rotations' step (its exponent), one
-// for the shifts'; then, range coded, for each node: whether the rotation's largest component is the predicted one (if
-// not, which, raw), the other three components, the three of the shift.
+// Range coded for each node: whether the rotation's largest component is the predicted one (if not, which, raw), the
+// other three components, the three of the shift.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +17,8 @@
 
 #include "codec/reference/transforms.h"
 #include "core/geometry.h"
+#include "entropy/decision_log.h"
+#include "entropy/range_coder.h"
 #include "htvm/result.hpp"
 
 namespace htvm::internal {
@@ -30,24 +30,38 @@ struct NodeGraph {
     std::vector<Vector3d> normals;                  // of the surface at the pivots, unit length or zero
 };
 
+// How motion is quantised, which the decoder must know.
+struct NodeMotionSteps {
+    static constexpr int most_rotation = 10, most_shift = 20;
+    int rotation_exponent = 4;  // 0..most_rotation: steps of 2^4 / 2^rotation_bits
+    int shift_exponent = 3;     // 0..most_shift: steps of 2^3 lattice units
+    bool operator==(const NodeMotionSteps&) const = default;
+};
+
 struct NodeMotionOptions {
-    int rotation_exponent = 4;  // 0..10: steps of 2^4 / 2^rotation_bits
-    int shift_exponent = 3;     // 0..20: steps of 2^3 lattice units
-    double still_along = 0;     // lattice units: a residual along the surface below this is not coded
+    NodeMotionSteps steps;
+    double still_along = 0;  // lattice units: a residual along the surface below this is not coded
+};
+
+// The axes in which shifts are coded, and what predicts them.
+enum class NodeMotionSyntax : std::uint8_t {
+    axes_of_space,  // version 1 of the stream: predicted by the lowest neighbour alone
+    surface,        // across and along the surface, predicted by all lower neighbours
 };
 
 struct EncodedNodeMotion {
-    std::vector<std::uint8_t> bytes;
+    DecisionLog decisions;
     std::vector<QuantisedTransform> transforms;  // the transforms that the decoder will have
 };
 
-// wanted: one per node. before: the transforms of the previous frame, or empty.
+// wanted: one per node. before: the transforms of the frame that predicts them, or empty.
 EncodedNodeMotion encode_node_motion(std::span<const QuantisedTransform> wanted, const NodeGraph& graph,
                                      std::span<const QuantisedTransform> before, const NodeMotionOptions& options);
 
-// before: one per node; needed if the layer refers to it. corrupt_stream if the bytes end early or contain invalid
-// values.
-Result<std::vector<QuantisedTransform>> decode_node_motion(std::span<const std::uint8_t> bytes, const NodeGraph& graph,
-                                                           std::span<const QuantisedTransform> before);
+// before: as given to the encoder. corrupt_stream if the run ends early.
+Result<std::vector<QuantisedTransform>> decode_node_motion(RangeDecoder& decoder, const NodeMotionSteps& steps,
+                                                           const NodeGraph& graph,
+                                                           std::span<const QuantisedTransform> before,
+                                                           NodeMotionSyntax syntax = NodeMotionSyntax::surface);
 
 }  // namespace htvm::internal

@@ -13,8 +13,7 @@
 
 #include "codec/reference/deformation_nodes.h"
 #include "codec/stream/frame_payload.h"
-#include "codec/tracked/node_motion.h"
-#include "codec/tracked/vertex_field.h"
+#include "codec/tracked/tracked_payload.h"
 #include "core/geometry.h"
 #include "core/lattice.h"
 #include "core/thread.h"
@@ -27,6 +26,7 @@ struct TrackedReference {
     DeformationNodes nodes;
     NodeGraph graph;
     VertexHierarchy hierarchy;
+    CapturedCounts captured;  // what the I-frame was captured with; make_tracked_reference() does not know it
 };
 // node_spacing: lattice units, > 0. quantiser_step: that of the I-frame's positions, in lattice units. threads: uses
 // two at most.
@@ -40,6 +40,7 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 
 // What a frame leaves for the next one.
 struct TrackedState {
+    TrackedHead head;
     std::vector<QuantisedTransform> transforms;  // one per node
     FieldHistory displacement, colour;
 };
@@ -49,13 +50,18 @@ struct DecodedTrackedFrame {
     std::vector<LatticePoint> positions;
     std::vector<Colour> colours;           // if the reference has them
     std::vector<QuantisedNormal> normals;  // likewise
+    LayerBytes shares;                     // of its payload
     TrackedState state;
 };
 
-// before: state of the frame that the payload refers to; null if that is the I-frame. out: may hold an earlier frame,
-// whose arrays are reused, but not the one of `before`; its contents are undefined after an error.
-Result<void> decode_tracked_frame(const FramePayloadView& payload, const TrackedReference& reference,
+// payload: one run, as from version 3 of the stream on. before: state of the frame that it refers to; null if that is
+// the I-frame. out: may hold an earlier frame, whose arrays are reused, but not the one of `before`; its contents are
+// undefined after an error.
+Result<void> decode_tracked_frame(std::span<const std::uint8_t> payload, const TrackedReference& reference,
                                   const TrackedState* before, Threads threads, DecodedTrackedFrame& out);
+// The same of versions 1 and 2, where each layer is a run of its own.
+Result<void> decode_tracked_layers(const FramePayloadView& payload, const TrackedReference& reference,
+                                   const TrackedState* before, Threads threads, DecodedTrackedFrame& out);
 
 // The steps, which the encoder shares. First: the reference moved by its nodes, one transform per node.
 std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,

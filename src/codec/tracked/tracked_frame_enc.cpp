@@ -34,10 +34,28 @@ std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, s
 NodeMotionOptions motion_options(double geometry_step) {
     constexpr double still_along = 1.3;
     NodeMotionOptions out;
-    out.shift_exponent = std::clamp(static_cast<int>(std::lround(std::log2(std::max(geometry_step, 1.0)))) - 1, 0, 8);
-    out.rotation_exponent = std::clamp(out.shift_exponent + 4, 0, 10);
+    auto& steps = out.steps;
+    steps.shift_exponent = std::clamp(static_cast<int>(std::lround(std::log2(std::max(geometry_step, 1.0)))) - 1, 0, 8);
+    steps.rotation_exponent = std::clamp(steps.shift_exponent + 4, 0, NodeMotionSteps::most_rotation);
     out.still_along = still_along * geometry_step;
     return out;
+}
+
+// The layers one after the other in one run; sets payload, shares and the state's head.
+void write_run(const EncodedNodeMotion& motion, const EncodedField& displacement, const EncodedField* colour,
+               const KnownOfHead& known, EncodedTrackedFrame& out) {
+    RangeEncoder run;
+    write_tracked_head(run, out.state.head, known);
+    TrackedRunEnds ends;
+    ends.head = run.position();
+    motion.decisions.write(run);
+    ends.motion = run.position();
+    displacement.decisions.write(run);
+    ends.displacement = run.position();
+    if (colour) colour->decisions.write(run);
+    ends.colour = run.position();
+    out.payload = run.finish();
+    out.shares = layer_shares(ends, out.payload.size());
 }
 
 }  // namespace
@@ -76,10 +94,11 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     StageClock clock(stages);
     const auto& triangles = reference.mesh.triangles;
     EncodedTrackedFrame out;
+    const auto of_motion = motion_options(options.geometry_step);
     auto coded_motion = encode_node_motion(
         quantised(motion, reference.graph.pivots), reference.graph,
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
-        motion_options(options.geometry_step));
+        of_motion);
     const auto moved = moved_by_nodes(reference, coded_motion.transforms, options.threads);
     const auto normals = vertex_normals(moved, triangles);
     TrackedTargets targets;
@@ -123,18 +142,19 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
         out.mesh.normals = quantised_normals(vertex_normals(out.mesh.positions, triangles));
     out.state.transforms = std::move(coded_motion.transforms);
     out.state.displacement = std::move(displacement->history);
-    auto& header = out.payload.header;
-    header.source_vertices = static_cast<std::uint32_t>(mesh.positions.size());
-    header.source_triangles = static_cast<std::uint32_t>(mesh.triangles.size());
-    header.vertices = static_cast<std::uint32_t>(reference.mesh.positions.size());
-    header.triangles = static_cast<std::uint32_t>(triangles.size());
-    out.payload.set(Layer::transforms, std::move(coded_motion.bytes));
-    out.payload.set(Layer::geometry, std::move(displacement->bytes));
-    if (!reference.mesh.colours.empty()) {
+    auto& head = out.state.head;
+    head.captured = {static_cast<std::uint32_t>(mesh.positions.size()),
+                     static_cast<std::uint32_t>(mesh.triangles.size())};
+    head.motion = of_motion.steps;
+    head.displacement = displacement->steps;
+    const bool coloured = !reference.mesh.colours.empty();
+    if (coloured) {
         out.mesh.colours = recoloured(reference.mesh.colours, colours->values);
         out.state.colour = std::move(colours->history);
-        out.payload.set(Layer::colour, std::move(colours->bytes));
+        head.colour = colours->steps;
     }
+    write_run(coded_motion, *displacement, coloured ? &*colours : nullptr,
+              {before ? &before->head : nullptr, reference.captured, coloured}, out);
     clock.done("reconstruction");
     return out;
 }

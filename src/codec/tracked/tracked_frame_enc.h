@@ -35,8 +35,9 @@ std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const 
                                         const NodeStarts& starts, const DeformationOptions& options);
 
 struct EncodedTrackedFrame {
-    FramePayload payload;  // header and layers
-    LatticeMesh mesh;      // the mesh that the decoder will have
+    std::vector<std::uint8_t> payload;
+    LayerBytes shares;  // of the payload
+    LatticeMesh mesh;   // the mesh that the decoder will have
     TrackedState state;
 };
 

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "codec/tracked/vertex_field_walk.h"
-#include "core/bytes.h"
 #include "entropy/range_coder.h"
 
 namespace htvm::internal {
@@ -64,14 +63,14 @@ void pass_down(const HierarchyLevel& coarser, std::span<const std::uint8_t> own,
 
 }  // namespace
 
-FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldHeader& header, std::size_t count,
+FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldSteps& steps, std::size_t count,
                      const FieldHistory* before)
     : hierarchy(mesh), has_history(before != nullptr), components(count) {
     const std::size_t levels = hierarchy.levels.size();
     for (std::size_t c = 0; c < count; ++c) {
         ComponentWalk& component = components[c];
         component.before = before ? &before->planes[c] : nullptr;
-        component.step = header.step[c];
+        component.step = steps.step[c];
         component.last = first_mode(has_history);
         component.above.assign(1, 0);
         FieldPlane& plane = component.plane;
@@ -196,7 +195,7 @@ double field_error_bound(const VertexHierarchy& hierarchy, double step) {
 namespace {
 
 struct FieldReader {
-    RangeDecoder decoder;
+    RangeDecoder& decoder;
     bool bit(BinaryModel& model, bool) { return decoder.bit(model); }
     std::uint32_t raw(std::uint32_t, int n) { return decoder.raw(n); }
 };
@@ -216,34 +215,23 @@ void read_field(FieldWalk& walk, FieldReader& reader) {
 
 }  // namespace
 
-Result<DecodedField> decode_field(std::span<const std::uint8_t> bytes, const VertexHierarchy& hierarchy,
+Result<DecodedField> decode_field(RangeDecoder& decoder, const FieldSteps& steps, const VertexHierarchy& hierarchy,
                                   std::size_t components, const FieldHistory* before) {
     if (components == 0 || components > most_field_components)
         return fail(ErrorKind::bad_input, "vertex field: there must be one to three components");
-    ByteReader reader(bytes);
-    FieldHeader header;
-    const std::uint8_t flags = reader.u8();
-    header.turned = flags & 1;
-    header.has_history = flags & 2;
-    bool valid = flags < 4 && (!header.turned || components == 3);
-    for (std::size_t c = 0; c < components; ++c) {
-        const std::uint64_t step = reader.varint();
-        valid = valid && step <= most_step;
-        header.step[c] = static_cast<std::uint32_t>(std::min<std::uint64_t>(step, most_step));
-    }
-    if (!reader.ok()) return fail(ErrorKind::corrupt_stream, "vertex field: the layer ends within its header");
-    if (!valid) return fail(ErrorKind::corrupt_stream, "vertex field: the layer's header is not one of a field");
-    if (header.has_history && !before)
-        return fail(ErrorKind::corrupt_stream, "vertex field: the layer needs the frame before, which is missing");
-    if (header.has_history && !history_fits(*before, hierarchy, components, header.turned))
+    if (steps.turned && components != 3)
+        return fail(ErrorKind::bad_input, "vertex field: only three components can be turned");
+    for (const auto step : steps.step)
+        if (step > FieldSteps::most) return fail(ErrorKind::bad_input, "vertex field: a step is out of range");
+    if (before && !history_fits(*before, hierarchy, components, steps.turned))
         return fail(ErrorKind::bad_input, "vertex field: the frame before is of another mesh or another kind of field");
-    FieldWalk walk(hierarchy, header, components, header.has_history ? before : nullptr);
-    FieldReader coder{RangeDecoder(reader.bytes(reader.remaining()))};
-    if (hierarchy.vertex_count > 0) read_field(walk, coder);
-    if (coder.decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "vertex field: the layer ends too early");
+    FieldWalk walk(hierarchy, steps, components, before);
+    FieldReader reader{decoder};
+    if (hierarchy.vertex_count > 0) read_field(walk, reader);
+    if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "vertex field: its run ends too early");
     DecodedField out;
-    out.history = history_of(walk, header.turned);
-    out.values = field_values(out.history.planes, hierarchy.vertex_count, header.turned);
+    out.history = history_of(walk, steps.turned);
+    out.values = field_values(out.history.planes, hierarchy.vertex_count, steps.turned);
     return out;
 }
 

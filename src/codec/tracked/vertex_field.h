@@ -6,8 +6,7 @@
 // a history, from the frame before), quantised by a step that makes every difference count by the squared error it
 // causes. Closed loop: no error builds up. The encoder zeroes what costs more bits than it is worth.
 //
-// Layer: a byte of flags (bit 0: turned, bit 1: has a history), the step of each component as a varint in 1/256, then
-// range coded: the mean of each component, and level by level, component by component, whether all differences are as
+// Range coded: the mean of each component, and level by level, component by component, whether all differences are as
 // predicted, how they are predicted, and the quantised rests.
 #pragma once
 
@@ -20,6 +19,8 @@
 
 #include "codec/reference/vertex_hierarchy.h"
 #include "core/thread.h"
+#include "entropy/decision_log.h"
+#include "entropy/range_coder.h"
 #include "htvm/result.hpp"
 
 namespace htvm::internal {
@@ -39,6 +40,14 @@ struct FieldOptions {
     double first_weight = 1;  // of a turned field: the sum's step is step[0] / first_weight
 };
 
+// How a field is quantised, which the decoder must know.
+struct FieldSteps {
+    static constexpr std::uint32_t most = 1u << 28;
+    bool turned = false;
+    std::array<std::uint32_t, most_field_components> step{};  // in 1/256 of the values' unit; 0: not coded
+    bool operator==(const FieldSteps&) const = default;
+};
+
 // One component of a decoded field in 1/256 of the values' unit, with what predicts the next frame.
 struct FieldPlane {
     std::vector<std::vector<std::int32_t>> mean;       // [0]: by vertex, [1 + k]: by node of level k
@@ -53,7 +62,8 @@ struct FieldHistory {
 };
 
 struct EncodedField {
-    std::vector<std::uint8_t> bytes;
+    FieldSteps steps;
+    DecisionLog decisions;
     std::vector<std::int32_t> values;  // as decode_field gives them
     FieldHistory history;
 };
@@ -66,16 +76,16 @@ struct DecodedField {
 // values: vertices x components, the components of a vertex side by side. before: the history of a frame on the same
 // hierarchy, or null; it is used where it predicts better. Errors: bad_input where sizes do not fit, a value is beyond
 // field_limit, a step or lambda out of range, or a field other than of three components is to be turned.
-// threads: two at most serve, three components side by side; any number gives the same bytes. beside: other work for
-// the second of them, done when the call returns, but for one that fails.
+// threads: two at most serve, three components side by side; any number gives the same decisions. beside: other work
+// for the second of them, done when the call returns, but for one that fails.
 Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values,
                                   std::size_t components, const FieldOptions& options = {},
                                   const FieldHistory* before = nullptr, Threads threads = {},
                                   const std::function<void()>& beside = {});
 
-// `before`: as given to the encoder; needed where the layer says so. Errors: corrupt_stream where the bytes end too
-// early, or name steps or a history that cannot be; bad_input where `before` is of another mesh.
-Result<DecodedField> decode_field(std::span<const std::uint8_t> bytes, const VertexHierarchy& hierarchy,
+// steps, before: as the encoder had them. Errors: corrupt_stream where the run ends too early; bad_input where steps
+// cannot be, or `before` is of another mesh.
+Result<DecodedField> decode_field(RangeDecoder& decoder, const FieldSteps& steps, const VertexHierarchy& hierarchy,
                                   std::size_t components, const FieldHistory* before = nullptr);
 
 // The largest error of a vertex, in the values' unit, that lambda 0 can leave before values are rounded to whole

@@ -4,63 +4,12 @@
 #include <string>
 
 #include "codec/tracked/vertex_field_walk.h"
-#include "core/bytes.h"
 #include "core/parallel.h"
 #include "entropy/cost.h"
-#include "entropy/range_coder.h"
 
 namespace htvm::internal {
 
 namespace {
-
-// Decisions in the order of a stream and what they cost, to be written when it is known what comes before them.
-class DecisionLog {
-public:
-    bool bit(BinaryModel& model, bool wanted) {
-        bits_ += decision_cost(model, wanted);
-        decisions_.push_back({wanted, model.one, 0});
-        model.update(wanted);
-        return wanted;
-    }
-    std::uint32_t raw(std::uint32_t wanted, int n) {
-        bits_ += n;
-        if (n > 0) decisions_.push_back({wanted, 0, static_cast<std::uint8_t>(n)});
-        return wanted;
-    }
-    double bits() const { return bits_; }
-    void clear() { decisions_.clear(), bits_ = 0; }
-    void write(RangeEncoder& encoder) const {
-        for (const auto& decision : decisions_) {
-            BinaryModel model{decision.one, model_seen_limit};
-            if (decision.width > 0)
-                encoder.raw(decision.value, decision.width);
-            else
-                encoder.bit(model, decision.value != 0);
-        }
-    }
-
-private:
-    struct Decision {
-        std::uint32_t value;
-        std::uint16_t one;   // of the model
-        std::uint8_t width;  // 0: under a model
-    };
-    std::vector<Decision> decisions_;
-    double bits_ = 0;
-};
-
-// What a walk writes with.
-struct FieldWriter {
-    RangeEncoder encoder;
-    bool bit(BinaryModel& model, bool wanted) {
-        encoder.bit(model, wanted);
-        return wanted;
-    }
-    std::uint32_t raw(std::uint32_t wanted, int n) {
-        encoder.raw(wanted, n);
-        return wanted;
-    }
-};
 
 // The bits of a decision predicted from several contexts, without adapting them.
 template <std::size_t N>
@@ -288,36 +237,35 @@ std::vector<ComponentPlan> plan_field(FieldWalk& walk, std::span<const std::int3
     return plans;
 }
 
-// Writes what was planned: level by level, component by component.
-std::vector<std::uint8_t> written(FieldWalk& walk, const std::vector<ComponentPlan>& plans) {
-    FieldWriter writer;
-    for (const auto& plan : plans) plan.root.write(writer.encoder);
+// What was planned in the order of the stream: level by level, component by component.
+DecisionLog in_order(FieldWalk& walk, const std::vector<ComponentPlan>& plans) {
+    DecisionLog out;
+    for (const auto& plan : plans) out.append(plan.root);
     std::vector<LevelMode> last;
     for (const auto& component : walk.components) last.push_back(first_mode(component.before != nullptr));
     for (std::size_t k = walk.hierarchy.levels.size(); k-- > 0;)
         for (std::size_t c = 0; c < plans.size(); ++c) {
             if (walk.components[c].step == 0) continue;
-            code_mode(writer, walk, last[c], plans[c].modes[k]);
-            plans[c].rests[k].write(writer.encoder);
+            code_mode(out, walk, last[c], plans[c].modes[k]);
+            out.append(plans[c].rests[k]);
         }
-    return writer.encoder.finish();
+    return out;
 }
 
-Result<FieldHeader> header_of(std::span<const std::int32_t> values, std::size_t components,
-                              const FieldOptions& options) {
-    FieldHeader header{.turned = options.turned};
+Result<FieldSteps> steps_of(std::span<const std::int32_t> values, std::size_t components, const FieldOptions& options) {
+    FieldSteps out{.turned = options.turned};
     for (std::size_t c = 0; c < components; ++c) {
         double step = options.step[c];
         if (options.turned && c == 0) step /= options.first_weight;
         if (!(step >= 0 && step <= field_limit && (step == 0 || step * field_one >= 0.5)))
             return fail(ErrorKind::bad_input, "vertex field: a step must be 0 or between 1/256 and 2^20");
-        header.step[c] = static_cast<std::uint32_t>(std::lround(step * field_one));
+        out.step[c] = static_cast<std::uint32_t>(std::lround(step * field_one));
     }
     for (std::size_t i = 0; i < values.size(); ++i)
         if (values[i] < -field_limit || values[i] > field_limit)
             return fail(ErrorKind::bad_input,
                         "vertex field: the value of vertex " + std::to_string(i / components) + " is beyond 2^20");
-    return header;
+    return out;
 }
 
 }  // namespace
@@ -333,25 +281,19 @@ Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<co
         return fail(ErrorKind::bad_input, "vertex field: only three components can be turned");
     if (!(options.lambda >= 0 && options.lambda <= 1e6))
         return fail(ErrorKind::bad_input, "vertex field: lambda must be between 0 and 10^6");
-    auto header = header_of(values, components, options);
-    if (!header) return tl::unexpected(header.error());
+    const auto steps = steps_of(values, components, options);
+    if (!steps) return tl::unexpected(steps.error());
     if (before && !history_fits(*before, hierarchy, components, options.turned))
         return fail(ErrorKind::bad_input, "vertex field: the frame before is of another mesh or another kind of field");
-    header->has_history = before != nullptr;
-    ByteWriter writer;
-    writer.u8(static_cast<std::uint8_t>((header->turned ? 1 : 0) | (header->has_history ? 2 : 0)));
-    for (std::size_t c = 0; c < components; ++c) writer.varint(header->step[c]);
-    FieldWalk walk(hierarchy, *header, components, before);
-    if (hierarchy.vertex_count > 0) {
-        const auto plans = plan_field(walk, values, options.turned, options.lambda, threads, beside);
-        writer.bytes(written(walk, plans));
-    } else if (beside) {
-        beside();
-    }
     EncodedField out;
-    out.bytes = writer.take();
-    out.history = history_of(walk, header->turned);
-    out.values = field_values(out.history.planes, hierarchy.vertex_count, header->turned);
+    out.steps = *steps;
+    FieldWalk walk(hierarchy, *steps, components, before);
+    if (hierarchy.vertex_count > 0)
+        out.decisions = in_order(walk, plan_field(walk, values, options.turned, options.lambda, threads, beside));
+    else if (beside)
+        beside();
+    out.history = history_of(walk, steps->turned);
+    out.values = field_values(out.history.planes, hierarchy.vertex_count, steps->turned);
     return out;
 }
 

@@ -108,13 +108,6 @@ std::int32_t code_split(Coder& coder, SplitModels& m, const SplitContext& c, std
 inline constexpr int field_bits = 8;  // of the fraction of means, differences and steps
 inline constexpr std::int32_t field_one = 1 << field_bits;
 inline constexpr std::int32_t most_mean = 1 << 29;
-inline constexpr std::uint32_t most_step = 1u << 28;
-
-// What the layer says beside the differences.
-struct FieldHeader {
-    bool turned = false, has_history = false;
-    std::array<std::uint32_t, most_field_components> step{};  // 0: not coded
-};
 
 // How the differences of a level and component are coded.
 struct LevelMode {
@@ -232,7 +225,7 @@ struct ComponentWalk {
 
 // Everything that is known of a field while it is coded.
 struct FieldWalk {
-    FieldWalk(const VertexHierarchy& hierarchy, const FieldHeader& header, std::size_t components,
+    FieldWalk(const VertexHierarchy& hierarchy, const FieldSteps& steps, std::size_t components,
               const FieldHistory* before);
 
     const VertexHierarchy& hierarchy;

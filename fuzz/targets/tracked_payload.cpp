@@ -1,0 +1,73 @@
+// The payload of T-frames on any mesh: heads come back; frames after frames of any bytes give meshes on the lattice, or
+// an error.
+#include "codec/tracked/tracked_payload.h"
+
+#include <cstdlib>
+
+#include "codec/tracked/tracked_frame.h"
+#include "small_mesh.h"
+
+namespace {
+
+using namespace htvm;
+using namespace htvm::internal;
+using fuzz::require;
+
+std::uint32_t any_count(fuzz::FuzzInput& input) { return input.u32() >> (1 + input.below(31)); }
+
+FieldSteps any_steps(fuzz::FuzzInput& input, std::size_t components, bool turned) {
+    FieldSteps out;
+    out.turned = turned;
+    for (std::size_t c = 0; c < components; ++c)
+        out.step[c] = std::min(input.u32() >> input.below(32), FieldSteps::most);
+    return out;
+}
+
+void check_head(const KnownOfHead& known, fuzz::FuzzInput& input) {
+    TrackedHead head;
+    if (known.before && input.flag()) head = *known.before;
+    if (input.flag()) head.captured = {any_count(input), any_count(input)};
+    if (input.flag()) head.motion = {static_cast<int>(input.below(11)), static_cast<int>(input.below(21))};
+    if (input.flag()) head.displacement = any_steps(input, 1, false);
+    if (known.colours && input.flag())
+        head.colour = any_steps(input, 3, known.before ? known.before->colour.turned : input.flag());
+    if (known.before) head.colour.turned = known.before->colour.turned;
+    RangeEncoder encoder;
+    write_tracked_head(encoder, head, known);
+    const auto position = encoder.position();
+    const auto bytes = encoder.finish();
+    RangeDecoder decoder(bytes);
+    const auto again = read_tracked_head(decoder, known);
+    require(again && *again == head, "a head comes back");
+    require(decoder.position() == position, "both sides say where it ends");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    fuzz::FuzzInput input(data, size);
+    const auto small = fuzz::small_mesh(input);
+    LatticeMesh mesh;
+    mesh.positions = small.positions;
+    mesh.triangles = small.triangles;
+    if (input.flag()) mesh.colours.resize(mesh.positions.size());
+    if (input.flag()) mesh.normals.resize(mesh.positions.size());
+    auto reference = make_tracked_reference(mesh, 1 + static_cast<std::int32_t>(input.below(2000)), 16);
+    require(reference.has_value(), "any mesh can be a reference");
+    reference->captured = {any_count(input), any_count(input)};
+    DecodedTrackedFrame last, next;
+    const TrackedState* before = nullptr;
+    for (int frame = 0; frame < 4; ++frame) {
+        check_head({before ? &before->head : nullptr, reference->captured, !mesh.colours.empty()}, input);
+        const auto payload = frame < 3 ? input.take(input.u16() % 512) : input.rest();
+        if (!decode_tracked_frame(payload, *reference, before, {}, next)) continue;
+        require(next.positions.size() == mesh.positions.size() && next.colours.size() == mesh.colours.size() &&
+                    next.normals.size() == mesh.normals.size(),
+                "the reference's counts and attributes");
+        require(fuzz::all_on_lattice(next.positions), "positions are on the lattice");
+        require(next.shares.total() <= payload.size(), "shares of what there is");
+        std::swap(last, next);
+        before = &last.state;
+    }
+    return 0;
+}
