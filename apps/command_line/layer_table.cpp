@@ -73,6 +73,15 @@ std::string layer_table(const TotalsByType& totals) {
     };
     for (const auto& kind : frame_kinds) row(kind.letter, totals.of(kind.type));
     row("all", all);
+    if (all.bytes.total() == 0) return out;
+    const auto share = [&](std::size_t bytes) {
+        return 100.0 * static_cast<double>(bytes) / static_cast<double>(all.bytes.total());
+    };
+    out += fmt::format("{:<18}", "% of all");
+    for_each_part(all.bytes, [&](const char*, std::size_t bytes) {
+        if (bytes > 0) out += fmt::format("{:>16.1f}", share(bytes));
+    });
+    out += fmt::format("{:>10.1f}\n", share(all.bytes.total()));
     return out;
 }
 

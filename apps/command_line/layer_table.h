@@ -32,7 +32,7 @@ void add(TotalsByType& totals, const TotalsByType& others);
 // Bits per captured vertex; 0 if there is no vertex.
 double bits_per_vertex(std::size_t bytes, std::uint64_t vertices);
 
-// A table of bits per vertex by layer, one line per kind of frame and one for all.
+// A table of bits per vertex by layer, one line per kind of frame and one for all, and the layers' shares of all bytes.
 std::string layer_table(const TotalsByType& totals);
 
 nlohmann::json layers_json(const LayerBytes& bytes);

@@ -242,11 +242,13 @@ Result<void> info(const Options& options) {
     const auto& s = *headers.sequence();
     const double seconds = static_cast<double>(count > 0 ? time.total_us() : time.one_frame_us()) / 1e6;
     const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
+    const auto outside_frames = bytes - totals.all().bytes.total() - audio.bytes;  // sequence headers, the index
     if (options.json) {
         nlohmann::json out{{"sequence", sequence_json(first_sequence ? *first_sequence : s)},
                            {"sequences", sequences},
                            {"frames", frames},
                            {"bytes", bytes},
+                           {"bytes_outside_frames", outside_frames},
                            {"audio", audio_json(audio)},
                            {"index", index},
                            {"front_index", front ? index_json(*front) : nlohmann::json()},
@@ -262,8 +264,9 @@ Result<void> info(const Options& options) {
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);
-        fmt::print("{}{} in {:.2f} s, {} bytes, {:.2f} Mbit/s{}\n", layer_table(totals), counted(count, "frame"),
-                   seconds, bytes, megabits, index ? ", with an index for seeking" : "");
+        fmt::print("{}{} in {:.2f} s, {} bytes ({} outside frames), {:.2f} Mbit/s{}\n", layer_table(totals),
+                   counted(count, "frame"), seconds, bytes, outside_frames, megabits,
+                   index ? ", with an index for seeking" : "");
     }
     if (auto whole = check_whole(*input, options.input); !whole) return whole;
     if (buffer) return check_buffer(options, *buffer);
@@ -297,7 +300,7 @@ void add_info(CLI::App& app, Run& run) {
     command->footer(
         "Columns: pose is the skeleton (I), transforms are the bones' (EP); fans and distance order are the\n"
         "connectivity's two parts; texcoords are texture coordinates; bpv is the frame's total, with packet and layer\n"
-        "headers (overhead, below). All in bits per vertex of the captured mesh.\n"
+        "headers, counts and ends of runs (overhead, below). All in bits per vertex of the captured mesh.\n"
         "T-frames are decoded to tell their parts; one that cannot be counts as overhead.\n"
         "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.");
     command->callback([options, &run] { run = [options] { return info(*options); }; });

@@ -181,18 +181,17 @@ struct LayerColumn {
     const char* key;
     std::size_t (*bytes)(const LayerBytes&);
 };
-constexpr std::array<LayerColumn, 7> layer_columns = {{
+constexpr std::array<LayerColumn, 9> layer_columns = {{
+    {"motion", "motion", [](const LayerBytes& b) { return b[Layer::pose] + b[Layer::transforms]; }},
     {"geometry", "geometry", [](const LayerBytes& b) { return b[Layer::geometry]; }},
     {"colour", "colour", [](const LayerBytes& b) { return b[Layer::colour]; }},
     {"mapping", "mapping", [](const LayerBytes& b) { return b[Layer::mapping]; }},
     {"fans", "fans", [](const LayerBytes& b) { return b[Layer::fans]; }},
     {"dist.ord.", "distance_order", [](const LayerBytes& b) { return b[Layer::distance_orders]; }},
     {"one piece", "one_piece", [](const LayerBytes& b) { return b[Layer::external_intra]; }},
+    {"overhead", "overhead", [](const LayerBytes& b) { return b.overhead; }},
     {"other", "other",
-     [](const LayerBytes& b) {
-         return b.overhead + b[Layer::pose] + b[Layer::transforms] + b[Layer::normals] + b[Layer::texcoords] +
-                b[Layer::coded_bones];
-     }},
+     [](const LayerBytes& b) { return b[Layer::normals] + b[Layer::texcoords] + b[Layer::coded_bones]; }},
 }};
 
 bool measured(std::span<const RdPoint> points, const Measure& measure) {

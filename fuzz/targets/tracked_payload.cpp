@@ -32,6 +32,7 @@ void check_head(const KnownOfHead& known, fuzz::FuzzInput& input) {
     if (known.colours && input.flag())
         head.colour = any_steps(input, 3, known.before ? known.before->colour.turned : input.flag());
     if (known.before) head.colour.turned = known.before->colour.turned;
+    head.colour_run = known.colours && input.flag() ? any_count(input) : 0;
     RangeEncoder encoder;
     write_tracked_head(encoder, head, known);
     const auto position = encoder.position();

@@ -78,7 +78,7 @@ inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the larg
 // it came with.
 struct LayerBytes {
     std::array<std::size_t, layer_count> of_layer{};
-    std::size_t overhead = 0;  // packet headers, counts, checksums
+    std::size_t overhead = 0;  // packet headers, checksums, counts, steps, ends of runs
     std::size_t& operator[](Layer layer) { return of_layer[static_cast<std::size_t>(layer)]; }
     std::size_t operator[](Layer layer) const { return of_layer[static_cast<std::size_t>(layer)]; }
     LayerBytes& operator+=(const LayerBytes& other) {

@@ -232,10 +232,10 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     out.reference = from_last ? *nodes.frame : reference.number;
     out.referred = configuration.options.tracked.references == TrackedReferences::previous;
     out.access = !from_last;
-    out.packets.push_back(frame_packet(PacketKind::tracked, std::move(encoded->payload)));
+    out.packets.push_back(frame_packet(PacketKind::tracked, std::move(encoded->runs.payload)));
     out.decoded = std::move(encoded->mesh);
     out.captured = counts_of(work.mesh);
-    out.shares = encoded->shares;
+    out.shares = encoded->runs.shares;
     auto& history = out.nodes.emplace();
     history.frame = work.sequence.next_frame;
     history.before_last = nodes.last;

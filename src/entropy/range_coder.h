@@ -93,6 +93,12 @@ public:
         return value;
     }
     bool exhausted() const { return past_end_ > allowed_past_end; }
+    // Says that the run ends after so many of the bytes that were given, at most all; false if more were read already.
+    bool end_at(std::size_t size) {
+        if (size < position_) return false;
+        data_ = data_.first(size);
+        return true;
+    }
     // As RangeEncoder's; beyond the data where the encoder cut zeros off.
     std::size_t position() const { return position_ + past_end_ - 4 + (range_ < half_a_byte); }
 

@@ -10,6 +10,7 @@
 #include "codec/intra/intra_frame.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
+#include "codec/tracked/tracked_frame_enc.h"
 #include "surface/surface_distance.h"
 
 namespace htvm::internal {
@@ -221,6 +222,65 @@ TEST(TrackedFrames, ThatEndEarlyAreRefusedButForFewByChance) {
         if (decode_tracked_frame(std::span(whole).first(size), reference, nullptr, {}, frame)) ++taken;
     EXPECT_GT(cuts, 100u);
     EXPECT_LE(20 * taken, cuts);
+}
+
+// A frame by chance, or one of which nothing but the colours changes.
+TEST(TrackedFrames, DecodeToTheSameWithTheColoursInARunOfTheirOwn) {
+    const auto reference = first_tracked_frame().reference;
+    std::mt19937 random(6);
+    for (const bool still : {false, true}) {
+        std::vector<QuantisedTransform> wanted(reference.graph.pivots.size());
+        std::vector<std::int32_t> displacement, colour;
+        for (std::size_t v = 0; v < reference.mesh.positions.size(); ++v) {
+            displacement.push_back(still ? 0 : static_cast<std::int32_t>(below(random, 100)));
+            for (int c = 0; c < 3; ++c) colour.push_back(static_cast<std::int32_t>(below(random, 60)) - 30);
+        }
+        const auto motion = encode_node_motion(wanted, reference.graph, {}, {});
+        const auto moved = encode_field(reference.hierarchy, displacement, 1).value();
+        const auto recoloured = encode_field(reference.hierarchy, colour, 3).value();
+        TrackedHead head;
+        head.motion = NodeMotionOptions{}.steps;
+        head.displacement = moved.steps;
+        head.colour = recoloured.steps;
+        const auto write = [&](std::size_t least_run) {
+            return write_tracked_runs(head, {nullptr, reference.captured, true},
+                                      {motion.decisions, moved.decisions, &recoloured.decisions}, least_run);
+        };
+        const auto together = write(1 << 20);
+        EXPECT_EQ(head.colour_run, 0u);
+        const auto apart = write(100);
+        EXPECT_GT(head.colour_run, 100u);
+        EXPECT_NEAR(static_cast<double>(apart.payload.size()), static_cast<double>(together.payload.size()), 8);
+        DecodedTrackedFrame one, other;
+        ASSERT_TRUE(decode_tracked_frame(together.payload, reference, nullptr, {}, one).has_value());
+        const ThreadPool two(2);
+        for (const Threads threads : {Threads{}, two.threads()}) {
+            ASSERT_TRUE(decode_tracked_frame(apart.payload, reference, nullptr, threads, other).has_value());
+            EXPECT_EQ(other.positions, one.positions);
+            EXPECT_EQ(other.colours, one.colours);
+            EXPECT_EQ(other.shares.of_layer, apart.shares.of_layer);
+            EXPECT_EQ(other.shares[Layer::colour], head.colour_run);
+        }
+        const std::span<const std::uint8_t> bytes = apart.payload;
+        EXPECT_FALSE(decode_tracked_frame(bytes.first(20), reference, nullptr, {}, other).has_value());
+    }
+}
+
+TEST(TrackedFrames, WhoseColoursWouldBeginWithinTheHeadAreRefused) {
+    const auto reference = first_tracked_frame().reference;
+    const KnownOfHead known{nullptr, reference.captured, true};
+    TrackedHead head;
+    head.captured = reference.captured;
+    for (head.colour_run = 94; head.colour_run < 200; ++head.colour_run) {
+        RangeEncoder encoder;
+        write_tracked_head(encoder, head, known);
+        auto payload = encoder.finish();
+        payload.resize(100);
+        DecodedTrackedFrame frame;
+        const auto refused = decode_tracked_frame(payload, reference, nullptr, {}, frame);
+        ASSERT_FALSE(refused.has_value());
+        EXPECT_EQ(refused.error().kind, ErrorKind::corrupt_stream);
+    }
 }
 
 TEST(TrackedFrames, HaveTheSameSharesAndCountsInTheEncoderAndTheDecoderWhichAddUp) {

@@ -27,6 +27,7 @@ TrackedHead any_head(std::mt19937& random, bool colours) {
     if (!colours) return out;
     out.colour.turned = below(random, 2) == 0;
     for (auto& step : out.colour.step) step = any_step(random);
+    if (below(random, 2) == 0) out.colour_run = any_count(random);
     if (below(random, 2) == 0) out.colour.step[1] = out.colour.step[0];
     return out;
 }
@@ -103,13 +104,21 @@ TEST(TrackedHead, FromAnyBytesIsInRangeOrRefused) {
 }
 
 TEST(LayerShares, AreWhatIsBetweenTheEndsAndNoMoreThanThereIs) {
-    const auto shares = layer_shares({2, 50, 50, 90}, 92);
+    const auto shares = layer_shares({2, 50, 50, 90}, 92, 0);
     EXPECT_EQ(shares[Layer::transforms], 48u);
     EXPECT_EQ(shares[Layer::geometry], 0u);
     EXPECT_EQ(shares[Layer::colour], 40u);
     EXPECT_EQ(shares.total(), 88u);
-    EXPECT_EQ(layer_shares({2, 50, 70, 73}, 71).total(), 69u);  // where zeros were cut off
-    EXPECT_EQ(layer_shares({2, 3, 4, 4}, 0).total(), 0u);
+    EXPECT_EQ(layer_shares({2, 50, 70, 73}, 71, 0).total(), 69u);  // where zeros were cut off
+    EXPECT_EQ(layer_shares({2, 3, 4, 4}, 0, 0).total(), 0u);
+}
+
+TEST(LayerShares, OfColoursInTheirOwnRunAreAllOfIt) {
+    const auto shares = layer_shares({2, 50, 60, 60}, 92, 30);
+    EXPECT_EQ(shares[Layer::transforms], 48u);
+    EXPECT_EQ(shares[Layer::geometry], 10u);
+    EXPECT_EQ(shares[Layer::colour], 30u);
+    EXPECT_EQ(layer_shares({2, 50, 70, 70}, 92, 92).total(), 92u);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include "codec/intra/intra_frame.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
-#include "codec/tracked/tracked_frame.h"
+#include "codec/tracked/tracked_frame_enc.h"
 
 namespace htvm::test {
 
@@ -65,12 +65,12 @@ inline std::vector<std::uint8_t> tracked_by_chance(const TrackedReference& refer
     if (coloured)
         coded_colour = *encode_field(reference.hierarchy, colour, 3, fields, before ? &before->colour : nullptr);
     head.colour = coded_colour.steps;
-    RangeEncoder run;
-    write_tracked_head(run, head, {before ? &before->head : nullptr, reference.captured, coloured});
-    coded_motion.decisions.write(run);
-    coded_displacement.decisions.write(run);
-    coded_colour.decisions.write(run);
-    return run.finish();
+    const std::size_t least_run = random() % 2 == 0 ? 1 : 1 << 30;  // the colours in their own run, or not
+    return write_tracked_runs(
+               head, {before ? &before->head : nullptr, reference.captured, coloured},
+               {coded_motion.decisions, coded_displacement.decisions, coloured ? &coded_colour.decisions : nullptr},
+               least_run)
+        .payload;
 }
 
 // A stream of I-frames with a few T-frames after each: one from the I-frame, two from the previous frame, one more from

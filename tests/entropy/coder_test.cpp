@@ -87,6 +87,19 @@ TEST(RangeCoder, ADecoderWithoutEnoughBytesSaysSo) {
     EXPECT_TRUE(decoder.exhausted());
 }
 
+TEST(RangeCoder, ADecoderThatIsToldWhereItsRunEndsReadsZerosBehindIt) {
+    RangeEncoder encoder;
+    for (std::uint32_t i = 0; i < 20; ++i) encoder.raw(i < 8 ? i : 0, 8);
+    auto bytes = encoder.finish();
+    const auto end = bytes.size();
+    bytes.insert(bytes.end(), 40, 0xAB);
+    RangeDecoder decoder(bytes);
+    EXPECT_EQ(decoder.raw(8), 0u);
+    EXPECT_FALSE(decoder.end_at(4));
+    ASSERT_TRUE(decoder.end_at(end));
+    for (std::uint32_t i = 1; i < 20; ++i) EXPECT_EQ(decoder.raw(8), i < 8 ? i : 0);
+}
+
 TEST(RangeCoder, BothSidesSayWhereInTheRunTheyAreAndThatIsWhatTheDecisionsSoFarTake) {
     std::mt19937 random(5);
     for (int skew : {2, 20, 2000}) {

@@ -99,6 +99,10 @@ class Decoder:
         self.past_end += 1
         return 0
 
+    def end_at(self, size):
+        check(self.at <= size, "a run ends within what was read of it")
+        self.data = self.data[:size]
+
     def check_end(self):
         check(self.past_end <= 4, "a layer ends too early")
 

@@ -79,6 +79,12 @@ def decode_captured(decoder, before):
     return vertices, clamp(expected + decoder.signed(SignedModel()), 0, most)
 
 
+def decode_number(decoder):
+    """Below 2^31."""
+    width = decoder.raw(5)
+    return 1 << (width - 1) | decoder.raw(width - 1) if width else 0
+
+
 def decode_steps(decoder, number):
     """Of a field of so many components."""
     steps = []
@@ -86,15 +92,14 @@ def decode_steps(decoder, number):
         if c > 0 and decoder.raw(1):
             steps.append(steps[-1])
             continue
-        width = decoder.raw(5)
-        steps.append(1 << (width - 1) | decoder.raw(width - 1) if width else 0)
+        steps.append(decode_number(decoder))
     check(max(steps) <= 1 << 28, "a field's step is out of range")
     return steps
 
 
 def decode_run(payload, reference, before):
-    """The layers of a payload that is one run (8.16)."""
-    decoder = Decoder(payload)
+    """The layers of a payload that is one run, or two (8.16)."""
+    decoder = of_colours = Decoder(payload)
     state = TrackedState()
     state.captured = decode_captured(decoder, before.captured if before else reference.captured)
     if before and decoder.raw(1):
@@ -112,6 +117,10 @@ def decode_run(payload, reference, before):
         else:
             state.turned = before.turned if before else decoder.raw(1) != 0
             state.change_steps = decode_steps(decoder, 3)
+        colour_run = decode_number(decoder) if decoder.raw(1) else 0
+        if colour_run > 0:
+            decoder.end_at(len(payload) - colour_run)
+            of_colours = Decoder(payload[len(payload) - colour_run:])
     vertices = len(reference.mesh.positions)
     state.transforms = decode_node_motion(
         decoder, state.motion_steps, reference.nodes, reference.node_normals, before and before.transforms)
@@ -119,7 +128,7 @@ def decode_run(payload, reference, before):
         decoder, False, state.steps, vertices, reference.levels, before and before.displacement)
     if reference.mesh.colours:
         state.change = decode_field(
-            decoder, state.turned, state.change_steps, vertices, reference.levels, before and before.change)
+            of_colours, state.turned, state.change_steps, vertices, reference.levels, before and before.change)
     return state
 
 

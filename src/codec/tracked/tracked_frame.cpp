@@ -129,8 +129,8 @@ struct LayerSources {
     const FieldHistory *displacement_before = nullptr, *colour_before = nullptr;
 };
 
-// Returns where each layer ends in its run. The second thread makes the surface while the first reads: what is read
-// from one run is read in turn.
+// Returns where each layer ends in its run. Two runs are read side by side; while one thread reads a run of all layers,
+// in turn, the other makes the surface.
 Result<TrackedRunEnds> decode_layers(const LayerSources& from, const TrackedReference& reference, Threads threads,
                                      DecodedTrackedFrame& out) {
     const auto& mesh = reference.mesh;
@@ -145,33 +145,36 @@ Result<TrackedRunEnds> decode_layers(const LayerSources& from, const TrackedRefe
     Result<DecodedField> displacement, colours;
     std::vector<LatticePoint> moved;
     std::vector<Vector3d> normals;
-    parallel_invoke(
-        threads,
-        [&] {
-            displacement = decode_field(*from.displacement, from.head.displacement, reference.hierarchy, 1,
-                                        from.displacement_before);
-            ends.displacement = from.displacement->position();
-        },
-        [&] {
-            moved = moved_by_nodes(reference, out.state.transforms, {});
-            normals = vertex_normals(moved, mesh.triangles);
-        });
+    const auto read_displacement = [&] {
+        displacement =
+            decode_field(*from.displacement, from.head.displacement, reference.hierarchy, 1, from.displacement_before);
+        ends.displacement = from.displacement->position();
+    };
+    const auto read_colours = [&] {
+        if (!mesh.colours.empty())
+            colours = decode_field(*from.colour, from.head.colour, reference.hierarchy, 3, from.colour_before);
+        ends.colour = from.colour->position();
+    };
+    const auto move_nodes = [&] {
+        moved = moved_by_nodes(reference, out.state.transforms, {});
+        normals = vertex_normals(moved, mesh.triangles);
+    };
+    const auto displace = [&] {
+        if (!displacement) return;
+        {
+            const auto from_nodes = std::move(moved);
+            const auto across = std::move(normals);
+            out.positions = displaced(from_nodes, across, displacement->values);
+        }
+        if (!mesh.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, mesh.triangles));
+    };
+    if (from.colour != from.displacement) {
+        parallel_invoke(threads, read_colours, [&] { read_displacement(), move_nodes(), displace(); });
+    } else {
+        parallel_invoke(threads, read_displacement, move_nodes);
+        if (displacement) parallel_invoke(threads, read_colours, displace);
+    }
     if (!displacement) return tl::unexpected(displacement.error());
-    parallel_invoke(
-        threads,
-        [&] {
-            {
-                const auto from_nodes = std::move(moved);
-                const auto across = std::move(normals);
-                out.positions = displaced(from_nodes, across, displacement->values);
-            }
-            if (!mesh.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, mesh.triangles));
-        },
-        [&] {
-            if (!mesh.colours.empty())
-                colours = decode_field(*from.colour, from.head.colour, reference.hierarchy, 3, from.colour_before);
-            ends.colour = from.colour->position();
-        });
     if (!colours) return tl::unexpected(colours.error());
     out.state.displacement = std::move(displacement->history);
     if (!mesh.colours.empty()) {
@@ -235,9 +238,13 @@ Result<void> decode_tracked_frame(std::span<const std::uint8_t> payload, const T
     auto head =
         read_tracked_head(run, {before ? &before->head : nullptr, reference.captured, !reference.mesh.colours.empty()});
     if (!head) return tl::unexpected(head.error());
+    if (!run.end_at(payload.size() - std::min<std::size_t>(head->colour_run, payload.size())))
+        return fail(ErrorKind::corrupt_stream, "tracked frame: the colours' run is longer than the payload");
+    RangeDecoder colour_run(payload.last(head->colour_run));
     LayerSources from;
     from.head = *head;
-    from.motion = from.displacement = from.colour = &run;
+    from.motion = from.displacement = &run;
+    from.colour = head->colour_run > 0 ? &colour_run : &run;
     if (before) {
         from.motion_before = before->transforms;
         from.displacement_before = &before->displacement;
@@ -247,7 +254,7 @@ Result<void> decode_tracked_frame(std::span<const std::uint8_t> payload, const T
     auto ends = decode_layers(from, reference, threads, out);
     if (!ends) return tl::unexpected(ends.error());
     ends->head = head_end;
-    out.shares = layer_shares(*ends, payload.size());
+    out.shares = layer_shares(*ends, payload.size(), head->colour_run);
     return {};
 }
 

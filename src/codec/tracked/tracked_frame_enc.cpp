@@ -41,24 +41,32 @@ NodeMotionOptions motion_options(double geometry_step) {
     return out;
 }
 
-// The layers one after the other in one run; sets payload, shares and the state's head.
-void write_run(const EncodedNodeMotion& motion, const EncodedField& displacement, const EncodedField* colour,
-               const KnownOfHead& known, EncodedTrackedFrame& out) {
+}  // namespace
+
+TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
+                               std::size_t least_run) {
+    TrackedRuns out;
+    std::vector<std::uint8_t> colour_run;
+    if (decisions.colour) colour_run = decisions.colour->run();
+    if (colour_run.size() < least_run) colour_run.clear();
+    head.colour_run = static_cast<std::uint32_t>(colour_run.size());
     RangeEncoder run;
-    write_tracked_head(run, out.state.head, known);
+    write_tracked_head(run, head, known);
     TrackedRunEnds ends;
     ends.head = run.position();
-    motion.decisions.write(run);
+    decisions.motion.write(run);
     ends.motion = run.position();
-    displacement.decisions.write(run);
+    decisions.displacement.write(run);
     ends.displacement = run.position();
-    if (colour) colour->decisions.write(run);
+    if (decisions.colour && colour_run.empty()) decisions.colour->write(run);
     ends.colour = run.position();
     out.payload = run.finish();
-    out.shares = layer_shares(ends, out.payload.size());
+    // The four bytes that are read ahead of the head must not be the colours'.
+    if (!colour_run.empty()) out.payload.resize(std::max(out.payload.size(), ends.head + 4));
+    out.payload.insert(out.payload.end(), colour_run.begin(), colour_run.end());
+    out.shares = layer_shares(ends, out.payload.size(), colour_run.size());
+    return out;
 }
-
-}  // namespace
 
 DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options) {
     std::vector<Eigen::Vector3d> handles;
@@ -153,8 +161,11 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
         out.state.colour = std::move(colours->history);
         head.colour = colours->steps;
     }
-    write_run(coded_motion, *displacement, coloured ? &*colours : nullptr,
-              {before ? &before->head : nullptr, reference.captured, coloured}, out);
+    // A run takes four bytes beside its decisions: from here on less than a hundredth.
+    constexpr std::size_t least_run = 400;
+    out.runs = write_tracked_runs(
+        head, {before ? &before->head : nullptr, reference.captured, coloured},
+        {coded_motion.decisions, displacement->decisions, coloured ? &colours->decisions : nullptr}, least_run);
     clock.done("reconstruction");
     return out;
 }

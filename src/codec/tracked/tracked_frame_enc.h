@@ -3,11 +3,14 @@
 // normals and in the colours are coded as fields.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "codec/tracked/tracked_frame.h"
 #include "core/thread.h"
+#include "entropy/decision_log.h"
 #include "htvm/encoder.hpp"
 #include "surface/tracked_registration.h"
 
@@ -34,10 +37,21 @@ struct NodeStarts {
 std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
                                         const NodeStarts& starts, const DeformationOptions& options);
 
-struct EncodedTrackedFrame {
+struct TrackedRuns {
     std::vector<std::uint8_t> payload;
     LayerBytes shares;  // of the payload
-    LatticeMesh mesh;   // the mesh that the decoder will have
+};
+struct TrackedDecisions {
+    const DecisionLog &motion, &displacement;
+    const DecisionLog* colour = nullptr;  // null where the reference has no colours
+};
+// The payload of decisions. least_run: bytes from which on the colours are a run of their own; sets head.colour_run.
+TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
+                               std::size_t least_run);
+
+struct EncodedTrackedFrame {
+    TrackedRuns runs;
+    LatticeMesh mesh;  // the mesh that the decoder will have
     TrackedState state;
 };
 

@@ -37,6 +37,15 @@ bool code_flag(Coder& coder, bool wanted) {
     return coder.raw(wanted ? 1 : 0, 1) != 0;
 }
 
+// Below 2^31.
+template <class Coder>
+std::uint32_t code_number(Coder& coder, std::uint32_t wanted) {
+    const auto width = coder.raw(static_cast<std::uint32_t>(std::bit_width(wanted)), 5);
+    if (width == 0) return 0;
+    const std::uint32_t top = 1u << (width - 1);
+    return top | coder.raw(wanted & (top - 1), static_cast<int>(width) - 1);
+}
+
 template <class Coder>
 NodeMotionSteps code_steps(Coder& coder, const NodeMotionSteps& wanted, const NodeMotionSteps* before) {
     if (before && code_flag(coder, wanted == *before)) return *before;
@@ -52,15 +61,8 @@ FieldSteps code_steps(Coder& coder, const FieldSteps& wanted, const FieldSteps* 
     FieldSteps out;
     if (components == 3) out.turned = before ? before->turned : code_flag(coder, wanted.turned);
     for (std::size_t c = 0; c < components; ++c) {
-        const auto step = wanted.step[c];
-        if (c > 0 && code_flag(coder, step == wanted.step[c - 1])) {
-            out.step[c] = out.step[c - 1];
-            continue;
-        }
-        const auto width = coder.raw(static_cast<std::uint32_t>(std::bit_width(step)), 5);
-        if (width == 0) continue;
-        const std::uint32_t top = 1u << (width - 1);
-        out.step[c] = top | coder.raw(step & (top - 1), static_cast<int>(width) - 1);
+        const bool same = c > 0 && code_flag(coder, wanted.step[c] == wanted.step[c - 1]);
+        out.step[c] = same ? out.step[c - 1] : code_number(coder, wanted.step[c]);
     }
     return out;
 }
@@ -72,7 +74,9 @@ TrackedHead code_head(Coder& coder, const TrackedHead& wanted, const KnownOfHead
     out.captured = code_captured(coder, wanted.captured, before ? before->captured : known.of_intra);
     out.motion = code_steps(coder, wanted.motion, before ? &before->motion : nullptr);
     out.displacement = code_steps(coder, wanted.displacement, before ? &before->displacement : nullptr, 1);
-    if (known.colours) out.colour = code_steps(coder, wanted.colour, before ? &before->colour : nullptr, 3);
+    if (!known.colours) return out;
+    out.colour = code_steps(coder, wanted.colour, before ? &before->colour : nullptr, 3);
+    if (code_flag(coder, wanted.colour_run > 0)) out.colour_run = code_number(coder, wanted.colour_run);
     return out;
 }
 
@@ -96,17 +100,19 @@ Result<TrackedHead> read_tracked_head(RangeDecoder& decoder, const KnownOfHead& 
     return out;
 }
 
-LayerBytes layer_shares(const TrackedRunEnds& ends, std::size_t bytes) {
+LayerBytes layer_shares(const TrackedRunEnds& ends, std::size_t bytes, std::size_t colour_run) {
     LayerBytes out;
-    std::size_t at = std::min(ends.head, bytes);
+    const std::size_t first_run = bytes - colour_run;
+    std::size_t at = std::min(ends.head, first_run);
     const auto give = [&](Layer layer, std::size_t end) {
-        end = std::min(end, bytes);
+        end = std::min(end, first_run);
         out[layer] = end - at;
         at = end;
     };
     give(Layer::transforms, ends.motion);
     give(Layer::geometry, ends.displacement);
-    give(Layer::colour, ends.colour);
+    if (colour_run == 0) give(Layer::colour, ends.colour);
+    out[Layer::colour] += colour_run;
     return out;
 }
 

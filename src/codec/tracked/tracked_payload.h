@@ -1,10 +1,12 @@
 // A T-frame's payload from version 3 of the stream on: one run of the range coder, without any table. First the head,
 // which says how the layers are quantised; then node motion, displacement and, where the reference has colours, their
 // change. Counts, attributes and what predicts each layer follow from the reference, and what is as in the frame before
-// takes a bit. (Versions 1 and 2 have a run for each layer, in a payload like those of other frames.)
+// takes a bit. Colours of many bytes are a run of their own behind the first, so that two threads read side by side.
+// (Versions 1 and 2 have a run for each layer, in a payload like those of other frames.)
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "codec/stream/frame_payload.h"
 #include "codec/tracked/node_motion.h"
@@ -19,7 +21,8 @@ struct TrackedHead {
     CapturedCounts captured;  // informative
     NodeMotionSteps motion;
     FieldSteps displacement;
-    FieldSteps colour;  // none where the reference has no colours
+    FieldSteps colour;             // none where the reference has no colours
+    std::uint32_t colour_run = 0;  // bytes of the colours' own run, the last of the payload; 0: they are in the first
     bool operator==(const TrackedHead&) const = default;
 };
 
@@ -35,11 +38,11 @@ void write_tracked_head(RangeEncoder& encoder, const TrackedHead& head, const Kn
 // corrupt_stream if a step is out of range.
 Result<TrackedHead> read_tracked_head(RangeDecoder& decoder, const KnownOfHead& known);
 
-// Where in a run its parts end: position() behind each.
+// Where in the first run its parts end: position() behind each; the colours' if they are in it.
 struct TrackedRunEnds {
     std::size_t head = 0, motion = 0, displacement = 0, colour = 0;
 };
-// The layers' shares of a run of so many bytes, to the nearest byte. What they leave is the head and the run's end.
-LayerBytes layer_shares(const TrackedRunEnds& ends, std::size_t bytes);
+// The layers' shares of a payload of so many bytes, to the nearest byte. What they leave is the head and the run's end.
+LayerBytes layer_shares(const TrackedRunEnds& ends, std::size_t bytes, std::size_t colour_run);
 
 }  // namespace htvm::internal
