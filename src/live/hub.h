@@ -10,6 +10,7 @@
 // in a queue, and they come before packets that wait.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -291,7 +292,8 @@ private:
 
     HubLimits limits_;
     Log log_;
-    std::shared_ptr<std::size_t> memory_ = std::make_shared<std::size_t>(0);  // of packets, wherever they are held
+    // Bytes of packets, wherever they are held; the last to hold one may be a recording, on its thread.
+    std::shared_ptr<std::atomic<std::size_t>> memory_ = std::make_shared<std::atomic<std::size_t>>(0);
     std::map<std::string, Stream> streams_;
     std::map<std::uint64_t, Stream> ended_;  // by number: until their last viewers have been sent what waits
     std::map<std::uint64_t, Connection> connections_;

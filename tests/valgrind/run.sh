@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# The encoder and the decoder under valgrind: tests/valgrind/run.sh HTVM
-# HTVM: the command line, built without sanitizers. Encodes and decodes a small capture with every profile, and decodes the
-# conformance streams. Fails if memory is misused, read before it was written, or leaked.
+# The encoder, the decoder and the live threads under valgrind: tests/valgrind/run.sh HTVM TEST_LIVE
+# HTVM: the command line, TEST_LIVE: the tests of src/live, both built without sanitizers. Encodes and decodes a small
+# capture with every profile, decodes the conformance streams, and runs the tests but those that need the time that
+# valgrind takes, or end a process in their midst. Fails if memory is misused, read before it was written, or leaked.
 set -euo pipefail
-htvm=$(realpath "$1")
+htvm=$(realpath "$1") test_live=$(realpath "$2")
 streams=$(cd "$(dirname "$0")/../data/conformance" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -32,4 +33,7 @@ for stream in "$streams"/*.htvm; do
     name=$(basename "$stream" .htvm)
     check "htvm decode, conformance stream $name" "$htvm" decode "$stream" --threads 2 -o "$work/$name"
 done
+late='Publisher.AHubThatTakesNothingHoldsNobodyUp:ServerAccessTest.TlsIsAgreedOn*'
+ended='RecorderTest.AFullDisk*:RecorderTest.AProgramThatIsKilled*'
+check "test_live" "$test_live" --gtest_brief=1 "--gtest_filter=-$late:$ended"
 [ $failures -eq 0 ]
