@@ -3,8 +3,10 @@
 #include <netinet/tcp.h>
 
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/bind_executor.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/websocket/ssl.hpp>
 #include <chrono>
 
 namespace htvm::live {
@@ -34,6 +36,27 @@ net::awaitable<void> Line::close() {
     }
     beast::error_code ignored;
     next_layer().socket().shutdown(net::ip::tcp::socket::shutdown_both, ignored);
+}
+
+// What a read or a write goes on with runs where the line does; its own executor could not be asked for all that
+// Boost.Beast asks for.
+void Line::read_some(const Buffers<net::mutable_buffer>& buffers, Done done) {
+    auto here = net::bind_executor(get_executor(), std::move(done));
+    if (auto* tls = secure()) return tls->async_read_some(buffers, std::move(here));
+    next_layer().async_read_some(buffers, std::move(here));
+}
+
+void Line::write_some(const Buffers<net::const_buffer>& buffers, Done done) {
+    auto here = net::bind_executor(get_executor(), std::move(done));
+    if (auto* tls = secure()) return tls->async_write_some(buffers, std::move(here));
+    next_layer().async_write_some(buffers, std::move(here));
+}
+
+void Line::end(beast::role_type role, Ended ended) {
+    using beast::websocket::async_teardown;
+    auto here = net::bind_executor(get_executor(), std::move(ended));
+    if (auto* tls = secure()) return async_teardown(role, *tls, std::move(here));
+    async_teardown(role, next_layer().socket(), std::move(here));
 }
 
 void keep_kernel_buffers_small(Line& line) {

@@ -1,12 +1,16 @@
-// A connection, with TLS or without: one type, so that HTTP and WebSockets are compiled once and work over both.
+// A connection, with TLS or without: one type, so that HTTP and WebSockets are compiled once and work over both. What
+// they go on with after a read or a write is held behind one type, too, so that TLS is compiled once, in line.cpp.
 #pragma once
 
+#include <boost/asio/any_completion_handler.hpp>
+#include <boost/asio/async_result.hpp>
 #include <boost/asio/awaitable.hpp>
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/ssl/ssl_stream.hpp>
-#include <boost/beast/websocket/ssl.hpp>
 #include <boost/beast/websocket/teardown.hpp>
+#include <boost/container/static_vector.hpp>
 #include <string>
 #include <utility>
 #include <variant>
@@ -40,18 +44,42 @@ public:
     Secure* secure() { return std::get_if<Secure>(&stream_); }
     executor_type get_executor() { return next_layer().get_executor(); }
 
+    // Of very many buffers the first are read into or written, as if there were no others.
     template <class Buffers, class Token>
     auto async_read_some(const Buffers& buffers, Token&& token) {
-        if (auto* tls = secure()) return tls->async_read_some(buffers, std::forward<Token>(token));
-        return next_layer().async_read_some(buffers, std::forward<Token>(token));
+        return started<&Line::read_some>(first_of<boost::asio::mutable_buffer>(buffers), std::forward<Token>(token));
     }
     template <class Buffers, class Token>
     auto async_write_some(const Buffers& buffers, Token&& token) {
-        if (auto* tls = secure()) return tls->async_write_some(buffers, std::forward<Token>(token));
-        return next_layer().async_write_some(buffers, std::forward<Token>(token));
+        return started<&Line::write_some>(first_of<boost::asio::const_buffer>(buffers), std::forward<Token>(token));
     }
 
+    // How Boost.Beast ends the connection below a WebSocket.
+    using Ended = boost::asio::any_completion_handler<void(boost::beast::error_code)>;
+    void end(boost::beast::role_type role, Ended ended);
+
 private:
+    template <class Buffer>
+    using Buffers = boost::container::static_vector<Buffer, 16>;
+    using Done = boost::asio::any_completion_handler<void(boost::beast::error_code, std::size_t)>;
+    void read_some(const Buffers<boost::asio::mutable_buffer>& buffers, Done done);
+    void write_some(const Buffers<boost::asio::const_buffer>& buffers, Done done);
+
+    template <class Buffer, class All>
+    static Buffers<Buffer> first_of(const All& all) {
+        Buffers<Buffer> out;
+        const auto end = boost::asio::buffer_sequence_end(all);
+        for (auto it = boost::asio::buffer_sequence_begin(all); it != end && out.size() < out.capacity(); ++it)
+            out.push_back(*it);
+        return out;
+    }
+    template <auto start, class Buffers, class Token>
+    auto started(const Buffers& buffers, Token&& token) {
+        return boost::asio::async_initiate<Token, void(boost::beast::error_code, std::size_t)>(
+            [this](auto&& done, const Buffers& given) { (this->*start)(given, std::forward<decltype(done)>(done)); },
+            token, buffers);
+    }
+
     std::variant<boost::beast::tcp_stream, Secure> stream_;
 };
 
@@ -62,14 +90,9 @@ void keep_kernel_buffers_small(Line& line);
 // files. bad_input if they cannot be read or do not belong together.
 Result<boost::asio::ssl::context> server_context(const std::string& certificate, const std::string& private_key);
 
-// How Boost.Beast ends the connection below a WebSocket.
 template <class Handler>
 void async_teardown(boost::beast::role_type role, Line& line, Handler&& handler) {
-    using boost::beast::websocket::async_teardown;
-    if (auto* tls = line.secure())
-        async_teardown(role, *tls, std::forward<Handler>(handler));
-    else
-        async_teardown(role, line.next_layer().socket(), std::forward<Handler>(handler));
+    line.end(role, std::forward<Handler>(handler));
 }
 
 }  // namespace htvm::live
