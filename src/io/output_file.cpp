@@ -1,5 +1,7 @@
 #include "io/output_file.h"
 
+#include <unistd.h>
+
 #include <cerrno>
 #include <cstring>
 #include <string>
@@ -71,6 +73,22 @@ Result<void> OutputFile::write(std::span<const std::uint8_t> bytes) {
     return {};
 }
 
+Result<void> OutputFile::append(const fs::path& file) {
+    const std::unique_ptr<std::FILE, Close> in(std::fopen(file.c_str(), "rb"));
+    if (!in) return fail(ErrorKind::bad_input, file.string() + " cannot be read: " + std::strerror(errno));
+    std::vector<std::uint8_t> piece(std::size_t{1} << 20);
+    while (const auto bytes = std::fread(piece.data(), 1, piece.size(), in.get()))
+        if (auto ok = write({piece.data(), bytes}); !ok) return ok;
+    if (std::ferror(in.get()) != 0) return fail(ErrorKind::bad_input, file.string() + " cannot be read");
+    return {};
+}
+
+Result<void> OutputFile::sync() {
+    if (std::fflush(file_.get()) != 0 || ::fsync(::fileno(file_.get())) != 0)
+        return tl::unexpected(write_error(path_.string(), errno));
+    return {};
+}
+
 Result<void> OutputFile::finish() {
     if (std::fflush(file_.get()) != 0) return tl::unexpected(write_error(path_.string(), errno));
     if (!partial_.empty() && std::rename(partial_.c_str(), path_.c_str()) != 0)
@@ -81,32 +99,16 @@ Result<void> OutputFile::finish() {
 
 Result<void> OutputFile::finish_behind(std::span<const std::uint8_t> front) {
     if (std::fflush(file_.get()) != 0) return tl::unexpected(write_error(path_.string(), errno));
-    const std::unique_ptr<std::FILE, Close> written(std::fopen(partial_.c_str(), "rb"));
-    if (!written) return tl::unexpected(write_error(path_.string(), errno));
-    const fs::path whole = partial_.string() + ".whole";
+    OutputFile whole;
+    whole.path_ = path_;
+    whole.partial_ = partial_.string() + ".whole";
+    whole.file_.reset(std::fopen(whole.partial_.c_str(), "wb"));
+    if (!whole.file_) return tl::unexpected(write_error(path_.string(), errno));
     std::error_code ignored;
-    const auto join = [&]() -> Result<void> {
-        const std::unique_ptr<std::FILE, Close> out(std::fopen(whole.c_str(), "wb"));
-        if (!out) return tl::unexpected(write_error(path_.string(), errno));
-        fs::permissions(whole, fs::status(partial_, ignored).permissions(), ignored);
-        std::vector<std::uint8_t> piece(front.begin(), front.end());
-        while (!piece.empty()) {
-            if (std::fwrite(piece.data(), 1, piece.size(), out.get()) != piece.size())
-                return tl::unexpected(write_error(path_.string(), errno));
-            piece.resize(std::size_t{1} << 20);
-            piece.resize(std::fread(piece.data(), 1, piece.size(), written.get()));
-        }
-        if (std::ferror(written.get()) != 0 || std::fflush(out.get()) != 0)
-            return tl::unexpected(write_error(path_.string(), errno));
-        return {};
-    };
-    auto joined = join();
-    if (joined && std::rename(whole.c_str(), path_.c_str()) != 0)
-        joined = tl::unexpected(write_error(path_.string(), errno));
-    if (!joined) {
-        fs::remove(whole, ignored);
-        return joined;
-    }
+    fs::permissions(whole.partial_, fs::status(partial_, ignored).permissions(), ignored);
+    if (auto ok = whole.write(front); !ok) return ok;
+    if (auto ok = whole.append(partial_); !ok) return ok;
+    if (auto ok = whole.finish(); !ok) return ok;
     file_.reset();
     fs::remove(partial_, ignored);
     return {};

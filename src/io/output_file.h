@@ -23,6 +23,10 @@ public:
     ~OutputFile();
 
     Result<void> write(std::span<const std::uint8_t> bytes);
+    // Writes all of another file. bad_input if it cannot be read.
+    Result<void> append(const std::filesystem::path& file);
+    // Waits until the disk has what was written, so that not even a power cut takes it. Only for files.
+    Result<void> sync();
     // Puts the file in its place.
     Result<void> finish();
     // The same with these bytes in front of what was written. Only for files. If it fails, finish() may still succeed.

@@ -10,8 +10,6 @@ namespace {
 
 bool is_index(PacketKind kind) { return kind == PacketKind::index || kind == PacketKind::front_index; }
 
-bool is_frame(PacketKind kind) { return frame_type(kind).has_value(); }
-
 using Places = std::vector<std::uint64_t>;
 
 Places ascending(Places places) {
@@ -33,6 +31,8 @@ Places united(const Places& a, const Places& b) {
 
 }  // namespace
 
+bool LivePacket::is_frame() const { return frame_type(header.kind).has_value(); }
+
 std::optional<std::uint64_t> Broadcast::push(SharedPacket packet, Clock::time_point now) {
     if (is_index(packet->header.kind) || is_kept(*packet)) return std::nullopt;
     const auto sequence = dependencies_.sequences();
@@ -40,7 +40,7 @@ std::optional<std::uint64_t> Broadcast::push(SharedPacket packet, Clock::time_po
     next_place_ = place + 1;
     // What is left of the sequence before must not be sent behind the new header.
     if (dependencies_.sequences() != sequence) closure_.clear();
-    const bool frame = is_frame(packet->header.kind);
+    const bool frame = packet->is_frame();
     packets_[place] = std::move(packet);
     kept_ = ascending(dependencies_.kept());
     const auto closure = ascending(dependencies_.closure());
@@ -139,7 +139,7 @@ void Broadcast::give(Queue& queue, std::uint64_t place, Clock::time_point now) {
 void Broadcast::give_in_step(Queue& queue, std::uint64_t place, Clock::time_point now) {
     const auto& packet = *packets_.at(place);
     if (fits(queue, packet, now)) return give(queue, place, now);
-    const bool frame = is_frame(packet.header.kind);
+    const bool frame = packet.is_frame();
     // Nothing depends on it, as on sound.
     if (packet.header.has(packet_flag::droppable)) {
         queue.counters.dropped_frames += frame ? 1 : 0;
@@ -154,7 +154,7 @@ void Broadcast::fall_behind(Queue& queue, std::uint64_t place) {
     Places dropped;
     for (const auto& waiting : queue.waiting) {
         dropped.push_back(waiting.place);
-        if (is_frame(waiting.packet->header.kind)) ++queue.counters.dropped_frames;
+        if (waiting.packet->is_frame()) ++queue.counters.dropped_frames;
     }
     dropped.push_back(place);
     std::sort(dropped.begin(), dropped.end());
@@ -174,7 +174,7 @@ void Broadcast::try_to_follow(Queue& queue, Clock::time_point now) {
         there = there && packets_.contains(place);
         if (!there) break;
         const auto& packet = *packets_.at(place);
-        frames += is_frame(packet.header.kind) ? 1 : 0;
+        frames += packet.is_frame() ? 1 : 0;
         bytes += packet.bytes.size();
     }
     const std::size_t missed = frames > 0 ? frames - 1 : 0;

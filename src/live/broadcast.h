@@ -26,6 +26,8 @@ struct LivePacket {
     PacketHeader header;  // as told_header() has it
     std::vector<std::uint8_t> bytes;
     std::optional<Stamp> stamp{};  // for measurement
+
+    bool is_frame() const;
 };
 using SharedPacket = std::shared_ptr<const LivePacket>;
 

@@ -1,5 +1,8 @@
 #include "live/recorder.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -13,7 +16,6 @@
 #include <thread>
 #include <utility>
 
-#include "htvm/decoder.hpp"
 #include "htvm/stream_index.hpp"
 #include "io/output_file.h"
 
@@ -54,6 +56,14 @@ Packet packet_of(const LivePacket& packet) {
 
 // ---- A file that grows ----------------------------------------------------------------------------------------------
 
+// Waits until the disk has the name of a new file; what is in it is another matter. Not every file system can.
+void sync_name(const fs::path& path) {
+    const int folder = ::open(path.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder < 0) return;
+    ::fsync(folder);
+    ::close(folder);
+}
+
 class GrowingFile {
 public:
     // path: without a number that may be needed and without ".htvm".
@@ -67,6 +77,7 @@ public:
             if (!out.file_) return tl::unexpected(write_error(out.path_.string(), errno));
             // Each packet goes to the system at once, so nothing of it is lost if this program ends.
             std::setvbuf(out.file_.get(), nullptr, _IONBF, 0);
+            sync_name(out.path_);
             return out;
         }
         return fail(ErrorKind::limit, "too many files begin in the same second");
@@ -83,6 +94,12 @@ public:
         return {};
     }
 
+    // Waits until the disk has what was written.
+    Result<void> sync() {
+        if (::fdatasync(::fileno(file_.get())) != 0) return tl::unexpected(write_error(path_.string(), errno));
+        return {};
+    }
+
     // Leaves the whole packets.
     void cut_off() {
         file_.reset();
@@ -93,17 +110,11 @@ public:
     // Replaces the file by one with the index in front, for which it is copied. If that fails, it stays as it is.
     Result<void> finish() {
         file_.reset();
-        const File written(std::fopen(path_.c_str(), "rb"));
-        if (!written) return tl::unexpected(write_error(path_.string(), errno));
         auto whole = OutputFile::create(path_);
         if (!whole) return tl::unexpected(whole.error());
-        auto piece = write_packet(write_index(indexer_.finish(bytes_)));
-        while (!piece.empty()) {
-            if (auto ok = whole->write(piece); !ok) return ok;
-            piece.resize(std::size_t{1} << 20);
-            piece.resize(std::fread(piece.data(), 1, piece.size(), written.get()));
-        }
-        if (std::ferror(written.get()) != 0) return fail(ErrorKind::bad_input, path_.string() + " cannot be read");
+        if (auto ok = whole->write(write_packet(write_index(indexer_.finish(bytes_)))); !ok) return ok;
+        if (auto ok = whole->append(path_); !ok) return ok;
+        if (auto ok = whole->sync(); !ok) return ok;
         return whole->finish();
     }
 
@@ -119,13 +130,14 @@ private:
 
 class Recording {
 public:
+    using Clock = Recorder::Clock;
     struct Item {
-        SharedPacket packet;
+        SharedPacket packet;  // null: none has come
         fs::path new_file{};  // begins with this packet; empty: it goes on
     };
 
-    Recording(std::string stream, std::shared_ptr<Shared> shared)
-        : stream_(std::move(stream)), shared_(std::move(shared)), thread_([this] { run(); }) {}
+    Recording(std::string stream, std::chrono::milliseconds sync, std::shared_ptr<Shared> shared)
+        : stream_(std::move(stream)), sync_(sync), shared_(std::move(shared)), thread_([this] { run(); }) {}
     Recording(const Recording&) = delete;
     Recording& operator=(const Recording&) = delete;
     ~Recording() {
@@ -159,15 +171,21 @@ private:
                 finish();
                 begin(item->new_file);
             }
-            if (file_) write(*item->packet);
+            if (file_ && item->packet) write(*item->packet);
+            if (file_ && unsynced_since_ && Clock::now() - *unsynced_since_ >= sync_) sync();
         }
         finish();
         done_ = true;
     }
 
+    // Nothing once the recording has ended. Waits for a packet no longer than until the disk has to have the last ones.
     std::optional<Item> next() {
         std::unique_lock lock(mutex_);
-        changed_.wait(lock, [this] { return ended_ || !items_.empty(); });
+        const auto some = [this] { return ended_ || !items_.empty(); };
+        if (!unsynced_since_)
+            changed_.wait(lock, some);
+        else if (!changed_.wait_until(lock, *unsynced_since_ + sync_, some))
+            return Item{};
         if (items_.empty()) return std::nullopt;
         auto item = std::move(items_.front());
         items_.pop_front();
@@ -188,16 +206,23 @@ private:
     }
 
     void write(const LivePacket& packet) {
-        if (const auto written = file_->write(packet); !written) {
-            file_->cut_off();
-            shared_->warn("recording_failed", stream_,
-                          "recording stops, the live stream goes on: " + written.error().message);
-            file_.reset();
-            failed_ = true;
-            return;
-        }
+        if (const auto written = file_->write(packet); !written) return stop(written.error());
+        if (!unsynced_since_) unsynced_since_ = Clock::now();
         ++shared_->packets;
         shared_->bytes += packet.bytes.size();
+    }
+
+    void sync() {
+        unsynced_since_.reset();
+        if (const auto synced = file_->sync(); !synced) stop(synced.error());
+    }
+
+    void stop(const Error& error) {
+        file_->cut_off();
+        shared_->warn("recording_failed", stream_, "recording stops, the live stream goes on: " + error.message);
+        file_.reset();
+        unsynced_since_.reset();
+        failed_ = true;
     }
 
     void finish() {
@@ -214,9 +239,11 @@ private:
                               "; 'htvm index' adds it",
                           false);
         file_.reset();
+        unsynced_since_.reset();
     }
 
     std::string stream_;
+    std::chrono::milliseconds sync_;
     std::shared_ptr<Shared> shared_;
     std::mutex mutex_;  // of what follows, up to ended_
     std::condition_variable changed_;
@@ -224,11 +251,13 @@ private:
     std::size_t waiting_ = 0;  // bytes
     bool ended_ = false;
     std::atomic<bool> done_ = false, failed_ = false;
-    std::optional<GrowingFile> file_;  // the thread's own
-    std::thread thread_;               // last: it uses the others
+    std::optional<GrowingFile> file_;  // the thread's own, and so
+    std::optional<Clock::time_point> unsynced_since_{};
+    std::thread thread_;  // last: it uses the others
 };
 
-bool stands_alone(const PacketHeader& header) {
+// It can be decoded by itself, and others go on from it.
+bool begins_file(const PacketHeader& header) {
     return header.kind == PacketKind::intra && header.has(packet_flag::referred);
 }
 
@@ -257,7 +286,7 @@ struct Recorder::State {
         auto& out = streams[name];
         std::erase_if(ending, [](const auto& recording) { return recording->done(); });
         if (streams.size() + ending.size() <= options.streams)
-            out.recording = std::make_unique<Recording>(name, shared);
+            out.recording = std::make_unique<Recording>(name, options.sync, shared);
         else
             shared->warn("recording_failed", name, "not recorded: as many streams as can be are being recorded");
         return out;
@@ -299,7 +328,7 @@ bool Recorder::take(const std::string& name, const SharedPacket& packet, Clock::
         stream.file = stream.whole = false;
         stream.failed = now;
     }
-    const bool frame = frame_type(header.kind).has_value();
+    const bool frame = packet->is_frame();
     if (!stream.header || (stream.failed && now - *stream.failed < options.retry)) return false;
     const bool due = stream.file && options.file_length.count() > 0 && now - stream.begun >= options.file_length;
     const auto put = [&](const SharedPacket& item, fs::path new_file) {
@@ -309,18 +338,18 @@ bool Recorder::take(const std::string& name, const SharedPacket& packet, Clock::
         if (frame) ++state_->shared->dropped_frames;
         return false;
     };
-    if (stands_alone(header) && (!stream.file || due)) {
+    if (begins_file(header) && (!stream.file || due)) {
         stream.whole = stream.file = put(stream.header, options.folder / recording_name(name, time));
         stream.begun = now;
         stream.failed.reset();
-    } else if (stands_alone(header)) {
+    } else if (begins_file(header)) {
         stream.whole = true;
     } else if (!stream.whole) {
         if (frame && stream.file) ++state_->shared->dropped_frames;
         return frame;
     }
     if (stream.whole) put(packet, {});
-    return (frame && !stream.whole) || (due && !stands_alone(header));
+    return (frame && !stream.whole) || (due && !begins_file(header));
 }
 
 void Recorder::end(const std::string& name) {

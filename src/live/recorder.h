@@ -1,9 +1,10 @@
 // Keeps live streams as files. Each session of a stream becomes NAME-YYYYMMDD-HHMMSS.htvm (UTC), begun with a frame
 // that can be decoded by itself.
 //
-// A file grows under its final name: it can be watched while it is recorded, and if the program or the machine ends in
-// the middle, it holds every packet up to the last one that was written whole, and nothing has to be renamed. What it
-// lacks then is the index in front. Once a recording has ended, the file is replaced by one that begins with the index.
+// A file grows under its final name: it can be watched while it is recorded, and if the program ends in the middle, it
+// holds every packet up to the last one that was written whole, and nothing has to be renamed. If the machine does, by
+// a power cut, it may lack those of the last seconds. What it lacks then besides is the index in front. Once a
+// recording has ended, the file is replaced by one that begins with the index, and not before the disk has all of that.
 //
 // Each recording has a thread of its own that writes, so a slow disk holds up neither the server nor the other
 // recordings. What waits for the disk is bounded; what does not fit is dropped up to the next frame that can be decoded
@@ -28,6 +29,7 @@ struct RecorderOptions {
     // After this a stream's next file begins, at a frame that can be decoded by itself; 0: one file a session.
     std::chrono::milliseconds file_length{0};
     std::size_t waiting_bytes = std::size_t{64} << 20;  // for the disk, of one stream
+    std::chrono::milliseconds sync{2000};               // what was written is on the disk after this
     std::size_t streams = 300;                          // at once, those included whose files are being finished
     std::chrono::milliseconds retry{60000};             // after a fault, such as a full disk, until it is tried again
 };

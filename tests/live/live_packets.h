@@ -18,8 +18,8 @@ inline Packet live_packet(PacketKind kind, std::uint32_t frame, std::uint32_t re
     out.payload.assign(bytes, static_cast<std::uint8_t>(frame));
     return out;
 }
-inline Packet live_header(std::uint32_t session) {
-    return live_packet(PacketKind::sequence, 0, session, packet_flag::session, 40);
+inline Packet live_header(std::uint32_t session, std::size_t bytes = 40) {
+    return live_packet(PacketKind::sequence, 0, session, packet_flag::session, bytes);
 }
 inline Packet live_intra(std::uint32_t frame, std::size_t bytes = 300) {
     return live_packet(PacketKind::intra, frame, frame, packet_flag::referred | packet_flag::access, bytes);

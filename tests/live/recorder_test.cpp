@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,41 +13,45 @@
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <map>
+#include <mutex>
 #include <thread>
 
 #include "htvm/decoder.hpp"
 #include "htvm/stream_index.hpp"
+#include "live_packets.h"
+
+// In place of the C library's, so that the tests see what the disk is waited for; they go on to the kernel.
+namespace {
+std::mutex sync_mutex;
+std::function<void(const std::string& path)> on_sync;
+
+int synced(int file, long call) {
+    {
+        const std::lock_guard lock(sync_mutex);
+        if (on_sync) on_sync(std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(file)).string());
+    }
+    return static_cast<int>(syscall(call, file));
+}
+}  // namespace
+extern "C" int fsync(int file) { return synced(file, SYS_fsync); }
+extern "C" int fdatasync(int file) { return synced(file, SYS_fdatasync); }
 
 namespace htvm::live {
 namespace {
 
 using namespace std::chrono_literals;
-using namespace packet_flag;
 namespace fs = std::filesystem;
 
 constexpr Recorder::Clock::time_point start{};
 const auto evening = std::chrono::system_clock::from_time_t(1795352751);  // 2026-11-22 13:05:51
 
-SharedPacket packet(PacketKind kind, std::uint32_t frame, std::uint32_t reference, std::uint8_t flags,
-                    std::size_t bytes) {
-    Packet out;
-    out.kind = kind;
-    out.frame = frame;
-    out.reference = reference;
-    out.flags = static_cast<std::uint8_t>(told | flags);
-    out.timestamp_us = frame * 40000;
-    out.payload.assign(bytes, static_cast<std::uint8_t>(frame));
-    return std::make_shared<LivePacket>(LivePacket{out, write_packet(out), {}});
+SharedPacket shared(const Packet& packet) {
+    return std::make_shared<LivePacket>(LivePacket{packet, write_packet(packet), {}});
 }
-SharedPacket header(std::uint32_t session_number) {
-    return packet(PacketKind::sequence, 0, session_number, session, 40);
-}
-SharedPacket intra(std::uint32_t frame, std::size_t bytes = 300) {
-    return packet(PacketKind::intra, frame, frame, referred | access, bytes);
-}
-SharedPacket tracked(std::uint32_t frame, std::size_t bytes = 100) {
-    return packet(PacketKind::tracked, frame, frame - 1, referred, bytes);
-}
+SharedPacket header(std::uint32_t session) { return shared(live_header(session)); }
+SharedPacket intra(std::uint32_t frame, std::size_t bytes = 300) { return shared(live_intra(frame, bytes)); }
+SharedPacket tracked(std::uint32_t frame, std::size_t bytes = 100) { return shared(live_tracked(frame, bytes)); }
 
 class RecorderTest : public testing::Test {
 protected:
@@ -215,6 +220,61 @@ TEST_F(RecorderTest, AFaultStopsTheRecordingUntilItIsTriedAgain) {
     wait_until([&] { return recorder.counters().packets == 2; });
     EXPECT_EQ(frames("anna-20261122-130652.htvm"), Frames{3});
     EXPECT_EQ(events(recorder), Names{"recording"});
+}
+
+// While it lives, act(path) is called before the disk is waited for.
+class WatchedDisk {
+public:
+    explicit WatchedDisk(std::function<void(const std::string& path)> act) { set(std::move(act)); }
+    WatchedDisk(const WatchedDisk&) = delete;
+    ~WatchedDisk() { set({}); }
+
+private:
+    static void set(std::function<void(const std::string& path)> act) {
+        const std::lock_guard lock(sync_mutex);
+        on_sync = std::move(act);
+    }
+};
+
+TEST_F(RecorderTest, AFileThatGrowsIsOnTheDiskAfterAMomentAndNobodyElseWaitsForThat) {
+    options.sync = 50ms;
+    const auto name = "anna-20261122-130551.htvm";
+    std::mutex mutex;
+    std::map<std::string, std::uintmax_t> on_disk;  // by path: a file's size
+    const auto waited_for = [&](const fs::path& path) {
+        const std::lock_guard lock(mutex);
+        return on_disk.contains(path) ? on_disk[path] : 0;
+    };
+    const WatchedDisk disk([&, here = std::this_thread::get_id()](const std::string& path) {
+        const std::lock_guard lock(mutex);
+        on_disk[path] = fs::is_regular_file(path) ? fs::file_size(path) : 1;
+        EXPECT_NE(std::this_thread::get_id(), here);
+    });
+    auto recorder = open();
+    take(recorder, header(1));
+    take(recorder, intra(0));
+    wait_until([&] { return recorder.counters().packets == 2; });
+    const auto first = fs::file_size(options.folder / name);
+    wait_until([&] { return waited_for(options.folder / name) == first; });  // although nothing more comes
+    EXPECT_EQ(waited_for(options.folder), 1u);                               // its name
+    take(recorder, tracked(1));
+    wait_until([&] { return waited_for(options.folder / name) > first; });
+}
+
+TEST_F(RecorderTest, TheFileWithItsIndexTakesThePlaceOfTheOtherOnceTheDiskHasIt) {
+    const auto path = options.folder / "anna-20261122-130551.htvm";
+    std::vector<PacketKind> first;  // of both files, when the disk has the new one
+    const WatchedDisk disk([&](const std::string& waited_for) {
+        if (waited_for != path.string() + ".partial") return;
+        for (const auto& name : {waited_for, path.string()})
+            first.push_back(packets(fs::path(name).filename())[0].kind);
+    });
+    auto recorder = open();
+    take(recorder, header(1));
+    take(recorder, intra(0));
+    recorder.finish();
+    EXPECT_EQ(first, (std::vector<PacketKind>{PacketKind::front_index, PacketKind::sequence}));
+    EXPECT_EQ(packets(path.filename())[0].kind, PacketKind::front_index);
 }
 
 // What a child process does, and how it ended.
