@@ -71,8 +71,9 @@ if(NOT HTVM_SANITIZE)
   add_test(NAME second_decoder COMMAND ${PROJECT_SOURCE_DIR}/tests/second_decoder/check.sh $<TARGET_FILE:htvm>)
   set_tests_properties(second_decoder PROPERTIES TIMEOUT 900 SKIP_RETURN_CODE 77 COST 100)
 endif()
-# Three hubs, a real nats-server, and what fails.
+# Hubs and a real nats-server: who may join; and what fails.
 if(NOT HTVM_SANITIZE)
+  add_test(NAME nats_access COMMAND ${PROJECT_SOURCE_DIR}/tests/live/nats_access.py $<TARGET_FILE:htvm>)
   add_test(NAME nats COMMAND ${PROJECT_SOURCE_DIR}/tests/live/nats.py $<TARGET_FILE:htvm>)
-  set_tests_properties(nats PROPERTIES TIMEOUT 180 SKIP_RETURN_CODE 77 RUN_SERIAL ON)
+  set_tests_properties(nats nats_access PROPERTIES TIMEOUT 180 SKIP_RETURN_CODE 77 RUN_SERIAL ON)
 endif()

@@ -14,6 +14,7 @@
 #include <memory>
 #include <mutex>
 #include <random>
+#include <set>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -27,18 +28,22 @@ constexpr std::chrono::milliseconds tick{20};
 // The library waits between two attempts for this long and up to as much again.
 constexpr std::chrono::milliseconds reconnect{250}, connect_timeout{2000}, write_timeout{2000};
 constexpr int most_pending_messages = 65536;
+constexpr std::size_t most_troubles = 10;
 
 // What the library's threads reach. It outlives the link for as long as one of them may call back.
 struct Mailbox {
-    explicit Mailbox(net::io_context& given, std::size_t bytes) : context(&given), most_waiting(bytes) {}
+    Mailbox(net::io_context& given, Hub& its_hub, std::size_t bytes)
+        : context(&given), hub(its_hub), most_waiting(bytes) {}
 
     std::mutex mutex;
     net::io_context* context;  // null: the link is gone, and what comes goes nowhere
-    HubLink* link = nullptr;   // on the context's thread only
+    Hub& hub;                  // on the context's thread only,
+    HubLink* link = nullptr;   // as the link
     const std::size_t most_waiting;
     std::size_t waiting = 0;  // bytes posted to the context
     NatsCounters counters{};
-    bool closed = false;  // the library gave the connection up
+    bool closed = false;               // the library gave the connection up
+    std::set<std::string> troubles{};  // that the log was told of since there was a connection
     std::condition_variable news{};
 
     // Runs act(link) on the server's thread.
@@ -47,6 +52,18 @@ struct Mailbox {
         if (!box->context) return;
         net::post(*box->context, [box, act = std::move(act)] {
             if (box->link) act(*box->link);
+        });
+    }
+    // Says in the log why the hubs are not joined: each reason once, until they are.
+    static void tell_trouble(const std::shared_ptr<Mailbox>& box, const std::string& why) {
+        {
+            const std::lock_guard lock(box->mutex);
+            if (box->troubles.size() >= most_troubles || !box->troubles.insert(why).second) return;
+        }
+        post(box, [box, why](HubLink&) {
+            box->hub.tell({.name = "nats_trouble",
+                           .text = "not joined with other hubs: " + why + "; streams of this hub go on",
+                           .warning = true});
         });
     }
 };
@@ -86,26 +103,40 @@ void on_connected(natsConnection*, void* closure) {
     {
         const std::lock_guard lock(box->mutex);
         ++box->counters.connections;
-        box->counters.last_error.clear();
+        box->troubles.clear();
     }
-    Mailbox::post(box, [](HubLink& link) { link.connected(HubLink::Clock::now()); });
+    Mailbox::post(box, [box](HubLink& link) {
+        link.connected(HubLink::Clock::now());
+        box->hub.tell({.name = "nats_connected", .text = "joined with other hubs through NATS"});
+    });
 }
 
 void on_disconnected(natsConnection*, void* closure) {
-    Mailbox::post(mailbox(closure), [](HubLink& link) { link.disconnected(HubLink::Clock::now()); });
-}
-
-void on_error(natsConnection*, natsSubscription*, natsStatus status, void* closure) {
     const auto& box = mailbox(closure);
-    const std::lock_guard lock(box->mutex);
-    if (status == NATS_SLOW_CONSUMER)
-        ++box->counters.slow_consumer;
-    else
-        box->counters.last_error = natsStatus_GetText(status);
+    Mailbox::post(box, [](HubLink& link) { link.disconnected(HubLink::Clock::now()); });
+    Mailbox::tell_trouble(box, "the connection to NATS has broken");
 }
 
-void on_closed(natsConnection*, void* closure) {
+// What NATS itself said is clearer than the library's word for it.
+void tell_error(natsConnection* connection, natsStatus status, const SharedMailbox& box) {
+    const char* said = nullptr;
+    natsConnection_GetLastError(connection, &said);
+    Mailbox::tell_trouble(box, "NATS: " + std::string(said && *said ? said : natsStatus_GetText(status)));
+}
+
+void on_error(natsConnection* connection, natsSubscription*, natsStatus status, void* closure) {
+    const auto& box = mailbox(closure);
+    if (status != NATS_SLOW_CONSUMER) return tell_error(connection, status, box);
+    const std::lock_guard lock(box->mutex);
+    ++box->counters.slow_consumer;
+}
+
+// The library gave up, as it does when it is refused twice.
+void on_closed(natsConnection* connection, void* closure) {
     auto* shared = &mailbox(closure);
+    const char* ignored = nullptr;
+    const auto status = natsConnection_GetLastError(connection, &ignored);
+    if (status != NATS_OK) tell_error(connection, status, *shared);
     {
         const std::lock_guard lock((*shared)->mutex);
         (*shared)->closed = true;
@@ -244,7 +275,8 @@ private:
         Bytes message;
     };
 
-    // Until the link ends: connects, again if the library gives up, as it does when it is refused twice.
+    // Until the link ends: connects, again where that fails, and if the library gives up, as it does when it is refused
+    // twice.
     void run() {
         while (!ends_within(std::chrono::milliseconds(0))) {
             natsConnection* connection = nullptr;
@@ -292,16 +324,15 @@ private:
         natsOptions_SetReconnectedCB(options, on_connected, closure);
         natsOptions_SetClosedCB(options, on_closed, closure);
         natsOptions_SetErrorHandler(options, on_error, closure);
-        natsOptions_SetRetryOnFailedConnect(options, true, on_connected, closure);
         const auto status = natsConnection_Connect(&connection, options);
-        if (status != NATS_OK && status != NATS_NOT_YET_CONNECTED) {
-            on_error(nullptr, nullptr, status, closure);
+        if (status != NATS_OK) {
+            Mailbox::tell_trouble(box_, "NATS: " + std::string(natsStatus_GetText(status)));
             delete closure;
             connection = nullptr;
             return false;
         }
         for (auto& [subject, subscription] : subscriptions_) subscription = subscribed(connection, subject);
-        if (status == NATS_OK) on_connected(connection, closure);
+        on_connected(connection, closure);
         return true;
     }
 
@@ -359,7 +390,7 @@ struct NatsLink::State {
 
     State(LibraryOptions library, const HubLinkOptions& options, std::size_t most_waiting, Hub& hub,
           net::io_context& context)
-        : box(std::make_shared<Mailbox>(context, most_waiting)),
+        : box(std::make_shared<Mailbox>(context, hub, most_waiting)),
           sender(std::move(library), box),
           link(hub, options,
                {[this](const std::string& subject, Bytes message) { sender.send(subject, std::move(message)); },
@@ -414,7 +445,5 @@ NatsCounters NatsLink::counters() const {
     out.hubs = state_->link.counters();
     return out;
 }
-
-bool has_nats() { return true; }
 
 }  // namespace htvm::live

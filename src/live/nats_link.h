@@ -30,13 +30,13 @@ struct NatsCounters {
     std::uint64_t slow_consumer = 0;  // how often NATS or its library dropped messages for us
     std::uint64_t dropped_to = 0;     // messages not sent: too many waited, or there was no connection
     std::uint64_t dropped_from = 0;   // messages not taken: too many waited
-    std::string last_error{};         // of the connection, as the library has it
 };
 
 class NatsLink {
 public:
-    // Connects, and goes on trying. hub and context outlive it; the hub is called on the thread that runs the context.
-    // bad_input if the servers are no addresses or a file cannot be read; unsupported if it was built without NATS.
+    // Connects, and goes on trying; the hub's log says when it has, and once why not. hub and context outlive it; the
+    // hub is called on the thread that runs the context. bad_input if the servers are no addresses or a file cannot be
+    // read; unsupported if this program was built without NATS.
     static Result<NatsLink> open(const NatsOptions& options, Hub& hub, boost::asio::io_context& context);
     NatsLink(NatsLink&&) noexcept;
     NatsLink& operator=(NatsLink&&) noexcept;
@@ -50,8 +50,5 @@ private:
     explicit NatsLink(std::unique_ptr<State> state);
     std::unique_ptr<State> state_;
 };
-
-// Whether this program was built with NATS.
-bool has_nats();
 
 }  // namespace htvm::live

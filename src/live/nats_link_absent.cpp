@@ -6,7 +6,9 @@ namespace htvm::live {
 struct NatsLink::State {};
 
 Result<NatsLink> NatsLink::open(const NatsOptions&, Hub&, boost::asio::io_context&) {
-    return fail(ErrorKind::unsupported, "this htvm was built without NATS (libnats-dev)");
+    return fail(ErrorKind::unsupported,
+                "this htvm was built without NATS, so it cannot join other hubs: leave out --nats and HTVM_NATS, or "
+                "install libnats-dev and build it again with -DHTVM_NATS=ON");
 }
 
 NatsLink::NatsLink(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -15,7 +17,5 @@ NatsLink& NatsLink::operator=(NatsLink&&) noexcept = default;
 NatsLink::~NatsLink() = default;
 
 NatsCounters NatsLink::counters() const { return {}; }
-
-bool has_nats() { return false; }
 
 }  // namespace htvm::live

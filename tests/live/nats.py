@@ -222,6 +222,18 @@ def free_port():
         return taken.getsockname()[1]
 
 
+def streams_at(port):
+    """What the hub lists, by name."""
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/streams", timeout=2) as answer:
+        return {stream["name"]: stream for stream in json.load(answer)}
+
+
+def has_nats(htvm):
+    """Whether the program was built with it."""
+    said = subprocess.run([htvm, "serve", "--port", "0", "--nats", "-"], capture_output=True, text=True).stderr
+    return "built without NATS" not in said
+
+
 class Machines:
     def __init__(self, htvm, folder):
         self.htvm, self.folder = htvm, folder
@@ -239,8 +251,7 @@ class Machines:
              "--hub-name", f"hub{i}", "--hub-url", f"ws://127.0.0.1:{self.ports[i]}"], stdout=log, stderr=log)
 
     def streams(self, i):
-        with urllib.request.urlopen(f"http://127.0.0.1:{self.ports[i]}/api/streams", timeout=2) as answer:
-            return {stream["name"]: stream for stream in json.load(answer)}
+        return streams_at(self.ports[i])
 
     def end(self):
         for process in [self.nats, *self.hubs]:
@@ -327,7 +338,7 @@ def main():
     if not shutil.which("nats-server"):
         print("Skipped: there is no nats-server.")
         return SKIPPED
-    if "--nats" not in subprocess.run([htvm, "serve", "--help-all"], capture_output=True, text=True).stdout:
+    if not has_nats(htvm):
         print("Skipped: this htvm was built without NATS.")
         return SKIPPED
     with tempfile.TemporaryDirectory() as folder:
