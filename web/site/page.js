@@ -26,13 +26,16 @@ function play(name, attributes, alone) {
     if (!alone) content.append(make('a', { class: 'back', href: '/' }, 'All streams'));
 }
 
+// What the page's address has besides `file`, such as a signed link's query, goes on to the file.
 function playFile(path, alone) {
-    play(nameOf(path), { src: address(path), loop: '' }, alone);
+    const rest = new URLSearchParams(query);
+    for (const own of ['file', 'orbit']) rest.delete(own);
+    play(nameOf(path), { src: address(path) + (rest.size > 0 ? `?${rest}` : ''), loop: '' }, alone);
 }
 
 // The query of a signed link goes on to the stream.
-function playLive(name, query) {
-    play(name, { src: `/watch/${encodeURIComponent(name)}${query}`, live: '' }, false);
+function playLive(name) {
+    play(name, { src: `/watch/${encodeURIComponent(name)}${location.search}`, live: '' }, false);
 }
 
 function sizeText(bytes) {
@@ -111,7 +114,7 @@ const watched = /^\/play\/([^/]+)$/.exec(location.pathname);
 const asked = query.get('file');
 const beside = query.get('beside');
 if (watched) {
-    playLive(decodeURIComponent(watched[1]), location.search);
+    playLive(decodeURIComponent(watched[1]));
 } else if (asked !== null && beside !== null) {
     const streams = [asked, beside].map((path) => ({ name: nameOf(path.replace(/^beside\//, '')), address: address(path) }));
     document.title = `${streams.map(({ name }) => name).join(' | ')} – htvm`;

@@ -161,6 +161,18 @@ test('htvm serve lists a folder with stills, and plays what is chosen', options,
         await page.waitForFunction(() => document.querySelectorAll('li').length === 4);
     }));
 
+test('htvm serve --link-keys: the page plays a file whose link it was given', options, async () => {
+    const keys = join(work, 'keys.json');
+    execFileSync(program, ['serve', '--link-keys', keys, '--add-link-key', '--quiet']);
+    const link = execFileSync(program, ['link', 'more/a person.htvm', '--file', '--keys', keys, '--for', '1h'], { encoding: 'utf8' });
+    const signed = link.trim().slice(link.indexOf('?') + 1);
+    await running(['serve', '--files', join(work, 'streams'), '--link-keys', keys, '--port', '0'], async (page, address) => {
+        await page.goto(`${address}?file=more%2Fa+person.htvm&orbit=180,20&${signed}`);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 3);
+        assert.equal(await page.evaluate(() => document.querySelector('htvm-player').src), `/files/more/a%20person.htvm?${signed}`);
+    });
+});
+
 test('htvm serve lists what is live, and shows it; the query of its address goes on to the stream', options, () =>
     running(['serve', '--port', '0'], async (page, address) => {
         await page.goto(address);
