@@ -21,9 +21,9 @@ struct Options {
 
 Result<void> link(const Options& options) {
     if (!options.file && !live::is_stream_name(options.name))
-        return fail(ErrorKind::bad_input, fmt::format("'{}' is no name of a live stream: letters, digits, '-', '_' and "
-                                                      "'.'; --file makes a link to a file",
-                                                      options.name));
+        return fail(ErrorKind::bad_input, fmt::format("'{}' is no name of a live stream: {}; --file makes a link to a "
+                                                      "file",
+                                                      options.name, live::stream_name_rule));
     const auto keys = live::read_link_keys(options.keys);
     if (!keys) return tl::unexpected(keys.error());
     auto hub = options.hub;

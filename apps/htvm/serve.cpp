@@ -232,16 +232,22 @@ void add_limits(CLI::App& command, Options& options) {
     add("--streams", options.hub.streams, "Live streams at once");
     add("--viewers", options.hub.viewers, "Viewers of one live stream");
     add("--viewers-per-address", server.viewers_per_address, "Viewers of live streams from one address");
-    command
-        .add_option("--message-bytes", options.hub.packet_bytes,
-                    fmt::format("A publisher's largest message (default {} MiB)", options.hub.packet_bytes >> 20))
-        ->transform(CLI::AsSizeValue(false));
-    command
-        .add_option_function<unsigned>(
-            "--header-time", [&server](unsigned seconds) { server.header_time = std::chrono::seconds(seconds); },
-            fmt::format("Seconds for a request's header, and for agreeing on TLS (default {})",
-                        server.header_time.count()))
-        ->check(CLI::Range(1, 3600));
+    const auto add_bytes = [&](const char* name, std::size_t& limit, const std::string& text) {
+        command.add_option(name, limit, fmt::format("{} (default {} MiB)", text, limit >> 20))
+            ->transform(CLI::AsSizeValue(false));
+    };
+    add_bytes("--message-bytes", options.hub.packet_bytes, "A publisher's largest message");
+    add_bytes("--memory", options.hub.memory, "All packets of live streams, kept, waiting, and come in part");
+    const auto add_time = [&](const char* name, auto& limit, const std::string& text) {
+        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limit).count();
+        command
+            .add_option_function<unsigned>(
+                name, [&limit](unsigned given) { limit = std::chrono::seconds(given); },
+                fmt::format("Seconds for {} (default {})", text, seconds))
+            ->check(CLI::Range(1, 3600));
+    };
+    add_time("--header-time", server.header_time, "a request's header, and for agreeing on TLS");
+    add_time("--message-time", options.hub.message_time, "a message of a publisher or viewer, from its first part on");
 }
 
 }  // namespace
@@ -272,7 +278,7 @@ void add_serve(CLI::App& app, Run& run) {
                      "How TCP finds out how fast it may send: bbr (default; where packets are lost, live streams come "
                      "late with others: docs/live.md), another that the kernel has, or system: the kernel's choice")
         ->type_name("NAME");
-    if (live::has_nats()) add_nats_options(*command, server.nats);
+    add_nats_options(*command, server.nats);
     add_access_options(*command, *options);
     add_recording(*command, *options);
     add_limits(*command, *options);

@@ -144,9 +144,7 @@ Result<Publishers> read_publishers(const std::string& path) {
 }
 
 Result<std::string> add_publisher(const std::string& path, const std::string& name) {
-    if (!is_stream_name(name))
-        return fail(ErrorKind::bad_input,
-                    "a name has 1 to 64 letters, digits, '-', '_' and '.', and does not begin with '.'");
+    if (!is_stream_name(name)) return fail(ErrorKind::bad_input, stream_name_rule);
     Publishers publishers;
     if (exists(path)) {
         auto known = read_publishers(path);

@@ -16,6 +16,8 @@ namespace htvm::live {
 // A stream's name: 1 to 64 letters, digits, '-', '_' and '.', not beginning with '.'. So it is a file's name, a segment
 // of a path and a word of a log as it stands.
 bool is_stream_name(std::string_view name);
+inline constexpr const char* stream_name_rule =
+    "a stream's name has 1 to 64 letters, digits, '-', '_' and '.', and does not begin with '.'";
 
 // What is kept of a publisher's token, which has 256 random bits: a salted SHA-256 is enough, since nobody can try them
 // all, and it makes checking cheap for the hub.

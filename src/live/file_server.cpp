@@ -249,6 +249,7 @@ struct FileServer::State {
                                    const net::ip::address& address) const;
     std::optional<Refusal> link_refused(const std::string& path, const Request& request) const;
     void tell_refused(const Refusal& refusal, const std::string& stream, const net::ip::address& address);
+    void tell_too_slow(const net::ip::address& address);
     void tell(const Event& event) const {
         if (options.log) options.log(event);
     }
@@ -574,12 +575,18 @@ void FileServer::State::tell_refused(const Refusal& refusal, const std::string& 
           .address = address.to_string()});
 }
 
+// One who has not sent a whole request within header_time, nor agreed on TLS.
+void FileServer::State::tell_too_slow(const net::ip::address& address) {
+    const auto seconds = std::to_string(options.header_time.count());
+    tell_refused({"header_time", "the request did not come whole within " + seconds + " seconds"}, "", address);
+}
+
 net::awaitable<void> FileServer::State::publish(Line line, Request request, LiveTarget target,
                                                 net::ip::address address) {
     auto header = common_header();
     std::optional<Refusal> refusal;
     if (!is_stream_name(target.name))
-        refusal = {"name", "a stream's name has 1 to 64 letters, digits, '-', '_' and '.'", http::status::bad_request};
+        refusal = {"name", stream_name_rule, http::status::bad_request};
     else if (!origin_allowed(request))
         refusal = {"origin", "pages of this site may not publish here"};
     else if (const auto why = publishing_refused(request, target, address); !why.empty())
@@ -651,7 +658,9 @@ net::awaitable<void> FileServer::State::serve(Line line, net::ip::address addres
     const Counted counted(by_address, counted_address(address));
     ++connections;
     line.next_layer().expires_after(options.header_time);
-    if (!co_await line.handshake(net::ssl::stream_base::server)) {
+    if (const auto insecure = co_await line.handshake(net::ssl::stream_base::server)) {
+        if (insecure == beast::error::timeout) tell_too_slow(address);
+    } else {
         if (auto live = co_await answer_requests(line, address)) {
             auto& [request, target] = *live;
             if (target.publish)
@@ -677,6 +686,7 @@ net::awaitable<std::optional<std::pair<Request, LiveTarget>>> FileServer::State:
         idle.insert(&line);
         const auto [error, bytes] = co_await http::async_read_header(line, buffer, parser, awaited);
         idle.erase(&line);
+        if (error == beast::error::timeout && parser.got_some()) tell_too_slow(address);
         if (error) break;
         // No request here has a body; one that does would be read as the next request.
         const bool body = !parser.is_done();

@@ -6,7 +6,6 @@
 #include "codec/stream/sequence.h"
 #include "core/bytes.h"
 #include "core/crc32.h"
-#include "htvm/decoder.hpp"
 
 namespace htvm::live {
 namespace {
@@ -16,6 +15,7 @@ constexpr double viewer_burst = 50, viewer_texts_each_second = 10;
 constexpr double publisher_burst = 1000, publisher_texts_each_second = 500;
 
 constexpr const char* memory_used_up = "this hub's memory for packets is used up";
+constexpr const char* connection_ended = "the connection has ended";
 
 // The header of a message that is exactly one sound packet.
 std::optional<PacketHeader> header_of(std::span<const std::uint8_t> message, std::size_t most_bytes) {
@@ -34,6 +34,15 @@ std::int64_t microseconds(Hub::Clock::duration time) {
 
 CloseCode code_of(const Error& error) {
     return error.kind == ErrorKind::limit ? CloseCode::try_later : CloseCode::refused;
+}
+
+// Why the connection of whoever sent this text message ends; nothing if it may go on.
+template <class Message>
+std::optional<Closing> text_refused(std::string_view text, const Result<Message>& message, TextAllowance& allowance,
+                                    Hub::Clock::time_point now) {
+    if (message && allowance.take(now)) return std::nullopt;
+    return Closing{text.size() > most_text_bytes ? CloseCode::too_large : CloseCode::refused,
+                   message ? "too many text messages" : message.error().message};
 }
 
 std::optional<std::uint64_t> session_of(const std::optional<StreamInfo::Header>& header) {
@@ -249,12 +258,34 @@ std::shared_ptr<LivePacket> Hub::counted(LivePacket packet) const {
             }};
 }
 
+// False if there is no memory for so much.
+bool Hub::hold(PartOfMessage& part, std::size_t bytes, Clock::time_point now) {
+    if (part.bytes == 0) part.since = now;
+    *memory_ += bytes;
+    *memory_ -= std::exchange(part.bytes, bytes);
+    return has_memory_for(0);
+}
+
+// The message is whole, or nothing more of it will come.
+void Hub::drop(PartOfMessage& part) { *memory_ -= std::exchange(part.bytes, 0); }
+
+Result<void> Hub::take_part(Publisher publisher, std::size_t bytes, Clock::time_point now) {
+    const auto found = connections_.find(publisher.connection);
+    if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
+    auto& connection = found->second;
+    heard(publisher, now);
+    if (hold(connection.part, bytes, now)) return {};
+    ++counters_.refused_publishers_limit;
+    detach(connection, "the hub has no memory for it", now);
+    return refuse(connection, {ErrorKind::limit, memory_used_up}, CloseCode::try_later);
+}
+
 Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
-    if (found == connections_.end() || found->second.closing)
-        return fail(ErrorKind::bad_input, "the connection has ended");
+    if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
     connection.heard = now;
+    drop(connection.part);
     auto header = header_of(message, limits_.packet_bytes);
     if (!connection.admitted) {
         if (!header) {
@@ -288,7 +319,7 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
     counters_.bytes_in += message.size();
     if (header->kind == PacketKind::sequence) begin_session(connection.stream, stream, *header, message);
     auto packet = counted({*header, std::move(message), {}});
-    const bool frame = frame_type(header->kind).has_value();
+    const bool frame = packet->is_frame();
     stream.has_frames = stream.has_frames || frame;
     if (frame && stream.stamp) {
         if (stream.stamp->frame == header->frame) packet->stamp = stream.stamp;
@@ -315,19 +346,18 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
 
 Result<void> Hub::take_text(Publisher publisher, std::string_view text, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
-    if (found == connections_.end() || found->second.closing)
-        return fail(ErrorKind::bad_input, "the connection has ended");
+    if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
+    drop(connection.part);
     const auto message = read_from_publisher(text);
-    if (message && connection.allowance.take(now)) {
+    const auto refusal = text_refused(text, message, connection.allowance, now);
+    if (!refusal) {
         take(publisher, *message, now);
         return {};
     }
     ++counters_.refused_publishers_message;
-    const Error error = message ? Error{ErrorKind::bad_input, "too many text messages"} : message.error();
-    const bool long_text = text.size() > most_text_bytes;
     detach(connection, "the publisher sent a text message that is not allowed", now);
-    return refuse(connection, error, long_text ? CloseCode::too_large : CloseCode::refused);
+    return refuse(connection, {ErrorKind::bad_input, refusal->reason}, *refusal->code);
 }
 
 void Hub::take(Publisher publisher, const FromPublisher& message, Clock::time_point now) {
@@ -392,6 +422,7 @@ void Hub::leave(Publisher publisher, bool ended_stream, Clock::time_point now) {
     if (found == connections_.end()) return;
     const bool published = found->second.admitted;
     const auto name = found->second.stream;
+    drop(found->second.part);
     detach(found->second, "the publisher's connection ended", now);
     connections_.erase(found);
     if (published && ended_stream) end_stream(streams_.find(name), "the publisher ended the stream");
@@ -464,7 +495,9 @@ Hub::Watching* Hub::watching(const Viewer& viewer) {
 }
 
 void Hub::leave(const Viewer& viewer) {
-    if (!watching(viewer)) return;
+    auto* watching = this->watching(viewer);
+    if (!watching) return;
+    drop(watching->part);
     auto& stream = *stream_of(viewer);
     const auto& counters = stream.broadcast.counters(viewer.viewer);
     counters_.dropped_frames += counters.dropped_frames;
@@ -475,20 +508,30 @@ void Hub::leave(const Viewer& viewer) {
     if (stream.ended && stream.watching.empty()) ended_.erase(viewer.number);
 }
 
+Result<void> Hub::take_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now) {
+    auto* watching = this->watching(viewer);
+    if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
+    if (hold(watching->part, bytes, now)) return {};
+    ++counters_.refused_viewers_limit;
+    watching->closing = Closing{CloseCode::try_later, memory_used_up};
+    watching->wake();
+    return fail(ErrorKind::limit, memory_used_up);
+}
+
 Result<void> Hub::take_text(const Viewer& viewer, std::string_view text, Clock::time_point now) {
     auto* watching = this->watching(viewer);
-    if (!watching || watching->closing) return fail(ErrorKind::bad_input, "the connection has ended");
+    if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
+    drop(watching->part);
     const auto message = read_from_viewer(text);
-    if (message && watching->allowance.take(now)) {
+    const auto refusal = text_refused(text, message, watching->allowance, now);
+    if (!refusal) {
         if (std::holds_alternative<KeyFrameRequest>(*message)) ask_for_key_frame(*stream_of(viewer), now);
         return {};
     }
     ++counters_.refused_viewers_message;
-    const Error error = message ? Error{ErrorKind::bad_input, "too many text messages"} : message.error();
-    watching->closing =
-        Closing{text.size() > most_text_bytes ? CloseCode::too_large : CloseCode::refused, error.message};
+    watching->closing = refusal;
     watching->wake();
-    return tl::unexpected(error);
+    return fail(ErrorKind::bad_input, refusal->reason);
 }
 
 ForViewer Hub::next(const Viewer& viewer, Clock::time_point now) {
@@ -554,9 +597,25 @@ void Hub::tick(Clock::time_point now) {
         other.heartbeat = true;
         other.wake();
     };
+    // The line is as good as dead; or somebody holds memory by sending a byte now and then.
+    const auto takes_too_long = [&](auto& other, const std::string& stream) {
+        if (other.part.bytes == 0 || now - other.part.since < limits_.message_time) return false;
+        other.closing = Closing{};
+        other.wake();
+        const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits_.message_time).count();
+        tell({.name = "cut_off",
+              .text = "cut off: a message has not come whole within " + std::to_string(seconds) + " seconds",
+              .stream = stream});
+        return true;
+    };
     for (auto& [number, connection] : connections_) {
         if (connection.closing || connection.far) continue;
         beat(connection);
+        if (takes_too_long(connection, connection.stream)) {
+            ++counters_.slow_publishers;
+            detach(connection, "the publisher takes too long for a message", now);
+            continue;
+        }
         if (now - connection.heard < limits_.publisher_silence) continue;
         ++counters_.silent_publishers;
         detach(connection, "the publisher has fallen silent", now);
@@ -565,7 +624,11 @@ void Hub::tick(Clock::time_point now) {
     }
     for (auto it = streams_.begin(); it != streams_.end();) {
         auto& stream = it->second;
-        for (auto& [viewer, watching] : stream.watching) beat(watching);
+        for (auto& [viewer, watching] : stream.watching) {
+            if (watching.closing) continue;
+            beat(watching);
+            if (takes_too_long(watching, it->first)) ++counters_.slow_viewers;
+        }
         if (stream.wants_key_frame) ask_for_key_frame(stream, now);
         const auto found = it++;
         if (!stream.connection && now - stream.heard > limits_.remembered_without_publisher)

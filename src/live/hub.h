@@ -37,9 +37,10 @@ struct HubLimits {
     std::size_t streams = 256;
     std::size_t viewers = 4096;                        // of one stream
     std::size_t packet_bytes = std::size_t{16} << 20;  // of one packet
-    // Of all packets together, each counted once: kept for those who may join, and waiting for viewers. Beyond it
-    // nobody new is let in, and what publishers send is dropped.
+    // Of all packets together, each counted once: kept for those who may join, waiting for viewers, and of those that
+    // have come in part. Beyond it nobody new is let in, and what publishers send is dropped.
     std::size_t memory = std::size_t{1} << 30;
+    std::chrono::milliseconds message_time{30000};      // from a message's first part to its last
     std::chrono::milliseconds silence{2000};            // after which another session may take a stream over
     std::chrono::milliseconds publisher_silence{3000};  // after which its connection is ended
     std::chrono::milliseconds remembered_without_publisher{10000};  // then the stream is gone
@@ -88,10 +89,11 @@ struct HubCounters {
     std::uint64_t key_frame_requests = 0;  // passed to publishers
     std::uint64_t refused_publishers_busy = 0, refused_publishers_limit = 0, refused_publishers_message = 0;
     std::uint64_t refused_viewers_no_stream = 0, refused_viewers_limit = 0, refused_viewers_message = 0;
-    std::uint64_t silent_publishers = 0;   // whose connections were ended
-    std::uint64_t dropped_for_memory = 0;  // packets that came when HubLimits::memory was used up
-    std::uint64_t joined = 0;              // viewers who were let in
-    std::size_t memory = 0;                // of all packets, now
+    std::uint64_t slow_publishers = 0, slow_viewers = 0;  // whose messages took too long; so their connections ended
+    std::uint64_t silent_publishers = 0;                  // whose connections were ended
+    std::uint64_t dropped_for_memory = 0;                 // packets that came when HubLimits::memory was used up
+    std::uint64_t joined = 0;                             // viewers who were let in
+    std::size_t memory = 0;                               // of all packets, those included that have come in part, now
 };
 
 // The publisher's clock, carried on by our own. What it tells is late by the time on the way, which varies: of the last
@@ -170,7 +172,10 @@ public:
     // A text message. Likewise an error if it is none, too long, or one of too many.
     Result<void> take_text(Publisher publisher, std::string_view text, Clock::time_point now);
     void take(Publisher publisher, const FromPublisher& message, Clock::time_point now);
-    // A part of a message came: the line is alive.
+    // A part of a message came, which takes so many bytes of memory by now, until it is whole: take() or take_text().
+    // An error ends the connection: there is no memory for it.
+    Result<void> take_part(Publisher publisher, std::size_t bytes, Clock::time_point now);
+    // The line is alive.
     void heard(Publisher publisher, Clock::time_point now);
     ForPublisher next(Publisher publisher);
     // The connection ended. ended_stream: the publisher said that the stream ended with it; its viewers are sent what
@@ -200,6 +205,8 @@ public:
     // bad_input: there is no such stream; limit: it has too many viewers. wake: as for publish().
     Result<Viewer> watch(const std::string& name, std::function<void()> wake, const WatchOptions& options,
                          Clock::time_point now);
+    // As of a publisher.
+    Result<void> take_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now);
     // A text message; an error ends the connection.
     Result<void> take_text(const Viewer& viewer, std::string_view text, Clock::time_point now);
     ForViewer next(const Viewer& viewer, Clock::time_point now);
@@ -229,13 +236,19 @@ public:
     }
 
 private:
+    // A message that has come in part.
+    struct PartOfMessage {
+        std::size_t bytes = 0;  // of memory; 0: there is none
+        Clock::time_point since{};
+    };
     struct Watching {
         std::function<void()> wake;
         WatchOptions options;
         TextAllowance allowance;
         bool hello = true, heartbeat = false, gone = false;  // to be written
-        Clock::time_point heartbeat_at{};                    // the next one
-        SharedPacket behind_stamp{};                         // its stamp was written
+        PartOfMessage part{};
+        Clock::time_point heartbeat_at{};  // the next one
+        SharedPacket behind_stamp{};       // its stamp was written
         std::optional<Closing> closing{};
     };
     struct Stream {
@@ -264,6 +277,7 @@ private:
         std::function<void()> wake;
         TextAllowance allowance;
         Clock::time_point heard{};
+        PartOfMessage part{};
         bool far = false;  // to another hub
         bool admitted = false;
         bool hello = true, heartbeat = false, key_frame = false;  // to be written
@@ -272,6 +286,8 @@ private:
     };
     std::shared_ptr<LivePacket> counted(LivePacket packet) const;
     bool has_memory_for(std::size_t bytes) const { return *memory_ + bytes <= limits_.memory; }
+    bool hold(PartOfMessage& part, std::size_t bytes, Clock::time_point now);
+    void drop(PartOfMessage& part);
     Stream* stream_of(const Viewer& viewer);
     Watching* watching(const Viewer& viewer);
     Stream* published_by(const Connection& connection);
@@ -292,7 +308,8 @@ private:
 
     HubLimits limits_;
     Log log_;
-    // Bytes of packets, wherever they are held; the last to hold one may be a recording, on its thread.
+    // Bytes of packets, wherever they are held, and of what has come of others; the last to hold a packet may be a
+    // recording, on its thread.
     std::shared_ptr<std::atomic<std::size_t>> memory_ = std::make_shared<std::atomic<std::size_t>>(0);
     std::map<std::string, Stream> streams_;
     std::map<std::uint64_t, Stream> ended_;  // by number: until their last viewers have been sent what waits

@@ -4,6 +4,7 @@
 #include <set>
 #include <utility>
 
+#include "live/access.h"
 #include "live/control.h"
 
 namespace htvm::live {
@@ -19,12 +20,6 @@ void add(HubLinkCounters& sum, const FarStreamCounters& stream) {
     sum.gaps += stream.gaps;
     sum.closures += stream.closures;
     sum.doubled += stream.doubled;
-}
-
-// As they stand in addresses: one segment of a path.
-bool is_stream_name(const std::string& name) {
-    const auto bad = [](char c) { return c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' ' || c == 127; };
-    return !name.empty() && name.front() != '.' && std::none_of(name.begin(), name.end(), bad);
 }
 
 }  // namespace
@@ -108,7 +103,8 @@ void HubLink::hear(const Announcement& message, std::uint64_t hub, Clock::time_p
     for (const auto& [name, stream] : other.streams) names.insert(name);
     other.streams.clear();
     for (const auto& stream : message.streams) {
-        if (other.streams.size() >= most_streams || !is_stream_name(stream.stream)) break;
+        if (other.streams.size() >= most_streams) break;
+        if (!is_stream_name(stream.stream)) continue;
         other.streams[stream.stream] = stream;
         names.insert(stream.stream);
     }

@@ -74,26 +74,29 @@ net::awaitable<void> close(Connection& connection, CloseCode code, const std::st
     co_await connection.socket.async_close(why, awaited);
 }
 
-// Reads messages until the connection ends or take(text, bytes) says that it should. heard: called for each piece.
-template <class Take, class Heard>
-net::awaitable<void> read_messages(SharedConnection connection, std::size_t largest_text, Take take, Heard heard) {
+// Reads messages until the connection ends, or one of these says that it should: take_part(bytes), which is called for
+// each piece with the memory that the message takes by then, and take(text, message).
+template <class TakePart, class Take>
+net::awaitable<void> read_messages(SharedConnection connection, TakePart take_part, Take take) {
     auto& socket = connection->socket;
     beast::flat_buffer buffer;
     for (bool wanted = true; wanted;) {
         buffer.clear();
+        if (buffer.capacity() > piece_bytes) buffer.shrink_to_fit();
         beast::error_code failed;
         do {
             const auto [error, bytes] = co_await socket.async_read_some(buffer, piece_bytes, awaited);
             failed = error;
-            heard();
-        } while (!failed && !socket.is_message_done() && !(socket.got_text() && buffer.size() > largest_text));
+            wanted = take_part(buffer.capacity());
+        } while (!failed && wanted && !socket.is_message_done() &&
+                 !(socket.got_text() && buffer.size() > most_text_bytes));
         if (failed == websocket::error::closed) connection->news.theirs = socket.reason();
         if (failed) {
             connection->news.ended = true;
             break;
         }
-        wanted =
-            take(socket.got_text(), std::span(static_cast<const std::uint8_t*>(buffer.cdata().data()), buffer.size()));
+        wanted = wanted && take(socket.got_text(),
+                                std::span(static_cast<const std::uint8_t*>(buffer.cdata().data()), buffer.size()));
     }
     connection->news.timer.cancel();
 }
@@ -164,15 +167,16 @@ net::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::stri
         const bool ended_stream = news.theirs && news.theirs->code == websocket::close_code::normal;
         hub.leave(*publisher, ended_stream, Hub::Clock::now());
     });
+    const auto take_part = [&hub, number = *publisher](std::size_t bytes) {
+        return hub.take_part(number, bytes, Hub::Clock::now()).has_value();
+    };
     const auto take = [&hub, number = *publisher](bool text, std::span<const std::uint8_t> message) {
         const auto now = Hub::Clock::now();
         return (text ? hub.take_text(number, text_of(message), now)
                      : hub.take(number, {message.begin(), message.end()}, now))
             .has_value();
     };
-    const auto heard = [&hub, number = *publisher] { hub.heard(number, Hub::Clock::now()); };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, most_text_bytes, take, heard),
-                  net::detached);
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, take_part, take), net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*publisher); });
 }
 
@@ -189,12 +193,14 @@ net::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string
         co_return;
     }
     const Leave leave([&hub, &viewer] { hub.leave(*viewer); });
+    const auto take_part = [&hub, number = *viewer](std::size_t bytes) {
+        return hub.take_part(number, bytes, Hub::Clock::now()).has_value();
+    };
     // What is no text counts as one: it means nothing, but a flood of it is a flood.
     const auto take = [&hub, number = *viewer](bool text, std::span<const std::uint8_t> message) {
         return hub.take_text(number, text ? text_of(message) : R"({"type":"binary"})", Hub::Clock::now()).has_value();
     };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, most_text_bytes, take, [] {}),
-                  net::detached);
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, take_part, take), net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*viewer, Hub::Clock::now()); });
 }
 

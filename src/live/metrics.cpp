@@ -77,6 +77,10 @@ void add_hub(Metrics& metrics, const Hub& hub, Hub::Clock::time_point now) {
         "dropped_frames_total", "counter",
         "Frames not sent: undecodable ones to nobody, others not to a viewer who was too slow", "cause",
         {{"undecodable", number_text(total.undecodable_frames)}, {"slow_viewer", number_text(total.dropped_frames)}});
+    metrics.gauge("memory_bytes", "Of packets, kept and waiting, and of those that came in part",
+                  std::uint64_t{total.memory});
+    metrics.counter("dropped_packets_total", "From publishers, when the memory for packets was used up",
+                    total.dropped_for_memory);
     metrics.counter("viewers_fallen_behind_total", "How often viewers were too slow", total.fallen_behind);
     metrics.counter("key_frame_requests_total", "Requests passed to publishers", total.key_frame_requests);
     metrics.counter("silent_publishers_total", "Publishers' connections that ended since nothing was heard",
@@ -117,9 +121,11 @@ void add_refused(Metrics& metrics, const MetricsSources& sources) {
         refused["publisher_stream_busy"] += total.refused_publishers_busy;
         refused["publisher_limit"] += total.refused_publishers_limit;
         refused["publisher_message"] += total.refused_publishers_message;
+        refused["publisher_slow"] += total.slow_publishers;
         refused["viewer_no_stream"] += total.refused_viewers_no_stream;
         refused["viewer_limit"] += total.refused_viewers_limit;
         refused["viewer_message"] += total.refused_viewers_message;
+        refused["viewer_slow"] += total.slow_viewers;
     }
     std::vector<Metrics::Sample> samples;
     for (const auto& [cause, count] : refused) samples.push_back({cause, number_text(count)});

@@ -41,6 +41,10 @@ expect 2 "--viewers" "$htvm" serve --viewers 0
 expect 2 "--record-minutes requires --record" "$htvm" serve --record-minutes 5
 expect 1 "there is no folder none" "$htvm" serve --port 0 --record none
 expect 0 "--viewers-per-address" "$htvm" serve --help-all
+expect 0 "(default 1024 MiB)" "$htvm" serve --help-all
+# With NATS or without, the option is known, and what is wrong is said in a sentence.
+said=$("$htvm" serve --port 0 --nats somewhere 2>&1)
+[ $? -eq 1 ] && grep -qE "begins with nats:// or tls://|was built without NATS, .* -DHTVM_NATS=ON" <<<"$said" || fail "--nats somewhere: $said"
 printf 'port = 0\nfiles = "streams"\njson = true\n' >serve.conf
 start --config serve.conf
 grep -q '"event":"listening"' out || fail "--json from the file of options: $(cat out)"
@@ -69,7 +73,7 @@ token=$("$htvm" serve --publishers publishers.json --add-publisher anna 2>said)
 [[ $token =~ ^[0-9a-f]{64}$ ]] || fail "the token is $token"
 grep -q "shown only now" said || fail "says nothing of the token: $(cat said)"
 [ "$(stat -c %a publishers.json)" = 600 ] || fail "others may read the publishers"
-expect 1 "a name has 1 to 64" "$htvm" serve --publishers publishers.json --add-publisher ../anna
+expect 1 "a stream's name has 1 to 64" "$htvm" serve --publishers publishers.json --add-publisher ../anna
 "$htvm" serve --link-keys keys.json --add-link-key 2>said || fail "no key"
 grep -q "has key 1 now" said || fail "says nothing of the key: $(cat said)"
 expect 2 "--for" "$htvm" link anna --keys keys.json

@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <boost/asio.hpp>
 #include <filesystem>
 #include <fstream>
-#include <optional>
 #include <thread>
+
+#include "server_test.h"
 
 namespace htvm::live {
 namespace {
@@ -17,13 +17,10 @@ namespace fs = std::filesystem;
 namespace net = boost::asio;
 using tcp = net::ip::tcp;
 
-class FileServerTest : public testing::Test {
+class FileServerTest : public ServerTest {
 protected:
-    void SetUp() override {
-        auto name = (fs::temp_directory_path() / "htvm-server-XXXXXX").string();
-        ASSERT_TRUE(mkdtemp(name.data()));
-        root = name;
-        fs::create_directories(root / "served" / "inner");
+    FileServerTest() {
+        fs::create_directory(root / "served" / "inner");
         write("secret.htvm", "secret");
         write("served/person.htvm", content);
         write("served/inner/a b.htvm", "inner");
@@ -31,63 +28,10 @@ protected:
         write("served/notes.txt", "notes");
         fs::create_symlink(root / "secret.htvm", root / "served" / "link.htvm");
         fs::create_directory_symlink(root, root / "served" / "up");
-        options.folder = (root / "served").string();
     }
-
-    void TearDown() override {
-        if (server) server->stop();
-        if (thread.joinable()) thread.join();
-        fs::remove_all(root);
-    }
-
-    void start() {
-        auto opened = FileServer::open(options);
-        ASSERT_TRUE(opened) << opened.error().message;
-        server.emplace(std::move(*opened));
-        thread = std::thread([this] { server->run(); });
-    }
-
     void write(const std::string& name, const std::string& text) const { std::ofstream(root / name) << text; }
 
-    tcp::socket connect() {
-        tcp::socket socket(context);
-        socket.connect({net::ip::make_address("127.0.0.1"), server->port()});
-        return socket;
-    }
-
-    // All that the server sends until it closes the connection.
-    static std::string read_all(tcp::socket& socket) {
-        std::string out;
-        boost::system::error_code error;
-        net::read(socket, net::dynamic_buffer(out), error);
-        return out;
-    }
-
-    // The response to one request; headers end in \r\n each.
-    std::string get(const std::string& target, const std::string& headers = "", const std::string& method = "GET") {
-        auto socket = connect();
-        net::write(socket, net::buffer(method + ' ' + target + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n" +
-                                       headers + "\r\n"));
-        return read_all(socket);
-    }
-
-    static int status(const std::string& response) {
-        return response.size() > 12 ? std::atoi(response.c_str() + 9) : 0;
-    }
-    static std::string body(const std::string& response) { return response.substr(response.find("\r\n\r\n") + 4); }
-    static std::string header(const std::string& response, const std::string& name) {
-        const auto at = response.find("\r\n" + name + ": ");
-        if (at == std::string::npos || at > response.find("\r\n\r\n")) return "";
-        const auto begin = at + name.size() + 4;
-        return response.substr(begin, response.find("\r\n", begin) - begin);
-    }
-
-    fs::path root;
     const std::string content = "0123456789abcdefghij";
-    FileServerOptions options;
-    std::optional<FileServer> server;
-    std::thread thread;
-    net::io_context context;
 };
 
 // reno is part of every kernel.
@@ -175,8 +119,7 @@ TEST_F(FileServerTest, FilesWithNamesAreServedAlone) {
 TEST_F(FileServerTest, OtherSitesMayReadOnlyIfAllowed) {
     start();
     EXPECT_EQ(header(get("/files/person.htvm"), "Access-Control-Allow-Origin"), "");
-    server->stop();
-    thread.join();
+    stop();
     options.other_sites = true;
     start();
     EXPECT_EQ(header(get("/files/person.htvm"), "Access-Control-Allow-Origin"), "*");
@@ -226,6 +169,25 @@ TEST_F(FileServerTest, ClientsThatDoNotFinishTheirRequestAreCutOff) {
     net::write(socket, net::buffer(std::string("GET /files/person.htvm HTTP/1.1\r\nHost")));
     EXPECT_EQ(read_all(socket), "");  // returns because the server closes the connection
     EXPECT_EQ(status(get("/files/person.htvm")), 200);
+}
+
+TEST_F(FileServerTest, ARequestThatComesAByteAtATimeIsCutOffAfterItsTimeCountedAndHoldsUpNobody) {
+    options.header_time = std::chrono::seconds(1);
+    start();
+    auto silent = connect(), slow = connect();
+    const auto begin = std::chrono::steady_clock::now();
+    const auto passed = [&] { return std::chrono::steady_clock::now() - begin; };
+    net::write(slow, net::buffer(std::string("GET /files/person.htvm HTTP/1.1\r\nX: ")));
+    boost::system::error_code error;
+    while (!error && passed() < std::chrono::seconds(10)) {
+        net::write(slow, net::buffer("x", 1), error);
+        EXPECT_EQ(status(get("/files/person.htvm")), 200);
+    }
+    EXPECT_TRUE(error);
+    EXPECT_GE(passed(), std::chrono::milliseconds(990));
+    EXPECT_LE(passed(), std::chrono::seconds(5));
+    EXPECT_EQ(read_all(silent), "");  // it has asked for nothing, so nothing was refused
+    EXPECT_NE(get("/metrics").find("\nhtvm_refused_total{cause=\"header_time\"} 1\n"), std::string::npos);
 }
 
 TEST_F(FileServerTest, ClientsThatTakeNothingAreCutOffAndHoldUpNobody) {

@@ -10,27 +10,16 @@
 #include <set>
 
 #include "htvm/decoder.hpp"
+#include "live_packets.h"
 
 namespace htvm::live {
 namespace {
 
 using namespace std::chrono_literals;
-using namespace packet_flag;
 
-Bytes message(PacketKind kind, std::uint32_t frame, std::uint32_t reference, std::uint8_t flags,
-              std::size_t bytes = 50) {
-    Packet out;
-    out.kind = kind;
-    out.frame = frame;
-    out.reference = reference;
-    out.flags = static_cast<std::uint8_t>(told | flags);
-    out.timestamp_us = frame * 33333;
-    out.payload.resize(bytes, static_cast<std::uint8_t>(frame));
-    return write_packet(out);
-}
-Bytes header(std::uint32_t session_number) { return message(PacketKind::sequence, 0, session_number, session); }
-Bytes intra(std::uint32_t frame) { return message(PacketKind::intra, frame, frame, referred | access); }
-Bytes tracked(std::uint32_t frame) { return message(PacketKind::tracked, frame, frame - 1, referred); }
+Bytes header(std::uint32_t session) { return write_packet(live_header(session)); }
+Bytes intra(std::uint32_t frame) { return write_packet(live_intra(frame)); }
+Bytes tracked(std::uint32_t frame) { return write_packet(live_tracked(frame)); }
 
 // Machines 0, 1, ... , each with a hub; time goes on in steps of 10 ms.
 struct Machines : testing::Test {
@@ -168,6 +157,21 @@ TEST_F(HubLinkTest, WhatIsPublishedOnOneHubIsListedAndWatchedOnAnother) {
     EXPECT_EQ(frames(2, watching), (Frames{0, 1, 2, 3}));
     pass(1100ms);
     EXPECT_EQ(stream(0)->viewers_afar, 1u);
+}
+
+TEST_F(HubLinkTest, OfNamesThatAreNoNamesOfStreamsNothingIsHeard) {
+    for (const auto i : {0, 1}) start(i);
+    const auto anna = publisher(0);
+    for (const auto& name : std::vector<std::string>{"a b", "", ".a", "b\nc", std::string(65, 'a')}) {
+        const auto odd = hub(0).publish(
+            name, [] {}, now);
+        ASSERT_TRUE(odd);
+        publish(0, *odd, {header(1)});
+    }
+    publish(0, anna, {header(2)});
+    pass(100ms);
+    ASSERT_EQ(hub(1).streams(now).size(), 1u);
+    EXPECT_EQ(hub(1).streams(now)[0].name, "anna");
 }
 
 TEST_F(HubLinkTest, PacketsGoOverOnlyWhileSomebodyWatches) {

@@ -7,39 +7,22 @@
 #include <algorithm>
 
 #include "codec/stream/sequence.h"
+#include "live_packets.h"
 
 namespace htvm::live {
 namespace {
 
 using namespace std::chrono_literals;
-using namespace packet_flag;
+using Bytes = std::vector<std::uint8_t>;
 
 constexpr Hub::Clock::time_point start{};
 
-std::vector<std::uint8_t> message(PacketKind kind, std::uint32_t frame, std::uint32_t reference, std::uint8_t flags,
-                                  std::size_t bytes = 50) {
-    Packet out;
-    out.kind = kind;
-    out.frame = frame;
-    out.reference = reference;
-    out.flags = static_cast<std::uint8_t>(told | flags);
-    out.payload.resize(bytes, 1);
-    return write_packet(out);
-}
-
-std::vector<std::uint8_t> header(std::uint32_t session_number) {
-    return message(PacketKind::sequence, 0, session_number, session);
-}
-std::vector<std::uint8_t> intra(std::uint32_t frame) {
-    return message(PacketKind::intra, frame, frame, referred | access);
-}
-
-std::vector<std::uint8_t> tracked(std::uint32_t frame) {
-    return message(PacketKind::tracked, frame, frame - 1, referred);
-}
+Bytes header(std::uint32_t session) { return write_packet(live_header(session, 50)); }
+Bytes intra(std::uint32_t frame) { return write_packet(live_intra(frame, 50)); }
+Bytes tracked(std::uint32_t frame) { return write_packet(live_tracked(frame, 50)); }
 
 // A sequence header that tells something of the stream.
-std::vector<std::uint8_t> real_header(std::uint64_t session_number) {
+Bytes real_header(std::uint64_t session_number) {
     internal::SequenceHeader out;
     out.session = session_number;
     out.fps_numerator = 25;
@@ -143,8 +126,7 @@ TEST_F(HubTest, DamagedMessagesAreCountedAndGoNoFurther) {
     longer.push_back(0);
     auto shorter = intra(0);
     shorter.pop_back();
-    for (const auto& wrong : {damaged, longer, shorter, std::vector<std::uint8_t>{}})
-        EXPECT_TRUE(hub.take(anna, wrong, start));
+    for (const auto& wrong : {damaged, longer, shorter, Bytes{}}) EXPECT_TRUE(hub.take(anna, wrong, start));
     EXPECT_EQ(frames(watching), Frames{});
     EXPECT_EQ(info().publisher.damaged, 4u);
     EXPECT_EQ(info().publisher.packets, 1u);
@@ -253,9 +235,6 @@ TEST_F(HubTest, StreamsAndViewersAreLimited) {
     EXPECT_EQ(hub.counters().refused_publishers_limit, 2u);
 }
 
-// ---- Text messages: docs/live.md, section 2
-// ---------------------------------------------------------------------------
-
 TEST_F(HubTest, MemoryForPacketsIsBounded) {
     // A header and one frame fit, and no other frame; the frame before is kept until another has come.
     const auto size = header(1).size();
@@ -296,6 +275,53 @@ TEST_F(HubTest, PacketsThatAreForgottenFreeTheirMemory) {
     EXPECT_EQ(hub.counters().memory, 0u);
 }
 
+TEST_F(HubTest, MessagesThatHaveComeInPartTakeMemoryToo) {
+    const auto size = header(1).size();
+    hub = Hub(HubLimits{.memory = 1000 + size});
+    const auto anna = publishing();
+    const auto ben = publisher("ben");
+    const auto watching = viewer();
+    EXPECT_TRUE(hub.take_part(anna, 300, start));
+    EXPECT_TRUE(hub.take_part(anna, 800, start));
+    EXPECT_TRUE(hub.take_part(watching, 100, start));
+    EXPECT_EQ(hub.counters().memory, size + 900);
+    EXPECT_FALSE(hub.take_part(ben, 101, start));
+    EXPECT_EQ(closing(ben), "1013 this hub's memory for packets is used up");
+    hub.leave(ben, false, start);
+    EXPECT_EQ(hub.counters().memory, size + 900);
+    EXPECT_TRUE(hub.take(anna, intra(0), start));  // whole
+    EXPECT_EQ(hub.counters().memory, 2 * size + 100);
+    EXPECT_TRUE(hub.take_text(watching, R"({"type":"key_frame"})", start));
+    EXPECT_EQ(hub.counters().memory, 2 * size);
+    EXPECT_TRUE(hub.take_part(watching, 100, start));
+    hub.leave(watching);
+    EXPECT_EQ(hub.counters().memory, 2 * size);
+    EXPECT_EQ(hub.counters().refused_publishers_limit, 1u);
+}
+
+TEST_F(HubTest, WhoTakesTooLongForAMessageIsCutOff) {
+    hub = Hub(HubLimits{.message_time = 5s});
+    const auto slow = publishing(), quick = publisher("ben");
+    const auto watching = viewer();
+    ASSERT_TRUE(hub.take(quick, header(2), start));
+    for (auto now = start; now < start + 5s; now += 500ms) {
+        EXPECT_TRUE(hub.take_part(slow, 100, now));
+        EXPECT_TRUE(hub.take_part(watching, 100, now));
+        EXPECT_TRUE(hub.take_part(quick, 100, now));
+        EXPECT_TRUE(hub.take(quick, intra(0), now));
+        hub.tick(now);
+    }
+    EXPECT_EQ(closing(slow), "");
+    EXPECT_EQ(closing(watching), "");
+    hub.tick(start + 5s);
+    EXPECT_EQ(closing(slow), "dead");
+    EXPECT_EQ(closing(watching), "dead");
+    EXPECT_EQ(closing(quick), "");
+    EXPECT_FALSE(hub.stream("anna", start + 5s)->published);
+    EXPECT_EQ(hub.counters().slow_publishers, 1u);
+    EXPECT_EQ(hub.counters().slow_viewers, 1u);
+}
+
 TEST_F(HubTest, TheLogSaysWhoPublishedLeftAndWasRefused) {
     std::vector<std::string> names;
     hub = Hub({}, [&](const Event& event) { names.push_back(event.stream + ' ' + event.name); });
@@ -304,6 +330,9 @@ TEST_F(HubTest, TheLogSaysWhoPublishedLeftAndWasRefused) {
     hub.leave(first, true, start);
     EXPECT_EQ(names, (std::vector<std::string>{"anna published", "anna refused", "anna left", "anna ended"}));
 }
+
+// ---- Text messages: docs/live.md, section 2
+// ---------------------------------------------------------------------------
 
 TEST_F(HubTest, HelloComesFirst) {
     hub.name_other_hubs({"wss://b.example"});

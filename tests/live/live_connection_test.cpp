@@ -2,13 +2,7 @@
 #include "live/live_connection.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <boost/asio/read.hpp>
-#include <boost/asio/write.hpp>
-#include <boost/beast/core/buffers_to_string.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/websocket.hpp>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -17,8 +11,10 @@
 
 #include "htvm/decoder.hpp"
 #include "htvm/dependency.hpp"
-#include "live/file_server.h"
 #include "live/recorder.h"
+#include "live_packets.h"
+#include "server_test.h"
+#include "web_socket.h"
 
 namespace htvm::live {
 namespace {
@@ -26,111 +22,21 @@ namespace {
 namespace net = boost::asio;
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
-using tcp = net::ip::tcp;
-using namespace packet_flag;
 
-Packet packet(PacketKind kind, std::uint32_t frame, std::uint32_t reference, std::uint8_t flags, std::size_t bytes) {
-    Packet out;
-    out.kind = kind;
-    out.frame = frame;
-    out.reference = reference;
-    out.flags = static_cast<std::uint8_t>(told | flags);
-    out.payload.assign(bytes, static_cast<std::uint8_t>(frame));
-    return out;
-}
-Packet header(std::uint32_t session_number) { return packet(PacketKind::sequence, 0, session_number, session, 40); }
-Packet intra(std::uint32_t frame, std::size_t bytes = 300) {
-    return packet(PacketKind::intra, frame, frame, referred | access, bytes);
-}
-Packet tracked(std::uint32_t frame, std::size_t bytes = 100) {
-    return packet(PacketKind::tracked, frame, frame - 1, referred, bytes);
-}
-
-class LiveConnectionTest : public testing::Test {
+class LiveConnectionTest : public ServerTest {
 protected:
     // Publishers may pause, unless a test is of that.
     LiveConnectionTest()
         : LiveConnectionTest(HubLimits{.streams = 2, .publisher_silence = std::chrono::seconds(600)}) {}
     explicit LiveConnectionTest(const HubLimits& limits) : hub(limits) {
         options.connections_per_address = options.viewers_per_address = 300;
-    }
-    void SetUp() override {
-        options.folder = std::filesystem::temp_directory_path().string();
         options.hub = &hub;
-        auto opened = FileServer::open(options);
-        ASSERT_TRUE(opened) << opened.error().message;
-        server.emplace(std::move(*opened));
-        thread = std::thread([this] { server->run(); });
     }
-    void TearDown() override {
-        server->stop();
-        thread.join();
-    }
+    void SetUp() override { start(); }
 
-    tcp::socket connect() {
-        tcp::socket socket(context);
-        socket.connect({net::ip::make_address("127.0.0.1"), server->port()});
-        return socket;
-    }
-
-    struct Socket {
-        websocket::stream<tcp::socket> stream;
-        void send(const Packet& packet) {
-            const auto bytes = write_packet(packet);
-            stream.binary(true);
-            stream.write(net::buffer(bytes));
-        }
-        void say(const std::string& text) {
-            stream.text(true);
-            stream.write(net::buffer(text));
-        }
-        // The next message of either sort; nothing once the server has closed the connection.
-        std::optional<std::string> read() {
-            beast::flat_buffer buffer;
-            beast::error_code error;
-            stream.read(buffer, error);
-            if (error) return std::nullopt;
-            return beast::buffers_to_string(buffer.data());
-        }
-        // The next packet; texts on the way are passed over.
-        std::optional<std::string> next_bytes() {
-            auto message = read();
-            while (message && stream.got_text()) message = read();
-            return message;
-        }
-        std::optional<PacketHeader> next() {
-            const auto message = next_bytes();
-            if (!message) return std::nullopt;
-            std::uint32_t payload = 0;
-            return read_packet_header({reinterpret_cast<const std::uint8_t*>(message->data()), message->size()},
-                                      payload);
-        }
-        // The next text of this type; packets and other texts on the way are passed over. "" if none comes.
-        std::string next_text(const std::string& type) {
-            for (auto message = read(); message; message = read())
-                if (stream.got_text() && message->find("\"type\":\"" + type + '"') != std::string::npos)
-                    return *message;
-            return "";
-        }
-        std::uint32_t next_frame() {
-            const auto header = next();
-            return header ? header->frame : 9999;
-        }
-        // How the server closes the connection: "CODE REASON".
-        std::string refusal() {
-            while (next()) {
-            }
-            return std::to_string(stream.reason().code) + ' ' + std::string(stream.reason().reason.c_str());
-        }
-    };
-    Socket open(const std::string& target) {
-        Socket out{websocket::stream<tcp::socket>(connect())};
-        out.stream.set_option(websocket::stream_base::decorator([](websocket::request_type& request) {
-            request.set(beast::http::field::sec_websocket_protocol, live_protocol);
-        }));
-        websocket::response_type response;
-        out.stream.handshake(response, "127.0.0.1", target);
-        EXPECT_EQ(response[beast::http::field::sec_websocket_protocol], live_protocol);
+    WebSocket open(const std::string& target) {
+        auto out = WebSocket::open(connect(), host, target);
+        EXPECT_EQ(out.status, 101u);
         return out;
     }
 
@@ -142,52 +48,40 @@ protected:
         }
         FAIL() << get("/api/streams");
     }
-    std::string get(const std::string& target) {
-        auto socket = connect();
-        net::write(socket, net::buffer("GET " + target + " HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n"));
-        std::string out;
-        beast::error_code error;
-        net::read(socket, net::dynamic_buffer(out), error);
-        return out;
-    }
 
     Hub hub;
-    FileServerOptions options;
-    std::optional<FileServer> server;
-    std::thread thread;
-    net::io_context context;
 };
 
 TEST_F(LiveConnectionTest, WhatIsPublishedIsWatchedByEverybodyLateOnesToo) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
-    publisher.send(intra(0));
-    publisher.send(tracked(1));
+    publisher.send(live_header(1));
+    publisher.send(live_intra(0));
+    publisher.send(live_tracked(1));
     wait_for_packets(3);
     auto late = open("/watch/anna");
     EXPECT_EQ(late.next()->kind, PacketKind::sequence);
     EXPECT_EQ(late.next_frame(), 0u);
     EXPECT_EQ(late.next_frame(), 1u);
-    publisher.send(tracked(2));
+    publisher.send(live_tracked(2));
     EXPECT_EQ(late.next_frame(), 2u);
     EXPECT_NE(get("/api/streams").find(R"("name":"anna","packets":4,"published":true)"), std::string::npos);
 }
 
 TEST_F(LiveConnectionTest, TheEndlessBodyHasTheSamePackets) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
-    publisher.send(intra(0));
+    publisher.send(live_header(1));
+    publisher.send(live_intra(0));
     wait_for_packets(2);
     auto socket = connect();
     net::write(socket, net::buffer(std::string("GET /watch/anna HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")));
-    publisher.send(tracked(1));
+    publisher.send(live_tracked(1));
     const auto chunk = [](const Packet& packet) {
         const auto bytes = write_packet(packet);
         std::array<char, 16> size{};
         std::snprintf(size.data(), size.size(), "%zx\r\n", bytes.size());
         return size.data() + std::string(bytes.begin(), bytes.end()) + "\r\n";
     };
-    const auto expected = chunk(header(1)) + chunk(intra(0)) + chunk(tracked(1));
+    const auto expected = chunk(live_header(1)) + chunk(live_intra(0)) + chunk(live_tracked(1));
     std::string got;
     while (got.find("\r\n\r\n") == std::string::npos || got.size() < got.find("\r\n\r\n") + 4 + expected.size()) {
         std::array<char, 4096> piece{};
@@ -198,21 +92,21 @@ TEST_F(LiveConnectionTest, TheEndlessBodyHasTheSamePackets) {
 }
 
 TEST_F(LiveConnectionTest, WhatCannotBeIsRefusedWithAReason) {
-    EXPECT_EQ(open("/watch/nobody").refusal(), "1013 there is no stream 'nobody'");
+    EXPECT_EQ(open("/watch/nobody").closing(), "1013 there is no stream 'nobody'");
     EXPECT_EQ(get("/watch/nobody").substr(0, 22), "HTTP/1.1 404 Not Found");
     auto first = open("/publish/anna");
-    first.send(header(1));
+    first.send(live_header(1));
     wait_for_packets(1);
     auto second = open("/publish/anna");
-    second.send(header(2));
-    EXPECT_EQ(second.refusal(), "1008 'anna' is being published by another session; end that one, or wait");
+    second.send(live_header(2));
+    EXPECT_EQ(second.closing(), "1008 'anna' is being published by another session; end that one, or wait");
     auto headless = open("/publish/ben");
-    headless.send(intra(0));
-    EXPECT_EQ(headless.refusal(), "1008 the first packet must be a sequence header of version 2 or later");
+    headless.send(live_intra(0));
+    EXPECT_EQ(headless.closing(), "1008 the first packet must be a sequence header of version 2 or later");
     auto again = open("/publish/anna");
-    again.send(header(1));
-    EXPECT_EQ(first.refusal(), "4000 this session was continued by another connection");
-    again.send(intra(0));
+    again.send(live_header(1));
+    EXPECT_EQ(first.closing(), "4000 this session was continued by another connection");
+    again.send(live_intra(0));
     wait_for_packets(3);
 }
 
@@ -237,14 +131,14 @@ TEST_F(LiveConnectionTest, WithoutKnownPublishersOnlyProgramsOnThisMachineMayPub
 
 TEST_F(LiveConnectionTest, AViewerWhoDoesNotReadDelaysNobodyAndGoesOnAtTheNewestIntraFrame) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
-    publisher.send(intra(0));
+    publisher.send(live_header(1));
+    publisher.send(live_intra(0));
     wait_for_packets(2);
     auto paused = open("/watch/anna"), quick = open("/watch/anna");
     EXPECT_EQ(quick.next()->kind, PacketKind::sequence);
     constexpr std::uint32_t frames = 300;
     for (std::uint32_t i = 0; i < frames; ++i) {
-        if (i > 0) publisher.send(i % 30 == 0 ? intra(i, 60000) : tracked(i, 30000));
+        if (i > 0) publisher.send(i % 30 == 0 ? live_intra(i, 60000) : live_tracked(i, 30000));
         ASSERT_EQ(quick.next_frame(), i);
     }
     // Of nine megabytes it gets what the buffers on the way held, and then the newest I-frame with what followed.
@@ -265,13 +159,13 @@ TEST_F(LiveConnectionTest, AViewerWhoDoesNotReadDelaysNobodyAndGoesOnAtTheNewest
 
 TEST_F(LiveConnectionTest, TwoHundredViewersGetExactlyWhatWasPublished) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
+    publisher.send(live_header(1));
     wait_for_packets(1);
-    std::vector<Socket> viewers;
+    std::vector<WebSocket> viewers;
     for (int i = 0; i < 200; ++i) viewers.push_back(open("/watch/anna"));
-    std::vector<std::vector<std::uint8_t>> published = {write_packet(header(1))};
+    std::vector<std::vector<std::uint8_t>> published = {write_packet(live_header(1))};
     for (std::uint32_t i = 0; i < 40; ++i) {
-        const auto frame = i % 20 == 0 ? intra(i, 20000) : tracked(i, 2000);
+        const auto frame = i % 20 == 0 ? live_intra(i, 20000) : live_tracked(i, 2000);
         publisher.send(frame);
         published.push_back(write_packet(frame));
     }
@@ -289,8 +183,8 @@ TEST_F(LiveConnectionTest, TwoHundredViewersGetExactlyWhatWasPublished) {
 TEST_F(LiveConnectionTest, TheHubSaysHelloAndItsHeartBeats) {
     auto publisher = open("/publish/anna");
     EXPECT_EQ(*publisher.read(), R"({"hubs":[],"stream":"anna","type":"hello","version":1})");
-    publisher.send(header(1));
-    publisher.send(intra(0));
+    publisher.send(live_header(1));
+    publisher.send(live_intra(0));
     publisher.say(R"({"type":"heartbeat","clock":1000000})");
     wait_for_packets(2);
     auto viewer = open("/watch/anna");
@@ -307,8 +201,8 @@ TEST_F(LiveConnectionTest, TheHubSaysHelloAndItsHeartBeats) {
 
 TEST_F(LiveConnectionTest, AViewersRequestForAKeyFrameReachesThePublisher) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
-    publisher.send(intra(0));
+    publisher.send(live_header(1));
+    publisher.send(live_intra(0));
     wait_for_packets(2);
     auto viewer = open("/watch/anna");
     viewer.say(R"({"type":"key_frame"})");
@@ -317,14 +211,14 @@ TEST_F(LiveConnectionTest, AViewersRequestForAKeyFrameReachesThePublisher) {
 
 TEST_F(LiveConnectionTest, StampsComeToThoseWhoAskForThem) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
-    publisher.send(intra(0));
+    publisher.send(live_header(1));
+    publisher.send(live_intra(0));
     wait_for_packets(2);
     auto with = open("/watch/anna?stamps"), without = open("/watch/anna");
     EXPECT_EQ(with.next()->kind, PacketKind::sequence);
     EXPECT_EQ(with.next_frame(), 0u);
     publisher.say(R"({"type":"stamp","frame":1,"sent":5})");
-    publisher.send(tracked(1));
+    publisher.send(live_tracked(1));
     const auto stamp = with.next_text("stamp");
     EXPECT_EQ(stamp.substr(0, 17), R"({"frame":1,"hub":)");
     EXPECT_EQ(stamp.substr(stamp.size() - 25), R"(,"sent":5,"type":"stamp"})");
@@ -335,8 +229,8 @@ TEST_F(LiveConnectionTest, StampsComeToThoseWhoAskForThem) {
 
 TEST_F(LiveConnectionTest, ViewersAreToldThatAPublisherIsGoneAndWhenTheStreamEnds) {
     auto publisher = std::make_optional(open("/publish/anna"));
-    publisher->send(header(1));
-    publisher->send(intra(0));
+    publisher->send(live_header(1));
+    publisher->send(live_intra(0));
     wait_for_packets(2);
     auto viewer = open("/watch/anna");
     publisher.reset();  // the line breaks
@@ -346,36 +240,36 @@ TEST_F(LiveConnectionTest, ViewersAreToldThatAPublisherIsGoneAndWhenTheStreamEnd
     while (heartbeat.find(R"("published":true)") != std::string::npos);
     EXPECT_NE(heartbeat.find(R"("published":false)"), std::string::npos) << heartbeat;
     publisher.emplace(open("/publish/anna"));
-    publisher->send(header(1));
-    publisher->send(tracked(1));
+    publisher->send(live_header(1));
+    publisher->send(live_tracked(1));
     wait_for_packets(4);
     publisher->stream.close(websocket::close_code::normal);
-    EXPECT_EQ(viewer.refusal(), "1000 the publisher ended the stream");
+    EXPECT_EQ(viewer.closing(), "1000 the publisher ended the stream");
 }
 
 TEST_F(LiveConnectionTest, MessagesThatAreTooLargeOrNoneEndTheirConnectionAndNoOther) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
-    publisher.send(intra(0));
+    publisher.send(live_header(1));
+    publisher.send(live_intra(0));
     wait_for_packets(2);
     auto calm = open("/watch/anna"), large = open("/watch/anna"), rude = open("/watch/anna"),
          flood = open("/watch/anna");
     large.say(std::string(5000, ' '));
-    EXPECT_EQ(large.refusal().substr(0, 4), "1009");
+    EXPECT_EQ(large.closing().substr(0, 4), "1009");
     rude.say("hello?");
-    EXPECT_EQ(rude.refusal(), "1008 the text message is not a JSON object");
+    EXPECT_EQ(rude.closing(), "1008 the text message is not a JSON object");
     beast::error_code ignored;
     flood.stream.binary(true);
     for (int i = 0; i < 100; ++i) flood.stream.write(net::buffer("x", 1), ignored);
-    EXPECT_EQ(flood.refusal(), "1008 too many text messages");
+    EXPECT_EQ(flood.closing(), "1008 too many text messages");
     auto other = open("/publish/ben");
-    other.send(header(2));
+    other.send(live_header(2));
     other.say(std::string(5000, ' '));
-    EXPECT_EQ(other.refusal(), "1009 the text message is longer than 4096 bytes");
+    EXPECT_EQ(other.closing(), "1009 the text message is longer than 4096 bytes");
     // Messages that are no packets, and a packet that no decoder accepts: counted and dropped, or passed on.
     publisher.stream.binary(true);
     for (const std::size_t size : {1, 35, 36, 5000}) publisher.stream.write(net::buffer(std::string(size, 'H')));
-    publisher.send(tracked(1));
+    publisher.send(live_tracked(1));
     EXPECT_EQ(calm.next()->kind, PacketKind::sequence);
     EXPECT_EQ(calm.next_frame(), 0u);
     EXPECT_EQ(calm.next_frame(), 1u);
@@ -387,39 +281,35 @@ TEST_F(LiveConnectionTest, APublisherWhoseMessageIsTooLargeIsToldSo) {
     beast::error_code ignored;
     publisher.stream.binary(true);
     publisher.stream.write(net::buffer(std::vector<char>((std::size_t{16} << 20) + 1000)), ignored);
-    EXPECT_EQ(publisher.refusal().substr(0, 4), "1009");
+    EXPECT_EQ(publisher.closing().substr(0, 4), "1009");
 }
 
 class RecordedLiveConnectionTest : public LiveConnectionTest {
 protected:
     RecordedLiveConnectionTest() {
-        std::filesystem::create_directories(folder);
+        std::filesystem::create_directory(folder);
         recorder.emplace(std::move(*Recorder::open({.folder = folder})));
         options.recorder = &*recorder;
     }
-    ~RecordedLiveConnectionTest() override { std::filesystem::remove_all(folder); }
-    std::filesystem::path folder =
-        std::filesystem::temp_directory_path() / ("htvm_recorded_test_" + std::to_string(getpid()));
+    std::filesystem::path folder = root / "recorded";
     std::optional<Recorder> recorder;
 };
 
 TEST_F(RecordedLiveConnectionTest, WhatGoesToTheViewersIsRecorded) {
     auto publisher = open("/publish/anna");
-    publisher.send(header(1));
-    publisher.send(tracked(4));  // nobody can decode it: a key frame is asked for
+    publisher.send(live_header(1));
+    publisher.send(live_tracked(4));  // nobody can decode it: a key frame is asked for
     EXPECT_EQ(publisher.next_text("key_frame"), R"({"type":"key_frame"})");
-    publisher.send(intra(5));
-    publisher.send(tracked(6));
-    publisher.send(tracked(6));  // again
+    publisher.send(live_intra(5));
+    publisher.send(live_tracked(6));
+    publisher.send(live_tracked(6));  // again
     wait_for_packets(5);
     const auto metrics = get("/metrics");
     EXPECT_NE(metrics.find("htvm_recording_faults_total 0\n"), std::string::npos) << metrics;
     publisher.stream.close(websocket::close_code::normal);
     for (int i = 0; i < 1000 && get("/api/streams").find("anna") != std::string::npos; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    server->stop();
-    thread.join();
-    thread = std::thread([] {});
+    stop();
     recorder->finish();
     EXPECT_EQ(recorder->counters().packets, 3u);
     std::vector<std::filesystem::path> files(std::filesystem::directory_iterator(folder), {});
@@ -427,12 +317,76 @@ TEST_F(RecordedLiveConnectionTest, WhatGoesToTheViewersIsRecorded) {
     std::ifstream in(files[0], std::ios::binary);
     const std::string bytes(std::istreambuf_iterator<char>(in), {});
     std::string expected;
-    for (const auto& packet : {header(1), intra(5), tracked(6)}) {
+    for (const auto& packet : {live_header(1), live_intra(5), live_tracked(6)}) {
         const auto written = write_packet(packet);
         expected.append(written.begin(), written.end());
     }
     EXPECT_TRUE(bytes.ends_with(expected));
     EXPECT_GT(bytes.size(), expected.size());  // the index
+}
+
+class HastyLiveConnectionTest : public LiveConnectionTest {
+protected:
+    HastyLiveConnectionTest()
+        : LiveConnectionTest(HubLimits{.message_time = std::chrono::milliseconds(500),
+                                       .silence = std::chrono::milliseconds(200),
+                                       .publisher_silence = std::chrono::seconds(600)}) {}
+};
+
+TEST_F(HastyLiveConnectionTest, APublisherWhoseStreamWentToANewerSessionIsToldSo) {
+    auto first = open("/publish/anna");
+    first.send(live_header(1));
+    wait_for_packets(1);
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    auto second = open("/publish/anna");
+    second.send(live_header(2));
+    EXPECT_EQ(first.closing(), "4001 another session took the stream over");
+    second.send(live_intra(7));
+    wait_for_packets(3);
+    auto viewer = open("/watch/anna");
+    EXPECT_EQ(viewer.next()->reference, 2u);
+    EXPECT_EQ(viewer.next_frame(), 7u);
+}
+
+TEST_F(HastyLiveConnectionTest, AMessageThatComesAByteAtATimeIsCutOffAfterItsTimeCountedAndHoldsUpNobody) {
+    auto slow = open("/publish/anna"), publisher = open("/publish/ben");
+    slow.send(live_header(1));
+    publisher.send(live_header(2));
+    publisher.send(live_intra(0));
+    wait_for_packets(2);
+    auto slow_viewer = open("/watch/ben"), viewer = open("/watch/ben");
+    EXPECT_EQ(viewer.next()->kind, PacketKind::sequence);
+    EXPECT_EQ(viewer.next_frame(), 0u);
+    // The beginning of a frame: of 4,096 bytes, masked by 0.
+    const auto trickle = [begin = std::chrono::steady_clock::now()](WebSocket& from, const std::string& more) {
+        beast::error_code error;
+        net::write(from.stream.next_layer(), net::buffer(more), error);
+        const auto passed = std::chrono::steady_clock::now() - begin;
+        if (error) {
+            EXPECT_GE(passed, std::chrono::milliseconds(490));
+        }
+        return !error && passed < std::chrono::seconds(10);
+    };
+    trickle(slow, std::string("\x82\xfe\x10\0\0\0\0\0", 8));
+    trickle(slow_viewer, std::string("\x81\xfe\x10\0\0\0\0\0", 8));
+    std::uint32_t frame = 0;
+    for (bool more = true; more;) {
+        const bool by_publisher = trickle(slow, "x"), by_viewer = trickle(slow_viewer, "x");
+        more = by_publisher || by_viewer;
+        publisher.send(live_tracked(++frame));
+        EXPECT_EQ(viewer.next_frame(), frame);
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    const auto metrics = get("/metrics");
+    for (const char* cause : {"publisher_slow", "viewer_slow"})
+        EXPECT_NE(metrics.find("\nhtvm_refused_total{cause=\"" + std::string(cause) + "\"} 1\n"), std::string::npos)
+            << metrics;
+    // Whoever was cut off holds no memory any more: only what is kept of ben's stream does.
+    publisher.send(live_intra(++frame));
+    EXPECT_EQ(viewer.next_frame(), frame);
+    const auto kept = write_packet(live_header(1)).size() + write_packet(live_header(2)).size() +
+                      write_packet(live_intra(frame)).size();
+    EXPECT_EQ(hub.counters().memory, kept);
 }
 
 class QuickLiveConnectionTest : public LiveConnectionTest {
@@ -442,15 +396,15 @@ protected:
 
 TEST_F(QuickLiveConnectionTest, ASilentPublisherIsCutOffAndOneWhoseHeartBeatsIsNot) {
     auto silent = open("/publish/anna"), alive = open("/publish/ben");
-    silent.send(header(1));
-    alive.send(header(2));
-    std::thread cut_off([&] { EXPECT_EQ(silent.refusal(), "0 "); });
+    silent.send(live_header(1));
+    alive.send(live_header(2));
+    std::thread cut_off([&] { EXPECT_EQ(silent.closing(), "0 "); });
     for (int i = 0; i < 30; ++i) {
         alive.say(R"({"type":"heartbeat"})");
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     cut_off.join();
-    alive.send(intra(0));
+    alive.send(live_intra(0));
     auto viewer = open("/watch/ben");
     EXPECT_EQ(viewer.next_frame(), 0u);  // the header's
     EXPECT_NE(get("/api/streams").find(R"("name":"anna","packets":1,"published":false)"), std::string::npos);

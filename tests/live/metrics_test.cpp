@@ -7,11 +7,12 @@
 #include <set>
 #include <sstream>
 
+#include "live_packets.h"
+
 namespace htvm::live {
 namespace {
 
 using namespace std::chrono_literals;
-using namespace packet_flag;
 
 constexpr Hub::Clock::time_point start{};
 
@@ -63,16 +64,6 @@ std::map<std::string, double> read_metrics(const std::string& text) {
     return out;
 }
 
-std::vector<std::uint8_t> message(PacketKind kind, std::uint32_t frame, std::uint32_t reference, std::uint8_t flags) {
-    Packet out;
-    out.kind = kind;
-    out.frame = frame;
-    out.reference = reference;
-    out.flags = static_cast<std::uint8_t>(told | flags);
-    out.payload.resize(50, 1);
-    return write_packet(out);
-}
-
 TEST(MetricsTest, AHubIsToldInFull) {
     Hub hub;
     Result<Hub::Viewer> viewer = Hub::Viewer{};
@@ -80,13 +71,13 @@ TEST(MetricsTest, AHubIsToldInFull) {
     for (const auto& name : {std::string("anna"), odd}) {
         const auto publisher = *hub.publish(
             name, [] {}, start);
-        ASSERT_TRUE(hub.take(publisher, message(PacketKind::sequence, 0, 1, session), start));
-        ASSERT_TRUE(hub.take(publisher, message(PacketKind::intra, 0, 0, referred | access), start));
+        ASSERT_TRUE(hub.take(publisher, write_packet(live_header(1, 50)), start));
+        ASSERT_TRUE(hub.take(publisher, write_packet(live_intra(0, 50)), start));
         if (name == "anna")
             viewer = hub.watch(
                 name, [] {}, {.texts = false}, start);
         ASSERT_TRUE(hub.take(publisher, {1, 2, 3}, start));
-        ASSERT_TRUE(hub.take(publisher, message(PacketKind::tracked, 5, 4, referred), start));
+        ASSERT_TRUE(hub.take(publisher, write_packet(live_tracked(5, 50)), start));
         ASSERT_TRUE(hub.take_text(publisher, R"({"type":"heartbeat"})", start + 1s));
     }
     ASSERT_TRUE(viewer);
@@ -107,6 +98,10 @@ TEST(MetricsTest, AHubIsToldInFull) {
         {"htvm_packets_out_total", 1},
         {"htvm_bytes_out_total", 86},
         {"htvm_damaged_messages_total", 2},
+        {"htvm_memory_bytes", 6 * 86},
+        {"htvm_dropped_packets_total", 0},
+        {"htvm_refused_total{cause=\"publisher_slow\"}", 0},
+        {"htvm_refused_total{cause=\"viewer_slow\"}", 0},
         {"htvm_dropped_frames_total{cause=\"undecodable\"}", 2},
         {"htvm_dropped_frames_total{cause=\"slow_viewer\"}", 0},
         {"htvm_key_frame_requests_total", 2},

@@ -6,21 +6,17 @@
 #include <openssl/x509.h>
 
 #include <algorithm>
-#include <boost/asio.hpp>
 #include <boost/asio/ssl.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/websocket.hpp>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
 #include <optional>
-#include <thread>
 
-#include "htvm/packet.hpp"
 #include "live/access.h"
-#include "live/file_server.h"
-#include "live/live_connection.h"
+#include "live_packets.h"
+#include "server_test.h"
+#include "web_socket.h"
 
 namespace htvm::live {
 namespace {
@@ -28,11 +24,10 @@ namespace {
 namespace fs = std::filesystem;
 namespace net = boost::asio;
 namespace beast = boost::beast;
-namespace websocket = beast::websocket;
-using tcp = net::ip::tcp;
 using std::chrono::seconds;
 using std::chrono::system_clock;
 using testing::HasSubstr;
+using testing::MatchesRegex;
 
 // A certificate of its own for this name, with its key.
 void write_certificate(const std::string& certificate, const std::string& private_key, const std::string& name) {
@@ -58,24 +53,11 @@ void write_certificate(const std::string& certificate, const std::string& privat
     EVP_PKEY_free(key);
 }
 
-Packet packet(PacketKind kind, std::uint32_t frame, std::uint8_t flags) {
-    Packet out;
-    out.kind = kind;
-    out.frame = out.reference = frame;
-    out.flags = static_cast<std::uint8_t>(packet_flag::told | flags);
-    out.payload.assign(100, 7);
-    return out;
-}
-
-class ServerAccessTest : public testing::Test {
+class ServerAccessTest : public ServerTest {
 protected:
-    void SetUp() override {
-        auto name = (fs::temp_directory_path() / "htvm-access-XXXXXX").string();
-        ASSERT_TRUE(mkdtemp(name.data()));
-        root = name;
-        fs::create_directory(root / "served");
+    ServerAccessTest() {
         std::ofstream(root / "served" / "person.htvm") << "person";
-        options.folder = (root / "served").string();
+        host = "hub.example";
         options.hub = &hub;
         options.header_time = seconds(1);
         options.refusal_delay = {};
@@ -84,82 +66,15 @@ protected:
             events.push_back(event);
         };
     }
-    void TearDown() override {
-        if (server && !ended) server->stop();
-        if (thread.joinable()) thread.join();
-        fs::remove_all(root);
-    }
-    void start() {
-        auto opened = FileServer::open(options);
-        ASSERT_TRUE(opened) << opened.error().message;
-        server.emplace(std::move(*opened));
-        thread = std::thread([this] { server->run(); });
-    }
     std::string file(const std::string& name) const { return (root / name).string(); }
 
-    tcp::socket connect() {
-        tcp::socket socket(context);
-        socket.connect({net::ip::make_address("127.0.0.1"), server->port()});
-        return socket;
-    }
-    // The response to one request; headers end in \r\n each.
-    std::string get(const std::string& target, const std::string& headers = "") {
-        auto socket = connect();
-        net::write(socket, net::buffer("GET " + target + " HTTP/1.1\r\nHost: hub.example\r\nConnection: close\r\n" +
-                                       headers + "\r\n"));
-        std::string out;
-        beast::error_code error;
-        net::read(socket, net::dynamic_buffer(out), error);
-        return out;
-    }
-    static std::string status(const std::string& response) { return response.substr(9, 3); }
-    static std::string body(const std::string& response) { return response.substr(response.find("\r\n\r\n") + 4); }
-
-    struct Socket {
-        websocket::stream<tcp::socket> stream;
-        unsigned status = 0;
-        void send(const Packet& packet) {
-            const auto bytes = write_packet(packet);
-            stream.binary(true);
-            stream.write(net::buffer(bytes));
-        }
-        // The next packet's frame number; nothing once the server has closed the connection.
-        std::optional<std::uint32_t> next() {
-            for (;;) {
-                beast::flat_buffer buffer;
-                beast::error_code error;
-                const auto bytes = stream.read(buffer, error);
-                if (error) return std::nullopt;
-                std::uint32_t payload = 0;
-                const auto* begin = static_cast<const std::uint8_t*>(buffer.cdata().data());
-                if (!stream.got_binary()) continue;
-                if (const auto header = read_packet_header({begin, bytes}, payload)) return header->frame;
-            }
-        }
-        // The code by which the server closes it.
-        unsigned code() {
-            while (next()) {
-            }
-            return stream.reason().code;
-        }
-        std::string reason() const { return stream.reason().reason.c_str(); }
-    };
-    Socket open(const std::string& target, const std::string& name = "", const std::string& value = "") {
-        Socket out{websocket::stream<tcp::socket>(connect())};
-        out.stream.set_option(websocket::stream_base::decorator([&](websocket::request_type& request) {
-            request.set(beast::http::field::sec_websocket_protocol, live_protocol);
-            if (!name.empty()) request.set(name, value);
-        }));
-        websocket::response_type response;
-        beast::error_code error;
-        out.stream.handshake(response, "hub.example", target, error);
-        out.status = response.result_int();
-        return out;
+    WebSocket open(const std::string& target, const std::string& name = "", const std::string& value = "") {
+        return WebSocket::open(connect(), host, target, name, value);
     }
     // A stream of one frame.
-    static void begin(Socket& publisher) {
-        publisher.send(packet(PacketKind::sequence, 0, packet_flag::session));
-        publisher.send(packet(PacketKind::intra, 0, packet_flag::referred | packet_flag::access));
+    static void begin(WebSocket& publisher) {
+        publisher.send(live_header(1));
+        publisher.send(live_intra(0));
     }
     unsigned opened(const std::string& target, const std::string& name = "", const std::string& value = "") {
         return open(target, name, value).status;
@@ -187,14 +102,8 @@ protected:
         ASSERT_GT(count_of(name), before);
     }
 
-    fs::path root;
     // Nobody sends heartbeats here, and the machine may be slow.
     Hub hub{HubLimits{.publisher_silence = std::chrono::minutes(1)}};
-    FileServerOptions options;
-    std::optional<FileServer> server;
-    bool ended = false;
-    std::thread thread;
-    net::io_context context;
     std::mutex mutex;
     std::vector<Event> events;
 };
@@ -216,11 +125,10 @@ TEST_F(ServerAccessTest, PublishingNeedsTheTokenOfTheStreamAndRefusalsHurtNobody
     EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
     EXPECT_EQ(count_of("refused"), 5u);
     auto viewer = open("/watch/anna");
-    EXPECT_EQ(viewer.next(), 0u);  // the sequence header
-    publisher.send(packet(PacketKind::intra, 1, packet_flag::referred | packet_flag::access));
-    std::optional<std::uint32_t> frame = 0;
-    while (frame == 0u) frame = viewer.next();
-    EXPECT_EQ(frame, 1u);
+    EXPECT_EQ(viewer.next_frame(), 0u);  // the sequence header
+    publisher.send(live_intra(1));
+    EXPECT_EQ(viewer.next_frame(), 0u);
+    EXPECT_EQ(viewer.next_frame(), 1u);
 }
 
 TEST_F(ServerAccessTest, AWrongTokenIsAnsweredLate) {
@@ -268,33 +176,32 @@ TEST_F(ServerAccessTest, WhatIsShownByLinkAloneNeedsOne) {
         return '/' + path + '?' + link_query(keys, path, system_clock::now() + seconds(seconds_left));
     };
     // The stream begins when its first packet comes.
-    std::optional<Socket> viewer;
+    std::optional<WebSocket> viewer;
     for (int i = 0; i < 1000; ++i) {
         viewer.emplace(open(link("watch/anna", 60)));
         if (viewer->next()) break;
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
     const auto expired = link("watch/anna", -1), forged = link("watch/ben", 60).replace(7, 3, "anna");
-    EXPECT_EQ(status(get("/watch/anna")), "403");
+    EXPECT_EQ(status(get("/watch/anna")), 403);
     EXPECT_EQ(body(get("/watch/anna")), "this hub asks for a link: htvm link writes one\n");
-    EXPECT_EQ(status(get(expired)), "403");
+    EXPECT_EQ(status(get(expired)), 403);
     EXPECT_EQ(body(get(expired)), "this link has expired: ask for a new one\n");
-    EXPECT_EQ(status(get(forged)), "403");
+    EXPECT_EQ(status(get(forged)), 403);
     for (const auto& target : {std::string("/watch/anna"), expired, forged}) {
         auto refused = open(target);
         EXPECT_EQ(refused.status, 101u);  // else a page could not read why
-        EXPECT_EQ(refused.code(), 1008u);
-        EXPECT_NE(refused.reason(), "");
+        EXPECT_THAT(refused.closing(), MatchesRegex("1008 .+"));
     }
     EXPECT_EQ(body(get(link("files/person.htvm", 60))), "person");
-    EXPECT_EQ(status(get("/files/person.htvm")), "403");
-    EXPECT_EQ(status(get(link("watch/person.htvm", 60).replace(1, 5, "files"))), "403");
-    EXPECT_EQ(status(get("/api/files")), "403");
-    EXPECT_EQ(status(get("/api/streams")), "403");
+    EXPECT_EQ(status(get("/files/person.htvm")), 403);
+    EXPECT_EQ(status(get(link("watch/person.htvm", 60).replace(1, 5, "files"))), 403);
+    EXPECT_EQ(status(get("/api/files")), 403);
+    EXPECT_EQ(status(get("/api/streams")), 403);
     EXPECT_GE(count_of("refused"), 7u);
-    publisher.send(packet(PacketKind::intra, 1, packet_flag::referred | packet_flag::access));
-    std::optional<std::uint32_t> frame = 0;
-    while (frame == 0u) frame = viewer->next();
+    publisher.send(live_intra(1));
+    std::uint32_t frame = 0;
+    while (frame == 0) frame = viewer->next_frame();
     EXPECT_EQ(frame, 1u);  // goes on
 }
 
@@ -317,7 +224,7 @@ TEST_F(ServerAccessTest, OnlyPagesOfTheGivenSitesWatchAndRead) {
     EXPECT_FALSE(allowed("http://a.example"));
     EXPECT_FALSE(allowed("https://a.example.evil.example"));
     EXPECT_FALSE(allowed("null"));
-    EXPECT_EQ(open("/watch/anna", "Origin", "https://evil.example").code(), 1008u);
+    EXPECT_EQ(open("/watch/anna", "Origin", "https://evil.example").closing_code(), 1008u);
     EXPECT_TRUE(open("/watch/anna", "Origin", "http://hub.example").next());  // the hub's own page
     EXPECT_TRUE(open("/watch/anna").next());                                  // no page at all
     EXPECT_EQ(opened("/publish/ben", "Origin", "https://evil.example"), 403u);
@@ -331,8 +238,8 @@ TEST_F(ServerAccessTest, AnAddressHasAFewViewers) {
     wait_for_stream("anna");
     auto first = open("/watch/anna"), second = open("/watch/anna");
     EXPECT_TRUE(first.next() && second.next());
-    EXPECT_EQ(open("/watch/anna").code(), 1013u);
-    EXPECT_EQ(status(get("/watch/anna")), "503");
+    EXPECT_EQ(open("/watch/anna").closing_code(), 1013u);
+    EXPECT_EQ(status(get("/watch/anna")), 503);
     first.stream.next_layer().close();
     for (int i = 0; i < 1000 && !open("/watch/anna").next(); ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -350,13 +257,10 @@ TEST_F(ServerAccessTest, ItEndsWhenItIsToldToAndSaysSo) {
     auto idle = connect();
     const auto begin = std::chrono::steady_clock::now();
     std::raise(SIGTERM);
-    EXPECT_EQ(viewer.code(), 1001u);
-    EXPECT_EQ(publisher.code(), 1001u);
-    std::array<char, 8> piece{};
-    beast::error_code error;
-    EXPECT_EQ(idle.read_some(net::buffer(piece), error), 0u);
+    EXPECT_EQ(viewer.closing_code(), 1001u);
+    EXPECT_EQ(publisher.closing_code(), 1001u);
+    EXPECT_EQ(read_all(idle), "");
     thread.join();
-    ended = true;
     EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds(3));
 }
 
@@ -389,10 +293,10 @@ TEST_F(ServerAccessTest, TlsIsAgreedOnAndItsCertificateReadAgain) {
     EXPECT_EQ(presented(TLS1_2_VERSION), "first.example");
     EXPECT_EQ(presented(TLS1_1_VERSION), "");
     EXPECT_THAT(get("/files/person.htvm"), testing::Not(HasSubstr("person")));  // without TLS
+    const auto refused = count_of("refused");
     auto silent = connect();
-    std::array<char, 8> piece{};
-    beast::error_code error;
-    EXPECT_EQ(silent.read_some(net::buffer(piece), error), 0u);  // until header_time is over
+    EXPECT_EQ(read_all(silent), "");  // until header_time is over
+    EXPECT_EQ(count_of("refused"), refused + 1);
     write_certificate(options.certificate, options.private_key, "second.example");
     EXPECT_EQ(presented(TLS1_3_VERSION), "first.example");
     get("/");
