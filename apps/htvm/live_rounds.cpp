@@ -22,7 +22,7 @@ void LiveRounds::begin_round() {
 Result<Packet> LiveRounds::header_of_session(const Packet& header) const {
     auto read = read_sequence_header(header.payload);
     if (!read) return tl::unexpected(read.error());
-    if (read->version < stream_version)
+    if (read->version < session_version)
         return fail(ErrorKind::unsupported,
                     "streams of version " + std::to_string(read->version) + " cannot be live; encode it again");
     read->session = drawn_;

@@ -24,7 +24,7 @@ def noted(*rows):
     """Of (viewer, kind, frame, sent, arrived), times in milliseconds."""
     out = np.zeros(len(rows), arrivals.ARRIVAL)
     for place, (viewer, kind, frame, sent, arrived) in enumerate(rows):
-        out[place] = (arrived * 1000, sent * 1000, viewer, frame, 100, kind, [0, 0, 0])
+        out[place] = (arrived * 1000, sent * 1000, viewer, frame, 100, kind, 0, [0, 0])
     return out
 
 

@@ -117,7 +117,7 @@ Result<void> check_metadata(std::span<const MetadataEntry> metadata) {
 std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
     ByteWriter out;
     out.bytes(magic);
-    out.u16(stream_version);
+    out.u16(std::max(header.version, session_version));
     out.u8(static_cast<std::uint8_t>(header.lattice.bits));
     for (const auto c : header.lattice.origin) out.u32(static_cast<std::uint32_t>(c));
     out.u32(header.fps_numerator);

@@ -21,6 +21,8 @@ namespace htvm::internal {
 inline constexpr std::uint16_t stream_version = 3;
 inline constexpr std::uint16_t oldest_version = 1;
 
+// From this version on a sequence header has a session. The headers of all versions since have the same syntax.
+inline constexpr std::uint16_t session_version = 2;
 // From this version on a T-frame's payload is one run (tracked/tracked_payload.h).
 inline constexpr std::uint16_t tracked_run_version = 3;
 
@@ -32,7 +34,9 @@ inline constexpr int mtfan_max_nearest = 64;
 inline std::size_t axis_of(UpAxis up) { return (static_cast<std::size_t>(up) - 1) / 2; }
 
 struct SequenceHeader {
-    std::uint16_t version = stream_version;  // as read; always written in the newest
+    // As read, and as written, since what follows in the stream is of this version; but version 1 as 2, whose frames
+    // have the same syntax.
+    std::uint16_t version = stream_version;
     Lattice lattice;
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
     std::uint32_t unit_micrometres = 1000;  // the unit that the capture came in, so that a decoder can give it back
