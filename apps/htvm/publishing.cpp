@@ -81,6 +81,10 @@ std::string shown_place(const std::string& path_or_address) {
 }
 
 Result<Publishing> Publishing::open(const std::string& address, const PublishingOptions& options) {
+    if (address.find("/publish/") == std::string::npos)
+        return fail(ErrorKind::bad_input, "'" + shown_place(address) +
+                                              "' is not where a stream is published: "
+                                              "that is ws://HOST:PORT/publish/NAME");
     auto token = token_of(options);
     if (!token) return tl::unexpected(token.error());
     PublisherOptions settings;

@@ -66,7 +66,7 @@ Result<void> add_publisher(const Options& options) {
     const auto token = live::add_publisher(options.server.publishers, options.add_publisher);
     if (!token) return tl::unexpected(token.error());
     note(fmt::format(
-        "The token of {}, which is shown only now: {} keeps no more than a hash of it. A hub that runs reads "
+        "the token of {}, which is shown only now: {} keeps no more than a hash of it. A hub that runs reads "
         "the file again when it is sent SIGHUP.",
         options.add_publisher, options.server.publishers));
     fmt::print("{}\n", *token);
@@ -157,13 +157,22 @@ void read_options(CLI::App& command, const std::string& path) {
     CLI::ConfigTOML format;
     for (const auto& item : format.from_file(path)) {
         auto* option = item.parents.empty() ? command.get_option_no_throw("--" + item.name) : nullptr;
-        if (!option || !option->get_configurable()) throw CLI::ConfigError::Extras(item.fullname());
+        if (!option || !option->get_configurable())
+            throw CLI::ValidationError(path, "has '" + item.fullname() + "', which is no option");
         if (!option->empty()) continue;
         if (option->get_expected_min() == 0)
             option->add_result(option->get_flag_value(item.name, format.to_flag(item)));
         else
             for (const auto& value : item.inputs) option->add_result(value);
     }
+}
+
+// As browsers name it: anything behind the host would be no page's.
+std::string is_site(const std::string& text) {
+    const auto begin = text.find("://");
+    const bool named = begin != std::string::npos && begin > 0 && begin + 3 < text.size();
+    return named && text.find('/', begin + 3) == std::string::npos ? ""
+                                                                   : text + " is no site such as https://a.example";
 }
 
 void add_access_options(CLI::App& command, Options& options) {
@@ -201,6 +210,7 @@ void add_access_options(CLI::App& command, Options& options) {
                                     "Pages of this site, such as https://a.example, may read and watch, and no other "
                                     "site's; may be given more than once (default: pages of all sites)")
                         ->type_name("SITE")
+                        ->check(is_site)
                         ->allow_extra_args(false);
     command.add_flag("--same-site", options.same_site, "Pages of no other site may read and watch")->excludes(origins);
 }

@@ -53,6 +53,10 @@ Result<StreamInput> StreamInput::open(const std::string& path, std::uint64_t max
         static_cast<std::size_t>(std::min<std::uint64_t>(max_packet_bytes, std::numeric_limits<std::size_t>::max()));
     input.reader_ = PacketReader(most);
     if (live::looks_like_hub_address(path)) {
+        if (path.find("/watch/") == std::string::npos)
+            return fail(ErrorKind::bad_input, "'" + path.substr(0, path.find('?')) +
+                                                  "' is not where a stream is "
+                                                  "watched: that is ws://HOST:PORT/watch/NAME");
         auto watcher = open_watcher(path, most, trust);
         if (!watcher) return tl::unexpected(watcher.error());
         input.watcher_.emplace(std::move(*watcher));

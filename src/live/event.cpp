@@ -40,7 +40,6 @@ std::string json_line(const Event& event, std::chrono::system_clock::time_point 
 
 std::string text_line(const Event& event, std::chrono::system_clock::time_point time) {
     std::string out = time_text(time, "%H:%M:%SZ ");
-    if (event.warning) out += "warning: ";
     if (!event.stream.empty()) out += event.stream + ": ";
     out += event.text;
     if (!event.address.empty()) out += " (" + event.address + ')';

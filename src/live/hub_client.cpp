@@ -88,7 +88,7 @@ HubEnding by_response(const websocket::response_type& response) {
 
 HubEnding by_tls(Line& line, const beast::error_code& error) {
     const auto verified = SSL_get_verify_result(line.secure()->native_handle());
-    if (verified == X509_V_OK) return lost("TLS: " + error.message());
+    if (verified == X509_V_OK) return lost("TLS: " + error.message() + "; a hub without TLS has an address with ws://");
     return {HubEnding::Kind::refused, false,
             std::string("its certificate is not trusted: ") + X509_verify_cert_error_string(verified) +
                 "; --ca names a file of those to trust, --insecure takes any"};
@@ -213,7 +213,9 @@ net::awaitable<std::optional<HubEnding>> HubClient::State::connect(const HubAddr
     websocket::response_type response;
     const auto [refused] = co_await socket.async_handshake(response, host_header(address), address.target, awaited);
     if (refused == websocket::error::upgrade_declined) co_return by_response(response);
-    if (refused) co_return lost("it does not speak WebSocket: " + refused.message());
+    if (refused)
+        co_return lost("it does not speak WebSocket: " + refused.message() +
+                       (address.secure ? "" : "; a hub with TLS has an address with wss://"));
     if (response[http::field::sec_websocket_protocol] != live_protocol)
         co_return HubEnding{HubEnding::Kind::refused, false, "it is no hub: it does not speak htvm.1"};
     socket.binary(true);

@@ -247,8 +247,11 @@ Result<void> Publisher::finish(std::chrono::milliseconds timeout) {
     lock.unlock();
     state.client->stop();
     if (refused) return fail(ErrorKind::bad_input, why);
-    if (!over)
-        return fail(ErrorKind::limit, "the hub did not take the end of the stream" + (why.empty() ? why : ": " + why));
+    if (!over) {
+        const bool reached = state.client->status().connections > 0;
+        return fail(ErrorKind::limit, (reached ? "the hub did not take the end of the stream" : "no hub was reached") +
+                                          (why.empty() ? why : ": " + why));
+    }
     return {};
 }
 

@@ -16,7 +16,7 @@ TEST(Event, IsOneLineForPeopleAndOneObjectForMachines) {
               R"({"time":"2026-11-22T13:05:51.007Z","event":"left","text":"the publisher left after 12 packets",)"
               R"("stream":"anna","address":"192.0.2.1","packets":12})");
     const Event full{.name = "disk_full", .text = "recording stops", .warning = true};
-    EXPECT_EQ(text_line(full, time), "13:05:51Z warning: recording stops");
+    EXPECT_EQ(text_line(full, time), "13:05:51Z recording stops");
     EXPECT_EQ(json_line(full, time), R"({"time":"2026-11-22T13:05:51.007Z","event":"disk_full",)"
                                      R"("text":"recording stops","warning":true})");
 }

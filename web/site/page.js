@@ -23,7 +23,7 @@ function play(name, attributes, alone) {
     const player = make('htvm-player', { ...common, ...attributes, ...view });
     content.append(player);
     player.focus({ focusVisible: false }); // its keys work at once
-    if (!alone) content.append(make('a', { class: 'back', href: '/' }, 'All streams'));
+    if (!alone && !query.has('signature')) content.append(make('a', { class: 'back', href: '/' }, 'All streams'));
 }
 
 // What the page's address has besides `file`, such as a signed link's query, goes on to the file.
@@ -127,5 +127,5 @@ if (watched) {
     if (streams) list(files ?? [], streams);
     else if (files?.length === 1) playFile(files[0].path, true);
     else if (files?.length > 0) list(files, []);
-    else content.append(make('p', { class: 'empty' }, 'There are no .htvm files in this folder.'));
+    else content.append(make('p', { class: 'empty' }, files ? 'There are no .htvm files in this folder.' : 'Nothing is listed here: watching needs a link.'));
 }
