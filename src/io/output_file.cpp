@@ -1,5 +1,6 @@
 #include "io/output_file.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -31,6 +32,13 @@ Error open_error(const fs::path& path, int reason) {
     return write_error(path.string(), reason);
 }
 
+// Where root replaces somebody's file, it stays theirs: a service that reads it again may not read root's.
+void keep_owner(const fs::path& from, const fs::path& to) {
+    struct stat was {};
+    if (geteuid() != 0 || stat(from.c_str(), &was) != 0) return;
+    [[maybe_unused]] const int kept = chown(to.c_str(), was.st_uid, was.st_gid);
+}
+
 }  // namespace
 
 Error write_error(std::string_view name, int reason) {
@@ -54,7 +62,10 @@ Result<OutputFile> OutputFile::create(const fs::path& path) {
     const auto& opened = out.partial_.empty() ? out.path_ : out.partial_;
     out.file_.reset(std::fopen(opened.c_str(), "wb"));
     if (!out.file_) return tl::unexpected(open_error(path, errno));
-    if (!out.partial_.empty() && fs::exists(there)) fs::permissions(out.partial_, there.permissions(), ignored);
+    if (!out.partial_.empty() && fs::exists(there)) {
+        fs::permissions(out.partial_, there.permissions(), ignored);
+        keep_owner(out.path_, out.partial_);
+    }
     return out;
 }
 

@@ -244,7 +244,7 @@ const char* link_sentence(LinkCheck check) {
         case LinkCheck::good:
             return "this link is good";
         case LinkCheck::missing:
-            return "this hub asks for a link: htvm link writes one";
+            return "this needs a link: ask whoever runs this hub (htvm link writes one)";
         case LinkCheck::forged:
             return "this link is not one that this hub knows: it is incomplete, changed, or by a key no longer in use";
         case LinkCheck::expired:

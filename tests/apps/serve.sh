@@ -89,7 +89,7 @@ link=$("$htvm" link person.htvm --file --keys keys.json --for 1h --url "$url")
 [ "$(ask "$link")" = "200 person" ] || fail "a good link: $(ask "$link")"
 [ "$(ask "${link/person/people}")" = "403 this link is not one that this hub knows: it is incomplete, changed, or by a key no longer in use" ] ||
     fail "another file's link: $(ask "${link/person/people}")"
-[ "$(ask "$url/files/person.htvm")" = "403 this hub asks for a link: htvm link writes one" ] || fail "without a link"
+[ "$(ask "$url/files/person.htvm")" = "403 this needs a link: ask whoever runs this hub (htvm link writes one)" ] || fail "without a link"
 short=$("$htvm" link person.htvm --file --keys keys.json --for 1s --url "$url")
 sleep 2
 [ "$(ask "$short")" = "403 this link has expired: ask for a new one" ] || fail "an expired link: $(ask "$short")"

@@ -1,5 +1,8 @@
 #include "io/output_file.h"
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
@@ -38,6 +41,19 @@ TEST_F(Output, IsInItsPlaceOnceItIsFinished) {
     ASSERT_TRUE(file->finish());
     EXPECT_EQ(text("file"), "after");
     EXPECT_FALSE(fs::exists(folder / "file.partial"));
+}
+
+TEST_F(Output, OfSomebodyElseStaysTheirsWhereRootReplacesIt) {
+    if (geteuid() != 0) GTEST_SKIP() << "only root can give files away";
+    constexpr uid_t somebody = 12345;
+    ASSERT_EQ(chown((folder / "file").c_str(), somebody, somebody), 0);
+    auto file = OutputFile::create(folder / "file");
+    ASSERT_TRUE(file && write(*file, "after") && file->finish());
+    EXPECT_EQ(text("file"), "after");
+    struct stat now {};
+    ASSERT_EQ(stat((folder / "file").c_str(), &now), 0);
+    EXPECT_EQ(now.st_uid, somebody);
+    EXPECT_EQ(now.st_gid, somebody);
 }
 
 TEST_F(Output, LeavesNothingWhereItIsNotFinished) {

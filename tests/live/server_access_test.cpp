@@ -184,7 +184,7 @@ TEST_F(ServerAccessTest, WhatIsShownByLinkAloneNeedsOne) {
     }
     const auto expired = link("watch/anna", -1), forged = link("watch/ben", 60).replace(7, 3, "anna");
     EXPECT_EQ(status(get("/watch/anna")), 403);
-    EXPECT_EQ(body(get("/watch/anna")), "this hub asks for a link: htvm link writes one\n");
+    EXPECT_EQ(body(get("/watch/anna")), "this needs a link: ask whoever runs this hub (htvm link writes one)\n");
     EXPECT_EQ(status(get(expired)), 403);
     EXPECT_EQ(body(get(expired)), "this link has expired: ask for a new one\n");
     EXPECT_EQ(status(get(forged)), 403);

@@ -88,6 +88,39 @@ test('htvm play encodes a capture first', options, async () => {
     });
 });
 
+test('the view goes with somebody who walks off, unless it is fixed', options, async () => {
+    const capture = join(work, 'walk');
+    await makeCapture(capture, 12, 0.25);
+    const stream = join(work, 'walk.htvm');
+    execFileSync(program, ['encode', capture, '--keyint', '1', '-o', stream], { stdio: 'pipe' });
+    await running(['play', '--no-open', stream], async (page, address) => {
+        await page.goto(address);
+        await page.waitForFunction(() => document.querySelector('htvm-player')?.statistics.framesShown > 0);
+        const seen = await page.evaluate(async () => {
+            const player = document.querySelector('htvm-player');
+            player.loop = false;
+            player.pause();
+            const at = async (frame) => {
+                const shown = new Promise((resolve) =>
+                    player.addEventListener('framepresented', ({ detail }) => detail.frame === frame && resolve()));
+                player.currentTime = (frame + 0.5) / 30;
+                await shown;
+                return player.view.target[0];
+            };
+            await at(6);
+            const out = [await at(0), await at(1), await at(11), await at(0)];
+            player.fixed = true;
+            return [...out, await at(11)];
+        });
+        // 2.75 m less twice the 18 cm that are left to move in; a step of 25 cm is within them. And back.
+        const [first, second, last, back, fixed] = seen;
+        assert.equal(second, first);
+        assert.ok(last - first > 2.3 && last - first < 2.45, String(seen));
+        assert.ok(Math.abs(back - first) < 1e-3, String(seen));
+        assert.equal(fixed, back);
+    });
+});
+
 test('htvm play --beside shows a capture and a stream of it in one window, in step, with a slider', options, async () => {
     const capture = join(work, 'compared');
     await makeCapture(capture, 12);

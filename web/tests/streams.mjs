@@ -13,11 +13,12 @@ export async function digests(name) {
     return (await readFile(`${folder}${name}.digests`, 'utf8')).trim().split('\n');
 }
 
-/** A capture of a few triangles that move. */
-export async function makeCapture(capture, frames) {
+/** A capture of a few triangles that move; `walk` metres a frame to the right. */
+export async function makeCapture(capture, frames, walk = 0) {
     await mkdir(capture);
     for (let frame = 0; frame < frames; ++frame) {
-        const lines = ['v 0 0 0', `v 400 ${frame} 0`, 'v 0 900 0', 'v 0 0 300', 'f 1 3 2', 'f 1 2 4', 'f 1 4 3', 'f 2 3 4'];
+        const x = 1000 * walk * frame;
+        const lines = [`v ${x} 0 0`, `v ${x + 400} ${frame} 0`, `v ${x} 900 0`, `v ${x} 0 300`, 'f 1 3 2', 'f 1 2 4', 'f 1 4 3', 'f 2 3 4'];
         await writeFile(inFolder(capture, `${String(frame).padStart(3, '0')}.obj`), `${lines.join('\n')}\n`);
     }
 }

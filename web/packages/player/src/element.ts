@@ -68,6 +68,7 @@ const axes: readonly string[] = ['x', 'y', 'z', '-x', '-y', '-z'];
 export class HtvmPlayerElement extends HTMLElement {
     static readonly observedAttributes = [
         'src', 'live', 'audio', 'muted', 'loop', 'controls', 'poster', 'lit', 'up', 'theme', 'floor', 'statistics', 'label', 'orbit',
+        'fixed',
     ];
     /** Where the worker and the decoder lie; beside this file unless told, before the first element has a src. */
     static workerUrl: URL | string = new URL('./htvm-worker.js', import.meta.url);
@@ -77,6 +78,8 @@ export class HtvmPlayerElement extends HTMLElement {
     declare autoplay: boolean;
     declare loop: boolean;
     declare lit: boolean;
+    /** The view stays where it is when the mesh leaves its middle. */
+    declare fixed: boolean;
     /** The stream is a live one: src is a hub's /watch/NAME. */
     declare live: boolean;
 
@@ -413,6 +416,9 @@ export class HtvmPlayerElement extends HTMLElement {
                 if (this.#scene) this.#scene.floorVisible = value !== 'none';
                 this.#invalidate();
                 break;
+            case 'fixed':
+                if (this.#scene) this.#scene.follows = !this.fixed;
+                break;
             case 'orbit':
                 this.resetView();
                 break;
@@ -475,6 +481,7 @@ export class HtvmPlayerElement extends HTMLElement {
         if (this.#scene) return this.#scene;
         const scene = new StageScene(this.#canvas);
         scene.setLit(this.lit);
+        scene.follows = !this.fixed;
         scene.floorVisible = this.getAttribute('floor') !== 'none';
         scene.below = this.hasAttribute('controls') ? 0.1 : 0;
         this.#orbit = new Orbit(this.#canvas, scene.view, () => this.#viewChanged(), () => this.resetView());
@@ -795,7 +802,7 @@ export class HtvmPlayerElement extends HTMLElement {
     }
 }
 
-for (const name of ['autoplay', 'loop', 'lit', 'live'])
+for (const name of ['autoplay', 'loop', 'lit', 'live', 'fixed'])
     Object.defineProperty(HtvmPlayerElement.prototype, name, {
         get(this: HTMLElement): boolean {
             return this.hasAttribute(name);

@@ -21,6 +21,10 @@ export interface View {
     target: Vector3;
 }
 
+// How far from the middle of the view the mesh may go before the view goes with it: of the radius of what is seen.
+const leash = 0.3;
+const gridCells = 24;
+
 const shadowPixels = 128; // it is blurred anyway, and weak graphics cards have to draw it too
 const blurReach = 6; // pixels
 
@@ -34,6 +38,8 @@ export class StageScene {
     /** Share of the picture's height that controls cover at the bottom. */
     below = 0;
     lit = false;
+    /** Whether the view goes with a mesh that leaves its middle. */
+    follows = true;
     #scene = new Scene();
     #stage = new Group(); // stands on the floor, its middle above the origin
     #upright = new Group(); // turns the stream's up axis to y
@@ -45,6 +51,8 @@ export class StageScene {
     #bounds: Box3 | null = null; // of the first frame, upright, metres, not yet moved onto the floor
     #floor: number | null = null; // height of the floor in the upright mesh, metres
     #home: { distance: number; target: Vector3 } | null = null;
+    #followed = new Vector3(); // how far the view has gone with the mesh, along the floor
+    #leash = 0; // metres
     #shadowIsOld = true;
 
     constructor(canvas: HTMLCanvasElement) {
@@ -99,6 +107,7 @@ export class StageScene {
             const box = this.#uprightBox(frame.bounds);
             if (!this.#bounds) this.#standOnFloor(box);
             this.#shadow.moveOver(box.translate(this.#stage.position), this.#upright.quaternion, this.#stage.position);
+            this.#follow(box.getCenter(new Vector3()));
         }
         this.#shadowIsOld = true;
     }
@@ -153,6 +162,20 @@ export class StageScene {
         this.#shadowIsOld = true;
     }
 
+    // Only as far as it must: what moves on the spot is not followed.
+    #follow(middle: Vector3): void {
+        const away = middle.sub(this.#followed).setY(0);
+        const distance = away.length();
+        if (!this.follows || distance <= this.#leash) return;
+        away.multiplyScalar(1 - this.#leash / distance);
+        this.#followed.add(away);
+        this.view.target.add(away);
+        this.#home?.target.add(away);
+        // By whole cells, so that its lines stay where they are.
+        const cell = this.#grid.scale.x / gridCells;
+        this.#grid.position.set(Math.round(this.#followed.x / cell) * cell, 0, Math.round(this.#followed.z / cell) * cell);
+    }
+
     #uprightBox(bounds: FrameReport['bounds']): Box3 {
         const corner = new Vector3(bounds[0], bounds[1], bounds[2]).multiplyScalar(0.001);
         const other = new Vector3(bounds[3], bounds[4], bounds[5]).multiplyScalar(0.001);
@@ -171,11 +194,14 @@ export class StageScene {
         const radius = (Math.max(0.5 * Math.hypot(size.x, size.z), 0.5 * size.y) * 1.22) / (1 - this.below);
         const distance = radius / Math.sin((this.camera.fov * Math.PI) / 360);
         this.#home = { distance, target: new Vector3(0, middle.y - floor - this.below * radius, 0) };
+        this.#leash = leash * radius;
+        this.#followed.set(0, 0, 0);
+        this.#grid.position.set(0, 0, 0);
         this.view.distance = distance;
         this.view.target.copy(this.#home.target);
         // Lines half a metre apart for what is as large as a person, and so on by tens.
         const cell = 10 ** Math.round(Math.log10(Math.max(size.x, size.y, size.z, 1e-3) / 1.8)) * 0.5;
-        this.#grid.scale.setScalar(cell * 24);
+        this.#grid.scale.setScalar(cell * gridCells);
     }
 }
 
@@ -194,7 +220,7 @@ function gridPlane(): Mesh<PlaneGeometry, ShaderMaterial> {
             uniform vec3 colour;
             varying vec2 place;
             void main() {
-                vec2 cell = place * 24.0;
+                vec2 cell = place * ${gridCells.toFixed(1)};
                 vec2 width = fwidth(cell);
                 vec2 line = 1.0 - min(abs(fract(cell - 0.5) - 0.5) / max(width, 1e-4), 1.0);
                 float fade = 1.0 - smoothstep(0.1, 0.5, length(place));
