@@ -185,9 +185,8 @@ TEST_F(FileServerTest, ARequestThatComesAByteAtATimeIsCutOffAfterItsTimeCountedA
     }
     EXPECT_TRUE(error);
     EXPECT_GE(passed(), std::chrono::milliseconds(990));
-    EXPECT_LE(passed(), std::chrono::seconds(5));
     EXPECT_EQ(read_all(silent), "");  // it has asked for nothing, so nothing was refused
-    EXPECT_NE(get("/metrics").find("\nhtvm_refused_total{cause=\"header_time\"} 1\n"), std::string::npos);
+    EXPECT_TRUE(metrics_come_to("htvm_refused_total{cause=\"header_time\"} 1"));
 }
 
 TEST_F(FileServerTest, ClientsThatTakeNothingAreCutOffAndHoldUpNobody) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio.hpp>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -63,6 +64,14 @@ protected:
         boost::asio::write(socket, boost::asio::buffer(method + ' ' + target + " HTTP/1.1\r\nHost: " + host +
                                                        "\r\nConnection: close\r\n" + headers + "\r\n"));
         return read_all(socket);
+    }
+    // Whether the metrics come to hold this line: what a client sees may come before the server counts it.
+    bool metrics_come_to(const std::string& line) {
+        for (int i = 0; i < 1000; ++i) {
+            if (get("/metrics").find('\n' + line + '\n') != std::string::npos) return true;
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        return false;
     }
     static int status(const std::string& response) {
         return response.size() > 12 ? std::atoi(response.c_str() + 9) : 0;
