@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "codec/frame_kinds.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"
@@ -42,8 +43,7 @@ public:
     explicit FrameInspector(Decoder& decoder) : decoder_(decoder) {}
     Result<FrameInfo> inspect(const Packet& packet) {
         const auto type = frame_type(packet.kind);
-        const bool for_itself = packet.has(packet_flag::told) && !packet.has(packet_flag::referred);
-        if (type == FrameType::intra && !for_itself) intra_ = packet;
+        if (type == FrameType::intra && internal::is_referred(packet, internal::rules_of(*type))) intra_ = packet;
         if (type == FrameType::tracked) {
             if (intra_) static_cast<void>(decoder_.decode(*intra_));
             intra_.reset();

@@ -42,11 +42,8 @@ protected:
 
     // Waits until the server has told that many packets, since messages arrive when they arrive.
     void wait_for_packets(std::uint64_t count) {
-        for (int i = 0; i < 1000; ++i) {
-            if (get("/api/streams").find("\"packets\":" + std::to_string(count) + ",") != std::string::npos) return;
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        }
-        FAIL() << get("/api/streams");
+        const auto told = "\"packets\":" + std::to_string(count) + ",";
+        EXPECT_TRUE(soon([&] { return get("/api/streams").find(told) != std::string::npos; })) << get("/api/streams");
     }
 
     Hub hub;
@@ -307,8 +304,7 @@ TEST_F(RecordedLiveConnectionTest, WhatGoesToTheViewersIsRecorded) {
     const auto metrics = get("/metrics");
     EXPECT_NE(metrics.find("htvm_recording_faults_total 0\n"), std::string::npos) << metrics;
     publisher.stream.close(websocket::close_code::normal);
-    for (int i = 0; i < 1000 && get("/api/streams").find("anna") != std::string::npos; ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_TRUE(soon([&] { return get("/api/streams").find("anna") == std::string::npos; }));
     stop();
     recorder->finish();
     EXPECT_EQ(recorder->counters().packets, 3u);
@@ -384,9 +380,7 @@ TEST_F(HastyLiveConnectionTest, AMessageThatComesAByteAtATimeIsCutOffAfterItsTim
     EXPECT_EQ(viewer.next_frame(), frame);
     const auto kept = write_packet(live_header(1)).size() + write_packet(live_header(2)).size() +
                       write_packet(live_intra(frame)).size();
-    for (int i = 0; i < 1000 && hub.counters().memory != kept; ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    EXPECT_EQ(hub.counters().memory, kept);
+    EXPECT_TRUE(soon([&] { return hub.counters().memory == kept; })) << hub.counters().memory << ' ' << kept;
 }
 
 class QuickLiveConnectionTest : public LiveConnectionTest {

@@ -21,6 +21,7 @@
 #include "live/file_server.h"
 #include "live/watcher.h"
 #include "live_packets.h"
+#include "soon.h"
 
 namespace htvm::live {
 namespace {
@@ -30,15 +31,6 @@ namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 using tcp = net::ip::tcp;
 using std::chrono::milliseconds;
-
-// Waits for what other threads do.
-::testing::AssertionResult soon(const std::function<bool()>& is_so) {
-    for (int i = 0; i < 2000; ++i) {
-        if (is_so()) return ::testing::AssertionSuccess();
-        std::this_thread::sleep_for(milliseconds(5));
-    }
-    return ::testing::AssertionFailure() << "not within ten seconds";
-}
 
 // A hub that can be killed, and started again where it was.
 class TestHub {

@@ -20,6 +20,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/stream_index.hpp"
 #include "live_packets.h"
+#include "soon.h"
 
 // In place of the C library's, so that the tests see what the disk is waited for; they go on to the kernel.
 namespace {
@@ -107,10 +108,6 @@ protected:
         }
         return out;
     }
-    void wait_until(const std::function<bool()>& true_now) {
-        for (int i = 0; i < 2000 && !true_now(); ++i) std::this_thread::sleep_for(5ms);
-        EXPECT_TRUE(true_now());
-    }
 
     RecorderOptions options{.folder = fs::temp_directory_path() / ("htvm_recorder_test_" + std::to_string(getpid()))};
 };
@@ -122,7 +119,7 @@ TEST_F(RecorderTest, ASessionBecomesAFileWithItsIndexInFront) {
         auto recorder = open();
         EXPECT_FALSE(take(recorder, header(1)));
         for (std::uint32_t i = 0; i < 10; ++i) EXPECT_FALSE(take(recorder, i % 5 == 0 ? intra(i) : tracked(i)));
-        wait_until([&] { return recorder.counters().packets == 11; });
+        EXPECT_TRUE(soon([&] { return recorder.counters().packets == 11; }));
         // As it grows it has its name, and all that was written.
         EXPECT_EQ(files(), Names{"anna-20261122-130551.htvm"});
         EXPECT_EQ(frames("anna-20261122-130551.htvm").size(), 10u);
@@ -150,7 +147,7 @@ TEST_F(RecorderTest, AFileBeginsWithAFrameThatCanBeDecodedByItself) {
     EXPECT_TRUE(files().empty());
     EXPECT_FALSE(take(recorder, intra(10)));
     EXPECT_FALSE(take(recorder, tracked(11)));
-    wait_until([&] { return recorder.counters().packets == 3; });
+    EXPECT_TRUE(soon([&] { return recorder.counters().packets == 3; }));
     EXPECT_EQ(frames("anna-20261122-130551.htvm"), (Frames{10, 11}));
     EXPECT_EQ(recorder.counters().dropped_frames, 0u);
 }
@@ -209,7 +206,7 @@ TEST_F(RecorderTest, AFaultStopsTheRecordingUntilItIsTriedAgain) {
     take(recorder, header(1));
     fs::remove_all(options.folder);
     take(recorder, intra(0));
-    wait_until([&] { return recorder.counters().faults == 1; });
+    EXPECT_TRUE(soon([&] { return recorder.counters().faults == 1; }));
     EXPECT_EQ(events(recorder), Names{"recording_failed"});
     fs::create_directories(options.folder);
     take(recorder, tracked(1), 1s);
@@ -217,7 +214,7 @@ TEST_F(RecorderTest, AFaultStopsTheRecordingUntilItIsTriedAgain) {
     take(recorder, intra(2), 60s);
     EXPECT_TRUE(files().empty());
     take(recorder, intra(3), 61s);
-    wait_until([&] { return recorder.counters().packets == 2; });
+    EXPECT_TRUE(soon([&] { return recorder.counters().packets == 2; }));
     EXPECT_EQ(frames("anna-20261122-130652.htvm"), Frames{3});
     EXPECT_EQ(events(recorder), Names{"recording"});
 }
@@ -253,12 +250,12 @@ TEST_F(RecorderTest, AFileThatGrowsIsOnTheDiskAfterAMomentAndNobodyElseWaitsForT
     auto recorder = open();
     take(recorder, header(1));
     take(recorder, intra(0));
-    wait_until([&] { return recorder.counters().packets == 2; });
+    EXPECT_TRUE(soon([&] { return recorder.counters().packets == 2; }));
     const auto first = fs::file_size(options.folder / name);
-    wait_until([&] { return waited_for(options.folder / name) == first; });  // although nothing more comes
-    EXPECT_EQ(waited_for(options.folder), 1u);                               // its name
+    EXPECT_TRUE(soon([&] { return waited_for(options.folder / name) == first; }));  // although nothing more comes
+    EXPECT_EQ(waited_for(options.folder), 1u);                                      // its name
     take(recorder, tracked(1));
-    wait_until([&] { return waited_for(options.folder / name) > first; });
+    EXPECT_TRUE(soon([&] { return waited_for(options.folder / name) > first; }));
 }
 
 TEST_F(RecorderTest, TheFileWithItsIndexTakesThePlaceOfTheOtherOnceTheDiskHasIt) {

@@ -85,25 +85,20 @@ protected:
         return static_cast<std::size_t>(
             std::count_if(events.begin(), events.end(), [&](const Event& event) { return event.name == name; }));
     }
-    // What a client sees may come before the server tells of it. At least so many of these events.
-    void wait_for_count(const std::string& name, std::size_t count) {
-        for (int i = 0; i < 2000 && count_of(name) < count; ++i)
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    // At least so many of these events: what a client sees may come before the server tells of it.
+    testing::AssertionResult counts_to(const std::string& name, std::size_t count) {
+        return soon([&] { return count_of(name) >= count; });
     }
     void wait_for_stream(const std::string& name) {
-        for (int i = 0; i < 1000; ++i) {
-            if (get("/api/streams").find("\"name\":\"" + name + "\",\"packets\":2") != std::string::npos) return;
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        }
-        FAIL() << get("/api/streams");
+        const auto listed = "\"name\":\"" + name + "\",\"packets\":2";
+        EXPECT_TRUE(soon([&] { return get("/api/streams").find(listed) != std::string::npos; })) << get("/api/streams");
     }
     // Sent to this process; the server must be running, since it takes the signal.
     void hang_up_and_wait_for(const std::string& name) {
         const auto before = count_of(name);
         get("/");
         std::raise(SIGHUP);
-        wait_for_count(name, before + 1);
-        ASSERT_GT(count_of(name), before);
+        ASSERT_TRUE(counts_to(name, before + 1));
     }
 
     // Nobody sends heartbeats here, and the machine may be slow.
@@ -127,7 +122,7 @@ TEST_F(ServerAccessTest, PublishingNeedsTheTokenOfTheStreamAndRefusalsHurtNobody
     EXPECT_EQ(opened("/publish/anna?token=" + ben), 401u);
     EXPECT_EQ(opened("/publish/nobody", "Authorization", "Bearer " + anna), 401u);
     EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
-    wait_for_count("refused", 5);
+    EXPECT_TRUE(counts_to("refused", 5));
     EXPECT_EQ(count_of("refused"), 5u);
     auto viewer = open("/watch/anna");
     EXPECT_EQ(viewer.next_frame(), 0u);  // the sequence header
@@ -203,8 +198,7 @@ TEST_F(ServerAccessTest, WhatIsShownByLinkAloneNeedsOne) {
     EXPECT_EQ(status(get(link("watch/person.htvm", 60).replace(1, 5, "files"))), 403);
     EXPECT_EQ(status(get("/api/files")), 403);
     EXPECT_EQ(status(get("/api/streams")), 403);
-    wait_for_count("refused", 7);
-    EXPECT_GE(count_of("refused"), 7u);
+    EXPECT_TRUE(counts_to("refused", 7));
     publisher.send(live_intra(1));
     std::uint32_t frame = 0;
     while (frame == 0) frame = viewer->next_frame();
@@ -247,8 +241,7 @@ TEST_F(ServerAccessTest, AnAddressHasAFewViewers) {
     EXPECT_EQ(open("/watch/anna").closing_code(), 1013u);
     EXPECT_EQ(status(get("/watch/anna")), 503);
     first.stream.next_layer().close();
-    for (int i = 0; i < 1000 && !open("/watch/anna").next(); ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_TRUE(soon([&] { return open("/watch/anna").next().has_value(); }));
     EXPECT_TRUE(open("/watch/anna").next());
 }
 
@@ -302,7 +295,7 @@ TEST_F(ServerAccessTest, TlsIsAgreedOnAndItsCertificateReadAgain) {
     const auto refused = count_of("refused");
     auto silent = connect();
     EXPECT_EQ(read_all(silent), "");  // until header_time is over
-    wait_for_count("refused", refused + 1);
+    EXPECT_TRUE(counts_to("refused", refused + 1));
     EXPECT_EQ(count_of("refused"), refused + 1);
     write_certificate(options.certificate, options.private_key, "second.example");
     EXPECT_EQ(presented(TLS1_3_VERSION), "first.example");

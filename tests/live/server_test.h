@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio.hpp>
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <thread>
 
 #include "live/file_server.h"
+#include "soon.h"
 
 namespace htvm::live {
 
@@ -66,12 +66,8 @@ protected:
         return read_all(socket);
     }
     // Whether the metrics come to hold this line: what a client sees may come before the server counts it.
-    bool metrics_come_to(const std::string& line) {
-        for (int i = 0; i < 1000; ++i) {
-            if (get("/metrics").find('\n' + line + '\n') != std::string::npos) return true;
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        }
-        return false;
+    testing::AssertionResult metrics_come_to(const std::string& line) {
+        return soon([&] { return get("/metrics").find('\n' + line + '\n') != std::string::npos; });
     }
     static int status(const std::string& response) {
         return response.size() > 12 ? std::atoi(response.c_str() + 9) : 0;
