@@ -60,7 +60,7 @@ private:
     // What the newest frame needs of the packets held.
     struct Newest {
         std::uint64_t place = 0;
-        bool intra = false;
+        std::size_t references = 0;  // of references_
         Codebooks codebooks = {};
         std::size_t chained = 0;  // frames of chain_ that it needs
         bool known = false;
@@ -70,7 +70,7 @@ private:
     void take_codebook(const PacketHeader& header, std::uint64_t place);
     void take_frame(const PacketHeader& header, std::uint64_t place);
     void forget_reference();
-    std::vector<std::uint64_t> places(bool intra, const Codebooks& codebooks, std::size_t chained) const;
+    std::vector<std::uint64_t> places(std::size_t references, const Codebooks& codebooks, std::size_t chained) const;
 
     std::size_t most_;
     std::uint64_t pushed_ = 0;
@@ -82,7 +82,8 @@ private:
     };
     std::optional<HeaderInForce> header_;
     std::optional<std::uint32_t> highest_frame_;
-    std::optional<Frame> intra_;                   // the reference in force
+    std::vector<Frame> references_;                // the I-frame, and the frames that patched it, each referring to
+                                                   // the one before; the last is in force
     std::vector<Frame> chain_;                     // T-frames since, each referring to the one before
     Codebooks codebooks_;                          // since the I-frame
     std::vector<std::uint64_t> untold_codebooks_;  // of either purpose, all since the I-frame

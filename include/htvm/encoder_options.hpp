@@ -49,6 +49,8 @@ struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
     double simplify = 0.4;    // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
                               // its surface in geometry steps; 0: it keeps all vertices and its connectivity
+    double patch_share = 0.3;  // where tracking is lost, the largest share of the mesh that a patch may replace; where
+                               // more is lost, an I-frame is sent; 0: always
     double node_spacing = 0;  // mm between the nodes of the deformation graph; 0: 80 on an adult, in proportion to size
                               // on other subjects
 };

@@ -14,7 +14,8 @@ enum class FrameType : std::uint8_t {
     intra,      // a complete mesh by itself
     enhanced,   // against the last I-frame, with connectivity of its own
     predicted,  // the last I-frame's mesh, moved and nothing else
-    tracked,    // the last I-frame's mesh laid on the captured surface
+    tracked,    // the reference's mesh laid on the captured surface
+    patched,    // the same, with a part replaced by a piece with connectivity of its own: a new reference
 };
 
 // How a kind is called. Everything else the codec must know about it is in src/codec/frame_kinds.cpp.
@@ -28,6 +29,7 @@ inline constexpr std::array frame_kinds = {
     FrameKind{FrameType::enhanced, "EP", "enhanced"},
     FrameKind{FrameType::predicted, "P", "predicted"},
     FrameKind{FrameType::tracked, "T", "tracked"},
+    FrameKind{FrameType::patched, "TP", "patched"},
 };
 inline constexpr std::size_t frame_type_count = frame_kinds.size();
 
@@ -53,6 +55,9 @@ enum class Layer : std::uint8_t {
     distance_orders = 9,
     external_intra = 10,  // a whole mesh, coded by another coder
     coded_bones = 11,
+    tracked = 12,  // a T-frame's payload
+    removed = 13,  // what a patch takes out
+    border = 14,   // where a patch is joined
 };
 
 struct LayerName {
@@ -71,6 +76,9 @@ inline constexpr std::array frame_layers = {
     LayerName{Layer::distance_orders, "distance order"},
     LayerName{Layer::external_intra, "external intra"},
     LayerName{Layer::coded_bones, "coded bones"},
+    LayerName{Layer::tracked, "tracked"},
+    LayerName{Layer::removed, "removed"},
+    LayerName{Layer::border, "border"},
 };
 inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the largest number plus one; 0 is not a layer
 

@@ -103,12 +103,13 @@ enum {
     HTVM_FRAME_INTRA = 0,     /* a complete mesh by itself */
     HTVM_FRAME_ENHANCED = 1,  /* against the last I-frame, with connectivity of its own */
     HTVM_FRAME_PREDICTED = 2, /* the last I-frame's mesh moved */
-    HTVM_FRAME_TRACKED = 3,   /* the last I-frame's mesh laid on the captured surface */
-    HTVM_FRAME_KINDS = 4      /* number of types in this version */
+    HTVM_FRAME_TRACKED = 3,   /* the reference's mesh laid on the captured surface */
+    HTVM_FRAME_PATCHED = 4,   /* the same, with a part replaced: a new reference */
+    HTVM_FRAME_KINDS = 5      /* number of types in this version */
 };
 
-/* Name of a type: "intra" and "I", "enhanced" and "EP", "predicted" and "P", "tracked" and "T"; "unknown" and "?" for a
- * number that this version does not know. Never NULL. */
+/* Name of a type: "intra" and "I", "enhanced" and "EP", "predicted" and "P", "tracked" and "T", "patched" and "TP"; "unknown" and
+ * "?" for a number that this version does not know. Never NULL. */
 const char* htvm_frame_kind_name(uint32_t type);
 const char* htvm_frame_kind_letter(uint32_t type);
 

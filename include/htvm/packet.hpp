@@ -23,6 +23,7 @@ enum class PacketKind : std::uint8_t {
     front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
     checkpoint = 9,   // reserved: a reference for viewers who join late; not shown
     audio = 10,       // sound of the time from a frame to the next (audio.hpp); optional
+    patched = 11,     // TP-frame: a T-frame of which a part is replaced; a reference itself
 };
 
 // Bits of PacketHeader::flags (docs/bitstream.md, section 2.1), for programs that do not decode the packet.

@@ -84,6 +84,7 @@ static_assert(HTVM_FRAME_INTRA == static_cast<int>(FrameType::intra));
 static_assert(HTVM_FRAME_ENHANCED == static_cast<int>(FrameType::enhanced));
 static_assert(HTVM_FRAME_PREDICTED == static_cast<int>(FrameType::predicted));
 static_assert(HTVM_FRAME_TRACKED == static_cast<int>(FrameType::tracked));
+static_assert(HTVM_FRAME_PATCHED == static_cast<int>(FrameType::patched));
 static_assert(HTVM_FRAME_KINDS == frame_type_count);
 
 htvm_frame_info describe(const FrameInfo& info, std::uint32_t attributes) {

@@ -24,6 +24,13 @@ Rotation to_rotation(const RotationMatrix& m) {
     return out;
 }
 
+Pose to_pose(const CodedPose& pose, const Lattice& lattice) {
+    Pose out;
+    for (const auto joint : pose.joints) out.joints.push_back(to_millimetres(joint, lattice));
+    for (const auto& rotation : pose.orientations) out.orientations.push_back(to_rotation(rotation_matrix(rotation)));
+    return out;
+}
+
 Rotation product(const Rotation& a, const Rotation& b) {
     Rotation out{};
     for (std::size_t row = 0; row < 3; ++row)
@@ -118,8 +125,11 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
     const auto held = state.reference ? counts(state.reference->mesh()) : MeshCounts{};
     std::uint64_t kept = state.reference ? memory_of_reference(held) : 0;
     const bool nodes = state.reference && state.reference->tracked;
-    if (nodes || rules.refers_to == RefersTo::intra_or_before) kept += memory_of_tracking(held);
-    if (rules.refers_to == RefersTo::nothing && state.header->node_spacing > 0) kept += memory_of_tracking(coded);
+    if (nodes || rules.refers_to == RefersTo::reference_or_before) kept += memory_of_tracking(held);
+    // A patch adds to the mesh that it is put on.
+    const bool adds = rules.renews && rules.refers_to != RefersTo::nothing;
+    const MeshCounts renewed{coded.vertices + (adds ? held.vertices : 0), coded.triangles + (adds ? held.triangles : 0)};
+    if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);
     if (state.alone) kept += memory_of_reference(counts(state.alone->mesh));
     return kept;
 }
@@ -142,7 +152,7 @@ Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& pac
     const auto reference = refers ? counts(state.reference->mesh()) : MeshCounts{};
     if (auto ok = check_limits(rules.memory, coded, reference, kept_memory(state, rules, coded), state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
-    if (rules.refers_to == RefersTo::intra)
+    if (rules.refers_to == RefersTo::reference)
         if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
     return payload;
 }

@@ -17,10 +17,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(payload, external ? &*external : nullptr);
     if (!mesh) return tl::unexpected(mesh.error());
-    Pose shown;
-    for (const auto joint : pose->joints) shown.joints.push_back(to_millimetres(joint, header.lattice));
-    for (const auto& rotation : pose->orientations)
-        shown.orientations.push_back(to_rotation(rotation_matrix(rotation)));
+    auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {
         IntraAlone alone{packet.frame, topology, std::move(*mesh), std::move(shown)};

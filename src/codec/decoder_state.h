@@ -97,6 +97,7 @@ void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topolo
 Result<void> check_reference(const DecoderState& state, const Packet& packet);
 
 Rotation to_rotation(const RotationMatrix& matrix);
+Pose to_pose(const CodedPose& pose, const Lattice& lattice);
 Rotation product(const Rotation& a, const Rotation& b);
 
 // Stand-ins for a missing frame, shown as if decoded. False if there is nothing to derive one from.

@@ -22,7 +22,7 @@ PacketHeader told_header(const Packet& packet) {
         const auto& rules = rules_of(*type);
         out.flags |= rules.referred ? packet_flag::referred : packet_flag::droppable;
         // Of a T-frame the frames before would have to tell.
-        if (rules.refers_to != RefersTo::intra_or_before) out.flags |= packet_flag::access;
+        if (rules.refers_to != RefersTo::reference_or_before) out.flags |= packet_flag::access;
     }
     return out;
 }
@@ -43,7 +43,7 @@ void Dependencies::begin_sequence() {
 }
 
 void Dependencies::forget_reference() {
-    intra_.reset();
+    references_.clear();
     chain_.clear();
     codebooks_ = {};
     untold_codebooks_.clear();
@@ -58,7 +58,7 @@ void Dependencies::take_header(const PacketHeader& header, std::uint64_t place) 
 }
 
 void Dependencies::take_codebook(const PacketHeader& header, std::uint64_t place) {
-    if (!intra_ || intra_->number != header.reference) return;
+    if (references_.empty() || references_.back().number != header.reference) return;
     if (header.has(packet_flag::told)) {
         codebooks_.told[header.has(packet_flag::colour)] = place;
         return;
@@ -80,29 +80,30 @@ void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
         newest_ = {.place = place, .known = true};
         if (!referred) return;
         forget_reference();
-        intra_ = {header.frame, place};
+        references_.push_back({header.frame, place});
         return;
     }
     const bool of_frame_before =
-        rules.refers_to == RefersTo::intra_or_before && !chain_.empty() && chain_.back().number == header.reference;
-    if (!intra_ || (!of_frame_before && intra_->number != header.reference)) return;
+        rules.refers_to == RefersTo::reference_or_before && !chain_.empty() && chain_.back().number == header.reference;
+    if (references_.empty() || (!of_frame_before && references_.back().number != header.reference)) return;
     newest_ = {.place = place,
-               .intra = true,
+               .references = references_.size(),
                .codebooks = rules.codebooks ? codebooks_ : Codebooks{},
                .chained = of_frame_before ? chain_.size() : 0,
                .known = true};
     if (!referred) return;
     if (!of_frame_before) chain_.clear();
-    // The newest frame itself is the chain's last now; what it needs is what comes before it there.
-    chain_.push_back({header.frame, place});
-    if (chain_.size() <= most_) return;
+    // The newest frame itself is the last of these now; what it needs is what comes before it there.
+    (rules.renews ? references_ : chain_).push_back({header.frame, place});
+    if (references_.size() + chain_.size() <= most_) return;
     forget_reference();
     newest_ = {};
 }
 
-std::vector<std::uint64_t> Dependencies::places(bool intra, const Codebooks& codebooks, std::size_t chained) const {
+std::vector<std::uint64_t> Dependencies::places(std::size_t references, const Codebooks& codebooks,
+                                                std::size_t chained) const {
     std::vector<std::uint64_t> out;
-    if (intra) out.push_back(intra_->place);
+    for (std::size_t i = 0; i < references; ++i) out.push_back(references_[i].place);
     for (const auto& place : codebooks.told)
         if (place) out.push_back(*place);
     for (std::size_t i = 0; i < codebooks.untold; ++i) out.push_back(untold_codebooks_[i]);
@@ -114,12 +115,12 @@ std::vector<std::uint64_t> Dependencies::places(bool intra, const Codebooks& cod
 
 std::vector<std::uint64_t> Dependencies::closure() const {
     if (!newest_.known) return {};
-    auto out = places(newest_.intra, newest_.codebooks, newest_.chained);
+    auto out = places(newest_.references, newest_.codebooks, newest_.chained);
     out.push_back(newest_.place);
     return out;
 }
 
-std::vector<std::uint64_t> Dependencies::kept() const { return places(intra_.has_value(), codebooks_, chain_.size()); }
+std::vector<std::uint64_t> Dependencies::kept() const { return places(references_.size(), codebooks_, chain_.size()); }
 
 std::vector<std::size_t> closure(std::span<const PacketHeader> packets, std::size_t frame) {
     if (frame >= packets.size() || !frame_type(packets[frame].kind)) return {};

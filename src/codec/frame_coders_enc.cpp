@@ -52,18 +52,9 @@ FrameSteps tracked_steps(const FrameSteps& steps) {
 }
 
 LatticeMesh simplified(FrameWork& work, const FrameSteps& steps) {
-    constexpr double longest_edge = 40, reach = 30;  // mm on an adult
-    constexpr double colour_steps = 2.5;
     const auto& surface = work.surface();
     StageClock clock(work.stages);
-    const auto& configuration = work.configuration;
-    SimplifiedReferenceOptions options;
-    options.surface_error = configuration.options.tracked.simplify * steps.geometry;
-    options.colour_error = colour_steps * steps.colour;
-    options.longest_edge = longest_edge * configuration.adult_millimetre;
-    options.reach = reach * configuration.adult_millimetre;
-    options.threads = configuration.threads;
-    auto out = simplified_reference(work.mesh, surface, options);
+    auto out = simplified_reference(work.mesh, surface, simplification_options(work.configuration, steps));
     clock.done("simplification");
     return out;
 }
@@ -210,12 +201,12 @@ Result<Candidate> code_enhanced(FrameWork& work, const FrameSteps& steps) {
     return out;
 }
 
-Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts) {
+// before: state of the frame that it refers to; null if that is the reference.
+Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts,
+                                           const TrackedState* before) {
     // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
     constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
     const auto& configuration = work.configuration;
-    const auto& reference = work.reference().decoded;
-    const auto& nodes = work.sequence.nodes;
     TrackedFrameOptions options;
     options.geometry_step = tracked_steps(steps).geometry;
     options.colour_step = coarser_colours * steps.colour;
@@ -223,14 +214,21 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     options.reach = reach * configuration.adult_millimetre;
     options.motion_alone = parts == TrackedParts::motion_alone;
     options.threads = configuration.threads;
-    const bool from_last = nodes.frame && configuration.options.tracked.references == TrackedReferences::previous;
-    auto encoded = encode_tracked_frame(work.mesh, work.surface(), *reference.tracked, work.node_motion(),
-                                        from_last ? &nodes.state : nullptr, options, work.stages);
+    return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.node_motion(), before,
+                                options, work.stages);
+}
+
+Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts) {
+    const auto references = work.configuration.options.tracked.references;
+    const auto& reference = work.reference().decoded;
+    const auto& nodes = work.sequence.nodes;
+    const bool from_last = nodes.frame && references == TrackedReferences::previous;
+    auto encoded = encode_tracked(work, steps, parts, from_last ? &nodes.state : nullptr);
     if (!encoded) return tl::unexpected(encoded.error());
     Candidate out;
     out.type = FrameType::tracked;
     out.reference = from_last ? *nodes.frame : reference.number;
-    out.referred = configuration.options.tracked.references == TrackedReferences::previous;
+    out.referred = references == TrackedReferences::previous;
     out.access = !from_last;
     out.packets.push_back(frame_packet(PacketKind::tracked, std::move(encoded->runs.payload)));
     out.decoded = std::move(encoded->mesh);
@@ -247,14 +245,28 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
 
 // By FrameType.
 using FrameCoder = Result<Candidate> (*)(FrameWork& work, const FrameSteps& steps);
-constexpr std::array<FrameCoder, frame_type_count> frame_coders = {
+constexpr std::array<FrameCoder, frame_type_count - 1> frame_coders = {
     [](FrameWork& work, const FrameSteps& steps) { return code_intra(work, steps, IntraUse::reference); },
     code_enhanced,
     [](FrameWork& work, const FrameSteps&) { return code_predicted(work); },
     [](FrameWork& work, const FrameSteps& steps) { return code_tracked(work, steps, TrackedParts::all); },
 };
+// A TP-frame is coded by code_patched(), which needs a patch.
+static_assert(frame_coders.size() == static_cast<std::size_t>(FrameType::patched));
 
 }  // namespace
+
+SimplifiedReferenceOptions simplification_options(const Configuration& configuration, const FrameSteps& steps) {
+    constexpr double longest_edge = 40, reach = 30;  // mm on an adult
+    constexpr double colour_steps = 2.5;
+    SimplifiedReferenceOptions out;
+    out.surface_error = configuration.options.tracked.simplify * steps.geometry;
+    out.colour_error = colour_steps * steps.colour;
+    out.longest_edge = longest_edge * configuration.adult_millimetre;
+    out.reach = reach * configuration.adult_millimetre;
+    out.threads = configuration.threads;
+    return out;
+}
 
 Result<Candidate> code_frame(FrameType type, FrameWork& work, const FrameSteps& steps) {
     return frame_coders[static_cast<std::size_t>(type)](work, steps);
@@ -275,6 +287,46 @@ Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, con
     }
     if (everything || !something) return code_enhanced(work, steps);
     return code_moving_part(work, steps, coded);
+}
+
+Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const SurfacePatch& patch) {
+    const auto& in_use = work.reference();
+    // Not against the frame before: whoever joins later needs the references alone.
+    const auto tracked = encode_tracked(work, steps, TrackedParts::all, nullptr);
+    if (!tracked) return tl::unexpected(tracked.error());
+    StageClock clock(work.stages);
+    const auto coded_steps = tracked_steps(steps);
+    FramePayload payload;
+    const auto& mesh = tracked->mesh;
+    auto patched = encode_patch({mesh.positions, mesh.triangles, mesh.colours}, in_use.decoded.tracked->hierarchy, patch,
+                                {coded_steps.geometry, coded_steps.colour}, payload);
+    if (!patched) return tl::unexpected(patched.error());
+    const auto captured = counts_of(work.mesh);
+    payload.header.source_vertices = captured.vertices;
+    payload.header.source_triangles = captured.triangles;
+    payload.set(Layer::tracked, tracked->payload);
+    payload.set(Layer::pose, encode_pose(work.pose));
+    Candidate out;
+    out.type = FrameType::patched;
+    out.reference = in_use.decoded.number;
+    out.referred = true;
+    out.decoded = std::move(patched->mesh);
+    if (!mesh.normals.empty())
+        out.decoded.normals = quantised_normals(vertex_normals(out.decoded.positions, out.decoded.triangles));
+    out.settled = patched->kept;
+    out.captured = captured;
+    out.pose = work.pose;
+    out.packets.push_back(frame_packet(PacketKind::patched, payload));
+    auto& facts = out.intra.emplace(in_use.intra);
+    facts.step = coded_steps.geometry;
+    facts.steps = steps;
+    facts.edge = work.edge();
+    clock.done("patch coding");
+    // What the patches leave must not become the measure of what may be left.
+    facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
+    facts.fit.stray_share = std::min(facts.fit.stray_share, in_use.intra.fit.stray_share);
+    facts.fit.worst_region = std::min(facts.fit.worst_region, in_use.intra.fit.worst_region);
+    return out;
 }
 
 Result<Candidate> code_motion_alone(FrameWork& work, const FrameSteps& steps) {

@@ -4,13 +4,17 @@
 #include <vector>
 
 #include "codec/frame_work_enc.h"
+#include "codec/tracked/surface_patch.h"
 
 namespace htvm::internal {
 
 // A whole frame of this kind, to which later frames may refer as far as the kind allows: the coder column of the table
-// of frame kinds (frame_kinds.h). All but the I-frame need a reference that has a vertex and the same attributes as the
+// of frame kinds (frame_kinds.h), but for TP-frames. All but the I-frame need a reference that has a vertex and the same attributes as the
 // frame.
 Result<Candidate> code_frame(FrameType type, FrameWork& work, const FrameSteps& steps);
+
+// How far an I-frame that T-frames refer to, or a patch, may be simplified.
+SimplifiedReferenceOptions simplification_options(const Configuration& configuration, const FrameSteps& steps);
 
 // Variants that the choice of frames tries.
 // An I-frame that nothing refers to: it is quantised exactly with the steps asked for.
@@ -18,6 +22,8 @@ Result<Candidate> code_lone_intra(FrameWork& work, const FrameSteps& steps);
 // Motion-based coding: an EP-frame in which some bones are coded and the seams zippered, a P-frame if none is coded, a
 // whole EP-frame if nothing would be left to animate. coded: one per bone.
 Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded);
+// A T-frame of the reference alone, with a patch: see surface_patch.h.
+Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const SurfacePatch& patch);
 // A T-frame that has the motion of the nodes, but neither displacement nor colours.
 Result<Candidate> code_motion_alone(FrameWork& work, const FrameSteps& steps);
 

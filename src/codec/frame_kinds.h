@@ -20,8 +20,8 @@ struct DecoderState;
 // What must have been decoded before a frame can be, besides the sequence header.
 enum class RefersTo : std::uint8_t {
     nothing,
-    intra,            // the current I-frame
-    intra_or_before,  // the current I-frame, or the last frame of the same kind since then
+    reference,            // the current reference: an I-frame, or a frame that patched it
+    reference_or_before,  // the current reference, or the last frame of the same kind since then
 };
 
 // Kinds whose sizes rate control models together.
@@ -44,15 +44,16 @@ struct FrameRules {
     PacketKind packet;
     LayerSet layers;  // the layers that it may have; others are ignored
     RefersTo refers_to;
-    bool codebooks;      // whether it names codebooks, which come in packets of their own
-    bool referred;       // whether later frames may refer to it, unless its packet tells otherwise
-    bool codes_mesh;     // true: it codes as many vertices and triangles as its header says, so its payload has at
-                         // least least_payload() bytes; false: it has the counts of its reference, and its header must
-                         // say so
-    MemoryBound memory;  // for decoding it
+    bool codebooks;       // whether it names codebooks, which come in packets of their own
+    bool referred;        // whether later frames may refer to it, unless its packet tells otherwise
+    bool renews = false;  // whether it then is the reference of what follows
+    bool codes_mesh;      // true: it codes as many vertices and triangles as its header says, so its payload has at
+                          // least least_payload() bytes; false: it has the counts of its reference, and its header
+                          // must say so
+    MemoryBound memory;   // for decoding it
     RateClass rate;
     // Decodes and shows the frame. Called once the payload's header is known to be within all limits; if the frame
-    // refers to the I-frame alone, that is known to exist. After an error the state is unchanged, except for what helps
+    // refers to the reference alone, that is known to exist. After an error the state is unchanged, except for what helps
     // to conceal the frame.
     Result<void> (*decode)(DecoderState&, const Packet&, const FramePayloadView&);
 };
@@ -74,5 +75,6 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
 Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
 Result<void> decode_predicted(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
 Result<void> decode_tracked(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
+Result<void> decode_patched(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
 
 }  // namespace htvm::internal

@@ -60,13 +60,16 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         out.nodes = sent.nodes ? std::move(*sent.nodes) : before.nodes;
         return out;
     }
-    auto decoded = make_reference(configuration.header, {before.next_frame, sent.intra->step, sent.captured},
-                                  sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
+    const bool patched = sent.type == FrameType::patched;
+    auto decoded = make_reference(configuration.header,
+                                  {before.next_frame, sent.intra->step, sent.settled, sent.captured}, sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto in_use = std::make_shared<ReferenceInUse>();
     in_use->decoded = std::move(*decoded);
     in_use->intra = std::move(*sent.intra);
-    in_use->bytes = static_cast<double>(sent.bytes());
+    in_use->intra_frame = patched ? before.reference->intra_frame : before.next_frame;
+    in_use->bytes = patched ? before.reference->bytes : static_cast<double>(sent.bytes());
+    if (patched) out.nodes.best_fit = before.nodes.best_fit;
     if (in_use->decoded.tracked)
         in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
     else if (in_use->decoded.has_bones)

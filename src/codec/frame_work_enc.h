@@ -54,10 +54,11 @@ struct IntraFacts {
 // The current reference, and what the encoder derives from it.
 struct ReferenceInUse {
     Reference decoded;
-    IntraFacts intra;
-    double bytes = 0;           // size of the I-frame
-    ReferenceSearch search;     // over the bones' sub-meshes, if frames refer to bones
-    DeformableMesh deformable;  // if frames refer to nodes
+    IntraFacts intra;               // of the I-frame, patched since or not
+    std::uint32_t intra_frame = 0;  // number of the I-frame; patched since, the reference has another
+    double bytes = 0;               // size of the I-frame
+    ReferenceSearch search;         // over the bones' sub-meshes, if frames refer to bones
+    DeformableMesh deformable;      // if frames refer to nodes
 };
 
 // What the EP- and P-frames since the I-frame leave for the next one.
@@ -88,19 +89,20 @@ struct Candidate {
     FrameType type = FrameType::intra;
     std::vector<Packet> packets;  // new codebooks first, the frame last; numbered when sent
     std::uint32_t reference = 0;  // number of the frame that it refers to; of an I-frame, its own
-    bool referred = false;        // whether later frames may refer to it; an I-frame then becomes the reference
-    bool access = true;           // whether it is an I-frame or refers to one
+    bool referred = false;        // whether later frames may refer to it; an I- or TP-frame then becomes the reference
+    bool access = true;           // whether it is an I-frame or refers to a reference
     LatticeMesh decoded;          // the mesh that the decoder will have
     CapturedCounts captured;      // of the mesh that it was made of
+    std::uint32_t settled = 0;    // TP: how many vertices it takes over from its reference
     LayerBytes shares;            // T: its layers' of its bytes, which its packet does not tell
     double quality = 50;          // the quality setting used, under rate or error control
     bool stands_in = false;       // a P- or T-frame of motion alone, because nothing better fits the buffer
     // What it leaves for the sequence; one of the first three is set.
-    std::optional<IntraFacts> intra;                   // I; used only if it is referred to
+    std::optional<IntraFacts> intra;                   // I, TP; used only if it is referred to
     std::optional<BoneHistory> bones;                  // P, EP
     std::optional<NodeHistory> nodes;                  // T
     std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
-    CodedPose pose;                                    // I
+    CodedPose pose;                                    // I, TP
     std::vector<std::uint32_t> distance_order_counts;  // EP
     std::size_t bytes() const;
 };
@@ -137,7 +139,7 @@ public:
 
     // The current reference; there must be one.
     const ReferenceInUse& reference() const { return *sequence.reference; }
-    std::int64_t frames_since_intra() const { return std::int64_t{sequence.next_frame} - reference().decoded.number; }
+    std::int64_t frames_since_intra() const { return std::int64_t{sequence.next_frame} - reference().intra_frame; }
     // Whether the capture has what later frames need to refer to it: triangles in the tracked profile, else vertices. A
     // frame without them is an I-frame that nothing refers to, and leaves the reference as it was.
     bool carries_surface() const;

@@ -76,10 +76,10 @@ TEST(FrameKinds, ReferToFramesOfWhichTheirRowsSpeak) {
                     EXPECT_EQ(packet.reference, packet.frame) << stream;
                     if (is_referred(packet, rules_of(*type))) intra = packet.frame;
                     break;
-                case RefersTo::intra:
+                case RefersTo::reference:
                     EXPECT_EQ(packet.reference, intra) << stream;
                     break;
-                case RefersTo::intra_or_before:
+                case RefersTo::reference_or_before:
                     EXPECT_TRUE(packet.reference == intra || packet.reference == before) << stream;
                     break;
             }

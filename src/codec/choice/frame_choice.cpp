@@ -12,6 +12,7 @@
 #include "codec/frame_coders_enc.h"
 #include "codec/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
+#include "codec/tracked/surface_patch_enc.h"
 
 namespace htvm::internal {
 namespace {
@@ -260,17 +261,54 @@ bool relaid_texture(FrameWork& work, const LatticeMesh& tracked) {
     return others > most_others;
 }
 
-// A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the I-frame's mesh can no
-// longer follow, so an I-frame is sent. An I-frame is also sent once a T-frame takes more bits than the last I-frame
-// did, if the shortest key interval has passed.
+SurfacePatchOptions patch_options(const FrameWork& work, const FrameSteps& steps) {
+    const auto& configuration = work.configuration;
+    const double millimetre = configuration.adult_millimetre;
+    SurfacePatchOptions out;
+    out.lost = std::max(6 * millimetre, 0.5 * work.reference().intra.edge);
+    out.reach = 30 * millimetre;
+    out.speck = 20 * millimetre;
+    out.most_share = configuration.options.tracked.patch_share;
+    out.simplification = simplification_options(configuration, steps);
+    out.threads = configuration.threads;
+    return out;
+}
+
+// The T-frame with the lost regions replaced; nothing if that is not possible, does not help, or costs about as much as
+// an I-frame.
+Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
+    using Patched = std::optional<Candidate>;
+    constexpr double most_bytes = 0.8;  // of the I-frame's
+    if (work.configuration.options.tracked.patch_share <= 0 || !tracked.texcoords.empty()) return Patched();
+    StageClock clock(work.stages);
+    const auto found = find_surface_patch(tracked, work.reference().decoded.tracked->mesh.positions, work.mesh,
+                                          work.surface(), patch_options(work, steps));
+    clock.done("patch");
+    if (!found) return Patched();
+    auto out = code_patched(work, steps, *found);
+    if (!out) return tl::unexpected(out.error());
+    if (static_cast<double>(out->bytes()) > most_bytes * work.reference().bytes ||
+        lost_track(work, work.tracked_fit(out->decoded, work.reference().intra.edge, {})))
+        return Patched();
+    return Patched(std::move(*out));
+}
+
+// A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
+// no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
+// more bits than the last I-frame did, if the shortest key interval has passed.
 Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps) {
     auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
     const auto fit = work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
     const bool expensive = may_be_intra(work) && static_cast<double>(tracked->bytes()) > reference.bytes;
-    if (expensive || lost_track(work, fit) || relaid_texture(work, tracked->decoded))
-        return code_frame(FrameType::intra, work, steps);
+    const bool anew = expensive || relaid_texture(work, tracked->decoded);
+    if (!anew && lost_track(work, fit)) {
+        auto patched = patch(work, steps, tracked->decoded);
+        if (!patched) return tl::unexpected(patched.error());
+        if (*patched) return std::move(**patched);
+    }
+    if (anew || lost_track(work, fit)) return code_frame(FrameType::intra, work, steps);
     auto& best = tracked->nodes->best_fit;
     if (best == 0 || fit.rms < best) best = fit.rms;
     return tracked;
@@ -400,10 +438,11 @@ Result<Candidate> code_to_error(FrameWork& work, ErrorController& control, bool 
 
 }  // namespace
 
-// A frame without a surface says nothing of what others take.
+// A frame without a surface says nothing of what others take, nor does one with a patch of whatever size.
 FrameType rate_type(const Candidate& candidate) {
     const bool bare = stands_alone(candidate.type) && candidate.decoded.triangles.empty();
-    return candidate.stands_in || bare ? FrameType::predicted : candidate.type;
+    const bool patched = candidate.type == FrameType::patched;
+    return candidate.stands_in || bare || patched ? FrameType::predicted : candidate.type;
 }
 
 Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra) {

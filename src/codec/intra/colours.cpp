@@ -156,29 +156,48 @@ std::uint8_t decoded_weight_for(std::int32_t step) {
     return step <= 6 ? 14 : 13;
 }
 
+// Enters a colour that both sides know, if it is one.
+bool take_known(std::span<const std::uint8_t> known, std::span<const Colour> colours, std::uint32_t vertex,
+                ColourHistory& history) {
+    if (known.empty() || known[vertex] == 0) return false;
+    for (std::size_t k = 0; k < 3; ++k)
+        history.level[vertex][k] = static_cast<std::int16_t>(16 * colours[vertex][colour_order[k]]);
+    return true;
+}
+
+// What an encoder is given.
+struct ColourSource {
+    std::span<const LatticePoint> positions;
+    const Neighbours& neighbours;
+    std::int32_t step;
+    std::span<const std::uint8_t> known;
+};
+
 // Codes the first `end` vertices of the coding order and sets their colours to the decoded ones.
 template <class Writer>
-void write_colours(std::vector<Colour>& colours, std::span<const LatticePoint> positions, const Neighbours& neighbours,
-                   std::int32_t step, const ColourPredictor& predictor, std::size_t end, Writer& writer) {
+void write_colours(std::vector<Colour>& colours, const ColourSource& source, const ColourPredictor& predictor,
+                   std::size_t end, Writer& writer) {
+    const auto& neighbours = source.neighbours;
     ColourHistory history(neighbours.vertex_count());
-    const auto contexts = std::make_unique<ColourContexts>(step);
+    const auto contexts = std::make_unique<ColourContexts>(source.step);
     WritingCoder<Writer> coder{writer};
     for (std::size_t rank = 0; rank < end; ++rank)
-        code_colour(coder, std::span(colours), positions, neighbours, rank, predictor, step, history, *contexts);
+        if (!take_known(source.known, colours, neighbours.order[rank], history))
+            code_colour(coder, std::span(colours), source.positions, neighbours, rank, predictor, source.step, history,
+                        *contexts);
 }
 
 // Of a few predictors, the one that codes the first vertices in the fewest bits.
-ColourPredictor choose_predictor(std::span<const Colour> colours, std::span<const LatticePoint> positions,
-                                 const Neighbours& neighbours, std::int32_t step) {
+ColourPredictor choose_predictor(std::span<const Colour> colours, const ColourSource& source) {
     constexpr std::size_t trial_size = 6144;
     constexpr std::array<std::array<std::int8_t, 3>, 3> shares{{{64, 64, 0}, {58, 29, 29}, {52, 32, 18}}};
     ColourPredictor best;
     double fewest_bits = 0;
     for (std::size_t i = 0; i < shares.size(); ++i) {
-        const ColourPredictor predictor{shares[i][0], shares[i][1], shares[i][2], decoded_weight_for(step)};
+        const ColourPredictor predictor{shares[i][0], shares[i][1], shares[i][2], decoded_weight_for(source.step)};
         std::vector<Colour> trial(colours.begin(), colours.end());
         CostCounter counter;
-        write_colours(trial, positions, neighbours, step, predictor, std::min(trial_size, trial.size()), counter);
+        write_colours(trial, source, predictor, std::min(trial_size, trial.size()), counter);
         if (i > 0 && counter.bits() >= fewest_bits) continue;
         best = predictor;
         fewest_bits = counter.bits();
@@ -189,13 +208,15 @@ ColourPredictor choose_predictor(std::span<const Colour> colours, std::span<cons
 }  // namespace
 
 EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<const LatticePoint> positions,
-                                    const Neighbours& neighbours, std::int32_t step) {
+                                    const Neighbours& neighbours, std::int32_t step,
+                                    std::span<const std::uint8_t> known) {
     if (colours.empty()) return {};
-    const ColourPredictor predictor = choose_predictor(colours, positions, neighbours, step);
+    const ColourSource source{positions, neighbours, step, known};
+    const ColourPredictor predictor = choose_predictor(colours, source);
     EncodedColours out;
     out.decoded.assign(colours.begin(), colours.end());
     RangeEncoder encoder;
-    write_colours(out.decoded, positions, neighbours, step, predictor, colours.size(), encoder);
+    write_colours(out.decoded, source, predictor, colours.size(), encoder);
     const auto coded = encoder.finish();
     out.bytes.reserve(coded.size() + 4);
     for (const std::int8_t share : {predictor.red_from_green, predictor.blue_from_green, predictor.blue_from_red})
@@ -207,7 +228,7 @@ EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<c
 
 Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> bytes,
                                                  std::span<const LatticePoint> positions, const Neighbours& neighbours,
-                                                 std::int32_t step) {
+                                                 std::int32_t step, const Known<Colour>& known) {
     const std::size_t vertex_count = neighbours.vertex_count();
     if (step < 1 || step > 255)
         return fail(ErrorKind::corrupt_stream, "intra colours: the colour step is not within 1..255");
@@ -228,6 +249,11 @@ Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> b
     const auto contexts = std::make_unique<ColourContexts>(step);
     ReadingCoder<RangeDecoder> coder{decoder};
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
+        const auto v = neighbours.order[rank];
+        if (take_known(known.is, known.value, v, history)) {
+            colours[v] = known.value[v];
+            continue;
+        }
         code_colour(coder, std::span(colours), positions, neighbours, rank, predictor, step, history, *contexts);
         if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "intra colours: the layer ends too early");
     }

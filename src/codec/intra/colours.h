@@ -25,14 +25,15 @@ struct EncodedColours {
 
 // colours, positions: one per vertex of `neighbours`; positions as decoded, in any unit, on_lattice(). step: 1..255, in
 // levels; every component decodes to within step / 2 (rounded down) of the original, so 1 is exact. Without vertices
-// there are no bytes.
+// there are no bytes. known: as in Known, as `neighbours` was made with.
 EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<const LatticePoint> positions,
-                                    const Neighbours& neighbours, std::int32_t step);
+                                    const Neighbours& neighbours, std::int32_t step,
+                                    std::span<const std::uint8_t> known = {});
 
 // Errors: corrupt_stream if the bytes end too early or begin with an invalid weight, if step is not 1..255, or if there
 // is not one position per vertex.
 Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> bytes,
                                                  std::span<const LatticePoint> positions, const Neighbours& neighbours,
-                                                 std::int32_t step);
+                                                 std::int32_t step, const Known<Colour>& known = {});
 
 }  // namespace htvm::internal

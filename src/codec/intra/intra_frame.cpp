@@ -13,15 +13,10 @@
 namespace htvm::internal {
 namespace {
 
-// The lattice point of a grid point.
-LatticePoint from_grid(LatticePoint q, std::int32_t step) { return {q.x * step, q.y * step, q.z * step}; }
-
 // Positions in grid steps; colours as captured.
 LatticeMesh on_grid(const LatticeMesh& mesh, std::int32_t step) {
     LatticeMesh out = mesh;
-    for (auto& p : out.positions)
-        p = {static_cast<std::int32_t>(divide_rounded(p.x, step)), static_cast<std::int32_t>(divide_rounded(p.y, step)),
-             static_cast<std::int32_t>(divide_rounded(p.z, step))};
+    for (auto& p : out.positions) p = to_grid(p, step);
     return out;
 }
 

@@ -8,6 +8,13 @@
 
 namespace htvm::internal {
 
+// Positions in whole steps, and back: coded positions lie on this grid of lattice points.
+inline LatticePoint to_grid(LatticePoint p, std::int32_t step) {
+    return {static_cast<std::int32_t>(divide_rounded(p.x, step)), static_cast<std::int32_t>(divide_rounded(p.y, step)),
+            static_cast<std::int32_t>(divide_rounded(p.z, step))};
+}
+inline LatticePoint from_grid(LatticePoint q, std::int32_t step) { return {q.x * step, q.y * step, q.z * step}; }
+
 struct IntraFrameOptions {
     std::int32_t geometry_step = 32;  // lattice units, >= 1
     std::int32_t colour_step = 6;     // levels, 1..255

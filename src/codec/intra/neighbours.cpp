@@ -163,7 +163,8 @@ void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint3
 
 }  // namespace
 
-Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count) {
+Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count,
+                                   std::span<const std::uint8_t> known) {
     if (vertex_count > size_limit || triangles.size() > size_limit)
         return fail(ErrorKind::limit, "intra attributes: more than 2^28 vertices or triangles; split the mesh");
     for (const Triangle& t : triangles)
@@ -178,13 +179,15 @@ Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::siz
     out.order.reserve(vertex_count);
     out.first_parallelogram.reserve(vertex_count + 1);
     out.first_neighbour.reserve(vertex_count + 1);
-    for (std::size_t rank = 0; rank < vertex_count; ++rank) {
+    const auto take = [&](std::uint32_t v) {
         out.first_parallelogram.push_back(static_cast<std::uint32_t>(out.parallelograms.size()));
         out.first_neighbour.push_back(static_cast<std::uint32_t>(out.neighbours.size()));
-        const std::uint32_t v = state.pop();
         out.order.push_back(v);
         visit(corners, state, out, v);
-    }
+    };
+    for (std::uint32_t v = 0; v < known.size(); ++v)
+        if (known[v] != 0) take(v);
+    while (out.order.size() < vertex_count) take(state.pop());
     out.first_parallelogram.push_back(static_cast<std::uint32_t>(out.parallelograms.size()));
     out.first_neighbour.push_back(static_cast<std::uint32_t>(out.neighbours.size()));
     return out;

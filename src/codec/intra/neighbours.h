@@ -44,10 +44,20 @@ struct Neighbours {
 
 inline constexpr std::size_t row_limit = 8;  // most parallelograms, and most neighbours, per vertex
 
+// Vertices whose values both sides have before anything is decoded, such as those on the border of a patch: nothing is
+// coded for them, and others are predicted from them. Both arrays have one entry per vertex, or none if nothing is
+// known.
+template <class Value>
+struct Known {
+    std::span<const std::uint8_t> is;  // 1 if it is known
+    std::span<const Value> value;      // only read where it is
+};
+
 // The coding order and the candidates of each vertex. Accepts any triangles (non-manifold, duplicate, open, none).
 // Degenerate triangles are skipped; of the triangles at an edge, the first is paired with the second, the third with
 // the fourth, and so on. Time and memory are linear in vertices plus triangles. Errors: bad_input if a triangle names a
-// vertex >= vertex_count; limit above 2^28 vertices or triangles.
-Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count);
+// vertex >= vertex_count; limit above 2^28 vertices or triangles. known: as in Known; these vertices come first.
+Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count,
+                                   std::span<const std::uint8_t> known = {});
 
 }  // namespace htvm::internal

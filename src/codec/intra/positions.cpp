@@ -238,6 +238,8 @@ bool code_position(Coder& coder, std::span<LatticePoint> points, const Neighbour
     return true;
 }
 
+bool is_known(std::span<const std::uint8_t> known, std::uint32_t vertex) { return !known.empty() && known[vertex] != 0; }
+
 // The encoder's choice of weights. It may use doubles, because the weights are sent.
 using Matrix = std::array<std::array<double, weight_count + 1>, weight_count>;  // normal equations, the right-hand side
                                                                                 // in the last column
@@ -264,13 +266,14 @@ std::array<double, weight_count> solve(Matrix m) {
 // Least squares over the frame. Each vertex is weighted by the inverse square of the size of its surroundings and of
 // the error that the usual weights leave, so that neither large triangles nor outliers dominate. The result is drawn
 // towards the usual weights, those of most captures, which decide if there are few vertices.
-PositionWeights fit_weights(std::span<const LatticePoint> q, const Neighbours& neighbours) {
+PositionWeights fit_weights(std::span<const LatticePoint> q, const Neighbours& neighbours,
+                            std::span<const std::uint8_t> known) {
     constexpr std::array<std::array<double, weight_count>, 2> usual{{{0.5, 0.0, -0.4}, {0.46, 0.21, -0.2}}};
     std::array<Matrix, 2> equations{};
     PositionHistory history(q.size());
     for (std::size_t rank = 0; rank < q.size(); ++rank) {
         const PositionFeatures f = position_features(q, neighbours, rank, history);
-        if (f.parallelograms == 0) continue;
+        if (f.parallelograms == 0 || is_known(known, neighbours.order[rank])) continue;
         const LatticePoint p = q[neighbours.order[rank]];
         const std::array<double, 3> actual{16.0 * p.x, 16.0 * p.y, 16.0 * p.z};
         std::array<std::array<double, weight_count>, 3> feature{};
@@ -309,9 +312,10 @@ PositionWeights fit_weights(std::span<const LatticePoint> q, const Neighbours& n
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours) {
+std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours,
+                                                 std::span<const std::uint8_t> known) {
     if (q.empty()) return {};
-    const PositionWeights weights = fit_weights(q, neighbours);
+    const PositionWeights weights = fit_weights(q, neighbours, known);
     ByteWriter writer;
     for (const auto& set : weights)
         for (const std::int8_t weight : set) writer.u8(static_cast<std::uint8_t>(weight));
@@ -322,6 +326,7 @@ std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q
     std::vector<LatticePoint> points(q.begin(), q.end());
     for (std::size_t rank = 0; rank < q.size(); ++rank) {
         const PositionFeatures features = position_features(points, neighbours, rank, history);
+        if (is_known(known, neighbours.order[rank])) continue;
         code_position(coder, std::span(points), neighbours, rank, features, weights, history, *contexts);
     }
     writer.bytes(encoder.finish());
@@ -329,7 +334,8 @@ std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q
 }
 
 Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::uint8_t> bytes,
-                                                         const Neighbours& neighbours) {
+                                                         const Neighbours& neighbours,
+                                                         const Known<LatticePoint>& known) {
     const std::size_t vertex_count = neighbours.vertex_count();
     std::vector<LatticePoint> points(vertex_count);
     if (vertex_count == 0) return points;
@@ -344,6 +350,10 @@ Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::ui
     ReadingCoder<RangeDecoder> coder{decoder};
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
         const PositionFeatures features = position_features(points, neighbours, rank, history);
+        if (const auto v = neighbours.order[rank]; is_known(known.is, v)) {
+            points[v] = known.value[v];
+            continue;
+        }
         if (!code_position(coder, std::span(points), neighbours, rank, features, weights, history, *contexts))
             return fail(ErrorKind::corrupt_stream, "intra positions: a decoded vertex lies off the lattice");
         if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "intra positions: the layer ends too early");

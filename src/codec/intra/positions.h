@@ -19,11 +19,13 @@
 namespace htvm::internal {
 
 // q: one point per vertex, q.size() == neighbours.vertex_count(), every point on_lattice(). Without vertices there are
-// no bytes.
-std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours);
+// no bytes. known: as in Known, as `neighbours` was made with.
+std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours,
+                                                 std::span<const std::uint8_t> known = {});
 
 // The points that were encoded. Errors: corrupt_stream if the bytes end too early or lead off the lattice.
 Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::uint8_t> bytes,
-                                                         const Neighbours& neighbours);
+                                                         const Neighbours& neighbours,
+                                                         const Known<LatticePoint>& known = {});
 
 }  // namespace htvm::internal

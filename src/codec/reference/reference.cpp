@@ -12,7 +12,7 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
 
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
-    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads);
+    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step, reference.settled}, threads);
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     reference.tracked->captured = reference.captured;
@@ -24,6 +24,7 @@ Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFa
     Reference out;
     out.number = facts.number;
     out.step = facts.step;
+    out.settled = facts.settled;
     out.captured = facts.captured;
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);

@@ -18,7 +18,7 @@ namespace htvm::internal {
 
 // Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version on are
 // read.
-inline constexpr std::uint16_t stream_version = 3;
+inline constexpr std::uint16_t stream_version = 4;
 inline constexpr std::uint16_t oldest_version = 1;
 
 // From this version on a sequence header has a session. The headers of all versions since have the same syntax.

@@ -335,10 +335,6 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
             std::max(forth.worst_region, back.worst_region), std::move(squared)};
 }
 
-namespace {
-
-// Merges all vertices at the same place into one, with the colour of the first. Otherwise the two sides of a seam, as
-// of a texture chart, would be simplified separately, and gaps would open.
 LatticeMesh welded(const LatticeMesh& captured) {
     LatticeMesh places;
     places.positions = captured.positions;
@@ -347,6 +343,8 @@ LatticeMesh welded(const LatticeMesh& captured) {
     out.triangles = merged_triangles(captured.triangles, merging, false);
     return out;
 }
+
+namespace {
 
 LatticeMesh with_fewer_vertices(const LatticeMesh& captured, const SimplifiedReferenceOptions& options) {
     std::vector<Eigen::Vector3d> points;
@@ -379,11 +377,17 @@ void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const Surfac
 
 }  // namespace
 
+LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captured, const SurfaceIndex& surface,
+                             const SimplifiedReferenceOptions& options) {
+    auto out = with_fewer_vertices(piece, options);
+    fit_to_surface(out, captured, surface, options);
+    return out;
+}
+
 LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options) {
     if (captured.triangles.empty() || !captured.texcoords.empty()) return captured;
-    auto out = with_fewer_vertices(welded(captured), options);
-    fit_to_surface(out, captured, surface, options);
+    auto out = simplified_piece(welded(captured), captured, surface, options);
     if (!captured.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, out.triangles));
     return out;
 }

@@ -69,5 +69,12 @@ struct SimplifiedReferenceOptions {
 // coordinates, or without triangles, is returned unchanged. surface: index of `captured`.
 LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options);
+// The same for a piece cut from the captured surface; without normals.
+LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captured, const SurfaceIndex& surface,
+                             const SimplifiedReferenceOptions& options);
+
+// Merges all vertices at the same place into one, with the colour of the first: else the two sides of a seam, as of a
+// texture chart, would be simplified, or cut, separately, and gaps would open. Triangles keep their order.
+LatticeMesh welded(const LatticeMesh& captured);
 
 }  // namespace htvm::internal

@@ -26,7 +26,7 @@ NodeGraph graph_of(const DeformationNodes& nodes, const LatticeMesh& mesh) {
 }  // namespace
 
 std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> positions,
-                                                std::span<const Triangle> triangles, std::int32_t quantiser_step) {
+                                                std::span<const Triangle> triangles, const QuantiserCells& cells) {
     struct Sum {
         std::int64_t x = 0, y = 0, z = 0, count = 0;
     };
@@ -40,13 +40,13 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
                 sum.z += positions[neighbour].z;
                 ++sum.count;
             }
-    const std::int64_t reach = quantiser_step / 2;
+    const std::int64_t reach = cells.step / 2;
     std::vector<LatticePoint> out(positions.begin(), positions.end());
     const auto halfway = [&](std::int32_t own, std::int64_t sum, std::int64_t count) {
         const std::int64_t change = divide_rounded(sum - count * own, 2 * count);
         return within_lattice(own + std::clamp(change, -reach, reach));
     };
-    for (std::size_t v = 0; v < out.size(); ++v) {
+    for (std::size_t v = cells.settled; v < out.size(); ++v) {
         const auto& sum = around[v];
         if (sum.count == 0) continue;
         out[v] = {halfway(positions[v].x, sum.x, sum.count), halfway(positions[v].y, sum.y, sum.count),
@@ -56,10 +56,10 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 }
 
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                std::int32_t quantiser_step, Threads threads) {
+                                                const QuantiserCells& cells, Threads threads) {
     TrackedReference out;
     out.mesh = mesh;
-    out.mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, quantiser_step);
+    out.mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, cells);
     DeformationNodeOptions options;
     options.spacing = node_spacing;
     options.link_reach = std::max(node_spacing / 10, 1);

@@ -28,15 +28,19 @@ struct TrackedReference {
     VertexHierarchy hierarchy;
     CapturedCounts captured;  // what the I-frame was captured with; make_tracked_reference() does not know it
 };
-// node_spacing: lattice units, > 0. quantiser_step: that of the I-frame's positions, in lattice units. threads: uses
-// two at most.
+// How a mesh's positions are quantised.
+struct QuantiserCells {
+    std::int32_t step = 1;      // lattice units
+    std::uint32_t settled = 0;  // the first so many vertices are not; smoothed again with each patch, they would shrink
+};
+// node_spacing: lattice units, > 0. threads: uses two at most.
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                std::int32_t quantiser_step, Threads threads = {});
+                                                const QuantiserCells& cells, Threads threads = {});
 
-// Moves each vertex halfway to the mean of its neighbours, but in each coordinate no farther than half a quantiser
-// step. This removes the steps of a coarsely quantised surface at no cost in bits.
+// Moves each vertex that is not settled halfway to the mean of its neighbours, but in each coordinate no farther than
+// half a quantiser step. This removes the steps of a coarsely quantised surface at no cost in bits.
 std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> positions,
-                                                std::span<const Triangle> triangles, std::int32_t quantiser_step);
+                                                std::span<const Triangle> triangles, const QuantiserCells& cells);
 
 // What a frame leaves for the next one.
 struct TrackedState {

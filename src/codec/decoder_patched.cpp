@@ -1,0 +1,50 @@
+// Decodes TP-frames: a T-frame of which a part is replaced. The patched mesh is the reference of what follows.
+#include "codec/decoder_state.h"
+#include "codec/frame_kinds.h"
+#include "codec/tracked/surface_patch.h"
+
+namespace htvm::internal {
+
+Result<void> decode_patched(DecoderState& state, const Packet& packet, const FramePayloadView& payload) {
+    const auto& header = *state.header;
+    if (header.node_spacing == 0)
+        return fail(ErrorKind::corrupt_stream, "a patched frame in a stream whose header says that it has none");
+    auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
+    if (!pose) return tl::unexpected(pose.error());
+    if (auto ok = derive_nodes(*state.reference, header, state.threads); !ok) return tl::unexpected(ok.error());
+    const auto& reference = *state.reference->tracked;
+    if (!reference.mesh.texcoords.empty())
+        return fail(ErrorKind::corrupt_stream, "a patched frame whose reference has texture coordinates");
+    auto& history = state.tracked;
+    using enum DecodedNodes::Newest;
+    if (history.newest == next) history.newest = history.frame ? last : none;  // its arrays are written over
+    auto& tracked = history.next;
+    if (auto ok = decode_tracked_frame(payload.of(Layer::tracked), reference, nullptr, state.threads, tracked); !ok)
+        return ok;
+    const auto& triangles = reference.mesh.triangles;
+    auto patched = decode_patch(payload, {tracked.positions, triangles, tracked.colours}, reference.hierarchy);
+    if (!patched) return tl::unexpected(patched.error());
+    auto& mesh = patched->mesh;
+    if (!reference.mesh.normals.empty()) mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
+    // With what the patch added, the mesh may be larger than its header says, and than its reference.
+    if (auto ok = check_limits({}, {mesh.positions.size(), mesh.triangles.size()}, {}, 0, state.options); !ok)
+        return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
+    const ReferenceFacts facts{.number = packet.frame,
+                               .step = static_cast<std::int32_t>(payload.header.geometry_step),
+                               .settled = patched->kept,
+                               .captured = {payload.header.source_vertices, payload.header.source_triangles}};
+    auto shown = to_pose(*pose, header.lattice);
+    const auto topology = new_topology(state);
+    auto renewed = make_reference(header, facts, std::move(mesh), std::move(*pose), {.bones = false, .nodes = true},
+                                  state.threads);
+    if (!renewed) return tl::unexpected(renewed.error());
+    show(state, view_of(renewed->mesh()), topology, std::move(shown));
+    // Nothing can fail from here on.
+    state.reference = std::move(*renewed);
+    state.reference_topology = topology;
+    state.bones = {};
+    state.tracked = {};
+    return {};
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,40 @@
+// Where tracking is lost in one region, as when a hand comes out of a pocket: what of the tracked mesh goes, and the
+// piece of the captured surface that comes in its place, already joined to what stays.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "codec/tracked/captured_surface_enc.h"
+#include "codec/tracked/surface_patch.h"
+#include "core/lattice.h"
+#include "core/thread.h"
+#include "surface/surface_index.h"
+
+namespace htvm::internal {
+
+// Lengths are in lattice units; the defaults suit an adult at 16 units a millimetre.
+struct SurfacePatchOptions {
+    double lost = 96;         // a region is lost where the surfaces are farther apart than this, as far as they are
+                              // apart by half of it
+    double reach = 480;       // how far to search for the other surface
+    double speck = 320;       // side of a square: lost regions of a smaller area are left alone
+    int margin = 1;           // rings of triangles around a lost region that go as well, >= 0
+    double stretch = 3;       // a triangle is lost, too, where a side is longer than at rest by this factor
+    double gap = 0.5;         // between what stays and the piece, before they are joined: in mean edges there
+    double most_share = 0.3;  // of the tracked mesh's area that may go
+    int attempts = 5;         // where the two borders do not fit together, more goes around them and they are cut again
+    SimplifiedReferenceOptions simplification;  // of the piece
+    Threads threads = {};                       // their number does not change the result
+};
+
+// decoded: the tracked mesh as the decoder has it. rest: its vertices in the mesh that it refers to, by which stretched
+// and folded triangles are told; may be empty. surface: index by direction of `captured`. The result is nothing if
+// nothing is lost, too much is lost, the borders cannot be joined clearly, or the capture has texture coordinates: an
+// I-frame is what is left then.
+std::optional<SurfacePatch> find_surface_patch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
+                                               const LatticeMesh& captured, const SurfaceIndex& surface,
+                                               const SurfacePatchOptions& options);
+
+}  // namespace htvm::internal
