@@ -36,15 +36,15 @@ void add_codebook(LayerBytes& bytes, const Packet& packet) {
         bytes[packet.payload[0] == 0 ? Layer::geometry : Layer::colour] += packet.payload.size();
 }
 
-// A T-frame tells what its layers take only to who decodes it, and the I-frame that it needs; the other kinds by their
-// tables. Of one that cannot be decoded, all is overhead.
+// A T-frame tells what its layers take only to who decodes it, and what it needs; the other kinds by their tables. Of
+// one that cannot be decoded, all is overhead.
 class FrameInspector {
 public:
     explicit FrameInspector(Decoder& decoder) : decoder_(decoder) {}
     Result<FrameInfo> inspect(const Packet& packet) {
         const auto type = frame_type(packet.kind);
         if (type == FrameType::intra && internal::is_referred(packet, internal::rules_of(*type))) intra_ = packet;
-        if (type == FrameType::tracked) {
+        if (type == FrameType::tracked || type == FrameType::patched) {
             if (intra_) static_cast<void>(decoder_.decode(*intra_));
             intra_.reset();
             if (const auto decoded = decoder_.decode(packet); decoded && *decoded) return (*decoded)->info;

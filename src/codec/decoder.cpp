@@ -128,7 +128,8 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
     if (nodes || rules.refers_to == RefersTo::reference_or_before) kept += memory_of_tracking(held);
     // A patch adds to the mesh that it is put on.
     const bool adds = rules.renews && rules.refers_to != RefersTo::nothing;
-    const MeshCounts renewed{coded.vertices + (adds ? held.vertices : 0), coded.triangles + (adds ? held.triangles : 0)};
+    const MeshCounts renewed{coded.vertices + (adds ? held.vertices : 0),
+                             coded.triangles + (adds ? held.triangles : 0)};
     if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);
     if (state.alone) kept += memory_of_reference(counts(state.alone->mesh));
     return kept;

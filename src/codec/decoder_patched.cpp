@@ -25,7 +25,8 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     auto patched = decode_patch(payload, {tracked.positions, triangles, tracked.colours}, reference.hierarchy);
     if (!patched) return tl::unexpected(patched.error());
     auto& mesh = patched->mesh;
-    if (!reference.mesh.normals.empty()) mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
+    if (!reference.mesh.normals.empty())
+        mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
     // With what the patch added, the mesh may be larger than its header says, and than its reference.
     if (auto ok = check_limits({}, {mesh.positions.size(), mesh.triangles.size()}, {}, 0, state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);

@@ -95,7 +95,7 @@ void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
     if (!of_frame_before) chain_.clear();
     // The newest frame itself is the last of these now; what it needs is what comes before it there.
     (rules.renews ? references_ : chain_).push_back({header.frame, place});
-    if (references_.size() + chain_.size() <= most_) return;
+    if (references_.size() + chain_.size() <= most_ + 1) return;
     forget_reference();
     newest_ = {};
 }

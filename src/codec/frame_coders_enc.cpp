@@ -214,8 +214,8 @@ Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& st
     options.reach = reach * configuration.adult_millimetre;
     options.motion_alone = parts == TrackedParts::motion_alone;
     options.threads = configuration.threads;
-    return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.node_motion(), before,
-                                options, work.stages);
+    return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.node_motion(),
+                                before, options, work.stages);
 }
 
 Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts) {
@@ -298,13 +298,13 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     const auto coded_steps = tracked_steps(steps);
     FramePayload payload;
     const auto& mesh = tracked->mesh;
-    auto patched = encode_patch({mesh.positions, mesh.triangles, mesh.colours}, in_use.decoded.tracked->hierarchy, patch,
-                                {coded_steps.geometry, coded_steps.colour}, payload);
+    auto patched = encode_patch({mesh.positions, mesh.triangles, mesh.colours}, in_use.decoded.tracked->hierarchy,
+                                patch, {coded_steps.geometry, coded_steps.colour}, payload);
     if (!patched) return tl::unexpected(patched.error());
     const auto captured = counts_of(work.mesh);
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;
-    payload.set(Layer::tracked, tracked->payload);
+    payload.set(Layer::tracked, tracked->runs.payload);
     payload.set(Layer::pose, encode_pose(work.pose));
     Candidate out;
     out.type = FrameType::patched;

@@ -9,8 +9,8 @@
 namespace htvm::internal {
 
 // A whole frame of this kind, to which later frames may refer as far as the kind allows: the coder column of the table
-// of frame kinds (frame_kinds.h), but for TP-frames. All but the I-frame need a reference that has a vertex and the same attributes as the
-// frame.
+// of frame kinds (frame_kinds.h), but for TP-frames. All but the I-frame need a reference that has a vertex and the
+// same attributes as the frame.
 Result<Candidate> code_frame(FrameType type, FrameWork& work, const FrameSteps& steps);
 
 // How far an I-frame that T-frames refer to, or a patch, may be simplified.

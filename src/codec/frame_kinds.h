@@ -53,8 +53,8 @@ struct FrameRules {
     MemoryBound memory;   // for decoding it
     RateClass rate;
     // Decodes and shows the frame. Called once the payload's header is known to be within all limits; if the frame
-    // refers to the reference alone, that is known to exist. After an error the state is unchanged, except for what helps
-    // to conceal the frame.
+    // refers to the reference alone, that is known to exist. After an error the state is unchanged, except for what
+    // helps to conceal the frame.
     Result<void> (*decode)(DecoderState&, const Packet&, const FramePayloadView&);
 };
 

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "codec/moving_sequences.h"
+#include "codec/patched_sequences.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
 
@@ -59,6 +60,7 @@ const std::vector<NamedStream>& streams() {
         gaps.frames[3].mesh = Mesh{};
         add("T-frames of the frame before", gaps, tracked_from(TrackedReferences::previous));
         add("T-frames of the I-frame", gaps, tracked_from(TrackedReferences::intra));
+        add("TP-frames", horned_ball(6), patched_options());
         return out;
     }();
     return made;
@@ -104,10 +106,13 @@ TEST(Closure, TheStreamsOfTheseTestsHaveEveryKindOfFrame) {
         for (const auto& packet : packets)
             if (frame_type(packet.kind)) seen.insert({packet.kind, packet.has(packet_flag::referred)});
     using enum PacketKind;
-    EXPECT_EQ(
-        seen,
-        (std::set<std::pair<PacketKind, bool>>{
-            {intra, false}, {intra, true}, {enhanced, false}, {predicted, false}, {tracked, false}, {tracked, true}}));
+    EXPECT_EQ(seen, (std::set<std::pair<PacketKind, bool>>{{intra, false},
+                                                           {intra, true},
+                                                           {enhanced, false},
+                                                           {predicted, false},
+                                                           {tracked, false},
+                                                           {tracked, true},
+                                                           {patched, true}}));
 }
 
 TEST(Closure, DecodesTheFrameAndNoPacketOfItCanBeLeftOut) {

@@ -41,7 +41,7 @@ TEST(FrameKinds, AreFoundByTypeLetterAndPacket) {
         EXPECT_EQ(frame_type(rules_of(kind.type).packet), kind.type);
         letters.insert(kind.letter);
     }
-    EXPECT_EQ(letters, (std::set<std::string>{"I", "EP", "P", "T"}));
+    EXPECT_EQ(letters, (std::set<std::string>{"I", "EP", "P", "T", "TP"}));
     EXPECT_EQ(kind_of_letter("E"), nullptr);
     EXPECT_EQ(frame_type(PacketKind::codebook), std::nullopt);
 }
@@ -67,23 +67,24 @@ TEST(FrameKinds, HaveNoLayersButTheirRows) {
 
 TEST(FrameKinds, ReferToFramesOfWhichTheirRowsSpeak) {
     for (const auto& stream : conformance_streams()) {
-        std::uint32_t intra = 0, before = 0;
+        std::uint32_t reference = 0, before = 0;
         for (const auto& packet : packets_of(stream)) {
             const auto type = frame_type(packet.kind);
             if (!type) continue;
             switch (rules_of(*type).refers_to) {
                 case RefersTo::nothing:
                     EXPECT_EQ(packet.reference, packet.frame) << stream;
-                    if (is_referred(packet, rules_of(*type))) intra = packet.frame;
                     break;
                 case RefersTo::reference:
-                    EXPECT_EQ(packet.reference, intra) << stream;
+                    EXPECT_EQ(packet.reference, reference) << stream;
                     break;
                 case RefersTo::reference_or_before:
-                    EXPECT_TRUE(packet.reference == intra || packet.reference == before) << stream;
+                    EXPECT_TRUE(packet.reference == reference || packet.reference == before) << stream;
                     break;
             }
-            if (is_referred(packet, rules_of(*type))) before = packet.frame;
+            if (!is_referred(packet, rules_of(*type))) continue;
+            before = packet.frame;
+            if (rules_of(*type).renews) reference = packet.frame;
         }
     }
 }

@@ -180,7 +180,7 @@ FirstTrackedFrame first_tracked_frame() {
     const auto header = read_sequence_header(coded.packets[0].payload).value();
     const auto intra = read_frame_payload(coded.packets[1].payload).value();
     auto reference = make_tracked_reference(decode_intra_frame(intra, nullptr).value(), header.node_spacing,
-                                            static_cast<std::int32_t>(intra.header.geometry_step))
+                                            {static_cast<std::int32_t>(intra.header.geometry_step)})
                          .value();
     reference.captured = {intra.header.source_vertices, intra.header.source_triangles};
     return {std::move(reference), coded.packets[2].payload};
@@ -335,7 +335,7 @@ TEST(SmoothedWithinCells, MovesNoCoordinateByMoreThanHalfAStep) {
     for (int k = 0; k < 81; ++k)
         positions.push_back({between(random, -900, 900), between(random, -900, 900), between(random, -900, 900)});
     for (const int step : {1, 7, 64, 100000}) {
-        const auto smooth = smoothed_within_cells(positions, mesh.triangles, step);
+        const auto smooth = smoothed_within_cells(positions, mesh.triangles, {step});
         ASSERT_EQ(smooth.size(), positions.size());
         for (std::size_t v = 0; v < positions.size(); ++v) {
             EXPECT_LE(std::abs(smooth[v].x - positions[v].x), step / 2);
@@ -343,15 +343,16 @@ TEST(SmoothedWithinCells, MovesNoCoordinateByMoreThanHalfAStep) {
             EXPECT_LE(std::abs(smooth[v].z - positions[v].z), step / 2);
         }
     }
-    EXPECT_EQ(smoothed_within_cells(positions, {}, 64), positions);
+    EXPECT_EQ(smoothed_within_cells(positions, {}, {64}), positions);
 }
 
 TEST(SmoothedWithinCells, TakesAVertexHalfwayToItsNeighbours) {
     // The hub of four triangles stands 40 above its rim.
     const std::vector<LatticePoint> positions = {{0, 0, 40}, {100, 0, 0}, {0, 100, 0}, {-100, 0, 0}, {0, -100, 0}};
     const std::vector<Triangle> triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
-    EXPECT_EQ(smoothed_within_cells(positions, triangles, 64)[0], (LatticePoint{0, 0, 20}));
-    EXPECT_EQ(smoothed_within_cells(positions, triangles, 10)[0], (LatticePoint{0, 0, 35}));
+    EXPECT_EQ(smoothed_within_cells(positions, triangles, {64})[0], (LatticePoint{0, 0, 20}));
+    EXPECT_EQ(smoothed_within_cells(positions, triangles, {10})[0], (LatticePoint{0, 0, 35}));
+    EXPECT_EQ(smoothed_within_cells(positions, triangles, {.step = 64, .settled = 1})[0], positions[0]);
 }
 
 // Each node has some of the lower ones as neighbours; some surfaces have no normal.

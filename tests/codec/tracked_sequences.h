@@ -97,7 +97,7 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
         if (packet.kind != PacketKind::intra) continue;
         const auto payload = *read_frame_payload(packet.payload);
         auto reference = *make_tracked_reference(*decode_intra_frame(payload, nullptr), node_spacing,
-                                                 static_cast<std::int32_t>(payload.header.geometry_step));
+                                                 {static_cast<std::int32_t>(payload.header.geometry_step)});
         reference.captured = {payload.header.source_vertices, payload.header.source_triangles};
         const std::uint32_t key = frame;
         add(packet, key);

@@ -238,7 +238,9 @@ bool code_position(Coder& coder, std::span<LatticePoint> points, const Neighbour
     return true;
 }
 
-bool is_known(std::span<const std::uint8_t> known, std::uint32_t vertex) { return !known.empty() && known[vertex] != 0; }
+bool is_known(std::span<const std::uint8_t> known, std::uint32_t vertex) {
+    return !known.empty() && known[vertex] != 0;
+}
 
 // The encoder's choice of weights. It may use doubles, because the weights are sent.
 using Matrix = std::array<std::array<double, weight_count + 1>, weight_count>;  // normal equations, the right-hand side

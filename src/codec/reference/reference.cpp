@@ -12,7 +12,8 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
 
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
-    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step, reference.settled}, threads);
+    auto tracked =
+        make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step, reference.settled}, threads);
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     reference.tracked->captured = reference.captured;

@@ -1,6 +1,6 @@
-// What frames refer to: a decoded I-frame, or one that patched it, numbered, and what both sides derive from it. Encoder and decoder build it
-// in the same way. The mesh never changes afterwards; what follows from bones or nodes may be derived later, since the
-// decoder does not know which kind of frame comes next.
+// What frames refer to: a decoded I-frame, or one that patched it, numbered, and what both sides derive from it.
+// Encoder and decoder build it in the same way. The mesh never changes afterwards; what follows from bones or nodes may
+// be derived later, since the decoder does not know which kind of frame comes next.
 #pragma once
 
 #include <cstdint>
@@ -17,10 +17,11 @@ namespace htvm::internal {
 struct Reference {
     std::uint32_t number = 0;  // of the frame
     std::int32_t step = 1;     // of its positions, in lattice units
-    std::uint32_t settled = 0;  // of its vertices, the first so many came from the reference before, and stay as they are
-    CapturedCounts captured;   // what its frame was captured with
-    ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
-    bool has_bones = false;    // whether it was derived
+    std::uint32_t settled =
+        0;                    // of its vertices, the first so many came from the reference before, and stay as they are
+    CapturedCounts captured;  // what its frame was captured with
+    ReferenceMesh skinned;    // the mesh and its pose; what depends on bones is filled in only if it was derived
+    bool has_bones = false;   // whether it was derived
     std::optional<TrackedReference> tracked;  // what depends on the nodes, if it was derived
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };

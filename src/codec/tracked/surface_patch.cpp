@@ -124,9 +124,8 @@ std::optional<std::vector<std::uint32_t>> code_places(Coder& coder, std::span<co
         const bool wanted_on = !wanted.empty() && wanted[v] != none;
         if (!coder.bit(model, wanted_on)) continue;
         const std::int64_t from = neighbour != none ? place[neighbour] : last;
-        const auto difference =
-            coder.signed_number(step[neighbour != none],
-                                wanted_on ? static_cast<std::int32_t>(std::int64_t{wanted[v]} - from) : 0);
+        const auto difference = coder.signed_number(
+            step[neighbour != none], wanted_on ? static_cast<std::int32_t>(std::int64_t{wanted[v]} - from) : 0);
         const std::int64_t at = from + difference;
         if (at < 0 || at >= static_cast<std::int64_t>(border)) return std::nullopt;
         place[v] = last = static_cast<std::uint32_t>(at);
@@ -196,8 +195,7 @@ std::vector<std::uint32_t> open_border(std::span<const Triangle> triangles, cons
         for (std::size_t i = 0; i < 3; ++i) {
             is[t[i]] |= gone > 0 ? has_going : has_staying;
             // The edge that faces the only vertex that goes.
-            if (gone == 1 && removed[t[i]])
-                next[t[(i + 1) % 3]] = std::min(next[t[(i + 1) % 3]], t[(i + 2) % 3]);
+            if (gone == 1 && removed[t[i]]) next[t[(i + 1) % 3]] = std::min(next[t[(i + 1) % 3]], t[(i + 2) % 3]);
         }
     }
     const auto opens = [&](std::uint32_t v) { return !removed[v] && is[v] == (has_staying | has_going); };
@@ -297,13 +295,13 @@ Result<PatchedSurface> decode_patch(const FramePayloadView& payload, const Track
     const auto known = known_vertices(*place, border, tracked, step);
     const auto neighbours = find_neighbours(*triangles, header.vertices, known.known);
     if (!neighbours) return fail(ErrorKind::corrupt_stream, "patch: " + neighbours.error().message);
-    auto positions =
-        decode_intra_positions(payload.of(Layer::geometry), *neighbours, {known.known, known.positions});
+    auto positions = decode_intra_positions(payload.of(Layer::geometry), *neighbours, {known.known, known.positions});
     if (!positions) return tl::unexpected(positions.error());
     std::vector<Colour> colours;
     if (!tracked.colours.empty()) {
-        auto decoded = decode_intra_colours(payload.of(Layer::colour), *positions, *neighbours,
-                                            static_cast<std::int32_t>(header.colour_step), {known.known, known.colours});
+        auto decoded =
+            decode_intra_colours(payload.of(Layer::colour), *positions, *neighbours,
+                                 static_cast<std::int32_t>(header.colour_step), {known.known, known.colours});
         if (!decoded) return tl::unexpected(decoded.error());
         colours = std::move(*decoded);
     }

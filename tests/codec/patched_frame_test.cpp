@@ -1,0 +1,113 @@
+// TP-frames: a lost region is replaced, and what follows goes on from there.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "codec/moving_sequences.h"
+#include "codec/patched_sequences.h"
+#include "codec/test_sequences.h"
+#include "htvm/decoder.hpp"
+
+namespace htvm::internal {
+namespace {
+
+using namespace test;
+
+std::vector<FrameType> types_of(const CodedSequence& coded) {
+    std::vector<FrameType> out;
+    for (const auto& info : coded.infos) out.push_back(info.type);
+    return out;
+}
+
+constexpr auto I = FrameType::intra, T = FrameType::tracked, TP = FrameType::patched;
+
+TEST(PatchedFrames, ComeWhereARegionIsLostInsteadOfIFrames) {
+    const auto coded = encode(horned_ball(5), patched_options());
+    EXPECT_EQ(types_of(coded), (std::vector{I, T, TP, T, T}));
+    EXPECT_LT(coded.infos[2].bytes.total(), coded.infos[0].bytes.total());
+    auto without = patched_options();
+    without.tracked.patch_share = 0;
+    EXPECT_EQ(types_of(encode(horned_ball(5), without)), (std::vector{I, T, I, T, T}));
+}
+
+TEST(PatchedFrames, DecodeToWhatTheEncoderHas) {
+    const auto coded = encode(horned_ball(5), patched_options());
+    Decoder decoder;
+    std::size_t frame = 0;
+    for (const auto& packet : coded.packets) {
+        const auto decoded = decoder.push(packet);
+        ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
+        if (!*decoded) continue;
+        const auto& mesh = (*decoded)->mesh;
+        const auto& sent = coded.reconstructions[frame];
+        EXPECT_EQ(mesh.positions, sent.positions);
+        EXPECT_EQ(mesh.triangles, sent.triangles);
+        EXPECT_EQ(mesh.colours, sent.colours);
+        EXPECT_EQ((*decoded)->info.vertices, coded.infos[frame].vertices);
+        ++frame;
+    }
+    EXPECT_EQ(frame, 5u);
+}
+
+TEST(PatchedFrames, AreTheReferenceOfWhatFollows) {
+    auto options = patched_options();
+    options.tracked.references = TrackedReferences::intra;
+    const auto coded = encode(horned_ball(5), options);
+    ASSERT_EQ(types_of(coded), (std::vector{I, T, TP, T, T}));
+    EXPECT_EQ(coded.infos[2].reference, 0u);
+    EXPECT_EQ(coded.infos[3].reference, 2u);
+    EXPECT_EQ(coded.infos[4].reference, 2u);
+}
+
+TEST(PatchedFrames, CodeOnlyTheTrianglesThatCome) {
+    const auto coded = encode(horned_ball(3), patched_options());
+    const auto patched = std::find_if(coded.packets.begin(), coded.packets.end(),
+                                      [](const Packet& packet) { return packet.kind == PacketKind::patched; });
+    ASSERT_NE(patched, coded.packets.end());
+    const auto coming = read_frame_payload(patched->payload)->header.triangles;
+    const auto before = coded.reconstructions[1].triangles.size(), after = coded.reconstructions[2].triangles.size();
+    EXPECT_GT(coming, 0u);
+    EXPECT_LT(coming, after / 2);
+    EXPECT_LT(after - coming, before);
+}
+
+TEST(PatchedFrames, DoNotPutOffTheNextIFrame) {
+    auto options = patched_options();
+    options.key_interval = 4;
+    EXPECT_EQ(types_of(encode(horned_ball(6), options)), (std::vector{I, T, TP, T, I, T}));
+}
+
+TEST(PatchedFrames, ThatAreLostTakeThoseBehindThemWithThemUpToTheNextIFrame) {
+    auto options = patched_options();
+    options.key_interval = 4;
+    const auto coded = encode(horned_ball(6), options);
+    Decoder decoder;
+    std::vector<bool> decoded;
+    for (const auto& packet : coded.packets) {
+        if (!frame_type(packet.kind)) {
+            EXPECT_TRUE(decoder.push(packet).has_value());
+            continue;
+        }
+        decoded.push_back(packet.frame != 2 && decoder.push(packet).has_value());
+    }
+    EXPECT_EQ(decoded, (std::vector{true, true, false, false, true, true}));
+}
+
+TEST(PatchedFrames, ThatAreDamagedLeaveTheDecoderAsItWas) {
+    const auto coded = encode(horned_ball(3), patched_options());
+    const auto patched = std::find_if(coded.packets.begin(), coded.packets.end(),
+                                      [](const Packet& packet) { return packet.kind == PacketKind::patched; });
+    ASSERT_NE(patched, coded.packets.end());
+    Decoder decoder;
+    for (auto packet = coded.packets.begin(); packet != patched; ++packet) ASSERT_TRUE(decoder.push(*packet));
+    for (std::size_t size = 0; size < patched->payload.size(); size += 7) {
+        auto damaged = *patched;
+        damaged.payload.resize(size);
+        EXPECT_FALSE(decoder.push(damaged).has_value()) << size;
+    }
+    EXPECT_TRUE(decoder.push(*patched).has_value());
+}
+
+}  // namespace
+}  // namespace htvm::internal

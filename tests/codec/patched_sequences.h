@@ -1,0 +1,36 @@
+// Sequences in which tracking is lost in one region.
+#pragma once
+
+#include <algorithm>
+
+#include "codec/ball.h"
+#include "codec/test_sequences.h"
+
+namespace htvm::test {
+
+// A ball of 300 mm with a horn on top, which is on the right from frame `lost` on: no motion leads there.
+inline TestSequence horned_ball(int frames, int lost = 2) {
+    TestSequence out{"horned ball", {}, {}};
+    for (int t = 0; t < frames; ++t) {
+        const std::size_t axis = t < lost ? 2 : 0;
+        const auto ball_now =
+            ball(4, [&](const Vector3d& d) { return 300 + 150 * std::clamp((d[axis] - 0.88) / 0.1, 0.0, 1.0); });
+        SequenceFrame frame;
+        for (const auto p : ball_now.positions) {
+            frame.mesh.positions.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
+            const auto level = [](std::int32_t c) { return static_cast<std::uint8_t>(128 + c / 4); };
+            frame.mesh.colours.push_back({level(p.x), level(p.y), level(p.z)});
+        }
+        frame.mesh.triangles = ball_now.triangles;
+        out.frames.push_back(std::move(frame));
+    }
+    return out;
+}
+
+inline EncoderOptions patched_options() {
+    auto out = default_options(Profile::tracked);
+    out.subject_size = 1750;
+    return out;
+}
+
+}  // namespace htvm::test
