@@ -445,7 +445,7 @@ TEST(CInterface, TellsItsVersion) {
     EXPECT_EQ(htvm_version_string(), text);
     EXPECT_EQ(text, HTVM_PROJECT_VERSION);
     EXPECT_EQ(htvm_version(), std::uint32_t{HTVM_VERSION_MAJOR} << 16 | HTVM_VERSION_MINOR << 8 | HTVM_VERSION_PATCH);
-    EXPECT_EQ(htvm_stream_version(), 3u);
+    EXPECT_EQ(htvm_stream_version(), 4u);
 }
 
 TEST(CInterface, TellsWhatFramesNeedAsTheCppOneDoes) {
