@@ -256,6 +256,21 @@ TEST(SurfacePatch, is_the_same_for_any_number_of_threads) {
     EXPECT_EQ(one->triangles, three->triangles);
 }
 
+TEST(SurfacePatch, is_the_same_with_triangles_that_name_a_vertex_twice) {
+    auto decoded = ball(coarse, round_radius), captured = ball(fine, radius_with_cap);
+    const auto without = patch_of(decoded, captured);
+    const auto top = static_cast<std::uint32_t>(
+        std::max_element(decoded.positions.begin(), decoded.positions.end(),
+                         [](const LatticePoint& a, const LatticePoint& b) { return a.z < b.z; }) -
+        decoded.positions.begin());
+    decoded.triangles.push_back({top, top, top});
+    captured.triangles.push_back({0, 0, captured.triangles[0][1]});
+    const auto with = patch_of(decoded, captured);
+    ASSERT_TRUE(without.has_value() && with.has_value());
+    EXPECT_EQ(with->removed, without->removed);
+    EXPECT_EQ(with->triangles, without->triangles);
+}
+
 TEST(SurfacePatch, of_nothing_or_of_a_textured_capture_is_none) {
     const auto decoded = height_field(20, 200, flat);
     auto captured = height_field(80, 50, hill);

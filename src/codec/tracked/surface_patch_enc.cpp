@@ -49,7 +49,8 @@ public:
         };
         std::vector<std::uint32_t> along, against;
         for (std::uint32_t s = 0; s < twin_.size(); ++s) {
-            if (twin_[s] != none || from(s) == to(s)) continue;
+            if (from(s) == to(s)) twin_[s] = s;  // of a triangle that names a vertex twice: never a border
+            if (twin_[s] != none) continue;
             along.clear(), against.clear();
             for (const auto t : around.of(from(s)))
                 for (std::uint32_t other = 3 * t; other < 3 * t + 3; ++other) {
@@ -224,7 +225,7 @@ void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, c
     const auto& mesh = capture.mesh;
     std::vector<bool> uncovered(mesh.positions.size());
     for (std::size_t v = 0; v < uncovered.size(); ++v)
-        uncovered[v] = distance_to(capture.on_decoded[v], options.reach) > options.lost;
+        uncovered[v] = !capture.on_decoded[v].found() || distance_to(capture.on_decoded[v], 0) > options.lost;
     Groups regions(uncovered.size());
     std::vector<double> area(uncovered.size(), 0);
     for (const auto& t : mesh.triangles)
@@ -277,6 +278,7 @@ void grow(std::vector<bool>& marked, std::span<const Triangle> triangles) {
 // A region is lost as far as the error is over half the limit, if enough of it is over the limit.
 std::vector<bool> find_lost(const LatticeMesh& decoded, std::span<const LatticePoint> rest, const Sides& sides,
                             std::span<const double> error, const Capture& capture, const SurfacePatchOptions& options) {
+    constexpr double hardly_seen = 0.25;  // how much a triangle of bad shape counts that lies on the surface
     const std::size_t vertices = decoded.positions.size();
     std::vector<bool> rims(vertices, false);
     add_rims_of_uncovered(capture, decoded, options, rims);
@@ -289,7 +291,10 @@ std::vector<bool> find_lost(const LatticeMesh& decoded, std::span<const LatticeP
     for (const auto& t : decoded.triangles) {
         const double third = area_of(decoded.positions, t) / 3;
         for (const auto v : t)
-            if (error[v] > options.lost || bad_shape[v]) area[regions.of(v)] += third;
+            if (error[v] > options.lost)
+                area[regions.of(v)] += third;
+            else if (bad_shape[v])
+                area[regions.of(v)] += hardly_seen * third;
     }
     const double enough = options.speck * options.speck;
     for (std::uint32_t v = 0; v < vertices; ++v)
@@ -560,7 +565,7 @@ struct StripVertex {
 // are too long for that or do not face each other.
 std::optional<std::vector<Triangle>> strip_between(const std::vector<StripVertex>& left,
                                                    const std::vector<StripVertex>& right) {
-    constexpr std::size_t most = std::size_t{1} << 23;
+    constexpr std::size_t most = std::size_t{1} << 21;
     constexpr double turned = 8;  // what a triangle that faces the other way costs, against one that faces right
     const std::size_t n = left.size(), m = right.size();
     if (n == 0 || m == 0 || n + m < 3 || n * m > most) return std::nullopt;
