@@ -11,7 +11,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 checked=0
-# contains KIND: the stream compared last has frames of that kind, predicted, in_part or tracked.
+# contains KIND: the stream compared last has frames of that kind, predicted, in_part, tracked or patched.
 contains() {
     grep -q " $1" "$work/kinds" || { echo "$name: no frame is $1"; cat "$work/kinds"; exit 1; }
 }
@@ -32,7 +32,7 @@ same() {
         { echo "$name: decode failed"; cat "$work/log"; exit 1; }
     python3 "$here/compare.py" "$work/stream.htvm" "$work/decoded" >"$work/kinds" ||
         { cat "$work/kinds"; echo "$name: $*"; exit 1; }
-    grep -o " in_part\| predicted\| tracked" "$work/kinds" >>"$work/all_kinds" || true
+    grep -o " in_part\| predicted\| tracked\| patched" "$work/kinds" >>"$work/all_kinds" || true
     checked=$((checked + 1))
 }
 # stored FILE: decodes a stream with both, compares.
@@ -41,7 +41,7 @@ stored() {
     "$htvm" decode "$1" -o "$work/decoded" --unit mm >"$work/log" 2>&1 ||
         { echo "$1: decode failed"; cat "$work/log"; exit 1; }
     python3 "$here/compare.py" "$1" "$work/decoded" >"$work/kinds" || { cat "$work/kinds"; exit 1; }
-    grep -o " in_part\| predicted\| tracked" "$work/kinds" >>"$work/all_kinds" || true
+    grep -o " in_part\| predicted\| tracked\| patched" "$work/kinds" >>"$work/all_kinds" || true
     checked=$((checked + 1))
 }
 
@@ -92,6 +92,13 @@ same moving "$work/moving" --profile tracked --skeleton "$work/moving/skeleton.j
 contains tracked
 same moving "$work/moving" --profile tracked --simplify 0 --tracked-from intra
 contains tracked
+# TP-frames: dances in which tracking is lost in places.
+"$htvm" synth "$work/fast" --vertices 700 --frames 13 --motion fast >/dev/null 2>&1
+"$htvm" synth "$work/fast_normals" --vertices 800 --frames 6 --first-frame 8 --motion fast --normals >/dev/null 2>&1
+for name in fast fast_normals; do
+    same $name "$work/$name" --profile tracked
+    contains patched
+done
 for stream in "$here"/../data/conformance/*.htvm; do
     stored "$stream"
 done
@@ -113,4 +120,4 @@ for sequence in "$work"/awkward/*; do
 done
 echo "second decoder: $checked streams decode to the same meshes;" \
     "$(grep -c predicted "$work/all_kinds") P-frames, $(grep -c in_part "$work/all_kinds") motion-based EP-frames," \
-    "$(grep -c tracked "$work/all_kinds") T-frames"
+    "$(grep -c tracked "$work/all_kinds") T-frames, $(grep -c patched "$work/all_kinds") TP-frames"

@@ -8,7 +8,7 @@ import struct
 import sys
 
 import decoder
-from stream import CODED_BONES, ENHANCED, INTRA, PREDICTED, TRACKED, read_frame_payload
+from stream import CODED_BONES, ENHANCED, INTRA, PATCHED, PREDICTED, TRACKED, read_frame_payload
 
 CODES = {"float": "f", "double": "d", "uchar": "B", "char": "b", "ushort": "H", "short": "h", "uint": "I", "int": "i"}
 
@@ -76,7 +76,7 @@ def in_millimetres(mesh, header):
 def how_coded(packet):
     if packet.kind == ENHANCED:
         return "in_part" if CODED_BONES in read_frame_payload(packet.payload).layers else "enhanced"
-    return {INTRA: "intra", PREDICTED: "predicted", TRACKED: "tracked"}[packet.kind]
+    return {INTRA: "intra", PREDICTED: "predicted", TRACKED: "tracked", PATCHED: "patched"}[packet.kind]
 
 
 def main(stream, folder):

@@ -17,8 +17,9 @@ from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from intra import decode_intra_mesh
 from reference import Reference, decode_pose
-from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, POSE, PREDICTED, SEQUENCE, TRACKED, packets, read_coded_frame,
-                    read_frame_payload, read_sequence_header)
+from patched import decode_patched_mesh
+from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, PATCHED, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
+                    read_coded_frame, read_frame_payload, read_sequence_header)
 from tracked import TrackedReference, decode_tracked_mesh
 
 
@@ -33,22 +34,34 @@ def digest(mesh):
 
 
 class Group:
-    """An I-frame and what T-frames make of it (8.11)."""
+    """An I- or TP-frame and what T-frames make of it (8.11)."""
 
-    def __init__(self, mesh, intra, frame):
-        self.mesh, self.intra, self.frame = mesh, intra, frame
+    def __init__(self, mesh, frame, number, settled=0):
+        self.mesh, self.frame, self.number, self.settled = mesh, frame, number, settled
         self.reference = self.state = self.last = None
 
-    def decode(self, packet, header):
+    def tracked_reference(self, header):
         check(header.node_spacing > 0, "the header allows no tracked frames")
-        before = self.state if self.last == packet.reference else None
-        check(before or self.frame == packet.reference, "its reference is not there")
         self.reference = self.reference or TrackedReference(
-            self.mesh, self.intra.captured, self.intra.geometry_step, header.node_spacing)
-        mesh, state = decode_tracked_mesh(packet.payload, header.version, self.reference, before)
+            self.mesh, self.frame.captured, self.frame.geometry_step, self.settled, header.node_spacing)
+        return self.reference
+
+    def decode(self, packet, header):
+        before = self.state if self.last == packet.reference else None
+        check(before or self.number == packet.reference, "its reference is not there")
+        mesh, state = decode_tracked_mesh(packet.payload, header.version, self.tracked_reference(header), before)
         if packet.referred():
             self.state, self.last = state, packet.frame
         return mesh
+
+    def decode_patched(self, packet, header):
+        """The mesh, the joints, and the group that follows."""
+        check(self.number == packet.reference, "its reference is not there")
+        check(packet.referred(), "a patched frame that nothing may refer to")
+        frame = read_coded_frame(packet)
+        joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
+        mesh, kept = decode_patched_mesh(frame, self.tracked_reference(header))
+        return mesh, joints, Group(mesh, frame, packet.frame, kept)
 
 
 def decode_stream(data):
@@ -57,7 +70,7 @@ def decode_stream(data):
     books = [None, None]
     highest = -1  # number of a frame since the sequence began
     for packet in packets(data):
-        if packet.kind in (INTRA, ENHANCED, PREDICTED, TRACKED):
+        if packet.kind in (INTRA, ENHANCED, PREDICTED, TRACKED, PATCHED):
             highest = max(highest, packet.frame)
         try:
             if packet.kind == SEQUENCE:
@@ -84,11 +97,16 @@ def decode_stream(data):
                 group = Group(mesh, frame, packet.frame)
                 yield packet, header, mesh
             elif packet.kind == TRACKED:
-                check(group, "its I-frame is not there")
+                check(group, "its reference is not there")
                 yield packet, header, group.decode(packet, header)
+            elif packet.kind == PATCHED:
+                check(group, "its reference is not there")
+                mesh, joints, group = group.decode_patched(packet, header)
+                reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
+                yield packet, header, mesh
             elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
-                check(reference and reference.frame == packet.reference, "its I-frame is not there")
+                check(reference and reference.frame == packet.reference, "its reference is not there")
                 if packet.kind == PREDICTED:
                     frame = read_frame_payload(packet.payload)
                     yield packet, header, decode_predicted_mesh(frame, reference)
@@ -114,7 +132,7 @@ def main(arguments):
             failed = True
             continue
         attributes = [name for name in ("colours", "normals", "texcoords") if getattr(mesh, name)]
-        kind = {INTRA: "I", ENHANCED: "EP", PREDICTED: "P", TRACKED: "T"}[packet.kind]
+        kind = {INTRA: "I", ENHANCED: "EP", PREDICTED: "P", TRACKED: "T", PATCHED: "TP"}[packet.kind]
         print("frame %d %s %d vertices %d triangles %s %08x" % (
             packet.frame, kind, len(mesh.positions), len(mesh.triangles), "+".join(attributes) or "-", digest(mesh)))
     return 1 if failed else 0

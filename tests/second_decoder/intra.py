@@ -12,9 +12,10 @@ from stream import COLOUR, FANS, GEOMETRY, NORMALS, TEXCOORDS
 
 
 class Neighbourhood:
-    """order, neighbours and parallelograms by rank."""
+    """order, neighbours and parallelograms by rank. known: by vertex what both sides have before anything is decoded
+    (8.17), or None; in an I-frame nothing is."""
 
-    def __init__(self, vertices, triangles):
+    def __init__(self, vertices, triangles, known=None):
         self.vertex = [v for t in triangles if len(set(t)) == 3 for v in t]
         self.corners_at = [[] for _ in range(vertices)]
         for c, v in enumerate(self.vertex):
@@ -24,9 +25,15 @@ class Neighbourhood:
         self.stacks = [[] for _ in range(5)]
         self.seed = 0
         self.order, self.neighbours, self.parallelograms = [], [], []
-        for _ in range(vertices):
-            self.order.append(self.pop())
-            self.visit(self.order[-1])
+        for v in range(vertices):
+            if known and known[v] is not None:
+                self.take(v)
+        while len(self.order) < vertices:
+            self.take(self.pop())
+
+    def take(self, v):
+        self.order.append(v)
+        self.visit(v)
 
     @staticmethod
     def next(c):
@@ -158,7 +165,8 @@ def position_features(points, ring, around, rank):
     return mean_point, across, ending, outer, normal, spread, len(Q), int(bool(ends))
 
 
-def decode_positions(data, around):
+def decode_positions(data, around, known=None):
+    """known: grid points, as in Neighbourhood."""
     vertices = len(around.order)
     if vertices == 0:
         return []
@@ -174,6 +182,9 @@ def decode_positions(data, around):
     for rank, v in enumerate(around.order):
         N = around.neighbours[rank]
         mean_point, across, ending, outer, n, spread, count, has_ending = position_features(points, ring, around, rank)
+        if known and known[v] is not None:
+            points[v] = known[v]
+            continue
         w = weights[has_ending]
         predicted = []
         for k in range(3):
@@ -232,7 +243,8 @@ def colour_surroundings(points, level, miss, around, rank):
     return predicted, miss_around, spread
 
 
-def decode_colours(data, points, around, step):
+def decode_colours(data, points, around, step, known=None):
+    """known: colours, as in Neighbourhood."""
     vertices = len(around.order)
     if vertices == 0:
         return []
@@ -248,6 +260,10 @@ def decode_colours(data, points, around, step):
     mantissa = Models(ResidualMantissa)
     colours, level, miss = [None] * vertices, [None] * vertices, [None] * vertices
     for rank, v in enumerate(around.order):
+        if known and known[v] is not None:
+            red, green, blue = colours[v] = known[v]
+            level[v], miss[v] = [16 * green, 16 * red, 16 * blue], [0] * 3
+            continue
         predicted, miss_around, spread = colour_surroundings(points, level, miss, around, rank)
         values, off, level[v], miss[v] = [], [], [], []
         for k in range(3):

@@ -10,7 +10,7 @@ INFINITY = float("inf")
 MOST_NODES = 1024
 
 
-def smoothed(positions, triangles, step):
+def smoothed(positions, triangles, step, settled):
     reach = step // 2
     total, count = [[0, 0, 0] for _ in positions], [0] * len(positions)
     for t in triangles:
@@ -19,8 +19,8 @@ def smoothed(positions, triangles, step):
             for k in range(3):
                 total[t[i]][k] += positions[t[(i + 1) % 3]][k] + positions[t[(i + 2) % 3]][k]
     out = []
-    for p, s, n in zip(positions, total, count):
-        if n > 0:
+    for v, (p, s, n) in enumerate(zip(positions, total, count)):
+        if n > 0 and v >= settled:
             changes = (clamp(rdiv(s[k] - n * p[k], 2 * n), -reach, reach) for k in range(3))
             p = tuple(clamp(x + change, -L, L) for x, change in zip(p, changes))
         out.append(p)

@@ -8,13 +8,13 @@ from conventions import Bytes, L, Unsupported, check
 
 # ---------------------------------------------------------------------------------------------- 2. packets
 
-SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED, AUDIO = 1, 2, 3, 4, 5, 6, 7, 10
+SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED, AUDIO, PATCHED = 1, 2, 3, 4, 5, 6, 7, 10, 11
 REFERRED, TOLD = 1, 128  # flags
 
 
 class Packet:
     def referred(self):
-        """Whether later frames may refer to this I- or T-frame (2.1)."""
+        """Whether later frames may refer to this I-, T- or TP-frame (2.1)."""
         return not self.flags & TOLD or self.flags & REFERRED != 0
 
 
@@ -54,8 +54,8 @@ def read_sequence_header(payload):
     header = Header()
     check(read.take(4) == b"htvm", "this is no htvm stream")
     version = read.field("H")
-    if version not in (1, 2, 3):
-        raise Unsupported("version %d; this decoder reads 1 to 3" % version)
+    if not 1 <= version <= 4:
+        raise Unsupported("version %d; this decoder reads 1 to 4" % version)
     header.version = version
     header.bits = read.field("B")
     header.origin = [read.field("i") for _ in range(3)]
@@ -114,7 +114,7 @@ def read_metadata(read):
 # ---------------------------------------------------------------------------------------------- 4. frame payload
 
 (POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL,
- CODED_BONES) = range(1, 12)
+ CODED_BONES, TRACKED_RUN, REMOVED, BORDER) = range(1, 15)
 
 
 class Frame:
@@ -137,14 +137,14 @@ def read_frame_payload(payload):
     frame.layers = {}
     for number, size in table:
         layer = read.take(size)
-        if number < 12:
+        if number < 15:
             check(number not in frame.layers, "a layer comes twice")
             frame.layers[number] = layer
     return frame
 
 
 def read_coded_frame(packet):
-    """The payload of an I- or EP-frame, which has a least size."""
+    """The payload of an I-, EP- or TP-frame, which has a least size."""
     frame = read_frame_payload(packet.payload)
     least = max(-(-frame.vertices // 64), -(-frame.triangles // 128))
     check(len(packet.payload) >= least, "the payload is too short for so many vertices or triangles")

@@ -14,11 +14,12 @@ from stream import COLOUR, GEOMETRY, TRANSFORMS, read_frame_payload
 
 
 class TrackedReference:
-    """What all T-frames of an I-frame share."""
+    """What all T-frames of an I- or TP-frame share. settled: how many of its vertices are not smoothed, 0 of an
+    I-frame."""
 
-    def __init__(self, mesh, captured, geometry_step, spacing):
+    def __init__(self, mesh, captured, geometry_step, settled, spacing):
         self.mesh, self.captured = mesh, captured
-        self.positions = smoothed(mesh.positions, mesh.triangles, geometry_step)
+        self.positions = smoothed(mesh.positions, mesh.triangles, geometry_step, settled)
         self.nodes = Nodes(self.positions, mesh.triangles, spacing)
         normals = normals_of(self.positions, mesh.triangles)
         self.node_normals = [normals[v] for v in self.nodes.vertices]
@@ -54,12 +55,16 @@ def normals_of(positions, triangles):
     return [tuple(x / length for x in n) if length > 0 else (0.0, 0.0, 0.0) for n, length in zip(out, lengths)]
 
 
+def quantised_normals(mesh):
+    return [tuple(math.floor(x * 127 + 0.5) for x in n) for n in normals_of(mesh.positions, mesh.triangles)]
+
+
 def decode_layers(payload, reference, before):
     """The layers of a payload of versions 1 and 2."""
     frame = read_frame_payload(payload)
     source = reference.mesh
     vertices = len(source.positions)
-    check(frame.vertices == vertices and frame.triangles == len(source.triangles), "its counts are not the I-frame's")
+    check(frame.vertices == vertices and frame.triangles == len(source.triangles), "its counts are not the reference's")
     state = TrackedState()
     state.transforms = decode_node_motion_layer(
         frame.layer(TRANSFORMS), reference.nodes, reference.node_normals, before and before.transforms)
@@ -147,6 +152,5 @@ def decode_tracked_mesh(payload, version, reference, before):
         mesh.colours = [tuple(clamp(x + y, 0, 255) for x, y in zip(*pair))
                         for pair in zip(source.colours, state.change.values)]
     if source.normals:
-        mesh.normals = [tuple(math.floor(x * 127 + 0.5) for x in n)
-                        for n in normals_of(mesh.positions, mesh.triangles)]
+        mesh.normals = quantised_normals(mesh)
     return mesh, state
