@@ -9,6 +9,8 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     const auto& header = *state.header;
     if (header.node_spacing == 0)
         return fail(ErrorKind::corrupt_stream, "a patched frame in a stream whose header says that it has none");
+    if (!is_referred(packet, rules_of(FrameType::patched)))
+        return fail(ErrorKind::corrupt_stream, "a patched frame that nothing may refer to");
     auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
     if (!pose) return tl::unexpected(pose.error());
     if (auto ok = derive_nodes(*state.reference, header, state.threads); !ok) return tl::unexpected(ok.error());

@@ -1,7 +1,7 @@
 // Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
-// tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 of version 2, and no
-// encoder writes them any more; NAME_3 are of version 3. HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of
-// version 3 that are there; NAME_3 writes that one, whether it is there or not.
+// tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 and NAME_3 of versions
+// 2 and 3, and no encoder writes them any more; NAME_4 are of version 4. HTVM_WRITE_CONFORMANCE=1 in the environment
+// rewrites all of version 4 that are there; NAME_4 writes that one, whether it is there or not.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,6 +15,8 @@
 
 #include "codec/enhanced_options.h"
 #include "codec/moving_sequences.h"
+#include "codec/patched_sequences.h"
+#include "codec/patches_by_chance.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "codec/tracked_sequences.h"
@@ -181,6 +183,27 @@ void write_tracked_by_chance() {
     write_packets("tracked_by_chance", packets);
 }
 
+// What version 4 brought: TP-frames as the encoder writes them where tracking is lost.
+void write_patched() {
+    const auto coded = encode(horned_ball(5), patched_options());
+    ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
+    ASSERT_GE(frames_of(coded, FrameType::patched), 1u);
+    write_packets("patched", coded.packets);
+}
+
+// TP-frames with any patches on every awkward connectivity.
+void write_patched_by_chance() {
+    TestSequence awkward{"awkward", {}, {}};
+    unsigned attributes = 0;
+    for (const auto& shape : tfan_test::special_meshes())
+        if (shape.vertex_count <= 60) awkward.frames.push_back(sequence_of(shape, 1, attributes++ % 4).frames[0]);
+    EncoderOptions options = test::enhanced_options();
+    options.key_interval = 1;
+    options.topology.merge_duplicates = false;
+    options.geometry_step = 6;
+    write_packets("patched_by_chance", with_patched_frames(encode(awkward, options).packets, 1500, {}, 7));
+}
+
 // Rare cases: meshes without vertices or triangles among others, attributes that come and go, all vertices at one
 // point, the ends of the lattice, sizes that jump, many components.
 void write_corner_cases() {
@@ -288,6 +311,8 @@ void write_all() {
     write_moving();
     write_tracked();
     write_tracked_by_chance();
+    write_patched();
+    write_patched_by_chance();
     write_sequences();
 
     TestSequence spokes{"awkward, moving", {}, {}};

@@ -94,6 +94,16 @@ TEST(PatchedFrames, ThatAreLostTakeThoseBehindThemWithThemUpToTheNextIFrame) {
     EXPECT_EQ(decoded, (std::vector{true, true, false, false, true, true}));
 }
 
+TEST(PatchedFrames, ThatNothingMayReferToAreErrors) {
+    auto coded = encode(horned_ball(3), patched_options());
+    Decoder decoder;
+    for (auto& packet : coded.packets) {
+        const bool patched = packet.kind == PacketKind::patched;
+        if (patched) packet.flags = packet_flag::told | packet_flag::droppable;
+        EXPECT_EQ(decoder.push(packet).has_value(), !patched);
+    }
+}
+
 TEST(PatchedFrames, ThatAreDamagedLeaveTheDecoderAsItWas) {
     const auto coded = encode(horned_ball(3), patched_options());
     const auto patched = std::find_if(coded.packets.begin(), coded.packets.end(),
