@@ -41,14 +41,17 @@ enum class FrameChoice : std::uint8_t {
 
 enum class TrackedReferences : std::uint8_t {
     intra,     // T-frames refer to the I-frame alone, so any may be lost
-    previous,  // T-frames refer to the previous frame: fewer bits, but a lost frame costs those up to the next I-frame
+    previous,  // T-frames refer to the previous frame: fewer bits, but a lost frame costs those up to the next one that
+               // refers to the reference alone
 };
 
 // For Profile::tracked only; with other profiles, anything but the defaults is refused.
 struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
-    double simplify = 0.4;    // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
-                              // its surface in geometry steps; 0: it keeps all vertices and its connectivity
+    int access_interval = 30;  // with `previous`: largest distance, in frames, between places where decoding can start
+                               // for whoever has the I-frame and its patches: T-frames that refer to nothing else
+    double simplify = 0.4;     // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
+                               // its surface in geometry steps; 0: it keeps all vertices and its connectivity
     double patch_share = 0.3;  // where tracking is lost, the largest share of the mesh that a patch may replace; where
                                // more is lost, an I-frame is sent; 0: always
     double node_spacing = 0;  // mm between the nodes of the deformation graph; 0: 80 on an adult, in proportion to size
@@ -90,7 +93,8 @@ struct EncoderOptions {
     double colour_step = 6.0;    // levels of 255, >= 1: cell size of the colour quantiser
     double lambda = 0.12;        // squared error that is worth one bit, in units of step^2; 0: always the nearest
                                  // codeword
-    int key_interval = 30;       // largest distance between I-frames, in frames; 1: I-frames only
+    int key_interval = 300;      // largest distance between I-frames, in frames; 1: I-frames only. With EP-frames,
+                                 // which drift from their I-frame, 30: see default_options()
     int least_key_interval = 1;  // smallest distance between I-frames, unless the frame cannot refer to the I-frame or
                                  // the scene changes
     int lattice_bits = 0;        // decoded positions are multiples of 2^-lattice_bits mm; 0: automatic, 4 or more if
@@ -116,7 +120,8 @@ struct EncoderOptions {
     RateOptions rate;
 };
 
-// The default options of a profile: those of EncoderOptions; for Profile::paper, the paper's choices where they differ.
+// The default options of a profile: those of EncoderOptions for Profile::tracked. The others have an I-frame every 30
+// frames, and Profile::paper the paper's choices where they differ.
 EncoderOptions default_options(Profile profile);
 
 // The two steps for a quality from 0 to 100 that means about the same error for every capture, with T-frames or without

@@ -25,10 +25,8 @@ struct FrameKind {
     const char* name;
 };
 inline constexpr std::array frame_kinds = {
-    FrameKind{FrameType::intra, "I", "intra"},
-    FrameKind{FrameType::enhanced, "EP", "enhanced"},
-    FrameKind{FrameType::predicted, "P", "predicted"},
-    FrameKind{FrameType::tracked, "T", "tracked"},
+    FrameKind{FrameType::intra, "I", "intra"},         FrameKind{FrameType::enhanced, "EP", "enhanced"},
+    FrameKind{FrameType::predicted, "P", "predicted"}, FrameKind{FrameType::tracked, "T", "tracked"},
     FrameKind{FrameType::patched, "TP", "patched"},
 };
 inline constexpr std::size_t frame_type_count = frame_kinds.size();
@@ -113,6 +111,7 @@ struct FrameCost {
     FrameType type = FrameType::intra;
     double quality = 50;  // the quality setting used
     double bits = 0;
+    double renewed = 0;  // TP: the share of its vertices that are new, 0..1
 };
 
 }  // namespace htvm

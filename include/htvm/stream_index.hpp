@@ -64,9 +64,15 @@ public:
     StreamIndex finish(std::uint64_t bytes);
 
 private:
+    // The frame in force as the reference, and its place among the entries.
+    struct Referred {
+        std::uint32_t frame;
+        std::size_t entry;
+    };
     FrameNumbers numbers_;
     RunningTime time_;
     StreamIndex index_;
+    std::optional<Referred> reference_;
     std::uint64_t header_offset_ = 0;
 };
 

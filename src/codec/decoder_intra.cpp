@@ -17,6 +17,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(payload, external ? &*external : nullptr);
     if (!mesh) return tl::unexpected(mesh.error());
+    const auto step = smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step), header);
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {
@@ -27,7 +28,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     }
     // T-frames need the nodes at once; what depends on bones is built when a frame asks for it.
     const ReferenceFacts facts{.number = packet.frame,
-                               .step = static_cast<std::int32_t>(payload.header.geometry_step),
+                               .step = step,
                                .captured = {payload.header.source_vertices, payload.header.source_triangles}};
     auto reference = make_reference(header, facts, std::move(*mesh), std::move(*pose), {.bones = false, .nodes = true},
                                     state.threads);

@@ -27,14 +27,14 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     auto patched = decode_patch(payload, {tracked.positions, triangles, tracked.colours}, reference.hierarchy);
     if (!patched) return tl::unexpected(patched.error());
     auto& mesh = patched->mesh;
+    const auto step = static_cast<std::int32_t>(payload.header.geometry_step);
+    mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, {.step = step, .settled = patched->kept});
     if (!reference.mesh.normals.empty())
         mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
     // With what the patch added, the mesh may be larger than its header says, and than its reference.
     if (auto ok = check_limits({}, {mesh.positions.size(), mesh.triangles.size()}, {}, 0, state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
     const ReferenceFacts facts{.number = packet.frame,
-                               .step = static_cast<std::int32_t>(payload.header.geometry_step),
-                               .settled = patched->kept,
                                .captured = {payload.header.source_vertices, payload.header.source_triangles}};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);

@@ -212,7 +212,7 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     auto chosen = choose_frame(
         work, state.control, [&](const Candidate& candidate) { return bits_of(state, candidate); }, force_intra);
     if (!chosen) return tl::unexpected(chosen.error());
-    const FrameCost cost{rate_type(*chosen), chosen->quality, bits_of(state, *chosen)};
+    const FrameCost cost{rate_type(*chosen), chosen->quality, bits_of(state, *chosen), chosen->renewed};
     StageClock derivation(state.stages);
     auto sequence = advance(state.configuration, state.sequence, *chosen);
     if (!sequence) return tl::unexpected(sequence.error());
@@ -224,7 +224,7 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     state.begun = true;
     state.last_timestamp = timestamp_us;
     state.cost = cost;
-    if (state.control.rate) state.control.rate->coded(cost.type, cost.quality, cost.bits);
+    if (state.control.rate) state.control.rate->coded(cost);
     state.decoded = std::move(chosen->decoded);
     state.distance_order_counts = std::move(chosen->distance_order_counts);
     return {};
@@ -254,7 +254,8 @@ RateControlOptions rate_options(const EncoderOptions& options) {
     out.bits_per_second = options.rate.bits_per_second;
     out.frames_per_second = static_cast<double>(options.fps_numerator) / options.fps_denominator;
     out.buffer_seconds = options.rate.buffer_seconds;
-    out.key_interval = options.key_interval;
+    // An I-frame's bits are made up for within two seconds, not over ten.
+    out.key_interval = std::min(options.key_interval, 60);
     if (options.profile == Profile::tracked) out.intra_extra = 3;
     return out;
 }

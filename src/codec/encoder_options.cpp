@@ -194,6 +194,18 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.references); },
      .set = [](EncoderOptions& o, double value) { o.tracked.references = static_cast<TrackedReferences>(value); },
      .flag = "--tracked-from"},
+    {.name = "tracked.access_interval",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::whole_number,
+     .unit = "frames",
+     .least = 1,
+     .most = 1000000,
+     .meaning =
+         "largest number of frames between places to start from, for seeking and for viewers that join: I-frames, "
+         "and T-frames that refer to nothing but the I-frame and its patches",
+     .get = [](const EncoderOptions& o) -> double { return o.tracked.access_interval; },
+     .set = [](EncoderOptions& o, double value) { o.tracked.access_interval = static_cast<int>(value); },
+     .flag = "--access-interval"},
     {.name = "tracked.simplify",
      .group = OptionGroup::tracked,
      .kind = OptionKind::number,
@@ -212,8 +224,9 @@ constexpr Option list[] = {
      .least = 0,
      .most = 1,
      .zero = "always an I-frame",
-     .meaning = "where tracking is lost, the largest share of the mesh that a patch may replace; where more is lost, an "
-                "I-frame is sent",
+     .meaning =
+         "where tracking is lost, the largest share of the mesh that a patch may replace; where more is lost, an "
+         "I-frame is sent",
      .get = [](const EncoderOptions& o) -> double { return o.tracked.patch_share; },
      .set = [](EncoderOptions& o, double value) { o.tracked.patch_share = value; },
      .flag = "--patch-share"},
@@ -370,6 +383,7 @@ std::string quoted(std::string_view text) { return "'" + std::string(text) + "'"
 EncoderOptions default_options(Profile profile) {
     EncoderOptions out;
     out.profile = profile;
+    if (profile != Profile::tracked) out.key_interval = 30;
     if (profile != Profile::paper) return out;
     out.topology.frame_choice = FrameChoice::fixed;
     out.topology.reference_vertices = ReferenceVertices::bone;

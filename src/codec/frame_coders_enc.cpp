@@ -137,16 +137,26 @@ Candidate code_moving_part(FrameWork& work, const FrameSteps& steps, const std::
     return code_residuals(work, source, steps);
 }
 
-Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse use) {
+// Of two fits of the same capture, the errors that a later frame may not exceed: what tracking leaves must not become
+// the measure of what may be left.
+TrackedFit least_of(TrackedFit fit, const TrackedFit& before) {
+    fit.stray_share = std::min(fit.stray_share, before.stray_share);
+    fit.worst_region = std::min(fit.worst_region, before.worst_region);
+    return fit;
+}
+
+// renewed: the tracked mesh, which is coded instead of the capture; or null.
+Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse use,
+                             const LatticeMesh* renewed = nullptr) {
     const auto& configuration = work.configuration;
     const bool tracked = configuration.tracked(), referred_to = use == IntraUse::reference;
     const auto asked = tracked ? tracked_steps(steps) : steps;
-    const bool simplify = tracked && configuration.options.tracked.simplify > 0 && work.carries_surface();
+    const bool simplify = tracked && !renewed && configuration.options.tracked.simplify > 0 && work.carries_surface();
     // Without a skeleton EP-frames may never pay off, and then the bits of a finer I-frame would be wasted.
     const bool finer = referred_to && (configuration.header.skeleton_tracked || tracked ||
                                        configuration.options.topology.frame_choice != FrameChoice::cheaper);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
-    const auto& mesh = simplify ? simple : work.mesh;
+    const auto& mesh = renewed ? *renewed : simplify ? simple : work.mesh;
     StageClock clock(work.stages);
     IntraFrameOptions options;
     options.geometry_step =
@@ -157,6 +167,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     FramePayload payload;
     auto decoded = encode_intra_frame(mesh, options, payload);
     if (!decoded) return tl::unexpected(decoded.error());
+    const auto step = smooth_as_shown(*decoded, options.geometry_step, configuration.header);
     const auto captured = counts_of(work.mesh);
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;
@@ -172,11 +183,18 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     out.pose = work.pose;
     out.packets.push_back(frame_packet(PacketKind::intra, payload));
     auto& facts = out.intra.emplace();
-    facts.step = options.geometry_step;
+    facts.step = step;
     facts.edge = work.edge();
     facts.steps = steps;
     clock.done("intra coding");
     if (tracked && referred_to && out.referred) facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
+    facts.vertices = out.decoded.positions.size();
+    if (renewed) {
+        const auto& before = work.reference().intra;
+        facts.fit = least_of(std::move(facts.fit), before.fit);
+        facts.vertices = before.vertices;
+        out.renewal = true;
+    }
     return out;
 }
 
@@ -222,7 +240,10 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     const auto references = work.configuration.options.tracked.references;
     const auto& reference = work.reference().decoded;
     const auto& nodes = work.sequence.nodes;
-    const bool from_last = nodes.frame && references == TrackedReferences::previous;
+    // Now and then a place to start from, for whoever has the reference.
+    const auto since = work.sequence.next_frame - std::max(reference.number, nodes.access.value_or(0));
+    const bool from_last = nodes.frame && references == TrackedReferences::previous &&
+                           std::int64_t{since} < work.configuration.options.tracked.access_interval;
     auto encoded = encode_tracked(work, steps, parts, from_last ? &nodes.state : nullptr);
     if (!encoded) return tl::unexpected(encoded.error());
     Candidate out;
@@ -236,6 +257,7 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     out.shares = encoded->runs.shares;
     auto& history = out.nodes.emplace();
     history.frame = work.sequence.next_frame;
+    history.access = from_last ? nodes.access : history.frame;
     history.before_last = nodes.last;
     history.last = work.node_motion();
     history.state = std::move(encoded->state);
@@ -276,6 +298,10 @@ Result<Candidate> code_lone_intra(FrameWork& work, const FrameSteps& steps) {
     return code_intra(work, steps, IntraUse::alone);
 }
 
+Result<Candidate> code_renewed_intra(FrameWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
+    return code_intra(work, steps, IntraUse::reference, &tracked);
+}
+
 Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded) {
     if (std::find(coded.begin(), coded.end(), true) == coded.end()) return code_predicted(work);
     const auto& sub_meshes = work.reference().decoded.skinned.sub_meshes;
@@ -302,6 +328,7 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
                                 patch, {coded_steps.geometry, coded_steps.colour}, payload);
     if (!patched) return tl::unexpected(patched.error());
     const auto captured = counts_of(work.mesh);
+    const auto vertices = patched->mesh.positions.size();
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;
     payload.set(Layer::tracked, tracked->runs.payload);
@@ -310,22 +337,21 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     out.type = FrameType::patched;
     out.reference = in_use.decoded.number;
     out.referred = true;
+    out.renewed = vertices > 0 ? static_cast<double>(vertices - patched->kept) / static_cast<double>(vertices) : 0;
     out.decoded = std::move(patched->mesh);
+    out.decoded.positions = smoothed_within_cells(out.decoded.positions, out.decoded.triangles,
+                                                  {.step = coded_steps.geometry, .settled = patched->kept});
     if (!mesh.normals.empty())
         out.decoded.normals = quantised_normals(vertex_normals(out.decoded.positions, out.decoded.triangles));
-    out.settled = patched->kept;
     out.captured = captured;
     out.pose = work.pose;
     out.packets.push_back(frame_packet(PacketKind::patched, payload));
     auto& facts = out.intra.emplace(in_use.intra);
-    facts.step = coded_steps.geometry;
+    facts.step = 1;
     facts.steps = steps;
     facts.edge = work.edge();
     clock.done("patch coding");
-    // What the patches leave must not become the measure of what may be left.
-    facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
-    facts.fit.stray_share = std::min(facts.fit.stray_share, in_use.intra.fit.stray_share);
-    facts.fit.worst_region = std::min(facts.fit.worst_region, in_use.intra.fit.worst_region);
+    facts.fit = least_of(work.tracked_fit(out.decoded, facts.edge, {}), in_use.intra.fit);
     return out;
 }
 

@@ -19,6 +19,9 @@ SimplifiedReferenceOptions simplification_options(const Configuration& configura
 // Variants that the choice of frames tries.
 // An I-frame that nothing refers to: it is quantised exactly with the steps asked for.
 Result<Candidate> code_lone_intra(FrameWork& work, const FrameSteps& steps);
+// An I-frame of the tracked mesh instead of the capture: who starts here, or has lost something, gets what the others
+// see, and these see no change. tracked: the T-frame's mesh.
+Result<Candidate> code_renewed_intra(FrameWork& work, const FrameSteps& steps, const LatticeMesh& tracked);
 // Motion-based coding: an EP-frame in which some bones are coded and the seams zippered, a P-frame if none is coded, a
 // whole EP-frame if nothing would be left to animate. coded: one per bone.
 Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded);

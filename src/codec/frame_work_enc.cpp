@@ -61,16 +61,19 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         return out;
     }
     const bool patched = sent.type == FrameType::patched;
-    auto decoded =
-        make_reference(configuration.header, {before.next_frame, sent.intra->step, sent.settled, sent.captured},
-                       sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
+    auto decoded = make_reference(configuration.header, {before.next_frame, sent.intra->step, sent.captured},
+                                  sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto in_use = std::make_shared<ReferenceInUse>();
     in_use->decoded = std::move(*decoded);
     in_use->intra = std::move(*sent.intra);
     in_use->intra_frame = patched ? before.reference->intra_frame : before.next_frame;
     in_use->bytes = patched ? before.reference->bytes : static_cast<double>(sent.bytes());
-    if (patched) out.nodes.best_fit = before.nodes.best_fit;
+    if (patched) {
+        in_use->patches = before.reference->patches + 1;
+        in_use->patch_bytes = before.reference->patch_bytes + static_cast<double>(sent.bytes());
+    }
+    if (patched || sent.renewal) out.nodes.best_fit = before.nodes.best_fit;
     if (in_use->decoded.tracked)
         in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
     else if (in_use->decoded.has_bones)

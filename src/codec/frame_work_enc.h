@@ -43,12 +43,13 @@ struct FrameSteps {
 
 // What the encoder knows about an I-frame and the decoder does not.
 struct IntraFacts {
-    std::int32_t step = 1;  // of its positions, in lattice units
-    FrameSteps steps;       // the steps asked for
-    double edge = 0;        // mean edge of the captured mesh, in lattice units
-    TrackedFit fit;         // of the I-frame itself, if T-frames refer to it
-    SurfaceErrors plain;    // for choice by rate and distortion: the errors of an I-frame at `steps` that nothing
-                            // refers to
+    std::int32_t step = 1;     // of the reference that it becomes: Reference::step
+    FrameSteps steps;          // the steps asked for
+    double edge = 0;           // mean edge of the captured mesh, in lattice units
+    std::size_t vertices = 0;  // of the last I-frame that was made of the capture; later ones may be the tracked mesh
+    TrackedFit fit;            // of the I-frame itself, if T-frames refer to it
+    SurfaceErrors plain;       // for choice by rate and distortion: the errors of an I-frame at `steps` that nothing
+                               // refers to
 };
 
 // The current reference, and what the encoder derives from it.
@@ -57,6 +58,8 @@ struct ReferenceInUse {
     IntraFacts intra;               // of the I-frame, patched since or not
     std::uint32_t intra_frame = 0;  // number of the I-frame; patched since, the reference has another
     double bytes = 0;               // size of the I-frame
+    int patches = 0;                // how many TP-frames led from the I-frame to this reference
+    double patch_bytes = 0;         // their size
     ReferenceSearch search;         // over the bones' sub-meshes, if frames refer to bones
     DeformableMesh deformable;      // if frames refer to nodes
 };
@@ -73,6 +76,7 @@ struct BoneHistory {
 // What the T-frames since the I-frame leave for the next one.
 struct NodeHistory {
     std::optional<std::uint32_t> frame;          // number of the last one
+    std::optional<std::uint32_t> access;         // number of the last one that refers to the reference alone
     std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
     TrackedState state;                          // of the last one
     double best_fit = 0;                         // RMS of the best so far; 0: none yet
@@ -93,8 +97,9 @@ struct Candidate {
     bool access = true;           // whether it is an I-frame or refers to a reference
     LatticeMesh decoded;          // the mesh that the decoder will have
     CapturedCounts captured;      // of the mesh that it was made of
-    std::uint32_t settled = 0;    // TP: how many vertices it takes over from its reference
     LayerBytes shares;            // T: its layers' of its bytes, which its packet does not tell
+    bool renewal = false;         // I: whether it was made of the tracked mesh, not of the capture
+    double renewed = 0;           // TP: the share of its vertices that are new
     double quality = 50;          // the quality setting used, under rate or error control
     bool stands_in = false;       // a P- or T-frame of motion alone, because nothing better fits the buffer
     // What it leaves for the sequence; one of the first three is set.

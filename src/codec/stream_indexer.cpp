@@ -19,9 +19,18 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
     if (index_.frames == 0) index_.first_timestamp_us = packet.timestamp_us;
     index_.frames = std::max(index_.frames, number + 1);
     if (numbers_.begins_sequence()) index_.sequences.push_back({header_offset_, number});
-    if (!stands_alone(*type)) return;
-    const bool ascends = index_.points.empty() || number > index_.points.back().frame;
-    if (ascends) index_.points.push_back({number, packet.timestamp_us, offset, 0, told_header(packet).flags});
+    const auto& rules = rules_of(*type);
+    const auto header = told_header(packet);
+    const bool alone = rules.refers_to == RefersTo::nothing, referred = is_referred(header, rules);
+    if (!alone && !(referred && header.has(packet_flag::access))) return;
+    if (!index_.points.empty() && number <= index_.points.back().frame) return;
+    std::uint32_t back = 0;
+    if (!alone) {
+        if (!reference_ || reference_->frame != packet.reference) return;
+        back = static_cast<std::uint32_t>(index_.points.size() - reference_->entry);
+    }
+    if (rules.renews && referred) reference_ = Referred{packet.frame, index_.points.size()};
+    index_.points.push_back({number, packet.timestamp_us, offset, back, header.flags});
 }
 
 void StreamIndexer::add(const SpaceBounds& bounds) { extend(index_.bounds, bounds); }

@@ -70,6 +70,7 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
     std::mt19937 random(seed);
     std::vector<Packet> out;
     std::uint32_t frame = 0;
+    SequenceHeader header;
     const auto add = [&](Packet packet, std::uint32_t reference) {
         packet.frame = frame;
         packet.reference = reference;
@@ -79,7 +80,7 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
     };
     for (const auto& packet : intra) {
         if (packet.kind == PacketKind::sequence) {
-            auto header = *read_sequence_header(packet.payload);
+            header = *read_sequence_header(packet.payload);
             header.node_spacing = node_spacing;
             out.push_back(packet);
             out.back().payload = write_sequence_header(header);
@@ -87,12 +88,12 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
         if (packet.kind != PacketKind::intra) continue;
         const auto coded = *read_frame_payload(packet.payload);
         std::uint32_t number = frame;
-        QuantiserCells cells{static_cast<std::int32_t>(coded.header.geometry_step)};
         CapturedCounts captured{coded.header.source_vertices, coded.header.source_triangles};
         auto mesh = *decode_intra_frame(coded, nullptr);
+        smooth_as_shown(mesh, static_cast<std::int32_t>(coded.header.geometry_step), header);
         add(packet, number);
         for (int patches = 0;; ++patches) {
-            auto reference = *make_tracked_reference(mesh, node_spacing, cells);
+            auto reference = *make_tracked_reference(mesh, node_spacing, {});
             reference.captured = captured;
             TrackedState before;
             for (int t = 0; t < 1 + patches % 2; ++t) {
@@ -119,9 +120,10 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
             payload.header.source_vertices = captured.vertices;
             payload.header.source_triangles = captured.triangles;
             mesh = std::move(patched.mesh);
+            mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles,
+                                                   {.step = steps.geometry, .settled = patched.kept});
             if (!reference.mesh.normals.empty())
                 mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
-            cells = {steps.geometry, patched.kept};
             Packet next = packet;
             next.kind = PacketKind::patched;
             next.payload = write_frame_payload(payload);

@@ -77,7 +77,7 @@ Outcome code(const Capture& c, const RateControlOptions& options, std::vector<Fr
         if (type == FrameType::enhanced) last = quality;
         run.lowest = std::min(run.lowest, quality), run.highest = std::max(run.highest, quality);
         run.bits += bits;
-        rate.coded(type, quality, bits);
+        rate.coded({type, quality, bits});
     }
     EXPECT_DOUBLE_EQ(rate.total_bits(), run.bits);
     return run;
@@ -168,10 +168,10 @@ TEST(RateControl, TheFifthLowerQualityIsTheLowest) {
 TEST(RateControl, RoomIsWhatTheBufferDoesNotHold) {
     RateController rate({.bits_per_second = 3000, .frames_per_second = 30, .buffer_seconds = 2});
     EXPECT_EQ(rate.room(), 6000);
-    rate.coded(FrameType::intra, 50, 5000);
+    rate.coded({FrameType::intra, 50, 5000});
     EXPECT_EQ(rate.buffer_bits(), 4900);
     EXPECT_EQ(rate.room(), 1100);
-    for (int i = 0; i < 60; ++i) rate.coded(FrameType::predicted, 50, 0);
+    for (int i = 0; i < 60; ++i) rate.coded({FrameType::predicted, 50, 0});
     EXPECT_EQ(rate.buffer_bits(), 0);
 }
 

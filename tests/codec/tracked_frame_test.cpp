@@ -8,6 +8,7 @@
 #include "codec/enhanced_options.h"
 #include "codec/hostile_bytes.h"
 #include "codec/intra/intra_frame.h"
+#include "codec/reference/reference.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "codec/tracked/tracked_frame_enc.h"
@@ -179,9 +180,9 @@ FirstTrackedFrame first_tracked_frame() {
     const auto coded = encode(walking(2, true, 300), tracked());
     const auto header = read_sequence_header(coded.packets[0].payload).value();
     const auto intra = read_frame_payload(coded.packets[1].payload).value();
-    auto reference = make_tracked_reference(decode_intra_frame(intra, nullptr).value(), header.node_spacing,
-                                            {static_cast<std::int32_t>(intra.header.geometry_step)})
-                         .value();
+    auto mesh = decode_intra_frame(intra, nullptr).value();
+    smooth_as_shown(mesh, static_cast<std::int32_t>(intra.header.geometry_step), header);
+    auto reference = make_tracked_reference(mesh, header.node_spacing, {}).value();
     reference.captured = {intra.header.source_vertices, intra.header.source_triangles};
     return {std::move(reference), coded.packets[2].payload};
 }

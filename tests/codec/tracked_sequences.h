@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "codec/intra/intra_frame.h"
+#include "codec/reference/reference.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "codec/tracked/tracked_frame_enc.h"
@@ -80,6 +81,7 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
     std::mt19937 random(seed);
     std::vector<Packet> out;
     std::uint32_t frame = first;
+    SequenceHeader header;
     const auto add = [&](Packet packet, std::uint32_t reference) {
         packet.frame = frame;
         packet.reference = reference;
@@ -89,15 +91,16 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
     };
     for (const auto& packet : intra) {
         if (packet.kind == PacketKind::sequence) {
-            auto header = *read_sequence_header(packet.payload);
+            header = *read_sequence_header(packet.payload);
             header.node_spacing = node_spacing;
             out.push_back(packet);
             out.back().payload = write_sequence_header(header);
         }
         if (packet.kind != PacketKind::intra) continue;
         const auto payload = *read_frame_payload(packet.payload);
-        auto reference = *make_tracked_reference(*decode_intra_frame(payload, nullptr), node_spacing,
-                                                 {static_cast<std::int32_t>(payload.header.geometry_step)});
+        auto mesh = *decode_intra_frame(payload, nullptr);
+        smooth_as_shown(mesh, static_cast<std::int32_t>(payload.header.geometry_step), header);
+        auto reference = *make_tracked_reference(mesh, node_spacing, {});
         reference.captured = {payload.header.source_vertices, payload.header.source_triangles};
         const std::uint32_t key = frame;
         add(packet, key);

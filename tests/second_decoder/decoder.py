@@ -16,6 +16,7 @@ from audio import read_audio
 from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from intra import decode_intra_mesh
+from nodes import smoothed
 from reference import Reference, decode_pose
 from patched import decode_patched_mesh
 from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, PATCHED, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
@@ -36,14 +37,14 @@ def digest(mesh):
 class Group:
     """An I- or TP-frame and what T-frames make of it (8.11)."""
 
-    def __init__(self, mesh, frame, number, settled=0):
-        self.mesh, self.frame, self.number, self.settled = mesh, frame, number, settled
+    def __init__(self, mesh, frame, number, step=1):
+        self.mesh, self.frame, self.number, self.step = mesh, frame, number, step
         self.reference = self.state = self.last = None
 
     def tracked_reference(self, header):
         check(header.node_spacing > 0, "the header allows no tracked frames")
         self.reference = self.reference or TrackedReference(
-            self.mesh, self.frame.captured, self.frame.geometry_step, self.settled, header.node_spacing)
+            self.mesh, self.frame.captured, self.step, header.node_spacing)
         return self.reference
 
     def decode(self, packet, header):
@@ -60,8 +61,8 @@ class Group:
         check(packet.referred(), "a patched frame that nothing may refer to")
         frame = read_coded_frame(packet)
         joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
-        mesh, kept = decode_patched_mesh(frame, self.tracked_reference(header))
-        return mesh, joints, Group(mesh, frame, packet.frame, kept)
+        mesh = decode_patched_mesh(frame, self.tracked_reference(header))
+        return mesh, joints, Group(mesh, frame, packet.frame)
 
 
 def decode_stream(data):
@@ -89,12 +90,15 @@ def decode_stream(data):
                 check(header, "a frame came before any sequence header")
                 frame = read_coded_frame(packet)
                 joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
-                mesh = decode_intra_mesh(frame)
+                mesh, step = decode_intra_mesh(frame), frame.geometry_step
+                if header.version >= 4 and header.node_spacing > 0:
+                    mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
+                    step = 1
                 if not packet.referred():
                     yield packet, header, mesh
                     continue
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
-                group = Group(mesh, frame, packet.frame)
+                group = Group(mesh, frame, packet.frame, step)
                 yield packet, header, mesh
             elif packet.kind == TRACKED:
                 check(group, "its reference is not there")

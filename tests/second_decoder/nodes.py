@@ -10,16 +10,19 @@ INFINITY = float("inf")
 MOST_NODES = 1024
 
 
-def smoothed(positions, triangles, step, settled):
+def smoothed(positions, triangles, step, settled=0, at_seams=False):
     reach = step // 2
-    total, count = [[0, 0, 0] for _ in positions], [0] * len(positions)
+    places = positions if at_seams else range(len(positions))
+    total, count = defaultdict(lambda: [0, 0, 0]), defaultdict(int)
     for t in triangles:
         for i in range(3):
-            count[t[i]] += 2
+            place = places[t[i]]
+            count[place] += 2
             for k in range(3):
-                total[t[i]][k] += positions[t[(i + 1) % 3]][k] + positions[t[(i + 2) % 3]][k]
+                total[place][k] += positions[t[(i + 1) % 3]][k] + positions[t[(i + 2) % 3]][k]
     out = []
-    for v, (p, s, n) in enumerate(zip(positions, total, count)):
+    for v, p in enumerate(positions):
+        s, n = total[places[v]], count[places[v]]
         if n > 0 and v >= settled:
             changes = (clamp(rdiv(s[k] - n * p[k], 2 * n), -reach, reach) for k in range(3))
             p = tuple(clamp(x + change, -L, L) for x, change in zip(p, changes))

@@ -4,6 +4,7 @@ from arithmetic import Decoder, Models, SignedModel
 from conventions import L, check, rdiv
 from fans import FanDecoder, NumberInTurn
 from intra import Mesh, Neighbourhood, decode_colours, decode_positions
+from nodes import smoothed
 from stream import BORDER, COLOUR, FANS, GEOMETRY, REMOVED, TRACKED_RUN
 from tracked import decode_tracked_mesh, quantised_normals
 
@@ -86,7 +87,7 @@ def decode_places(data, triangles, vertices, border):
 
 
 def decode_patched_mesh(frame, reference):
-    """The mesh, and how many of its vertices it has of the reference's. frame: its payload."""
+    """frame: its payload."""
     check(not reference.mesh.texcoords, "its reference has texture coordinates")
     tracked, _ = decode_tracked_mesh(frame.layer(TRACKED_RUN), 4, reference, None)
     removed = decode_removed(frame.layer(REMOVED), len(tracked.positions), reference.levels)
@@ -119,6 +120,7 @@ def decode_patched_mesh(frame, reference):
         of_piece[v] = len(stay) + i
     mesh.triangles = [tuple(number[v] for v in t) for t in tracked.triangles if not any(removed[v] for v in t)]
     mesh.triangles += [tuple(of_piece[v] for v in t) for t in piece]
+    mesh.positions = smoothed(mesh.positions, mesh.triangles, step, len(stay))
     if reference.mesh.normals:
         mesh.normals = quantised_normals(mesh)
-    return mesh, len(stay)
+    return mesh

@@ -14,12 +14,11 @@ from stream import COLOUR, GEOMETRY, TRANSFORMS, read_frame_payload
 
 
 class TrackedReference:
-    """What all T-frames of an I- or TP-frame share. settled: how many of its vertices are not smoothed, 0 of an
-    I-frame."""
+    """What all T-frames of an I- or TP-frame share. step: of its positions, 1 if they were smoothed."""
 
-    def __init__(self, mesh, captured, geometry_step, settled, spacing):
+    def __init__(self, mesh, captured, step, spacing):
         self.mesh, self.captured = mesh, captured
-        self.positions = smoothed(mesh.positions, mesh.triangles, geometry_step, settled)
+        self.positions = smoothed(mesh.positions, mesh.triangles, step)
         self.nodes = Nodes(self.positions, mesh.triangles, spacing)
         normals = normals_of(self.positions, mesh.triangles)
         self.node_normals = [normals[v] for v in self.nodes.vertices]

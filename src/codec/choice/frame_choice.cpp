@@ -293,22 +293,45 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
     return Patched(std::move(*out));
 }
 
+// Whoever joins late needs all patches since the I-frame.
+bool patches_have_grown(const FrameWork& work) {
+    constexpr int most_patches = 16;
+    constexpr double most_bytes = 3;  // times the I-frame's
+    const auto& reference = work.reference();
+    return reference.patches >= most_patches || reference.patch_bytes > most_bytes * reference.bytes;
+}
+
+// Whether an I-frame of the tracked mesh is as good as one of the capture: it does not have many more vertices, nor was
+// it made for much coarser or finer steps.
+bool may_be_renewed(const FrameWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
+    constexpr double most_vertices = 1.3, most_steps = 1.5;
+    const auto& intra = work.reference().intra;
+    const double ratio = static_cast<double>(steps.geometry) / intra.steps.geometry;
+    return static_cast<double>(tracked.positions.size()) <= most_vertices * static_cast<double>(intra.vertices) &&
+           ratio <= most_steps && ratio >= 1 / most_steps;
+}
+
 // A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
 // no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
-// more bits than the last I-frame did, if the shortest key interval has passed.
-Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps) {
+// more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
+// late, it is made of the tracked mesh, so that nothing jumps. due: an I-frame is wanted.
+Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool due) {
     auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
     const auto fit = work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
     const bool expensive = may_be_intra(work) && static_cast<double>(tracked->bytes()) > reference.bytes;
     const bool anew = expensive || relaid_texture(work, tracked->decoded);
-    if (!anew && lost_track(work, fit)) {
+    const bool lost = lost_track(work, fit);
+    if (!anew && lost && !due) {
         auto patched = patch(work, steps, tracked->decoded);
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) return std::move(**patched);
     }
-    if (anew || lost_track(work, fit)) return code_frame(FrameType::intra, work, steps);
+    if (anew || lost) return code_frame(FrameType::intra, work, steps);
+    if (due || patches_have_grown(work))
+        return may_be_renewed(work, steps, tracked->decoded) ? code_renewed_intra(work, steps, tracked->decoded)
+                                                             : code_frame(FrameType::intra, work, steps);
     auto& best = tracked->nodes->best_fit;
     if (best == 0 || fit.rms < best) best = fit.rms;
     return tracked;
@@ -320,13 +343,14 @@ Result<Candidate> choose(FrameWork& work, const FrameSteps& steps, bool force_in
     const auto& options = work.configuration.options;
     const auto choice = options.topology.frame_choice;
     if (!work.carries_surface()) return code_lone_intra(work, steps);
+    if (options.profile == Profile::tracked && can_refer(work))
+        return choose_tracked(work, steps, force_intra || is_due(work));
     if (force_intra || is_due(work) || is_scene_change(work)) {
         if (options.profile != Profile::tracked && choice == FrameChoice::rate_distortion)
             return code_measured_intra(work, steps);
         return work.configuration.intra_alone() ? code_lone_intra(work, steps)
                                                 : code_frame(FrameType::intra, work, steps);
     }
-    if (options.profile == Profile::tracked) return choose_tracked(work, steps);
     switch (choice) {
         case FrameChoice::motion:
             return choose_by_motion(work, steps);
@@ -391,7 +415,7 @@ Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, cons
         if (trials-- > 0 && rate.is_guess(rate_type(*candidate))) {
             // Without the codebooks that come with the first frame, as later frames do not need them.
             const auto own = static_cast<double>(candidate->packets.back().payload.size() + packet_overhead);
-            rate.tried(candidate->type, quality, 8 * own);
+            rate.tried({candidate->type, quality, 8 * own, candidate->renewed});
             const double better = rate.quality(candidate->type);
             if (std::abs(better - quality) > far_off) {
                 quality = better;
@@ -410,7 +434,7 @@ Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, cons
         if (fits(*stand_in)) return stand_in;
     }
     auto error = does_not_fit(work.configuration.options.rate, rate.room(), bits);
-    rate.coded(FrameType::predicted, quality, 0);
+    rate.coded({FrameType::predicted, quality, 0});
     return error;
 }
 
@@ -438,11 +462,10 @@ Result<Candidate> code_to_error(FrameWork& work, ErrorController& control, bool 
 
 }  // namespace
 
-// A frame without a surface says nothing of what others take, nor does one with a patch of whatever size.
+// A frame without a surface says nothing of what others take.
 FrameType rate_type(const Candidate& candidate) {
     const bool bare = stands_alone(candidate.type) && candidate.decoded.triangles.empty();
-    const bool patched = candidate.type == FrameType::patched;
-    return candidate.stands_in || bare || patched ? FrameType::predicted : candidate.type;
+    return candidate.stands_in || bare ? FrameType::predicted : candidate.type;
 }
 
 Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra) {

@@ -52,9 +52,11 @@ RateControlOptions sane(RateControlOptions o) {
 
 }  // namespace
 
-double expected_bits(const FrameSizeModel& model, RateClass rate, double quality) {
+double expected_bits(const FrameSizeModel& model, RateClass rate, double quality, double renewed) {
     if (rate == RateClass::moved) return model.moved_bits;
-    return std::exp2(model.content + (rate == RateClass::intra ? model.intra_extra : 0) + model.slope * quality);
+    const double between = std::exp2(model.content + model.slope * quality);
+    const double intra = between * std::exp2(model.intra_extra);
+    return rate == RateClass::intra ? intra : between + renewed * intra;
 }
 
 void learn(FrameSizeModel& model, const FrameCost& frame) {
@@ -65,7 +67,12 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
         model.moved_bits += (first ? 1 : 0.2) * (frame.bits - model.moved_bits);
         return;
     }
-    const double surprise = std::log2(frame.bits / expected_bits(model, rate, frame.quality));
+    const double surprise = std::log2(frame.bits / expected_bits(model, rate, frame.quality, frame.renewed));
+    if (frame.renewed > 0) {
+        // Patches differ: what one takes says less of the frames between than these do themselves.
+        model.content += (first && seen_of(model, RateClass::between) == 1 ? 0.5 : model.usual_belief / 2) * surprise;
+        return;
+    }
     if (first) {
         const bool other = seen_of(model, rate == RateClass::intra ? RateClass::between : RateClass::intra) > 0;
         if (rate == RateClass::intra && other) {
@@ -150,7 +157,7 @@ double RateController::live_quality(FrameType type) const {
     const double wanted = wanted_bits();
     const auto average = [&](double q) {
         double bits = 0;
-        for (const auto rate : recent_) bits += expected_bits(model_, rate, q);
+        for (const auto rate : recent_) bits += expected_bits(model_, rate, q, renewed_);
         return bits / static_cast<double>(recent_.size());
     };
     double low = options_.lowest_quality, high = options_.highest_quality;
@@ -222,8 +229,9 @@ double RateController::lower_quality(FrameType type, double quality, double bits
     return std::max(options_.lowest_quality, quality - std::max(least, needed));
 }
 
-void RateController::coded(FrameType type, double quality, double bits) {
-    bits = std::isfinite(bits) ? std::max(bits, 0.0) : 0.0;
+void RateController::coded(const FrameCost& frame) {
+    const auto [type, quality, given, renewed] = frame;
+    const double bits = std::isfinite(given) ? std::max(given, 0.0) : 0.0;
     // An I-frame that was cut to fit does not lower the quality of the EP-frames after it.
     const auto rate = rules_of(type).rate;
     const bool between = rate == RateClass::between;
@@ -235,7 +243,8 @@ void RateController::coded(FrameType type, double quality, double bits) {
         if (planned > 0)
             planned_surprise_ += std::max(0.05, 1.0 / static_cast<double>(frames_ + 5)) * std::log2(bits / planned);
     }
-    learn(model_, {type, quality, bits});
+    learn(model_, {type, quality, bits, renewed});
+    if (between) renewed_ += (renewed - renewed_) / 30;
     recent_[frames_ % recent_.size()] = rate;
     since_intra_ = rate == RateClass::intra ? 1 : since_intra_ + (since_intra_ > 0 ? 1 : 0);
     total_bits_ += bits;

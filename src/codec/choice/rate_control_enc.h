@@ -5,8 +5,9 @@
 // bits_per_second. The bucket must never hold more than bits_per_second * buffer_seconds, which is the delay that a
 // live receiver needs. Running empty is no fault: the line idles.
 //
-// The model: log2(bits) of an I- or EP-frame is linear in quality; T-frames behave like EP-frames; the size of P-frames
-// does not depend on quality. One term, shared by all frames, follows the content; the slope and the extra size of an
+// The model: log2(bits) of an I- or EP-frame is linear in quality; T-frames behave like EP-frames, and TP-frames take
+// besides that share of an I-frame's bits that is the share of their vertices that are new; the size of P-frames does
+// not depend on quality. One term, shared by all frames, follows the content; the slope and the extra size of an
 // I-frame are learned.
 //
 // The controller looks for the quality at which the usual mixture of types spends what the line carries, slightly more
@@ -49,8 +50,8 @@ struct FrameSizeModel {
     std::array<FrameCost, frame_type_count> last{};  // the last frame, by type
 };
 
-// Bits that a frame of this class should take at this quality.
-double expected_bits(const FrameSizeModel& model, RateClass rate, double quality);
+// Bits that a frame of this class should take at this quality. renewed: FrameCost::renewed.
+double expected_bits(const FrameSizeModel& model, RateClass rate, double quality, double renewed = 0);
 // Learns from a coded frame; frames without bits are ignored.
 void learn(FrameSizeModel& model, const FrameCost& frame);
 
@@ -67,11 +68,11 @@ public:
     // must become a P-frame or be dropped.
     double lower_quality(FrameType type, double quality, double bits);
     // A frame was coded at this quality only to see its size, and is not sent.
-    void tried(FrameType type, double quality, double bits) { learn(model_, {type, quality, bits}); }
+    void tried(const FrameCost& frame) { learn(model_, frame); }
     // Whether no frame of this type has been coded yet, so that quality() is a guess that tried() improves.
     bool is_guess(FrameType type) const;
     // The frame as finally coded; a dropped frame takes 0 bits.
-    void coded(FrameType type, double quality, double bits);
+    void coded(const FrameCost& frame);
     double buffer_bits() const { return buffer_; }
     double total_bits() const { return total_bits_; }  // of all frames so far
 
@@ -95,6 +96,7 @@ private:
     int since_intra_ = 0;
     bool sent_between_ = false;                // whether an EP- or T-frame was sent
     double level_ = 0;                         // the quality shared by I- and EP-frames
+    double renewed_ = 0;                       // share of the vertices that a frame between I-frames has new, usually
     std::vector<RateClass> recent_;            // classes of the last key_interval frames, as a ring
     std::vector<double> plan_;                 // planned quality of each frame, from the first pass
     std::vector<std::array<double, 2>> rest_;  // planned bits from each frame to the end: of P-frames, of others

@@ -4,6 +4,13 @@
 
 namespace htvm::internal {
 
+std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, const SequenceHeader& header) {
+    if (header.version < shown_smoothed_version || header.node_spacing == 0) return step;
+    mesh.positions =
+        smoothed_within_cells(mesh.positions, mesh.triangles, {.step = step, .at_seams = !mesh.texcoords.empty()});
+    return 1;
+}
+
 void derive_bones(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.has_bones) return;
     skin_reference(reference.skinned, header.skeleton.bones, header.radii, header.weight_width, threads);
@@ -12,8 +19,7 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
 
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
-    auto tracked =
-        make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step, reference.settled}, threads);
+    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step}, threads);
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     reference.tracked->captured = reference.captured;
@@ -25,7 +31,6 @@ Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFa
     Reference out;
     out.number = facts.number;
     out.step = facts.step;
-    out.settled = facts.settled;
     out.captured = facts.captured;
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);

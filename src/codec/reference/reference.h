@@ -16,12 +16,10 @@ namespace htvm::internal {
 
 struct Reference {
     std::uint32_t number = 0;  // of the frame
-    std::int32_t step = 1;     // of its positions, in lattice units
-    std::uint32_t settled =
-        0;                    // of its vertices, the first so many came from the reference before, and stay as they are
-    CapturedCounts captured;  // what its frame was captured with
-    ReferenceMesh skinned;    // the mesh and its pose; what depends on bones is filled in only if it was derived
-    bool has_bones = false;   // whether it was derived
+    std::int32_t step = 1;     // of its positions, in lattice units; 1 if they were smoothed
+    CapturedCounts captured;   // what its frame was captured with
+    ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
+    bool has_bones = false;    // whether it was derived
     std::optional<TrackedReference> tracked;  // what depends on the nodes, if it was derived
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
@@ -36,9 +34,13 @@ struct Derived {
 struct ReferenceFacts {
     std::uint32_t number = 0;
     std::int32_t step = 1;
-    std::uint32_t settled = 0;
     CapturedCounts captured;
 };
+
+// Smooths an I-frame's mesh within its quantiser cells, as it is shown in streams with nodes from
+// shown_smoothed_version on; elsewhere does nothing. step: of its positions. Returns the step of the reference that the
+// mesh becomes.
+std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, const SequenceHeader& header);
 
 // mesh: as decoded. Errors: those of make_tracked_reference().
 Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFacts& facts, LatticeMesh mesh,

@@ -25,6 +25,9 @@ inline constexpr std::uint16_t oldest_version = 1;
 inline constexpr std::uint16_t session_version = 2;
 // From this version on a T-frame's payload is one run (tracked/tracked_payload.h).
 inline constexpr std::uint16_t tracked_run_version = 3;
+// From this version on the meshes of a stream with nodes are shown smoothed within their quantiser cells
+// (reference/reference.h); before, only what T-frames move is smoothed.
+inline constexpr std::uint16_t shown_smoothed_version = 4;
 
 // The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (paper/mtfan.h). The
 // paper's are 8, 16 and 32.

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
+#include <tuple>
 
 #include "codec/reference/transforms.h"
 #include "core/bytes.h"
@@ -19,6 +21,19 @@ NodeGraph graph_of(const DeformationNodes& nodes, const LatticeMesh& mesh) {
     for (const auto v : nodes.vertex) {
         out.pivots.push_back(mesh.positions[v]);
         out.normals.push_back(normals[v]);
+    }
+    return out;
+}
+
+// For each vertex the lowest one at its place.
+std::vector<std::uint32_t> first_at_same_place(std::span<const LatticePoint> positions) {
+    std::vector<std::uint32_t> order(positions.size()), out(positions.size());
+    std::iota(order.begin(), order.end(), 0u);
+    const auto key = [&](std::uint32_t v) { return std::tuple(positions[v].x, positions[v].y, positions[v].z, v); };
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        const bool same = i > 0 && positions[order[i]] == positions[order[i - 1]];
+        out[order[i]] = same ? out[order[i - 1]] : order[i];
     }
     return out;
 }
@@ -40,6 +55,15 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
                 sum.z += positions[neighbour].z;
                 ++sum.count;
             }
+    const auto leader = cells.at_seams ? first_at_same_place(positions) : std::vector<std::uint32_t>{};
+    for (std::size_t v = 0; v < leader.size(); ++v) {
+        if (leader[v] == v) continue;
+        auto& sum = around[leader[v]];
+        sum.x += around[v].x;
+        sum.y += around[v].y;
+        sum.z += around[v].z;
+        sum.count += around[v].count;
+    }
     const std::int64_t reach = cells.step / 2;
     std::vector<LatticePoint> out(positions.begin(), positions.end());
     const auto halfway = [&](std::int32_t own, std::int64_t sum, std::int64_t count) {
@@ -47,7 +71,7 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
         return within_lattice(own + std::clamp(change, -reach, reach));
     };
     for (std::size_t v = cells.settled; v < out.size(); ++v) {
-        const auto& sum = around[v];
+        const auto& sum = around[cells.at_seams ? leader[v] : v];
         if (sum.count == 0) continue;
         out[v] = {halfway(positions[v].x, sum.x, sum.count), halfway(positions[v].y, sum.y, sum.count),
                   halfway(positions[v].z, sum.z, sum.count)};

@@ -32,6 +32,7 @@ struct TrackedReference {
 struct QuantiserCells {
     std::int32_t step = 1;      // lattice units
     std::uint32_t settled = 0;  // the first so many vertices are not; smoothed again with each patch, they would shrink
+    bool at_seams = false;      // vertices at the same place move as one, so that a texture's seams stay closed
 };
 // node_spacing: lattice units, > 0. threads: uses two at most.
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
