@@ -29,10 +29,11 @@ enum class PacketKind : std::uint8_t {
 // Bits of PacketHeader::flags (docs/bitstream.md, section 2.1), for programs that do not decode the packet.
 namespace packet_flag {
 inline constexpr std::uint8_t referred = 1;   // frames: later frames may refer to it
-inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but the one it refers to, which needs none
+inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but the reference and what that needs
 inline constexpr std::uint8_t droppable = 4;  // frames, audio: it may be left out without affecting any frame
 inline constexpr std::uint8_t colour = 8;     // codebooks: it is for colours, not for geometry
 inline constexpr std::uint8_t session = 16;   // sequence headers: the session is not 0
+inline constexpr std::uint8_t settled = 32;   // I-frames: of a tracked mesh, which is not smoothed once more
 inline constexpr std::uint8_t told = 128;     // the other bits are valid; encoders of version 1 wrote 0
 }  // namespace packet_flag
 

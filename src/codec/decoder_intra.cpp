@@ -17,7 +17,8 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(payload, external ? &*external : nullptr);
     if (!mesh) return tl::unexpected(mesh.error());
-    const auto step = smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step), header);
+    const auto step = smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step),
+                                      packet.has(packet_flag::told) && packet.has(packet_flag::settled), header);
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {

@@ -167,7 +167,8 @@ void send_header(State& state, std::int64_t timestamp_us) {
 
 std::uint8_t flags_of(const Candidate& candidate) {
     using namespace packet_flag;
-    return static_cast<std::uint8_t>((candidate.referred ? referred : droppable) | (candidate.access ? access : 0));
+    return static_cast<std::uint8_t>((candidate.referred ? referred : droppable) | (candidate.access ? access : 0) |
+                                     (candidate.renewal ? settled : 0));
 }
 
 // Numbers and queues a frame's packets, and counts their bytes by layer.

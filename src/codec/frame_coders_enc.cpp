@@ -150,7 +150,10 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
                              const LatticeMesh* renewed = nullptr) {
     const auto& configuration = work.configuration;
     const bool tracked = configuration.tracked(), referred_to = use == IntraUse::reference;
-    const auto asked = tracked ? tracked_steps(steps) : steps;
+    auto asked = tracked ? tracked_steps(steps) : steps;
+    // What is quantised already would err twice as far, and jump.
+    constexpr double finer_again = 0.5;
+    if (renewed) asked.geometry = std::max(1, static_cast<std::int32_t>(std::lround(finer_again * asked.geometry)));
     const bool simplify = tracked && !renewed && configuration.options.tracked.simplify > 0 && work.carries_surface();
     // Without a skeleton EP-frames may never pay off, and then the bits of a finer I-frame would be wasted.
     const bool finer = referred_to && (configuration.header.skeleton_tracked || tracked ||
@@ -167,7 +170,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     FramePayload payload;
     auto decoded = encode_intra_frame(mesh, options, payload);
     if (!decoded) return tl::unexpected(decoded.error());
-    const auto step = smooth_as_shown(*decoded, options.geometry_step, configuration.header);
+    const auto step = smooth_as_shown(*decoded, options.geometry_step, renewed != nullptr, configuration.header);
     const auto captured = counts_of(work.mesh);
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;

@@ -18,7 +18,10 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
     const std::uint64_t number = numbers_.of(packet.frame);
     if (index_.frames == 0) index_.first_timestamp_us = packet.timestamp_us;
     index_.frames = std::max(index_.frames, number + 1);
-    if (numbers_.begins_sequence()) index_.sequences.push_back({header_offset_, number});
+    if (numbers_.begins_sequence()) {
+        index_.sequences.push_back({header_offset_, number});
+        reference_.reset();
+    }
     const auto& rules = rules_of(*type);
     const auto header = told_header(packet);
     const bool alone = rules.refers_to == RefersTo::nothing, referred = is_referred(header, rules);
@@ -27,6 +30,8 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
     std::uint32_t back = 0;
     if (!alone) {
         if (!reference_ || reference_->frame != packet.reference) return;
+        // Whoever starts there reads the frame before anyway.
+        if (!rules.renews && number == index_.points.back().frame + 1) return;
         back = static_cast<std::uint32_t>(index_.points.size() - reference_->entry);
     }
     if (rules.renews && referred) reference_ = Referred{packet.frame, index_.points.size()};

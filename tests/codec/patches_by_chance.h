@@ -90,7 +90,7 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
         std::uint32_t number = frame;
         CapturedCounts captured{coded.header.source_vertices, coded.header.source_triangles};
         auto mesh = *decode_intra_frame(coded, nullptr);
-        smooth_as_shown(mesh, static_cast<std::int32_t>(coded.header.geometry_step), header);
+        smooth_as_shown(mesh, static_cast<std::int32_t>(coded.header.geometry_step), false, header);
         add(packet, number);
         for (int patches = 0;; ++patches) {
             auto reference = *make_tracked_reference(mesh, node_spacing, {});

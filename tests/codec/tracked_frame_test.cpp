@@ -181,7 +181,7 @@ FirstTrackedFrame first_tracked_frame() {
     const auto header = read_sequence_header(coded.packets[0].payload).value();
     const auto intra = read_frame_payload(coded.packets[1].payload).value();
     auto mesh = decode_intra_frame(intra, nullptr).value();
-    smooth_as_shown(mesh, static_cast<std::int32_t>(intra.header.geometry_step), header);
+    smooth_as_shown(mesh, static_cast<std::int32_t>(intra.header.geometry_step), false, header);
     auto reference = make_tracked_reference(mesh, header.node_spacing, {}).value();
     reference.captured = {intra.header.source_vertices, intra.header.source_triangles};
     return {std::move(reference), coded.packets[2].payload};

@@ -99,7 +99,7 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
         if (packet.kind != PacketKind::intra) continue;
         const auto payload = *read_frame_payload(packet.payload);
         auto mesh = *decode_intra_frame(payload, nullptr);
-        smooth_as_shown(mesh, static_cast<std::int32_t>(payload.header.geometry_step), header);
+        smooth_as_shown(mesh, static_cast<std::int32_t>(payload.header.geometry_step), false, header);
         auto reference = *make_tracked_reference(mesh, node_spacing, {});
         reference.captured = {payload.header.source_vertices, payload.header.source_triangles};
         const std::uint32_t key = frame;

@@ -92,7 +92,8 @@ def decode_stream(data):
                 joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
                 mesh, step = decode_intra_mesh(frame), frame.geometry_step
                 if header.version >= 4 and header.node_spacing > 0:
-                    mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
+                    if not packet.settled():
+                        mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
                     step = 1
                 if not packet.referred():
                     yield packet, header, mesh

@@ -4,10 +4,10 @@
 
 namespace htvm::internal {
 
-std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, const SequenceHeader& header) {
+std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, bool settled, const SequenceHeader& header) {
     if (header.version < shown_smoothed_version || header.node_spacing == 0) return step;
-    mesh.positions =
-        smoothed_within_cells(mesh.positions, mesh.triangles, {.step = step, .at_seams = !mesh.texcoords.empty()});
+    const QuantiserCells cells{.step = step, .at_seams = !mesh.texcoords.empty()};
+    if (!settled) mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, cells);
     return 1;
 }
 

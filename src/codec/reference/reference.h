@@ -38,9 +38,9 @@ struct ReferenceFacts {
 };
 
 // Smooths an I-frame's mesh within its quantiser cells, as it is shown in streams with nodes from
-// shown_smoothed_version on; elsewhere does nothing. step: of its positions. Returns the step of the reference that the
-// mesh becomes.
-std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, const SequenceHeader& header);
+// shown_smoothed_version on, unless it is settled: of a mesh that was smoothed before. Elsewhere does nothing. step: of
+// its positions. Returns the step of the reference that the mesh becomes.
+std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, bool settled, const SequenceHeader& header);
 
 // mesh: as decoded. Errors: those of make_tracked_reference().
 Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFacts& facts, LatticeMesh mesh,
