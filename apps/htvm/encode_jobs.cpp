@@ -167,7 +167,7 @@ std::vector<Group> groups_in(std::size_t frames, std::size_t of_each, const Job&
 }  // namespace
 
 std::size_t frames_of_group(int key_interval) {
-    const auto interval = static_cast<std::size_t>(key_interval);
+    const auto interval = std::min<std::size_t>(static_cast<std::size_t>(key_interval), most_of_group);
     return interval * ((least_of_group + interval - 1) / interval);
 }
 

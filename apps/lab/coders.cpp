@@ -111,19 +111,19 @@ CoderUnderTest codec_under_test(const std::string& name, const std::string& desc
 
 EncoderOptions paper_options(int key_interval) {
     EncoderOptions out = default_options(Profile::paper);
-    out.key_interval = key_interval;
+    if (key_interval > 0) out.key_interval = key_interval;
     return out;
 }
 
 std::vector<CoderUnderTest> built_in_coders(int key_interval) {
     EncoderOptions ours = default_options(Profile::topology);
-    ours.key_interval = key_interval;
+    if (key_interval > 0) ours.key_interval = key_interval;
     EncoderOptions motion = ours;
     motion.topology.still_below = default_still_below;
     EncoderOptions chosen = ours;
     chosen.topology.frame_choice = FrameChoice::rate_distortion;
     EncoderOptions tracked = default_options(Profile::tracked);
-    tracked.key_interval = key_interval;
+    if (key_interval > 0) tracked.key_interval = key_interval;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
     return {

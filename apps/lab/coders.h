@@ -90,6 +90,7 @@ EncoderOptions paper_options(int key_interval);
 // (EncoderOptions::animation_error).
 inline constexpr double default_still_below = 50;
 
+// key_interval: 0: each coder's own default.
 // paper, htvm-ep, htvm-motion, htvm-rd, htvm-t, tfan, tfan-mpeg, draco10, draco7.
 std::vector<CoderUnderTest> built_in_coders(int key_interval);
 

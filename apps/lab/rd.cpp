@@ -39,7 +39,7 @@ struct Options {
     std::vector<std::string> metrics{"m1", "m2"};
     std::uint64_t samples = 200000;
     std::size_t measure_every = 1;
-    int key_interval = 30;
+    int key_interval = 0;
     int views = 10;
     std::size_t memory_megabytes = 1024;
     unsigned threads = 0, coder_threads = 1;
@@ -305,7 +305,7 @@ void add_sweep_options(CLI::App& command, Options& o) {
     command.add_option("--measure-every", o.measure_every, "Measure errors on every n-th frame (default 1)")
         ->check(CLI::Range(1, 1000000));
     command.add_option("--views", o.views, "Views for M3 (default 10)")->check(CLI::Range(1, 1000));
-    command.add_option("--keyint", o.key_interval, "Frames from one I-frame to the next (default 30)")
+    command.add_option("--keyint", o.key_interval, "Frames from one I-frame to the next (default: 300 for htvm-t, 30 for others)")
         ->check(CLI::Range(1, 1000000));
     command.add_flag("--geometry-only", o.geometry_only, "Leave the colours out");
 }

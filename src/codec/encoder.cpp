@@ -255,8 +255,8 @@ RateControlOptions rate_options(const EncoderOptions& options) {
     out.bits_per_second = options.rate.bits_per_second;
     out.frames_per_second = static_cast<double>(options.fps_numerator) / options.fps_denominator;
     out.buffer_seconds = options.rate.buffer_seconds;
-    // An I-frame's bits are made up for within two seconds, not over ten.
-    out.key_interval = std::min(options.key_interval, 60);
+    // An I-frame's bits are made up for within a second, not over ten.
+    out.key_interval = std::min(options.key_interval, 30);
     if (options.profile == Profile::tracked) out.intra_extra = 3;
     return out;
 }

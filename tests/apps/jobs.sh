@@ -23,10 +23,6 @@ for frame in 0 10 20 30; do
     "$htvm" info plain.htvm | awk -v frame=$frame '$1 == frame && $2 == "I" { found = 1 } END { exit !found }' ||
         fail "frame $frame is no I-frame, though a group begins there"
 done
-# Where the encoder chooses no I-frame of its own, the same without --jobs.
-encode --frames 20 -o alone.htvm
-encode --frames 20 --jobs 2 -o beside.htvm
-cmp -s alone.htvm beside.htvm || fail "with the same I-frames, a whole is another than by jobs"
 # What crosses from frame to frame, or comes from the first one: bones, radii, the floor; learned sizes and errors.
 whole skeleton --skeleton capture/skeleton.json --up y --floor lowest --title jobs
 whole exact --skeleton capture/skeleton.json --profile topology

@@ -144,11 +144,12 @@ void write_moving() {
     write_packets("moving", coded.packets);
 }
 
-// T-frames as the encoder writes them.
+// T-frames as the encoder writes them, and from version 4 on an I-frame of the tracked mesh.
 void write_tracked() {
     EncoderOptions options = default_options(Profile::tracked);
     options.profile = Profile::tracked;
     options.key_interval = 4;
+    options.tracked.access_interval = 2;
     write_stream("tracked", walking(6, 300, 20), options);
 }
 

@@ -117,7 +117,8 @@ TEST(FrontIndex, SaysWhereDecodingCanStart) {
         SCOPED_TRACE(frame);
         const auto* point = point_before(index, frame);
         ASSERT_NE(point, nullptr);
-        EXPECT_EQ(point->frame, frame / 8 * 8 + frame % 8 / 3 * 3);
+        EXPECT_LE(point->frame, frame);
+        EXPECT_GE(point->frame, frame / 8 * 8 + frame % 8 / 3 * 3);  // an I-frame at least
         const auto* header = sequence_of(index, *point);
         ASSERT_NE(header, nullptr);
         PacketReader reader;
@@ -126,6 +127,14 @@ TEST(FrontIndex, SaysWhereDecodingCanStart) {
         const auto sequence_header = reader.pull();
         ASSERT_EQ(sequence_header->kind, PacketKind::sequence);
         ASSERT_TRUE(decoder.push(*sequence_header).has_value());
+        const auto first_frame_at = [&](std::uint64_t offset) {
+            reader = PacketReader();
+            reader.push(std::span(bytes).subspan(offset));
+            return *reader.pull();
+        };
+        std::vector<Packet> needed;
+        for (const auto* at = point; at->back > 0;) needed.push_back(first_frame_at((at -= at->back)->offset));
+        for (; !needed.empty(); needed.pop_back()) ASSERT_TRUE(decoder.push(needed.back()).has_value());
         reader = PacketReader();
         reader.push(std::span(bytes).subspan(point->offset));
         for (auto next = point->frame; next <= frame; ++next) {
