@@ -150,7 +150,7 @@ void write_tracked() {
     options.profile = Profile::tracked;
     options.key_interval = 4;
     options.tracked.access_interval = 2;
-    write_stream("tracked", walking(6, 300, 20), options);
+    write_stream("tracked", horned_ball(7, never), options);
 }
 
 // T-frames on every awkward connectivity and on a person, moved at random: in the second sequence by nodes that are as

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "codec/moving_sequences.h"
+#include "codec/patched_sequences.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
 #include "htvm/dependency.hpp"
@@ -14,7 +14,7 @@ namespace {
 using namespace test;
 
 EncoderOptions tracked_options() {
-    auto out = default_options(Profile::tracked);
+    auto out = patched_options();
     out.tracked.patch_share = 0;
     return out;
 }
@@ -29,7 +29,7 @@ std::vector<Packet> frames_in(const CodedSequence& coded) {
 TEST(AccessFrames, ReferToTheReferenceAloneOnceInAnInterval) {
     auto options = tracked_options();
     options.tracked.access_interval = 3;
-    const auto packets = frames_in(encode(walking(8, 300, 20), options));
+    const auto packets = frames_in(encode(horned_ball(8, never), options));
     std::vector<std::uint32_t> references;
     std::vector<bool> access;
     for (const auto& packet : packets) {
@@ -43,7 +43,7 @@ TEST(AccessFrames, ReferToTheReferenceAloneOnceInAnInterval) {
 TEST(AccessFrames, NeedTheReferenceAndNothingElse) {
     auto options = tracked_options();
     options.tracked.access_interval = 3;
-    const auto coded = encode(walking(6, 300, 20), options);
+    const auto coded = encode(horned_ball(6, never), options);
     Decoder decoder;
     for (const auto& packet : coded.packets) {
         if (frame_type(packet.kind) && packet.frame > 0 && packet.frame < 4) continue;
@@ -57,7 +57,7 @@ TEST(AccessFrames, NeedTheReferenceAndNothingElse) {
 TEST(RenewedIFrames, HaveTheTrackedMeshInsteadOfTheCaptures) {
     auto options = tracked_options();
     options.key_interval = 4;
-    const auto coded = encode(walking(6, 300, 20), options);
+    const auto coded = encode(horned_ball(6, never), options);
     const auto packets = frames_in(coded);
     ASSERT_EQ(packets[4].kind, PacketKind::intra);
     EXPECT_FALSE(packets[0].has(packet_flag::settled));
@@ -71,7 +71,7 @@ TEST(RenewedIFrames, HaveTheTrackedMeshInsteadOfTheCaptures) {
 TEST(RenewedIFrames, AreMadeOfTheCaptureWhereTrackingIsLost) {
     auto options = tracked_options();
     options.key_interval = 2;
-    auto sequence = walking(3, 300, 20);
+    auto sequence = horned_ball(3, never);
     for (auto& p : sequence.frames[2].mesh.positions) p[0] += 900;
     const auto packets = frames_in(encode(sequence, options));
     ASSERT_EQ(packets[2].kind, PacketKind::intra);
@@ -81,7 +81,7 @@ TEST(RenewedIFrames, AreMadeOfTheCaptureWhereTrackingIsLost) {
 TEST(RenewedIFrames, ComeWhereTheCallerAsksForAnIFrame) {
     auto encoder = Encoder::create(tracked_options());
     ASSERT_TRUE(encoder.has_value());
-    const auto sequence = walking(3, 300, 20);
+    const auto sequence = horned_ball(3, never);
     std::vector<PacketKind> kinds;
     for (std::size_t t = 0; t < 3; ++t) {
         const auto& frame = sequence.frames[t];

@@ -8,6 +8,8 @@
 
 namespace htvm::test {
 
+inline constexpr int never = 1 << 30;
+
 // A ball of 300 mm with a horn on top, which is on the right from frame `lost` on: no motion leads there.
 inline TestSequence horned_ball(int frames, int lost = 2) {
     TestSequence out{"horned ball", {}, {}};
