@@ -36,6 +36,7 @@ namespace Htvm
         Enhanced = 1,
         Predicted = 2,
         Tracked = 3,
+        Patched = 4,
     }
 
     [Flags]

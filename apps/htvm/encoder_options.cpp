@@ -64,14 +64,17 @@ std::string capitalised(std::string text) {
     return text;
 }
 
-// The default in the first of the group's profiles, and in the paper's if different.
+// The default in the first of the group's profiles, and in the others where it is different.
 std::string default_text(const Option& option) {
     const auto text = [&](Profile profile) {
         return value_text(option, option.get(default_options(profile)) / option.flag_factor);
     };
-    const auto usual = text(option.group == OptionGroup::tracked ? Profile::tracked : Profile::topology);
-    const auto paper = text(Profile::paper);
-    return usual == paper ? usual : usual + "; paper: " + paper;
+    const auto topology = text(Profile::topology), paper = text(Profile::paper);
+    const bool is_tracked = option.group == OptionGroup::tracked || option.group == OptionGroup::common;
+    auto out = is_tracked ? text(Profile::tracked) : topology;
+    if (option.group == OptionGroup::common && topology != out) out += "; topology: " + topology;
+    if (option.group != OptionGroup::tracked && paper != topology) out += "; paper: " + paper;
+    return out;
 }
 
 std::string help_of(const Option& option) {

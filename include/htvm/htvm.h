@@ -108,7 +108,8 @@ enum {
     HTVM_FRAME_KINDS = 5      /* number of types in this version */
 };
 
-/* Name of a type: "intra" and "I", "enhanced" and "EP", "predicted" and "P", "tracked" and "T", "patched" and "TP"; "unknown" and
+/* Name of a type: "intra" and "I", "enhanced" and "EP", "predicted" and "P", "tracked" and "T", "patched" and "TP";
+ * "unknown" and
  * "?" for a number that this version does not know. Never NULL. */
 const char* htvm_frame_kind_name(uint32_t type);
 const char* htvm_frame_kind_letter(uint32_t type);
@@ -335,11 +336,13 @@ htvm_status htvm_dependencies_frame(htvm_dependencies* dependencies, uint32_t* f
 
 /* ---- index ---------------------------------------------------------------------------------------------------- */
 
-/* A place where decoding can start, once the sequence header is known. */
+/* A place where decoding can start, once the sequence header and the frames that it refers to are known. */
 typedef struct htvm_index_entry {
     int64_t timestamp_us;
     uint64_t offset; /* of its packet, bytes from the start of the stream */
     uint32_t frame;
+    uint32_t back;     /* how many entries before this one is the frame that it refers to; 0: it refers to nothing */
+    uint32_t flags;    /* of its packet: HTVM_PACKET_...; 0 in an index at the end, which does not tell them */
     uint32_t reserved; /* 0 */
 } htvm_index_entry;
 
@@ -347,7 +350,11 @@ typedef struct htvm_index_entry {
  * or of kind 8, in front: then it must be the first packet of the stream. *count is set to its number of entries;
  * HTVM_BUFFER_TOO_SMALL where capacity is less, and nothing is written (so a capacity of 0 asks for the number).
  * HTVM_CORRUPT_STREAM: not one whole, undamaged index packet. Frames and timestamps are what the stream says: check
- * them against the packets found there. */
+ * them against the packets found there.
+ *
+ * To show frame n: of the entries at or before n, take the last with HTVM_PACKET_REFERRED, or where none has it, the
+ * last. Send the decoder the packets of the entries that it refers to, `back` by `back`, the earliest first, then its
+ * own packet and all that follow. */
 htvm_status htvm_index_read(const uint8_t* packet, size_t size, htvm_index_entry* entries, size_t capacity,
                             size_t* count);
 

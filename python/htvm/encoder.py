@@ -45,7 +45,7 @@ class EncodedFrame:
     """What became of a mesh."""
 
     number: int
-    kind: str  # "I", "EP", "P" or "T"
+    kind: str  # "I", "EP", "P", "T" or "TP"
     timestamp_us: int
     vertices: int  # of the decoded mesh
     triangles: int

@@ -39,7 +39,7 @@ class Frame(Mesh):
 
     number: int = 0  # in the whole stream, from 0
     timestamp_us: int = 0  # microseconds
-    kind: str = ""  # "I", "EP", "P" or "T": docs/glossary.md
+    kind: str = ""  # "I", "EP", "P", "T" or "TP": docs/glossary.md
     bytes: int = 0  # of its packet
     topology: int = 0  # of frames of one iteration, the same if they have the same triangles and texcoords
     joints: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))  # (j, 3), millimetres

@@ -38,7 +38,7 @@ def test_options_have_their_names_with_underscores_for_dots():
     for option in htvm.encoder_options("tracked"):
         if option.serves and not option.name.startswith("rate."):
             htvm.Encoder(quality=None, **{option.name.replace(".", "_"): option.default})
-    assert {o.name: o.default for o in htvm.encoder_options()}["key_interval"] == 30
+    assert {o.name: o.default for o in htvm.encoder_options()}["key_interval"] == 300
     assert {o.name: o.words for o in htvm.encoder_options()}["tracked.references"] == ("intra", "previous")
 
 

@@ -136,20 +136,20 @@ htvm_status copy_pose(htvm_decoder* decoder, std::vector<Element> htvm::Pose::*p
     });
 }
 
-// The entries of an index of either kind. Of the one in front: those from which all later frames follow, if there are
-// any, as if its packet began the stream.
-htvm::Result<std::vector<htvm::internal::IndexEntry>> index_of(const htvm::Packet& packet, std::size_t size) {
-    if (packet.kind == htvm::PacketKind::index) return htvm::internal::read_sequence_index(packet.payload);
+// The entries of an index of either kind; of the one in front, as if its packet began the stream.
+htvm::Result<std::vector<htvm_index_entry>> index_of(const htvm::Packet& packet, std::size_t size) {
+    std::vector<htvm_index_entry> out;
+    if (packet.kind == htvm::PacketKind::index) {
+        const auto entries = htvm::internal::read_sequence_index(packet.payload);
+        if (!entries) return tl::unexpected(entries.error());
+        for (const auto& entry : *entries) out.push_back({entry.timestamp_us, entry.offset, entry.frame, 0, 0, 0});
+        return out;
+    }
     const auto front = htvm::read_index(packet);
     if (!front) return tl::unexpected(front.error());
-    const auto is_referred = [](const htvm::AccessPoint& point) {
-        return (point.flags & htvm::packet_flag::referred) != 0;
-    };
-    const bool some = std::any_of(front->points.begin(), front->points.end(), is_referred);
-    std::vector<htvm::internal::IndexEntry> out;
     for (const auto& point : front->points)
-        if (point.back == 0 && (!some || is_referred(point)))
-            out.push_back({static_cast<std::uint32_t>(point.frame), point.timestamp_us, size + point.offset});
+        out.push_back({point.timestamp_us, size + point.offset, static_cast<std::uint32_t>(point.frame), point.back,
+                       point.flags, 0});
     return out;
 }
 
@@ -395,7 +395,7 @@ htvm_status htvm_index_read(const uint8_t* packet, size_t size, htvm_index_entry
         if (!index) return error.set(index.error());
         *count = index->size();
         if (capacity < index->size()) return htvm_status{HTVM_BUFFER_TOO_SMALL};
-        for (const auto& entry : *index) *entries++ = {entry.timestamp_us, entry.offset, entry.frame, 0};
+        std::copy(index->begin(), index->end(), entries);
         return htvm_status{HTVM_OK};
     });
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "codec/frame_kinds.h"
 #include "htvm/decoder.hpp"
 
 namespace htvm::live {
@@ -32,6 +33,18 @@ Places united(const Places& a, const Places& b) {
 }  // namespace
 
 bool LivePacket::is_frame() const { return frame_type(header.kind).has_value(); }
+
+bool LivePacket::is_reference() const {
+    const auto type = frame_type(header.kind);
+    if (!type) return false;
+    const auto& rules = internal::rules_of(*type);
+    return rules.renews && internal::is_referred(header, rules);
+}
+
+bool LivePacket::is_access() const {
+    using namespace packet_flag;
+    return is_reference() || (is_frame() && header.has(referred) && header.has(access));
+}
 
 std::optional<std::uint64_t> Broadcast::push(SharedPacket packet, Clock::time_point now) {
     if (is_index(packet->header.kind) || is_kept(*packet)) return std::nullopt;
@@ -165,20 +178,22 @@ void Broadcast::fall_behind(Queue& queue, std::uint64_t place) {
     ++queue.counters.fallen_behind;
 }
 
-// Gives the newest frame with all that it and later ones need, if that is little, or the viewer has just come.
+// Gives the newest frame with all that it and later ones need, if that is little, or the viewer has just come. Missed
+// references count by their bytes alone: until the next I-frame, which may be long in coming, no frame needs fewer.
 void Broadcast::try_to_follow(Queue& queue, Clock::time_point now) {
     const auto needed = without(united(kept_, closure_), queue.has);
-    std::size_t frames = 0, bytes = 0;
+    std::size_t missed = 0, references = 0, bytes = 0;  // of the missed frames, how many are references
     bool there = true;
     for (const auto place : needed) {
         there = there && packets_.contains(place);
         if (!there) break;
         const auto& packet = *packets_.at(place);
-        frames += packet.is_frame() ? 1 : 0;
         bytes += packet.bytes.size();
+        if (!packet.is_frame() || place == closure_.back()) continue;
+        ++missed;
+        references += packet.is_reference() ? 1 : 0;
     }
-    const std::size_t missed = frames > 0 ? frames - 1 : 0;
-    const bool little = (queue.joining || missed <= limits_.most_missed) && bytes <= limits_.bytes;
+    const bool little = (queue.joining || missed - references <= limits_.most_missed) && bytes <= limits_.bytes;
     if (!there || (missed > 0 && !little)) {
         if (!queue.joining) ++queue.counters.dropped_frames;
         return;

@@ -28,6 +28,10 @@ struct LivePacket {
     std::optional<Stamp> stamp{};  // for measurement
 
     bool is_frame() const;
+    // Whether it is the reference of the frames that follow.
+    bool is_reference() const;
+    // Whether it and what follows can be decoded by whoever has the reference, without the T-frames before it.
+    bool is_access() const;
 };
 using SharedPacket = std::shared_ptr<const LivePacket>;
 
@@ -35,8 +39,8 @@ struct BroadcastLimits {
     // How much may wait for one viewer, besides what the kernel has taken:
     std::size_t bytes = std::size_t{1} << 20;
     std::chrono::milliseconds wait{2000};  // from a packet's arrival until it is taken
-    std::size_t most_missed = 4;           // frames sent belatedly so that a viewer can follow again; where more are
-                                           // missing, it waits for a frame that needs fewer
+    std::size_t most_missed = 4;           // frames sent belatedly so that a viewer can follow again, references not
+                                           // counted; where more are missing, it waits for a frame that needs fewer
     // How much is kept for those who may still join. If frames since the last I-frame are more, they must wait for the
     // next one; those who watch are not affected.
     std::size_t kept_bytes = std::size_t{64} << 20;

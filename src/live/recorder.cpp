@@ -267,7 +267,8 @@ struct Stream {
     std::unique_ptr<Recording> recording;  // null: there are too many
     SharedPacket header{};                 // of the session
     bool file = false;                     // one has begun, and nothing happened to it
-    bool whole = false;                    // what comes next can be decoded from what is in it
+    bool whole = false;                    // what comes next can be decoded from what is in it,
+    bool reference = false;                // or at least what needs the reference alone
     Recorder::Clock::time_point begun{};   // the file
     std::optional<Recorder::Clock::time_point> failed{};
 };
@@ -339,16 +340,16 @@ bool Recorder::take(const std::string& name, const SharedPacket& packet, Clock::
         return false;
     };
     if (begins_file(header) && (!stream.file || due)) {
-        stream.whole = stream.file = put(stream.header, options.folder / recording_name(name, time));
+        stream.whole = stream.reference = stream.file = put(stream.header, options.folder / recording_name(name, time));
         stream.begun = now;
         stream.failed.reset();
-    } else if (begins_file(header)) {
-        stream.whole = true;
-    } else if (!stream.whole) {
-        if (frame && stream.file) ++state_->shared->dropped_frames;
-        return frame;
+    } else if (begins_file(header) || (stream.file && stream.reference && packet->is_access())) {
+        stream.whole = stream.reference = true;
+    } else if (!stream.whole && frame && stream.file) {
+        ++state_->shared->dropped_frames;
     }
-    if (stream.whole) put(packet, {});
+    const bool taken = stream.whole && put(packet, {});
+    if (!taken && (packet->is_reference() || header.kind == PacketKind::codebook)) stream.reference = false;
     return (frame && !stream.whole) || (due && !begins_file(header));
 }
 

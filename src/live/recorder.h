@@ -8,7 +8,7 @@
 //
 // Each recording has a thread of its own that writes, so a slow disk holds up neither the server nor the other
 // recordings. What waits for the disk is bounded; what does not fit is dropped up to the next frame that can be decoded
-// by itself, and counted.
+// from what is in the file, and counted.
 #pragma once
 
 #include <chrono>
@@ -54,7 +54,8 @@ public:
     ~Recorder();
 
     // The next packet that went to the viewers of this stream. time: of the system clock, for the file's name. Returns
-    // whether a frame that can be decoded by itself is wanted, since a file can only begin or go on with one.
+    // whether a frame that can be decoded by itself is wanted, since a file can only begin with one, and where frames
+    // were dropped goes on the sooner.
     bool take(const std::string& stream, const SharedPacket& packet, Clock::time_point now,
               std::chrono::system_clock::time_point time);
     // All have ended; waits until their files are finished.

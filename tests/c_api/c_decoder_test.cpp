@@ -1,6 +1,7 @@
 // The C interface's decoder gives the same as the C++ one, and survives callers who misuse it.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -298,6 +299,8 @@ TEST(CInterface, ReadsAnIndex) {
     for (std::size_t i = 0; i < count; ++i) {
         EXPECT_EQ(entries[i].frame, intra[i].first);
         EXPECT_EQ(entries[i].offset, intra[i].second);
+        EXPECT_EQ(entries[i].back, 0u);
+        EXPECT_EQ(entries[i].flags, 0u);
     }
     EXPECT_EQ(htvm_index_read(index.data(), index.size() - 1, entries.data(), count, &count), HTVM_CORRUPT_STREAM);
     EXPECT_EQ(htvm_index_read(stream.data(), stream.size(), entries.data(), count, &count), HTVM_CORRUPT_STREAM);
@@ -316,7 +319,7 @@ TEST(CInterface, ReadsAnIndexInFront) {
         const auto bytes = write_packet(*packet);
         body.insert(body.end(), bytes.begin(), bytes.end());
     }
-    auto index = indexer.finish(body.size());
+    const auto index = indexer.finish(body.size());
     const auto packet = write_packet(write_index(index));
     std::vector<htvm_index_entry> entries(intra.size());
     std::size_t count = 0;
@@ -327,10 +330,24 @@ TEST(CInterface, ReadsAnIndexInFront) {
         EXPECT_EQ(entries[i].timestamp_us, index.points[i].timestamp_us);
         EXPECT_EQ(entries[i].offset, packet.size() + intra[i]);
     }
-    index.points[0].flags = packet_flag::told | packet_flag::droppable;  // nothing follows from it
-    const auto other = write_packet(write_index(index));
-    EXPECT_EQ(htvm_index_read(other.data(), other.size(), entries.data(), entries.size(), &count), HTVM_OK);
-    EXPECT_EQ(count, intra.size() - 1);
+}
+
+TEST(CInterface, AnIndexInFrontTellsWhichEntriesAnEntryRefersTo) {
+    StreamIndex index;
+    index.frames = 60;
+    index.bytes = 5000;
+    index.sequences.push_back({0, 0});
+    const std::uint8_t told = packet_flag::told | packet_flag::referred | packet_flag::access;
+    index.points = {{0, 0, 100, 0, told}, {20, 666667, 2000, 1, told}, {50, 1666667, 4000, 2, packet_flag::told}};
+    const auto packet = write_packet(write_index(index));
+    std::array<htvm_index_entry, 3> entries{};
+    std::size_t count = 0;
+    ASSERT_EQ(htvm_index_read(packet.data(), packet.size(), entries.data(), entries.size(), &count), HTVM_OK);
+    ASSERT_EQ(count, 3u);
+    for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_EQ(entries[i].back, index.points[i].back);
+        EXPECT_EQ(entries[i].flags, index.points[i].flags);
+    }
 }
 
 TEST(CDecoder, DiscardForgetsWhatWasSent) {

@@ -31,6 +31,13 @@ SharedPacket intra(std::uint32_t frame, std::size_t bytes = 1000) {
 SharedPacket tracked(std::uint32_t frame, std::size_t bytes = 100) {
     return packet(PacketKind::tracked, frame, frame - 1, referred, bytes);
 }
+// One that refers to the reference alone.
+SharedPacket tracked_anew(std::uint32_t frame, std::uint32_t reference, std::size_t bytes = 100) {
+    return packet(PacketKind::tracked, frame, reference, referred | access, bytes);
+}
+SharedPacket patched(std::uint32_t frame, std::uint32_t reference, std::size_t bytes = 100) {
+    return packet(PacketKind::patched, frame, reference, referred | access, bytes);
+}
 SharedPacket enhanced(std::uint32_t frame, std::uint32_t reference, std::size_t bytes = 100) {
     return packet(PacketKind::enhanced, frame, reference, droppable | access, bytes);
 }
@@ -145,6 +152,42 @@ TEST(Broadcast, AViewerWhoMissedFewFramesIsSentThem) {
     EXPECT_EQ(viewer.take_numbers(), Numbers{7});
 }
 
+TEST(Broadcast, ASlowViewerGoesOnAtATrackedFrameThatNeedsTheReferenceAlone) {
+    Broadcast broadcast({.bytes = 2000, .wait = 10s, .most_missed = 1});
+    Watching viewer(broadcast);
+    for (const auto& next : {header(), intra(0), patched(1, 0)}) broadcast.push(next, start);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 0, 1}));
+    for (std::uint32_t i = 2; i <= 9; ++i) broadcast.push(tracked(i, 400), start);
+    EXPECT_FALSE(broadcast.follows(viewer.viewer));
+    EXPECT_EQ(viewer.take_numbers(), Numbers{});
+    broadcast.push(tracked_anew(10, 1), start);
+    broadcast.push(tracked(11), start);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{10, 11}));
+}
+
+TEST(Broadcast, MissedReferencesAreSentHoweverManySinceTheNextIntraFrameMayBeFar) {
+    Broadcast broadcast({.bytes = 650, .wait = 1s, .most_missed = 1});
+    Watching viewer(broadcast);
+    for (const auto& next : {header(), intra(0)}) broadcast.push(next, start);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 0}));
+    for (std::uint32_t i = 1; i <= 4; ++i) broadcast.push(patched(i, i - 1), start);
+    broadcast.push(patched(5, 4), start + 2s);
+    EXPECT_EQ(broadcast.counters(viewer.viewer).fallen_behind, 1u);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{1, 2, 3, 4, 5}));
+    // But not more of them than may wait.
+    for (std::uint32_t i = 6; i <= 12; ++i) broadcast.push(patched(i, i - 1), start + 2s);
+    EXPECT_FALSE(broadcast.follows(viewer.viewer));
+    EXPECT_EQ(viewer.take_numbers(), Numbers{});
+}
+
+TEST(Broadcast, ALateViewerIsSentTheReferencesAndTheTrackedFramesSinceTheLastOneThatNeedsNone) {
+    Broadcast broadcast;
+    for (const auto& next : {header(), intra(0), tracked(1), patched(2, 0), tracked(3), tracked_anew(4, 2), tracked(5)})
+        broadcast.push(next, start);
+    Watching viewer(broadcast);
+    EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 0, 2, 4, 5}));
+}
+
 TEST(Broadcast, FramesThatNothingRefersToAreDroppedOneByOne) {
     Broadcast broadcast({.bytes = 350, .wait = 10s});
     Watching viewer(broadcast);
@@ -242,10 +285,14 @@ TEST(Broadcast, WhateverIsDroppedWhatIsSentCanBeDecoded) {
             const bool first = frame == 0 || chance(6);
             if (first) reference = frame, chain = chance(60);
             const std::size_t bytes = 50 + random() % 200;
+            const bool anew = chain && chance(10), patch = chain && chance(10);
             broadcast.push(first   ? intra(frame, 3 * bytes)
+                           : patch ? patched(frame, reference, bytes)
+                           : anew  ? tracked_anew(frame, reference, bytes)
                            : chain ? tracked(frame, bytes)
                                    : enhanced(frame, reference, bytes),
                            now);
+            if (patch) reference = frame;
             if (!first && chain && chance(3)) broadcast.push(header(crc), now);
             ++frame;
             for (auto& [viewer, appetite, headers] : viewers)

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <csignal>
 #include <fstream>
 #include <functional>
@@ -232,6 +233,45 @@ private:
         on_sync = std::move(act);
     }
 };
+
+TEST_F(RecorderTest, WhereOnlyTrackedFramesWereDroppedItGoesOnAtOneThatNeedsNone) {
+    options.waiting_bytes = 1000;
+    options.sync = 0ms;
+    std::atomic<bool> stuck = true;
+    const WatchedDisk disk([&](const std::string&) {
+        while (stuck) std::this_thread::sleep_for(1ms);
+    });
+    const auto needs_reference = [](PacketKind kind, std::uint32_t frame, std::uint32_t reference) {
+        return shared(live_packet(kind, frame, reference, packet_flag::referred | packet_flag::access, 100));
+    };
+    const auto all_written = [](Recorder& recorder, std::uint64_t packets) {
+        return soon([&] { return recorder.counters().packets == packets; });
+    };
+    {
+        auto recorder = open();
+        take(recorder, header(1));
+        take(recorder, intra(0));
+        for (std::uint32_t i = 1; i <= 20; ++i) take(recorder, tracked(i));
+        const auto taken = 22 - recorder.counters().dropped_frames;
+        EXPECT_LT(taken, 22u);
+        stuck = false;
+        EXPECT_TRUE(all_written(recorder, taken));
+        EXPECT_TRUE(take(recorder, tracked(21)));
+        EXPECT_FALSE(take(recorder, needs_reference(PacketKind::tracked, 22, 0)));
+        EXPECT_FALSE(take(recorder, tracked(23)));
+        EXPECT_TRUE(all_written(recorder, taken + 2));
+        // A reference that is not in the file is nothing to go on from.
+        stuck = true;
+        for (std::uint32_t i = 24; i <= 40; ++i) take(recorder, tracked(i));
+        EXPECT_TRUE(take(recorder, needs_reference(PacketKind::patched, 41, 0)));
+        stuck = false;
+        EXPECT_TRUE(take(recorder, needs_reference(PacketKind::tracked, 42, 41)));
+    }
+    const auto recorded = frames("anna-20261122-130551.htvm");
+    EXPECT_THAT(recorded, testing::IsSupersetOf({0u, 22u, 23u}));
+    EXPECT_THAT(recorded,
+                testing::Not(testing::AnyOf(testing::Contains(21u), testing::Contains(41u), testing::Contains(42u))));
+}
 
 TEST_F(RecorderTest, AFileThatGrowsIsOnTheDiskAfterAMomentAndNobodyElseWaitsForThat) {
     options.sync = 50ms;

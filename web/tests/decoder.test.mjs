@@ -2,32 +2,13 @@
 import assert from 'node:assert/strict';
 import { before, test } from 'node:test';
 import { readdir } from 'node:fs/promises';
-import { crc32, DecoderError, loadDecoder, packetKind, PacketSplitter, streamVersion } from '../packages/decoder/dist/node.js';
-import { conformance, digests, folder, frontIndexPacket, indexPacket, packet, packetsOf } from './streams.mjs';
+import { DecoderError, loadDecoder, packetKind, PacketSplitter, streamVersion } from '../packages/decoder/dist/node.js';
+import { conformance, digests, folder, framesOf, frontIndexPacket, indexPacket, lineOf, packet, packetsOf } from './streams.mjs';
 
 let module;
 before(async () => {
     module = await loadDecoder();
 });
-
-const bytesOf = (array) => (array ? new Uint8Array(array.buffer, array.byteOffset, array.byteLength) : new Uint8Array(0));
-
-function lineOf(frame) {
-    let crc = 0;
-    for (const array of [frame.positions, frame.indices, frame.colours, frame.normals, frame.texcoords]) crc = crc32(bytesOf(array), crc);
-    const digest = crc.toString(16).padStart(8, '0');
-    return `${frame.frame} ${frame.letter[0]} ${frame.vertices} ${frame.triangles} ${digest}`;
-}
-
-function framesOf(decoder, packets) {
-    const lines = [];
-    for (const { bytes } of packets) {
-        decoder.sendPacket(bytes);
-        const frame = decoder.receive();
-        if (frame) lines.push(lineOf(frame));
-    }
-    return lines;
-}
 
 const names = (await readdir(folder)).filter((file) => file.endsWith('.htvm')).map((file) => file.slice(0, -5));
 for (const name of names)
@@ -66,12 +47,16 @@ test('the header, the layers and the index are told', async () => {
     decoder.close();
     const intra = packets.filter(({ kind }) => kind === packetKind.intra);
     const index = module.readIndex(packets.find(({ kind }) => kind === packetKind.index).bytes);
-    assert.deepEqual(index, intra.map(({ frame, timestampUs, offset }) => ({ frame, timestampUs, offset })));
+    assert.deepEqual(index, intra.map(({ frame, timestampUs, offset }) => ({ frame, timestampUs, offset, back: 0, flags: 0 })));
     assert.deepEqual(module.readIndex(indexPacket(7, index)), index);
     // Offsets in front count from the end of the index.
     const front = frontIndexPacket(7, index, 1e6);
-    const shifted = index.map((entry) => ({ ...entry, offset: entry.offset + front.length }));
-    assert.deepEqual(module.readIndex(front), shifted);
+    const shifted = (entries, by) => entries.map((entry) => ({ ...entry, offset: entry.offset + by, flags: 131 }));
+    assert.deepEqual(module.readIndex(front), shifted(index, front.length));
+    // They may refer to each other.
+    const chain = index.map((entry, i) => ({ ...entry, back: i > 0 ? 1 : 0 }));
+    const chained = frontIndexPacket(7, chain, 1e6);
+    assert.deepEqual(module.readIndex(chained), shifted(chain, chained.length));
 });
 
 test('errors are told in words, by code, and cost one packet', async () => {

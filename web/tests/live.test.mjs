@@ -572,6 +572,60 @@ test('a page that takes no frames holds up a bounded number of packets, and goes
     assert.ok(reports.findLast(({ type }) => type === 'memory').heldBytes < 1 << 24);
 });
 
+/**
+ * A stream of one I-frame, a patch, and T-frames from then on. Those that `anew` tells refer to the patch alone, the others to
+ * the frame before; of these only the first behind each can be decoded.
+ */
+async function patchedStream(frames, anew) {
+    const [header, intra, , patched, first, next] = packetsOf(await conformance('patched_4'));
+    const patch = packet(11, patched.bytes.slice(32, -4), { ...patched, frame: 1, reference: 0 });
+    const out = [header, intra, packetsOf(patch)[0]];
+    for (let frame = 2; frame < frames; ++frame) {
+        const alone = frame === 2 || anew(frame);
+        const of = alone ? first : next;
+        const timestampUs = intra.timestampUs + Math.round((frame * 1e6) / 30);
+        const reference = alone ? 1 : frame - 1;
+        out.push(packetsOf(packet(7, of.bytes.slice(32, -4), { frame, reference, timestampUs, flags: alone ? 131 : 129 }))[0]);
+    }
+    return out;
+}
+
+test('a page that falls behind goes on at the newest frame that needs the reference alone, which it keeps', async () => {
+    const { give, settle, frames, session, state, reports, asked } = decoding({ room: 1 });
+    for (const one of await patchedStream(95, (frame) => frame % 10 === 3)) {
+        give(one);
+        state.now += 1000 / 30;
+    }
+    await settle();
+    const buffer = reports.find(({ type }) => type === 'frame').buffer;
+    assert.deepEqual(frames(), [0]);
+    session.take({ type: 'room', frames: 100 });
+    session.take({ type: 'done', buffer });
+    await settle();
+    assert.deepEqual(frames(), [1, 93, 94]);
+    assert.deepEqual(asked, ['connect']);
+});
+
+test('where T-frames alone were thrown away, it goes on at the next one that needs none of them', async () => {
+    const { give, settle, frames, session, state, asked } = decoding({ room: 3 });
+    const stream = await patchedStream(122, (frame) => frame === 120);
+    for (const one of stream.slice(0, 4)) {
+        give(one);
+        await settle();
+    }
+    assert.deepEqual(frames(), [0, 1, 2]);
+    for (const one of stream.slice(4, 110)) {
+        give(one);
+        state.now += 1000 / 30;
+    }
+    await settle();
+    assert.deepEqual(asked, ['connect', 'key frame']);
+    session.take({ type: 'room', frames: 100 });
+    for (const one of stream.slice(110)) give(one);
+    await settle();
+    assert.deepEqual(frames(), [120, 121]);
+});
+
 test('a hidden page closes the connection, and a shown one begins a new one', async () => {
     const { session, asked } = decoding();
     session.take({ type: 'rest' });

@@ -1,8 +1,10 @@
 // Streams for the tests, made from those in tests/data/conformance.
-import { mkdir, readFile, writeFile } from 'node:fs/promises';
+import { execFileSync } from 'node:child_process';
+import { mkdir, mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
+import { tmpdir } from 'node:os';
 import { join as inFolder } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { crc32, isFrame, packetKind, PacketSplitter } from '../packages/decoder/dist/node.js';
+import { crc32, isAccess, isFrame, isReference, packetKind, PacketSplitter } from '../packages/decoder/dist/node.js';
 
 export const folder = fileURLToPath(new URL('../../tests/data/conformance/', import.meta.url));
 
@@ -11,6 +13,20 @@ export const conformance = (name) => readFile(`${folder}${name}.htvm`);
 /** Lines "FRAME KIND VERTICES TRIANGLES DIGEST", as the native decoder's test wrote them. */
 export async function digests(name) {
     return (await readFile(`${folder}${name}.digests`, 'utf8')).trim().split('\n');
+}
+
+/** A dancer whose frames refer to one I-frame and its patches, with a place to start every ten frames. */
+export async function encodeDancer(program, frames) {
+    const work = await mkdtemp(inFolder(tmpdir(), 'htvm-dancer-'));
+    const [capture, stream] = [inFolder(work, 'capture'), inFolder(work, 'dancer.htvm')];
+    const run = (...words) => execFileSync(program, [...words, '--quiet']);
+    try {
+        run('synth', capture, '--motion', 'fast', '--frames', `${frames}`, '--vertices', '4000');
+        run('encode', capture, '--keyint', '300', '--access-interval', '10', '-o', stream);
+        return new Uint8Array(await readFile(stream));
+    } finally {
+        await rm(work, { recursive: true });
+    }
 }
 
 /** A capture of a few triangles that move; `walk` metres a frame to the right. */
@@ -29,6 +45,27 @@ export function packetsOf(stream) {
     const packets = [];
     for (let packet = splitter.next(); packet; packet = splitter.next()) packets.push({ ...packet, bytes: packet.bytes.slice() });
     return packets;
+}
+
+const bytesOf = (array) => (array ? new Uint8Array(array.buffer, array.byteOffset, array.byteLength) : new Uint8Array(0));
+
+/** Of a decoded frame, as in `digests`. */
+export function lineOf(frame) {
+    let crc = 0;
+    for (const array of [frame.positions, frame.indices, frame.colours, frame.normals, frame.texcoords]) crc = crc32(bytesOf(array), crc);
+    const digest = crc.toString(16).padStart(8, '0');
+    return `${frame.frame} ${frame.letter[0]} ${frame.vertices} ${frame.triangles} ${digest}`;
+}
+
+/** The lines of the frames among these packets. */
+export function framesOf(decoder, packets) {
+    const lines = [];
+    for (const { bytes } of packets) {
+        decoder.sendPacket(bytes);
+        const frame = decoder.receive();
+        if (frame) lines.push(lineOf(frame));
+    }
+    return lines;
 }
 
 export function packet(kind, payload, { frame = 0, reference = 0, timestampUs = 0, flags = 0 } = {}) {
@@ -62,13 +99,13 @@ function signedVarint(value) {
     return varint(wide < 0n ? -2n * wide - 1n : 2n * wide);
 }
 
-// Frame, timestamp, offset of each entry, as differences from the one before, and what `rest` has besides.
-function indexEntries(entries, rest = []) {
+// Frame, timestamp, offset of each entry, as differences from the one before, and what `rest` tells of it besides.
+function indexEntries(entries, rest = () => []) {
     const payload = varint(entries.length);
     let last = { frame: 0, timestampUs: 0, offset: 0 };
     for (const entry of entries) {
         const time = signedVarint(entry.timestampUs - last.timestampUs);
-        payload.push(...varint(entry.frame - last.frame), ...time, ...varint(entry.offset - last.offset), ...rest);
+        payload.push(...varint(entry.frame - last.frame), ...time, ...varint(entry.offset - last.offset), ...rest(entry));
         last = entry;
     }
     return payload;
@@ -83,8 +120,8 @@ export function indexPacket(frames, entries) {
 export function frontIndexPacket(frames, entries, bytes) {
     const numbers = [varint(frames), signedVarint(entries[0].timestampUs), varint(Math.round((frames * 1e6) / 30)), varint(bytes)];
     const sequences = [...varint(1), ...varint(0), ...varint(entries[0].frame)];
-    // No bounds; every entry is an I-frame that may be referred to.
-    const payload = [...numbers.flat(), 0, ...sequences, ...indexEntries(entries, [0, 128 + 2 + 1])];
+    // No bounds; every entry may be referred to.
+    const payload = [...numbers.flat(), 0, ...sequences, ...indexEntries(entries, ({ back = 0 }) => [...varint(back), 128 + 2 + 1])];
     return packet(packetKind.frontIndex, Uint8Array.from(payload), { frame: frames, flags: 128 });
 }
 
@@ -104,8 +141,14 @@ export function padded(stream, padding, index) {
     const packets = packetsOf(stream).filter(({ kind }) => kind !== packetKind.index);
     let offset = 0;
     const entries = [];
-    for (const { kind, frame, timestampUs, bytes } of packets) {
-        if (kind === packetKind.intra) entries.push({ frame, timestampUs, offset });
+    let reference = 0; // its place among the entries
+    for (const one of packets) {
+        const { kind, frame, timestampUs, bytes } = one;
+        if (kind === packetKind.intra || (index === 'front' && isAccess(one))) {
+            const back = kind === packetKind.intra ? 0 : entries.length - reference;
+            if (isReference(one)) reference = entries.length;
+            entries.push({ frame, timestampUs, offset, back });
+        }
         offset += bytes.length + (isFrame(kind) ? filler.length : 0);
     }
     const frames = packets.filter(({ kind }) => isFrame(kind)).length;

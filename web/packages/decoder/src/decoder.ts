@@ -1,7 +1,7 @@
 // The decoder: a WebAssembly module (the C interface of include/htvm/htvm.h) behind a typed interface.
 import { constants, layouts, type Functions } from './layouts.js';
 
-export type FrameKind = 'intra' | 'enhanced' | 'predicted' | 'tracked' | 'unknown';
+export type FrameKind = 'intra' | 'enhanced' | 'predicted' | 'tracked' | 'patched' | 'unknown';
 
 /** What a failed call is about. `internal` and `trap` are faults of the decoder: please report them. */
 export type ErrorCode = 'input' | 'corrupt' | 'unsupported' | 'limit' | 'memory' | 'internal' | 'trap';
@@ -80,12 +80,19 @@ export interface Frame {
     texcoords: Float32Array | null;
 }
 
-/** A place in a stream where decoding can start, once the sequence header is known. */
+/**
+ * A place in a stream where decoding can start, once the sequence header is known, and the packets of the entries that
+ * this one refers to.
+ */
 export interface IndexEntry {
     frame: number;
     timestampUs: number;
     /** Bytes from the start of the stream. */
     offset: number;
+    /** How many entries before this one is the frame that it refers to; 0: it refers to nothing. */
+    back: number;
+    /** Of its packet, as in `PacketHeader`; 0 where the index does not tell them. */
+    flags: number;
 }
 
 type Layout = { readonly size: number; readonly fields: Readonly<Record<string, readonly [number, string]>> };
@@ -159,7 +166,8 @@ export class DecoderModule {
             if (status !== constants.HTVM_OK) throw this.error(status, 'the index is damaged');
             return Array.from({ length: number }, (_, i) => {
                 const entry = this.read(entries + i * layout.size, layout);
-                return { frame: entry.frame, timestampUs: entry.timestamp_us, offset: entry.offset };
+                const { frame, timestamp_us: timestampUs, offset, back, flags } = entry;
+                return { frame, timestampUs, offset, back, flags };
             });
         } finally {
             this.free(entries);

@@ -4,7 +4,9 @@ export { crc32 } from './crc32.js';
 export { Decoder, DecoderError, DecoderModule } from './decoder.js';
 export type { DecoderOptions, ErrorCode, Axis, Frame, FrameKind, IndexEntry, SequenceInfo } from './decoder.js';
 export { streamVersion } from './layouts.js';
-export { isFrame, isReferred, isStart, packetKind, PacketSplitter, readPacketHeader } from './packets.js';
+export {
+    isAccess, isFrame, isReference, isReferred, isStart, packetFlag, packetKind, PacketSplitter, readPacketHeader,
+} from './packets.js';
 export type { Packet, PacketHeader } from './packets.js';
 import { DecoderModule } from './decoder.js';
 

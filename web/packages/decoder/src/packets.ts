@@ -4,10 +4,16 @@ import { crc32 } from './crc32.js';
 
 export const packetKind = {
     sequence: 1, intra: 2, enhanced: 3, codebook: 4, index: 5, predicted: 6, tracked: 7, frontIndex: 8, audio: 10,
+    patched: 11,
 } as const;
 
-// Bits of the flags; without `told` the others are not valid.
-const flag = { referred: 1, told: 128 } as const;
+/** Bits of the flags; without `told` the others are not valid. */
+export const packetFlag = { referred: 1, access: 2, told: 128 } as const;
+
+const frameKinds: readonly number[] = [
+    packetKind.intra, packetKind.enhanced, packetKind.predicted, packetKind.tracked, packetKind.patched,
+];
+const referredKinds: readonly number[] = [packetKind.intra, packetKind.tracked, packetKind.patched];
 
 export const headerSize = 32;
 export const closingSize = 4; // the payload's CRC
@@ -49,23 +55,31 @@ export function readPacketHeader(bytes: Uint8Array, at = 0): PacketHeader | null
 
 /** True where a packet of this kind is a frame. Kinds that this version does not know are none. */
 export function isFrame(kind: number): boolean {
-    return (
-        kind === packetKind.intra ||
-        kind === packetKind.enhanced ||
-        kind === packetKind.predicted ||
-        kind === packetKind.tracked
-    );
+    return frameKinds.includes(kind);
 }
 
-/** True for frames that later ones may refer to: I- and T-frames, unless their flags say otherwise. */
+/** True for frames that later ones may refer to: I-, T- and TP-frames, unless their flags say otherwise. */
 export function isReferred({ kind, flags }: PacketHeader): boolean {
-    const may = kind === packetKind.intra || kind === packetKind.tracked;
-    return may && ((flags & flag.told) === 0 || (flags & flag.referred) !== 0);
+    return referredKinds.includes(kind) && ((flags & packetFlag.told) === 0 || (flags & packetFlag.referred) !== 0);
 }
 
 /** True for I-frames from which decoding can start: all but those that later frames may not refer to. */
 export function isStart(header: PacketHeader): boolean {
     return header.kind === packetKind.intra && isReferred(header);
+}
+
+/** True for frames that are the reference of what follows: I- and TP-frames that later ones may refer to. */
+export function isReference(header: PacketHeader): boolean {
+    return header.kind !== packetKind.tracked && isReferred(header);
+}
+
+/**
+ * True for frames from which decoding can go on where only the reference is known: all that `isReference` tells, and
+ * T-frames that refer to no other T-frame and to which later ones may refer.
+ */
+export function isAccess(header: PacketHeader): boolean {
+    const { told, access } = packetFlag;
+    return isReference(header) || (isReferred(header) && (header.flags & (told | access)) === (told | access));
 }
 
 /**

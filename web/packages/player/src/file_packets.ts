@@ -1,5 +1,7 @@
 // The packets of a file in order, from any place where decoding can start.
-import { isFrame, isStart, packetKind, PacketSplitter, type DecoderModule, type Packet } from '@htvm/decoder';
+import {
+    isAccess, isFrame, isReference, isStart, packetFlag, packetKind, PacketSplitter, type DecoderModule, type Packet,
+} from '@htvm/decoder';
 import { SourceError, type ByteSource } from './byte_source.js';
 
 // What packets are read from.
@@ -16,6 +18,8 @@ interface AccessPoint {
     timeUs: number;
     offset: number;
     frame: number;
+    /** The I- or TP-frame that it refers to, to be decoded before it; null: it is an I-frame. */
+    reference: AccessPoint | null;
     /** What to take from timestamps for media time. */
     base: number;
     /** The sequence header in force there; null where an index names the place and it was not read yet. */
@@ -39,7 +43,8 @@ export class FilePackets {
     #lastTimestamp: number | null = null;
     #end = 0; // media time of the last frame seen from the beginning on
     #sequence: Uint8Array | null = null;
-    #expected: AccessPoint | null = null; // what the next packet must be
+    #route: AccessPoint[] = []; // what the next packets must be, before everything from the last of them on
+    #reference: AccessPoint | null = null; // of the frames that come next
     #packets = 0;
     #framesInIndex = 0;
     #measuredUs: number | null = null; // duration, once the end was read
@@ -71,22 +76,18 @@ export class FilePackets {
     }
 
     /**
-     * Goes to the last known place where decoding can start for a frame at `timeUs`. Returns the sequence header in force
-     * there, to be sent to the decoder first, or null if it is the next packet.
+     * Goes to the last known place where decoding can start for a frame at `timeUs`: the next packets are the frames that
+     * it refers to, and all from that place on. Returns the sequence header in force there, to be sent to the decoder
+     * first, or null if it is the next packet.
      */
     seek(timeUs: number): Uint8Array | null {
         let point: AccessPoint | null = null;
         for (const candidate of this.#points) if (candidate.timeUs <= timeUs) point = candidate;
         point ??= this.#points[0] ?? null;
-        this.#lastTimestamp = null;
-        this.#expected = null;
-        if (!point || !this.#sequence) {
-            this.#splitter = new PacketSplitter(0);
-            return null;
-        }
-        this.#splitter = new PacketSplitter(point.offset);
+        if (!this.#sequence) point = null;
+        this.#goTo(point);
+        if (!point) return null;
         this.#base = point.base;
-        if (point.fromIndex) this.#expected = point;
         if (point.sequence) this.#sequence = point.sequence;
         return this.#sequence;
     }
@@ -103,11 +104,20 @@ export class FilePackets {
                     continue;
                 }
                 this.#checkThatItIsAStream(true);
+                if (this.#route[0]) {
+                    this.#turnBack(this.#route[0]);
+                    continue;
+                }
                 if (this.#end > 0 || this.#points.length > 0) this.#measuredUs = this.#end + this.frameUs;
                 return null;
             }
             ++this.#packets;
-            if (this.#expected && !this.#isAsExpected(packet)) continue;
+            const point = this.#route[0];
+            if (point && !this.#isAt(point, packet)) {
+                this.#turnBack(point);
+                continue;
+            }
+            if (point) this.#goOn(point, packet);
             if (packet.kind === packetKind.sequence) this.#sequence = packet.bytes.slice();
             if (isIndex(packet)) this.#takeIndex(packet);
             if (isFrame(packet.kind)) return this.#timed(packet);
@@ -147,21 +157,35 @@ export class FilePackets {
         return true;
     }
 
-    // If something else is at an index's offset, the file was replaced, or the index belongs to another file.
-    #isAsExpected(packet: Packet): boolean {
-        const point = this.#expected!;
-        this.#expected = null;
-        if (packet.offset === point.offset && packet.frame === point.frame && isStart(packet)) {
-            point.fromIndex = false;
-            point.sequence = this.#sequence;
-            return true;
-        }
-        // What was read from the beginning on is sound; the rest is found by reading on from there.
-        this.#points = this.#points.filter(({ fromIndex }) => !fromIndex);
+    // To the frames that the point refers to, one after the other, then to itself; null: to the beginning of the file.
+    #goTo(point: AccessPoint | null): void {
+        this.#lastTimestamp = null;
+        this.#reference = null;
+        this.#route = [];
+        for (let next = point; next; next = next.reference) this.#route.unshift(next);
+        this.#splitter = new PacketSplitter(this.#route[0]?.offset ?? 0);
+    }
+
+    #isAt({ offset, frame, reference }: AccessPoint, packet: Packet): boolean {
+        if (packet.offset !== offset || packet.frame !== frame) return false;
+        return reference ? isAccess(packet) && packet.reference === reference.frame : packet.kind === packetKind.intra;
+    }
+
+    // The packet is what it must be.
+    #goOn(point: AccessPoint, packet: Packet): void {
+        point.fromIndex = false;
+        point.sequence = this.#sequence;
+        this.#route.shift();
+        const next = this.#route[0];
+        if (next && next.offset !== packet.offset + packet.size) this.#splitter = new PacketSplitter(next.offset);
+    }
+
+    // Something else is there: the file was replaced, or the index belongs to another file. What was read is sound unless it
+    // is that; the rest is found by reading on from its end.
+    #turnBack(point: AccessPoint): void {
+        this.#points = point.fromIndex ? this.#points.filter(({ fromIndex }) => !fromIndex) : [];
         this.indexed = false;
-        const last = this.#points.at(-1);
-        this.#splitter = new PacketSplitter(last?.offset ?? 0);
-        return false;
+        this.#goTo(this.#points.at(-1) ?? null);
     }
 
     #timed(packet: Packet): TimedPacket {
@@ -172,11 +196,15 @@ export class FilePackets {
         this.#lastTimestamp = packet.timestampUs;
         const timeUs = packet.timestampUs - this.#base;
         this.#end = Math.max(this.#end, timeUs);
-        if (isStart(packet))
-            this.#add({
-                timeUs, offset: packet.offset, frame: packet.frame, base: this.#base, sequence: this.#sequence,
-                fromIndex: false,
+        const known = isStart(packet) || this.#reference?.frame === packet.reference;
+        if (isAccess(packet) && known) {
+            const { offset, frame } = packet;
+            const reference = isStart(packet) ? null : this.#reference;
+            const point = this.#add({
+                timeUs, offset, frame, reference, base: this.#base, sequence: this.#sequence, fromIndex: false,
             });
+            if (isReference(packet)) this.#reference = point;
+        }
         return { ...packet, timeUs };
     }
 
@@ -191,19 +219,27 @@ export class FilePackets {
         const first = entries[0];
         if (!first) return;
         this.#base ??= first.timestampUs;
-        for (const { frame, timestampUs, offset } of entries) {
-            const timeUs = timestampUs - this.#base;
-            this.#add({ timeUs, offset, frame, base: this.#base, sequence: null, fromIndex: true });
+        const base = this.#base;
+        const points: AccessPoint[] = [];
+        for (const { frame, timestampUs, offset, back } of entries) {
+            const reference = back > 0 ? points.at(-back)! : null;
+            points.push({ timeUs: timestampUs - base, offset, frame, reference, base, sequence: null, fromIndex: true });
         }
+        // Those from which all that follows can be decoded, where there are any.
+        const unless = packetFlag.told | packetFlag.referred;
+        const lasting = points.filter((_, i) => (entries[i]!.flags & unless) !== packetFlag.told);
+        for (const point of lasting.length > 0 ? lasting : points) this.#add(point);
         this.indexed = true;
         this.#framesInIndex = packet.frame;
     }
 
-    #add(point: AccessPoint): void {
+    // The point among those known: the one at its offset, where that is known already.
+    #add(point: AccessPoint): AccessPoint {
         const at = this.#points.findIndex(({ offset }) => offset >= point.offset);
-        if (at < 0) this.#points.push(point);
-        else if (this.#points[at]!.offset !== point.offset) this.#points.splice(at, 0, point);
-        else if (!point.fromIndex) this.#points[at] = point;
+        const known = this.#points[at];
+        if (known?.offset === point.offset) return point.fromIndex ? known : Object.assign(known, point);
+        this.#points.splice(at < 0 ? this.#points.length : at, 0, point);
+        return point;
     }
 
     #checkThatItIsAStream(atEnd: boolean): void {

@@ -1,10 +1,14 @@
 // What the worker does with a live stream: decodes packets as they come, sends the frames on, and where the machine cannot
 // keep up, goes on at the newest place to start. What waits is bounded in time and bytes.
-import { Decoder, DecoderError, isFrame, isReferred, isStart, packetKind, readAudio, type DecoderModule, type Packet } from '@htvm/decoder';
+import {
+    Decoder, DecoderError, isAccess, isFrame, isReference, isReferred, isStart, packetKind, readAudio, type DecoderModule,
+    type Packet,
+} from '@htvm/decoder';
 import { SourceError } from './byte_source.js';
 import { FrameSender } from './frame_sender.js';
 import { LiveSource, type HubMessage, type LiveListener } from './live_source.js';
 import type { Report, Request } from './messages.js';
+import { otherTasks } from './other_tasks.js';
 
 interface Waiting {
     packet: Packet;
@@ -46,7 +50,7 @@ export class LiveSession {
     #joining: number | null = null; // since when what the newest frame needs is decoded
     #previewed = false;
     #sentUs = -Infinity; // present time of the newest frame sent
-    #lost = false; // up to the next place to start
+    #lost: 'nothing' | 'tracked' | 'reference' = 'nothing'; // what the next frames need: T-frames alone, or the reference too
     #leftOut = 0;
     #busyUntilMs = 0;
     #noticed = new Set<string>();
@@ -172,7 +176,7 @@ export class LiveSession {
         this.#queueBytes = 0;
         this.#decoder.discard();
         this.#joining = this.#now();
-        this.#lost = false;
+        this.#lost = 'nothing';
     }
 
     #pass(message: HubMessage): void {
@@ -185,38 +189,64 @@ export class LiveSession {
         }
     }
 
-    // Bounds what waits: everything before the newest place to start goes; without one everything, after a while.
+    // Bounds what waits: everything before the newest place to start goes, but for what that one refers to; without one
+    // everything, after a while.
     #shed(): void {
         const head = this.#queue[0];
         if (!head) return;
         const waitedMs = this.#now() - head.receivedMs;
         const tooMuch = this.#queueBytes > mostBytes;
         if (waitedMs < startAfterMs && !tooMuch) return;
-        let start = this.#queue.map(({ packet }) => isStart(packet)).lastIndexOf(true);
-        if (start <= 0) {
+        let { gone, kept } = this.#fromNewestPlace();
+        if (gone.length === 0) {
             if (waitedMs < giveUpAfterMs && !tooMuch) return;
-            if (start === 0 && !tooMuch) return;
-            start = this.#queue.length;
-            this.#lost = true;
+            if (kept.length > 0 && !tooMuch) return;
+            gone = this.#queue;
+            kept = [];
+            if (this.#lost === 'nothing') this.#lost = 'tracked';
+            if (gone.some(({ packet }) => isReference(packet))) this.#lost = 'reference';
         }
-        const gone = this.#queue.splice(0, start);
         this.#leftOut += gone.filter(({ packet }) => isFrame(packet.kind)).length;
         const header = gone.filter(({ packet }) => packet.kind === packetKind.sequence).at(-1);
-        if (header) this.#queue.unshift({ ...header, receivedMs: this.#queue[0]?.receivedMs ?? this.#now() });
-        this.#queueBytes = this.#queue.reduce((sum, { packet }) => sum + packet.size, 0);
-        if (this.#lost) this.#source.askForKeyFrame();
+        if (header) kept.unshift({ ...header, receivedMs: kept[0]?.receivedMs ?? this.#now() });
+        this.#queue = kept;
+        this.#queueBytes = kept.reduce((sum, { packet }) => sum + packet.size, 0);
+        if (this.#lost !== 'nothing') this.#source.askForKeyFrame();
+    }
+
+    // Parts what waits: what is needed from the newest place to start on, and the rest. Without such a place both are empty.
+    #fromNewestPlace(): { gone: Waiting[]; kept: Waiting[] } {
+        let known = this.#lost !== 'reference';
+        let start = 0; // of what may be needed for that place
+        let place = -1;
+        for (const [at, { packet }] of this.#queue.entries()) {
+            if (isStart(packet)) {
+                known = true;
+                start = at;
+            }
+            if (known && isAccess(packet)) place = at;
+        }
+        const gone: Waiting[] = [];
+        const kept: Waiting[] = [];
+        if (place < 0) return { gone, kept };
+        for (const [at, waiting] of this.#queue.entries()) {
+            const { packet } = waiting;
+            const lasts = isReference(packet) || packet.kind === packetKind.codebook;
+            (at >= place || (at >= start && lasts) ? kept : gone).push(waiting);
+        }
+        return { gone, kept };
     }
 
     // ---- decoding -------------------------------------------------------------------------------------------------
 
     #decode({ packet, presentUs, receivedMs }: Waiting): void {
         const frameKind = isFrame(packet.kind);
-        if (isStart(packet)) this.#lost = false;
+        if (isStart(packet) || (this.#lost === 'tracked' && isAccess(packet))) this.#lost = 'nothing';
         const later = this.#queue.some(({ packet: { kind } }) => isFrame(kind));
         const begin = this.#now();
         const late = later && begin - receivedMs > skipAfterMs && !isReferred(packet);
-        if (frameKind && (this.#lost || late)) {
-            if (this.#lost) this.#source.askForKeyFrame();
+        if (frameKind && (this.#lost !== 'nothing' || late)) {
+            if (this.#lost !== 'nothing') this.#source.askForKeyFrame();
             ++this.#leftOut;
             return;
         }
@@ -283,16 +313,4 @@ export class LiveSession {
 
 function sameBytes(a: Uint8Array, b: Uint8Array): boolean {
     return a.length === b.length && a.every((byte, i) => byte === b[i]);
-}
-
-// Lets messages be heard. A timer would wait for 4 ms.
-function otherTasks(): Promise<void> {
-    return new Promise((resolve) => {
-        const { port1, port2 } = new MessageChannel();
-        port1.onmessage = () => {
-            port1.close();
-            resolve();
-        };
-        port2.postMessage(null);
-    });
 }

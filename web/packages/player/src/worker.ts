@@ -1,10 +1,14 @@
 // The player's worker: fetches, decodes, computes normals, and sends frames as long as the player has room for them.
-import { Decoder, DecoderError, DecoderModule, isFrame, isReferred, isStart, packetKind, readAudio, type Frame } from '@htvm/decoder';
+import {
+    Decoder, DecoderError, DecoderModule, isAccess, isFrame, isReference, isReferred, isStart, packetKind, readAudio,
+    type Frame,
+} from '@htvm/decoder';
 import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
 import { FilePackets, type TimedPacket } from './file_packets.js';
 import { FrameSender } from './frame_sender.js';
 import { LiveSession } from './live_session.js';
 import type { Report, Request } from './messages.js';
+import { otherTasks } from './other_tasks.js';
 
 const scope = globalThis as unknown as {
     postMessage(message: Report, transfer?: Transferable[]): void;
@@ -25,7 +29,7 @@ class Session {
     #serial: number;
     #timeUs: number;
     #traps: number[]; // times of frames that stopped the decoder before
-    #passingOver = false; // up to the next I-frame, after such a frame
+    #passingOver: 'nothing' | 'to access' | 'to start' = 'nothing'; // after such a frame: up to one that does not need it
     #loop: boolean;
     #resting = false;
     #sender = new FrameSender(post);
@@ -168,9 +172,9 @@ class Session {
             const packet = await this.#file.next();
             if (this.#serial !== serial) return 'superseded';
             if (!packet) break;
-            if (isStart(packet) && packet.timeUs <= timeUs) {
-                group = group.filter(({ kind }) => kind === packetKind.sequence);
-                bytes = 0;
+            if (isAccess(packet) && packet.timeUs <= timeUs) {
+                group = isStart(packet) ? [] : group.filter((before) => isReference(before) || before.kind === packetKind.codebook);
+                bytes = group.reduce((sum, { size }) => sum + size, 0);
             }
             group.push({ ...packet, bytes: packet.bytes.slice() });
             bytes += packet.size;
@@ -182,16 +186,17 @@ class Session {
             }
         }
         let left = group.filter(({ kind }) => isFrame(kind)).length;
-        for (const packet of group) {
+        const begin = group.map(isAccess).lastIndexOf(true); // before it is what it refers to
+        for (const [place, packet] of group.entries()) {
             if (isFrame(packet.kind) && --left > 0 && !isReferred(packet)) continue; // no later frame needs it
             const frame = this.#decode(packet, serial);
             if (!frame) continue;
             const preview = left > 0;
-            if (preview && !(packet === group[0] && left > previewBeyond && !quietly)) continue;
-            if (!(await this.#haveRoom(serial))) return 'superseded';
-            this.#send(serial, frame, packet.timeUs, preview);
-            // Let a newer seek be heard between frames.
-            await new Promise((resolve) => setTimeout(resolve));
+            if (!preview || (place === begin && left > previewBeyond && !quietly)) {
+                if (!(await this.#haveRoom(serial))) return 'superseded';
+                this.#send(serial, frame, packet.timeUs, preview);
+            }
+            await otherTasks(); // a newer seek is heard between frames
             if (this.#serial !== serial) return 'superseded';
         }
         return 'shown';
@@ -215,9 +220,10 @@ class Session {
         }
         if (isFrame(packet.kind)) {
             this.#at = packet.timeUs;
-            if (this.#traps.includes(packet.timeUs)) this.#passingOver = true;
-            else if (packet.kind === packetKind.intra) this.#passingOver = false;
-            if (this.#passingOver) return null;
+            if (this.#traps.includes(packet.timeUs)) this.#passOver(packet);
+            else if (packet.kind === packetKind.intra) this.#passingOver = 'nothing';
+            else if (isAccess(packet) && this.#passingOver === 'to access') this.#passingOver = 'nothing';
+            if (this.#passingOver !== 'nothing') return null;
         }
         const begin = performance.now();
         let frame: Frame | null = null;
@@ -235,6 +241,11 @@ class Session {
         }
         if (packet.kind === packetKind.sequence) this.#tellSequence();
         return frame ? { frame, decodeMs: performance.now() - begin } : null;
+    }
+
+    #passOver(packet: TimedPacket): void {
+        if (isReference(packet)) this.#passingOver = 'to start';
+        else if (this.#passingOver === 'nothing') this.#passingOver = 'to access';
     }
 
     #tellSequence(): void {
