@@ -295,7 +295,9 @@ void add_sweep_options(CLI::App& command, Options& o) {
         ->option_text("NAME=COMMAND ...")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    command.add_option("--metrics", o.metrics, "Any of m1, m2, m3 (pictures: slow), d1 (with d2); default m1,m2")
+    command
+        .add_option("--metrics", o.metrics,
+                    "Any of m1, m2, m3 (pictures, also unlit, PSNR and SSIM: slow), d1 (with d2); default m1,m2")
         ->delimiter(',')
         ->check(CLI::IsMember({"m1", "m2", "m3", "d1"}))
         ->option_text("LIST");
