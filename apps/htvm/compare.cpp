@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
@@ -22,6 +23,7 @@
 #include "io/output_file.h"
 #include "io/sequence.h"
 #include "metrics/drift.h"
+#include "metrics/flicker.h"
 #include "picture_options.h"
 #include "sequences.h"
 #include "stream_file.h"
@@ -69,22 +71,29 @@ std::string topology_rows(const SequenceComparison& sums) {
 }
 
 std::string picture_rows(const SequenceComparison& sums, const ComparisonSummary& s, const CompareOptions& options) {
-    return fmt::format("\n  M3, {} of {} x {}, {} shading, {:.1f} % of the pixels foreground\n",
-                       counted(static_cast<std::size_t>(options.views.views), "view"), options.views.width,
-                       options.views.height, shading_name(options.render.shading), 100 * s.foreground_share) +
-           single("PSNR of the foreground, dB", s.m3_foreground_db, 2) +
-           single("PSNR of the full picture, dB", s.m3_full_db, 2) +
-           single("pixels of one mesh only, % of fgr.",
-                  sums.pictures.foreground_pixels > 0 ? 100.0 * static_cast<double>(sums.pictures.outline_pixels) /
-                                                            static_cast<double>(sums.pictures.foreground_pixels)
-                                                      : 0,
-                  3);
+    std::string out =
+        fmt::format("\n  M3, {} of {} x {}, {} shading, {:.1f} % of the pixels foreground\n",
+                    counted(static_cast<std::size_t>(options.views.views), "view"), options.views.width,
+                    options.views.height, shading_name(options.render.shading), 100 * s.foreground_share) +
+        single("PSNR of the foreground, dB", s.m3_foreground_db, 2) +
+        single("PSNR of the full picture, dB", s.m3_full_db, 2) + single("SSIM of the foreground", s.m3_ssim, 4) +
+        single("pixels of one mesh only, % of fgr.",
+               sums.pictures.foreground_pixels > 0 ? 100.0 * static_cast<double>(sums.pictures.outline_pixels) /
+                                                         static_cast<double>(sums.pictures.foreground_pixels)
+                                                   : 0,
+               3);
+    if (s.has_unlit)
+        out += "  unlit M3, the same pictures without shading\n" +
+               single("PSNR of the foreground, dB", s.m3_unlit_foreground_db, 2) +
+               single("PSNR of the full picture, dB", s.m3_unlit_full_db, 2) +
+               single("SSIM of the foreground", s.m3_unlit_ssim, 4);
+    return out;
 }
 
-// A column of the per-frame table.
+// A column of the per-frame table; empty where there is no value.
 struct Column {
     const char* name;
-    double value;
+    std::optional<double> value;
 };
 
 std::vector<Column> columns(const FrameComparison& frame, const CompareOptions& options, double peak_mm) {
@@ -106,7 +115,15 @@ std::vector<Column> columns(const FrameComparison& frame, const CompareOptions& 
              {"hausdorff_mm", s.hausdorff_mm}});
     if (options.texcoords) add({{"texcoord_rms", s.texcoord_rms}, {"texcoord_elsewhere", s.texcoord_elsewhere}});
     if (options.cloud) add({{"d1_db", s.d1_db}, {"d2_db", s.d2_db}});
-    if (options.pictures) add({{"m3_foreground_db", s.m3_foreground_db}, {"m3_full_db", s.m3_full_db}});
+    if (options.pictures) {
+        const auto unlit = [&](double value) { return s.has_unlit ? std::optional(value) : std::nullopt; };
+        add({{"m3_foreground_db", s.m3_foreground_db},
+             {"m3_full_db", s.m3_full_db},
+             {"m3_ssim", s.m3_ssim},
+             {"m3_unlit_foreground_db", unlit(s.m3_unlit_foreground_db)},
+             {"m3_unlit_full_db", unlit(s.m3_unlit_full_db)},
+             {"m3_unlit_ssim", unlit(s.m3_unlit_ssim)}});
+    }
     if (options.topology)
         add({{"original_components", static_cast<double>(frame.original_topology.components)},
              {"decoded_components", static_cast<double>(frame.decoded_topology.components)},
@@ -204,26 +221,174 @@ nlohmann::json summary_json(const ComparisonSummary& s, const CompareOptions& op
     if (options.pictures)
         out["m3"] = {{"foreground_db", s.m3_foreground_db},
                      {"full_db", s.m3_full_db},
+                     {"ssim", s.m3_ssim},
                      {"foreground_share", s.foreground_share},
                      {"views", options.views.views},
                      {"width", options.views.width},
                      {"height", options.views.height},
                      {"shading", shading_name(options.render.shading)}};
+    if (options.pictures && s.has_unlit)
+        out["m3_unlit"] = {
+            {"foreground_db", s.m3_unlit_foreground_db}, {"full_db", s.m3_unlit_full_db}, {"ssim", s.m3_unlit_ssim}};
     return out;
 }
 
-// One line per frame, with the columns that `options` asked for; infinity is written as inf.
+// One line per frame, without its end, with the columns that `options` asked for; infinity is written as inf.
 std::string csv_header(const CompareOptions& options) {
     std::string out = "frame";
     for (const auto& column : columns({}, options, 1)) out += fmt::format(",{}", column.name);
-    return out + "\n";
+    return out;
 }
 
 std::string csv_line(std::size_t frame, const FrameComparison& comparison, const CompareOptions& options,
                      double peak_mm) {
     std::string out = std::to_string(frame);
-    for (const auto& column : columns(comparison, options, peak_mm)) out += fmt::format(",{:.8g}", column.value);
-    return out + "\n";
+    for (const auto& column : columns(comparison, options, peak_mm))
+        out += column.value ? fmt::format(",{:.8g}", *column.value) : ",";
+    return out;
+}
+
+// ---- Flicker --------------------------------------------------------------------------------------------------------
+
+// Of a frame: how the pictures changed since the frame before, which a frame of files or behind a gap may not have; and
+// its kind, if it is known.
+struct FlickerFrame {
+    std::optional<FrameFlicker> change;
+    std::optional<FrameType> kind;
+};
+
+// Ascending: by how much frames stand out from the T-frames beside them.
+struct StandingOut {
+    std::vector<double> values;
+    double median() const { return values[values.size() / 2]; }
+    double largest() const { return values.back(); }
+};
+
+// Several frames together, in one shading.
+struct FlickerTotal {
+    std::size_t frames = 0;
+    ChangeSums sums;
+    StandingOut ratio, still;  // of a single kind
+};
+
+StandingOut standing_out(const std::vector<FlickerFrame>& frames, ChangeSums FrameFlicker::*shading, FrameType kind,
+                         double (*measure)(const ChangeSums&)) {
+    std::vector<FrameType> kinds;
+    std::vector<double> values;
+    for (const auto& frame : frames) {
+        const bool changed = frame.kind && frame.change && ((*frame.change).*shading).pixels > 0;
+        kinds.push_back(frame.kind.value_or(FrameType::intra));
+        values.push_back(changed ? measure((*frame.change).*shading) : std::numeric_limits<double>::infinity());
+    }
+    StandingOut out;
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        if (const auto beside = flicker_beside_tracked(kinds, values, i); beside && frames[i].kind == kind)
+            out.values.push_back(*beside);
+    std::ranges::sort(out.values);
+    return out;
+}
+
+// kind: only frames of this kind; none: all.
+FlickerTotal flicker_total(const std::vector<FlickerFrame>& frames, ChangeSums FrameFlicker::*shading,
+                           std::optional<FrameType> kind) {
+    FlickerTotal out;
+    for (const auto& frame : frames) {
+        if (!frame.change || (kind && frame.kind != kind)) continue;
+        ++out.frames;
+        out.sums += (*frame.change).*shading;
+    }
+    if (!kind) return out;
+    out.ratio = standing_out(frames, shading, *kind, flicker_ratio);
+    out.still = standing_out(frames, shading, *kind, still_change);
+    return out;
+}
+
+bool has_flicker(const std::vector<FlickerFrame>& frames) {
+    return std::ranges::any_of(frames,
+                               [](const FlickerFrame& frame) { return frame.change && frame.change->lit.pixels > 0; });
+}
+
+// The kinds that there are, in the order of their table.
+std::vector<FrameType> kinds_in(const std::vector<FlickerFrame>& frames) {
+    std::vector<FrameType> out;
+    for (const auto& kind : frame_kinds)
+        if (std::ranges::any_of(frames, [&](const FlickerFrame& f) { return f.change && f.kind == kind.type; }))
+            out.push_back(kind.type);
+    return out;
+}
+
+std::string flicker_rows(const std::vector<FlickerFrame>& frames) {
+    std::string out = fmt::format("\n  {:<34}{:>12}{:>12}{:>12}{:>12}  {}\n", "flicker: change from frame to frame",
+                                  "original", "decoded", "ratio", "still", "over T beside: median, largest");
+    const auto add = [&](const std::string& what, const FlickerTotal& total) {
+        out += fmt::format("  {:<34}{:>12.3f}{:>12.3f}{:>12.3f}{:>12.3f}", what, original_change(total.sums),
+                           decoded_change(total.sums), flicker_ratio(total.sums), still_change(total.sums));
+        for (const auto& [name, of] : {std::pair{"ratio", &total.ratio}, std::pair{"still", &total.still}})
+            if (!of->values.empty()) out += fmt::format("  {} {:.3f}, {:.3f}", name, of->median(), of->largest());
+        out += '\n';
+    };
+    for (const auto& [name, shading] :
+         {std::pair{"RMS levels", &FrameFlicker::lit}, std::pair{"unlit, RMS levels", &FrameFlicker::unlit}}) {
+        const auto all = flicker_total(frames, shading, {});
+        if (all.sums.pixels == 0) continue;
+        add(name, all);
+        for (const auto kind : kinds_in(frames)) {
+            const auto total = flicker_total(frames, shading, kind);
+            add(fmt::format("  into {} {}-frame{}", total.frames, kind_of(kind).letter, total.frames == 1 ? "" : "s"),
+                total);
+        }
+    }
+    return out;
+}
+
+std::string flicker_cells(const FlickerFrame& frame) {
+    std::string out = fmt::format(",{}", frame.kind ? kind_of(*frame.kind).letter : "");
+    for (const auto measure : {flicker_ratio, still_change})
+        for (const auto shading : {&FrameFlicker::lit, &FrameFlicker::unlit}) {
+            const bool measured = frame.change && ((*frame.change).*shading).pixels > 0;
+            out += measured ? fmt::format(",{:.8g}", measure((*frame.change).*shading)) : ",";
+        }
+    return out;
+}
+
+nlohmann::json change_json(const ChangeSums& sums) {
+    const auto pixels = static_cast<double>(std::max<std::uint64_t>(sums.pixels, 1));
+    return {{"original_levels", original_change(sums)},
+            {"decoded_levels", decoded_change(sums)},
+            {"ratio", flicker_ratio(sums)},
+            {"still_levels", still_change(sums)},
+            {"still_share", static_cast<double>(sums.still_pixels) / pixels}};
+}
+
+nlohmann::json total_json(const FlickerTotal& total) {
+    auto out = change_json(total.sums);
+    for (const auto& [name, of] : {std::pair{"ratio", &total.ratio}, std::pair{"still", &total.still}})
+        if (!of->values.empty())
+            out["over_tracked_beside"][name] = {{"median", of->median()}, {"largest", of->largest()}};
+    return out;
+}
+
+nlohmann::json flicker_json(const FrameFlicker& flicker) {
+    nlohmann::json out{{"lit", change_json(flicker.lit)}};
+    if (flicker.unlit.pixels > 0) out["unlit"] = change_json(flicker.unlit);
+    return out;
+}
+
+nlohmann::json flicker_json(const std::vector<FlickerFrame>& frames) {
+    nlohmann::json out;
+    for (const auto& [name, shading] :
+         {std::pair{"lit", &FrameFlicker::lit}, std::pair{"unlit", &FrameFlicker::unlit}}) {
+        const auto all = flicker_total(frames, shading, {});
+        if (all.sums.pixels == 0) continue;
+        out[name] = total_json(all);
+        for (const auto kind : kinds_in(frames)) {
+            const auto total = flicker_total(frames, shading, kind);
+            auto& of_kind = out["into"][kind_of(kind).letter];
+            of_kind["frames"] = total.frames;
+            of_kind[name] = total_json(total);
+        }
+    }
+    return out;
 }
 
 // ---- The command ----------------------------------------------------------------------------------------------------
@@ -241,7 +406,7 @@ struct Options {
     unsigned threads = 0;
     DecoderOptions limits;  // for streams
     ShadingOptions shading;
-    bool follow_sequence = false, json = false;
+    bool flicker = true, follow_sequence = false, json = false;
     double peak_mm = 0;
     std::string csv, pictures;
     int picture_views = 1;
@@ -250,7 +415,7 @@ struct Options {
 void choose_metrics(Options& options) {
     CompareOptions& c = options.compare;
     if (c.views.views == 0) {
-        c.pictures = false;
+        c.pictures = options.flicker = false;
         c.views.views = 1;
     }
     c.render.colours = !options.shading.grey;
@@ -263,6 +428,15 @@ void choose_metrics(Options& options) {
     c.cloud = only.contains("d1") || only.contains("d2");
     c.pictures = c.pictures && only.contains("m3");
     c.topology = only.contains("topology");
+    options.flicker = options.flicker && only.contains("flicker");
+}
+
+// As M3's pictures, but of half their size.
+FlickerOptions flicker_options(const CompareOptions& c) {
+    FlickerOptions out{c.views, c.render, c.view_box, c.threads};
+    out.views.width = (c.views.width + 1) / 2;
+    out.views.height = (c.views.height + 1) / 2;
+    return out;
 }
 
 struct Sources {
@@ -417,7 +591,8 @@ struct Measured {
     DriftMeter drift;                // if the truth is given
     std::vector<FrameDrift> drifts;  // of each frame, likewise
     std::vector<FrameComparison> frames;
-    std::vector<std::size_t> places;  // the position of each among the originals
+    std::vector<FlickerFrame> flickers;  // of each frame, if it is asked for
+    std::vector<std::size_t> places;     // the position of each among the originals
 };
 
 Result<FrameDrift> measure_drift(Marks& marks, DriftMeter& meter, std::size_t original, const Mesh& decoded) {
@@ -437,11 +612,13 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         if (!opened) return tl::unexpected(opened.error());
         marks = std::move(*opened);
     }
+    FlickerMeter flicker(flicker_options(options.compare));
+    std::optional<FramePair> before;
     Progress progress("compare", pairs.size());
     for (const auto& pair : pairs) {
-        const auto first = original.mesh_at(original, pair.original);
+        auto first = original.mesh_at(original, pair.original);
         if (!first) return tl::unexpected(first.error());
-        const auto second = decoded.mesh_at(decoded, pair.decoded);
+        auto second = decoded.mesh_at(decoded, pair.decoded);
         if (!second) return tl::unexpected(second.error());
         if (out.frames.empty()) warn_of_sizes(sources, *first, *second);
         auto comparison = compare_frame(*first, *second, options.compare);
@@ -459,6 +636,15 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         if (!options.pictures.empty())
             if (const auto ok = write_pictures(options, *first, *second, pair.original); !ok)
                 return tl::unexpected(ok.error());
+        if (options.flicker) {
+            if (before && (pair.original != before->original + 1 || pair.decoded != before->decoded + 1))
+                flicker.begin_anew();
+            before = pair;
+            auto change = flicker.add(std::move(*first), std::move(*second));
+            if (!change) return tl::unexpected(change.error());
+            out.flickers.push_back({*change, {}});
+            if (decoded.is_stream) out.flickers.back().kind = decoded.kinds[pair.decoded];
+        }
         progress.step();
     }
     if (original.millimetres_per_unit != decoded.millimetres_per_unit)
@@ -470,16 +656,17 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
 
 Result<void> write_csv(const Options& options, const Measured& measured, double peak_mm) {
     std::string text = csv_header(options.compare);
-    if (!measured.drifts.empty()) {
-        text.pop_back();
-        text += ",drift_age,drift_mean_mm,drift_p95_mm\n";
-    }
+    if (!measured.flickers.empty()) text += ",kind,flicker_lit,flicker_unlit,flicker_still_lit,flicker_still_unlit";
+    if (!measured.drifts.empty()) text += ",drift_age,drift_mean_mm,drift_p95_mm";
+    text += '\n';
     for (std::size_t i = 0; i < measured.frames.size(); ++i) {
         text += csv_line(measured.places[i], measured.frames[i], options.compare, peak_mm);
-        if (measured.drifts.empty()) continue;
-        text.pop_back();
-        const FrameDrift& drift = measured.drifts[i];
-        text += fmt::format(",{},{:.8g},{:.8g}\n", drift.age, drift.mean_mm, drift.p95_mm);
+        if (!measured.flickers.empty()) text += flicker_cells(measured.flickers[i]);
+        if (!measured.drifts.empty()) {
+            const FrameDrift& drift = measured.drifts[i];
+            text += fmt::format(",{},{:.8g},{:.8g}", drift.age, drift.mean_mm, drift.p95_mm);
+        }
+        text += '\n';
     }
     if (options.csv == "-") {
         fmt::print("{}", text);
@@ -523,6 +710,11 @@ nlohmann::json as_json(const Options& options, const Measured& measured, double 
             line["decoded_topology"] = topology_json(frame.decoded_topology);
         }
         if (!measured.drifts.empty()) line["drift"] = drift_json(measured.drifts[i]);
+        if (!measured.flickers.empty()) {
+            const auto& [change, kind] = measured.flickers[i];
+            if (change) line["flicker"] = flicker_json(*change);
+            if (kind) line["kind"] = kind_of(*kind).letter;
+        }
         frames.push_back(std::move(line));
     }
     nlohmann::json out = {
@@ -533,6 +725,7 @@ nlohmann::json as_json(const Options& options, const Measured& measured, double 
         drift.erase("age");
         for (const FrameDrift& of_age : measured.drift.by_age()) drift["by_age"].push_back(drift_json(of_age));
     }
+    if (has_flicker(measured.flickers)) out["sequence"]["flicker"] = flicker_json(measured.flickers);
     return out;
 }
 
@@ -568,6 +761,7 @@ Result<void> compare(Options options) {
     } else if (options.csv != "-") {
         fmt::print("{}", comparison_table(measured->sums, options.compare, options.peak_mm));
         if (!measured->drifts.empty()) fmt::print("{}", drift_rows(measured->drift));
+        if (has_flicker(measured->flickers)) fmt::print("{}", flicker_rows(measured->flickers));
     }
     return {};
 }
@@ -587,7 +781,7 @@ void take_apart(Options& options) {
 
 void add_view_options(CLI::App& command, Options& o) {
     ViewOptions& v = o.compare.views;
-    command.add_option("--views", v.views, "Views around the body for M3; 0: no M3")
+    command.add_option("--views", v.views, "Views around the body for M3 and flicker; 0: neither")
         ->check(CLI::Range(0, 1000))
         ->capture_default_str();
     add_camera_options(command, v, "");
@@ -617,7 +811,12 @@ void add_compare(CLI::App& app, Run& run) {
         "they\n"
         "      are elsewhere in it, and counted by themselves\n"
         "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
-        "  M3  PSNR of pictures from all sides\n"
+        "  M3  PSNR and SSIM of pictures from all sides; unlit M3: of the same pictures without shading, which show\n"
+        "      texture, where there are colours\n"
+        "  flicker  how such pictures change from frame to frame, decoded beside original: a ratio of 1 is as calm "
+        "as\n"
+        "      the original; and how much the decoded ones change where the original is still; of a stream by kind of\n"
+        "      frame, and beside the T-frames around it\n"
         "  topology  components, boundaries, cracks, flaps");
     command->add_option("ORIGINAL", o.first, "A mesh file, folder, glob or %05d pattern; or several files")
         ->type_name("FILE")
@@ -632,9 +831,9 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("--frames", o.frames, "Compare at most this many frames; 0: all (default: all)");
     command
         ->add_option("--only", o.only,
-                     "Measure only some of m1, m2, texcoords, d1, d2, m3, topology, separated by commas")
+                     "Measure only some of m1, m2, texcoords, d1, d2, m3, flicker, topology, separated by commas")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "texcoords", "d1", "d2", "m3", "topology"}))
+        ->check(CLI::IsMember({"m1", "m2", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
         ->option_text("LIST");
     command->add_option("--unit", o.unit, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
         ->check(CLI::IsMember({"auto", "mm", "cm", "m"}))

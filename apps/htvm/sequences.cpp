@@ -42,7 +42,9 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
             bounded = bounded && index->bounds;
             if (bounded) extend(source.bounds, index->bounds);
         }
-        if (!frame_type(packet->kind)) continue;
+        const auto kind = frame_type(packet->kind);
+        if (!kind) continue;
+        source.kinds.push_back(*kind);
         ascends = ascends && (source.times_us.empty() || source.times_us.back() < packet->timestamp_us);
         source.numbers.push_back(numbers.of(packet->frame));
         source.times_us.push_back(packet->timestamp_us);

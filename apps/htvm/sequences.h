@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "htvm/decoder.hpp"
+#include "htvm/frame.hpp"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "htvm/scene.hpp"
@@ -25,6 +26,7 @@ struct MeshSource {
     std::vector<std::uint64_t> numbers;  // of the frames, ascending; empty if the files' names have none
     std::vector<std::int64_t> times_us;  // of the frames, ascending; empty if they are known for none
     bool is_stream = false;
+    std::vector<FrameType> kinds;       // of the frames of a stream
     FrameRate rate;                     // of a stream
     UpAxis up = UpAxis::unknown;        // of a stream that says so
     std::optional<SpaceBounds> bounds;  // mm, of all frames of a stream that says so

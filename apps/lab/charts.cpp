@@ -151,7 +151,9 @@ std::string picture_lines(std::span<const RdPoint> points, const Measure& measur
     const auto [data, plots, xs, ys] = picture_curves(points, measure, by_bits_per_vertex);
     std::string out = data;
     out += axis_lines('x', rate_axis(xs), by_bits_per_vertex ? "bits per captured vertex (bpvf)" : "Mbit/s");
-    out += axis_lines('y', measure.is_error ? error_axis(ys) : psnr_axis(ys),
+    // A hundred of the last digits that tables show: 1 dB, 0.01 of an SSIM.
+    const double least_range = std::pow(10, 2 - measure.digits);
+    out += axis_lines('y', measure.is_error ? error_axis(ys) : psnr_axis(ys, least_range),
                       fmt::format("{}, {}{}", measure.title, measure.unit, measure.is_error ? " (log scale)" : ""));
     out += fmt::format("set key {} noenhanced\n", measure.is_error ? "top right" : "bottom right");
     const auto path = curves.folder / file_name(measure, by_bits_per_vertex);
@@ -202,10 +204,10 @@ Axis error_axis(std::span<const double> values) {
     return logarithmic_axis(*smallest, *largest);
 }
 
-Axis psnr_axis(std::span<const double> values) {
+Axis psnr_axis(std::span<const double> values, double least_range) {
     if (values.empty()) return {};
     const auto [smallest, largest] = std::minmax_element(values.begin(), values.end());
-    const double step = round_step(std::max(*largest - *smallest, 1.0), 8);
+    const double step = round_step(std::max(*largest - *smallest, least_range), 8);
     Axis axis;
     axis.low = std::floor(*smallest / step) * step;
     axis.high = std::ceil(*largest / step + 1e-9) * step;

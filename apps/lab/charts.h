@@ -25,8 +25,9 @@ Axis rate_axis(std::span<const double> values);
 // Logarithmic, so that equal factors are equal distances; tics at 1, 2 and 5 times powers of ten, and at more first
 // digits if fewer than five of those are in the range. Values must be > 0.
 Axis error_axis(std::span<const double> values);
-// From a round number below the smallest to one above the largest value; a PSNR has no natural zero.
-Axis psnr_axis(std::span<const double> values);
+// From a round number below the smallest to one above the largest value; a PSNR has no natural zero, nor has an SSIM.
+// least_range: what it shows at least, however close the values are.
+Axis psnr_axis(std::span<const double> values, double least_range = 1);
 
 // The text as gnuplot's single-quoted string.
 std::string quoted(const std::string& text);

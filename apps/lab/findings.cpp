@@ -330,7 +330,9 @@ std::vector<Table> result_tables(const Findings& findings) {
     if (!findings.colour.empty())
         out.push_back(rate_table_of(findings.colour, "Geometry and colour", {"m1_mm", "m1_colour"}));
     if (!findings.pictures.empty())
-        out.push_back(rate_table_of(findings.pictures, "Pictures", {"m3_foreground_db", "m3_full_db", "m1_mm"}));
+        out.push_back(
+            rate_table_of(findings.pictures, "Pictures",
+                          {"m3_foreground_db", "m3_full_db", "m3_ssim", "m3_unlit_db", "m3_unlit_ssim", "m1_mm"}));
     if (auto table = motion_table(findings)) out.push_back(std::move(*table));
     if (auto table = seam_table(findings)) out.push_back(std::move(*table));
     return out;

@@ -203,6 +203,8 @@ void print_tables(const Options& options, const std::string& title, const std::v
         "\n"
         "bpvf and layers: bits per captured vertex, all frames, including I-frames. one piece: what a coder does\n"
         "not split up (geometry with connectivity). Rate differences: Bjontegaard, n/a without a common range.\n");
+    if (std::ranges::find(options.metrics, "m3") != options.metrics.end())
+        fmt::print("M3 fgr, SSIM: of the foreground of lit pictures; unlit, u.SSIM: of the same without shading.\n");
     if (options.coder_threads == 1)
         fmt::print("Speeds: processor time of one thread (peers: the wall clock, coding and decoding together).\n");
 }
@@ -295,7 +297,9 @@ void add_sweep_options(CLI::App& command, Options& o) {
         ->option_text("NAME=COMMAND ...")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    command.add_option("--metrics", o.metrics, "Any of m1, m2, m3 (pictures: slow), d1 (with d2); default m1,m2")
+    command
+        .add_option("--metrics", o.metrics,
+                    "Any of m1, m2, m3 (pictures, also unlit, PSNR and SSIM: slow), d1 (with d2); default m1,m2")
         ->delimiter(',')
         ->check(CLI::IsMember({"m1", "m2", "m3", "d1"}))
         ->option_text("LIST");

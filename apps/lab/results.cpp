@@ -15,7 +15,7 @@ using namespace app;
 
 namespace {
 
-constexpr std::array<Measure, 9> all_measures = {{
+constexpr std::array<Measure, 12> all_measures = {{
     {"m1_mm", "M1, vertex to vertex, RMS", "M1", "mm", "m1", true, true, 3},
     {"m1_colour", "M1 colour, RMS", "M1 col", "levels", "m1", true, true, 2},
     {"m2_mm", "M2, point to surface, RMS", "M2", "mm", "m2", true, true, 3},
@@ -23,6 +23,9 @@ constexpr std::array<Measure, 9> all_measures = {{
     {"m2_worst_frame_mm", "M2 of the worst frame", "worst", "mm", "m2", true, false, 3},
     {"m3_foreground_db", "M3, pictures, PSNR of the foreground", "M3 fgr", "dB", "m3", false, true, 2},
     {"m3_full_db", "M3, pictures, PSNR of the full picture", "M3", "dB", "m3", false, false, 2},
+    {"m3_ssim", "SSIM of M3's pictures", "SSIM", "of 1", "m3", false, true, 4},
+    {"m3_unlit_db", "unlit M3, PSNR of the foreground", "unlit", "dB", "m3", false, true, 2},
+    {"m3_unlit_ssim", "SSIM of unlit M3's pictures", "u.SSIM", "of 1", "m3", false, true, 4},
     {"d1_db", "D1, point to point, PSNR", "D1", "dB", "d1", false, true, 2},
     {"d2_db", "D2, point to plane, PSNR", "D2", "dB", "d1", false, true, 2},
 }};
@@ -130,6 +133,9 @@ void take_measures(const ComparisonSummary& s, const CompareOptions& options, st
     take("m2_worst_frame_mm", options.surface, s.m2_worst_frame_mm);
     take("m3_foreground_db", options.pictures, s.m3_foreground_db);
     take("m3_full_db", options.pictures, s.m3_full_db);
+    take("m3_ssim", options.pictures, s.m3_ssim);
+    take("m3_unlit_db", options.pictures && s.has_unlit, s.m3_unlit_foreground_db);
+    take("m3_unlit_ssim", options.pictures && s.has_unlit, s.m3_unlit_ssim);
     take("d1_db", options.cloud, s.d1_db);
     take("d2_db", options.cloud, s.d2_db);
 }

@@ -22,7 +22,7 @@ struct Measure {
     const char* brief;  // for the column of a table
     const char* unit;
     const char* metric;  // the entry of --metrics that includes it
-    bool is_error;       // smaller is better; else a PSNR
+    bool is_error;       // smaller is better; else a PSNR or SSIM
     bool is_curve;       // drawn as a curve, and compared by rate differences
     int digits;          // after the decimal point, in tables
 };

@@ -22,6 +22,10 @@ Result<void> compare_pictures(const Mesh& original, const Mesh& decoded, const C
     render.colours = render.colours && !original.colours.empty() && !decoded.colours.empty();
     out.pictures =
         compare_views(make_drawable(original, render), make_drawable(decoded, render), *cameras, options.threads);
+    if (!render.colours) return {};
+    render.shading = Shading::unlit;
+    out.unlit_pictures =
+        compare_views(make_drawable(original, render), make_drawable(decoded, render), *cameras, options.threads);
     return {};
 }
 
@@ -96,6 +100,7 @@ SequenceComparison& operator+=(SequenceComparison& sums, const FrameComparison& 
     sums.texcoords += frame.texcoords;
     sums.cloud += frame.cloud;
     sums.pictures += frame.pictures;
+    sums.unlit_pictures += frame.unlit_pictures;
     sums.original_topology += frame.original_topology;
     sums.decoded_topology += frame.decoded_topology;
     return sums;
@@ -131,9 +136,14 @@ ComparisonSummary summarise(const SequenceComparison& sums, double peak_mm) {
     out.d2_db = d2_psnr(sums.cloud, out.peak_mm);
     out.m3_foreground_db = psnr_foreground(sums.pictures);
     out.m3_full_db = psnr_full(sums.pictures);
+    out.m3_ssim = mean_similarity(sums.pictures.similarity);
     if (sums.pictures.pixels > 0)
         out.foreground_share =
             static_cast<double>(sums.pictures.foreground_pixels) / static_cast<double>(sums.pictures.pixels);
+    out.has_unlit = sums.unlit_pictures.pixels > 0;
+    out.m3_unlit_foreground_db = psnr_foreground(sums.unlit_pictures);
+    out.m3_unlit_full_db = psnr_full(sums.unlit_pictures);
+    out.m3_unlit_ssim = mean_similarity(sums.unlit_pictures.similarity);
     return out;
 }
 

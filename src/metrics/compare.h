@@ -23,7 +23,7 @@ struct CompareOptions {
     bool surface = true;    // M2
     bool texcoords = true;  // if both meshes have them
     bool cloud = true;      // D1 and D2
-    bool pictures = true;   // M3
+    bool pictures = true;   // M3 and SSIM; and unlit, where both meshes have colours
     bool topology = true;   // counts
     SurfaceErrorOptions surface_options;
     TopologyMeasureOptions topology_options;
@@ -43,7 +43,8 @@ struct FrameComparison {
     SurfaceError surface;
     TexcoordError texcoords;
     CloudError cloud;
-    PictureErrorSums pictures;
+    PictureErrorSums pictures;        // as CompareOptions::render says
+    PictureErrorSums unlit_pictures;  // the same without shading; zero without colours
     Topology original_topology, decoded_topology;
 };
 
@@ -61,7 +62,7 @@ struct SequenceComparison {
     SurfaceErrorSums surface;
     TexcoordError texcoords;
     CloudError cloud;
-    PictureErrorSums pictures;
+    PictureErrorSums pictures, unlit_pictures;
     Topology original_topology, decoded_topology;  // sums over the frames
 };
 SequenceComparison& operator+=(SequenceComparison& sums, const FrameComparison& frame);
@@ -80,8 +81,10 @@ struct ComparisonSummary {
     double hausdorff_mm = 0;                          // the largest distance in both directions and all frames
     double peak_mm = 0;                               // for D1 and D2
     double d1_db = 0, d2_db = 0;
-    double m3_foreground_db = 0, m3_full_db = 0;
+    double m3_foreground_db = 0, m3_full_db = 0, m3_ssim = 1;
     double foreground_share = 0;  // of the pixels
+    bool has_unlit = false;       // whether both meshes had colours in some frame; the pictures of the others show none
+    double m3_unlit_foreground_db = 0, m3_unlit_full_db = 0, m3_unlit_ssim = 1;
 };
 
 // peak_mm: for D1 and D2; 0: the diagonal of the box around all originals so far.

@@ -15,6 +15,7 @@ PictureErrorSums& operator+=(PictureErrorSums& sums, const PictureErrorSums& mor
     sums.foreground_pixels += more.foreground_pixels;
     sums.outline_pixels += more.outline_pixels;
     sums.squared += more.squared;
+    sums.similarity += more.similarity;
     return sums;
 }
 
@@ -32,6 +33,7 @@ PictureErrorSums picture_error(const Picture& original, const Picture& decoded) 
         }
         sums.squared += squared;
     }
+    sums.similarity = structural_similarity(original, decoded);
     return sums;
 }
 

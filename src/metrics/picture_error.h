@@ -5,6 +5,9 @@
 // It is computed over all pixels, and over the foreground: the pixels that either mesh covers. The background adds no
 // difference, so the PSNR of the full picture depends on how large the body is in it; that of the foreground hardly
 // does.
+//
+// Lit pictures show the shape more than the colours: the same pictures without shading (Shading::unlit), "unlit M3",
+// see texture. And a PSNR hardly sees blur: the SSIM of the same pictures is taken beside it.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +15,7 @@
 
 #include "core/thread.h"
 #include "metrics/render.h"
+#include "metrics/structural_similarity.h"
 
 namespace htvm {
 
@@ -21,6 +25,7 @@ struct PictureErrorSums {
     std::uint64_t foreground_pixels = 0;  // covered in either picture
     std::uint64_t outline_pixels = 0;     // covered in only one of the two
     std::uint64_t squared = 0;            // exact sum of the squared differences of red, green and blue
+    SimilaritySums similarity;
 };
 PictureErrorSums& operator+=(PictureErrorSums& sums, const PictureErrorSums& more);
 

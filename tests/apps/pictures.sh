@@ -87,6 +87,42 @@ done
 expect 0 '"frame": 6' "$htvm" still walk.htvm -o middle.png --json
 expect 1 "its frames are 0 to 11" "$htvm" still walk.htvm --frame 12 -o none.png
 
+# ---- compare --------------------------------------------------------------------------------------------------------
+
+# field JSON PATH...: what is there, or "none".
+field() { python3 -c '
+import json, sys
+value = json.load(open(sys.argv[1]))
+for key in sys.argv[2:]:
+    value = value.get(key) if isinstance(value, dict) else value[int(key)]
+    if value is None: break
+print("none" if value is None else round(value, 3) if isinstance(value, float) else value)' "$@"; }
+measure=(--only m3,flicker --views 2 "${small[@]}" --json --quiet)
+# Of two colours, 30 levels of one channel apart: unlit pictures tell as much, whatever the light.
+square dark.obj "170 10 0"
+"$htvm" compare red.obj dark.obj "${measure[@]}" --orthographic >colours.json
+[ "$(field colours.json sequence m3_unlit foreground_db)" = 23.36 ] || fail "unlit M3 is $(field colours.json sequence m3_unlit)"
+[ "$(field colours.json sequence flicker)" = none ] || fail "a single frame flickers"
+"$htvm" compare red.obj dark.obj "${measure[@]}" --grey >grey.json
+[ "$(field grey.json sequence m3_unlit) $(field grey.json sequence m3 ssim)" = "none 1.0" ] || fail "grey: $(cat grey.json)"
+expect 0 "unlit M3, the same pictures without shading" "$htvm" compare red.obj red.obj --views 1 "${small[@]}"
+# Frames that change as their originals do, by files; and of a stream, by kind of frame.
+"$htvm" compare squares squares "${measure[@]}" >squares.json
+[ "$(field squares.json sequence flicker unlit ratio) $(field squares.json sequence flicker into)" = "1.0 none" ] ||
+    fail "equal frames flicker: $(cat squares.json)"
+"$htvm" compare walk walk.htvm "${measure[@]}" >walk.json
+[ "$(field walk.json frames 0 kind) $(field walk.json frames 0 flicker)" = "I none" ] || fail "nothing is before the first frame"
+[ "$(field walk.json sequence flicker into I frames) $(field walk.json sequence flicker into T frames)" = "2 9" ] ||
+    fail "flicker by kind: $(field walk.json sequence flicker)"
+[ "$(field walk.json sequence flicker into I unlit over_tracked_beside still largest)" != none ] || fail "I-frames have no T-frames beside"
+expect 0 "into 2 I-frames" "$htvm" compare walk walk.htvm --only flicker --views 2 "${small[@]}"
+# Where a frame is missing, none is compared with the one before.
+mkdir gap && cp whole/0000[02].ply gap
+"$htvm" compare walk gap "${measure[@]}" >gap.json
+[ "$(field gap.json frames 1 frame) $(field gap.json frames 1 flicker)" = "2 none" ] || fail "flicker across a gap"
+"$htvm" compare walk walk.htvm --only flicker --views 1 "${small[@]}" --frames 2 --csv - --quiet | cut -d, -f 6,7 >cells
+[ "$(head -2 cells | paste -sd ' ')" = "kind,flicker_lit I," ] && grep -q "^T,[0-9]" cells || fail "cells: $(cat cells)"
+
 # ---- render ---------------------------------------------------------------------------------------------------------
 
 # A single mesh turns round: as many pictures as asked for, its front, an edge, its back, the other edge.

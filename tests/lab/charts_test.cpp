@@ -34,6 +34,13 @@ TEST(PsnrAxis, begins_and_ends_at_round_numbers) {
     EXPECT_EQ(39, axis.high);
 }
 
+TEST(PsnrAxis, shows_no_less_than_it_is_told_to) {
+    const std::vector<double> values{0.952, 0.958};
+    EXPECT_LT(psnr_axis(values).low, 0.9);
+    EXPECT_NEAR(0.95, psnr_axis(values, 0.01).low, 1e-9);
+    EXPECT_NEAR(0.96, psnr_axis(values, 0.01).high, 1e-9);
+}
+
 TEST(Axes, hold_all_values_and_have_a_few_tics_within) {
     std::mt19937 random(3);
     for (int round = 0; round < 200; ++round) {

@@ -99,6 +99,23 @@ TEST(TakeMeasures, only_what_was_asked_for_and_is_finite) {
     EXPECT_EQ((std::map<std::string, double>{{"d2_db", 60}, {"m1_mm", 1}}), values);
 }
 
+TEST(TakeMeasures, unlit_pictures_only_where_there_are_colours) {
+    ComparisonSummary summary;
+    summary.m3_ssim = 0.5;
+    summary.m3_unlit_foreground_db = 30;
+    summary.m3_unlit_ssim = 0.75;
+    CompareOptions options;
+    options.points = options.surface = options.cloud = false;
+    std::map<std::string, double> values;
+    take_measures(summary, options, values);
+    EXPECT_EQ(0.5, values.at("m3_ssim"));
+    EXPECT_FALSE(values.contains("m3_unlit_db") || values.contains("m3_unlit_ssim"));
+    summary.has_unlit = true;
+    take_measures(summary, options, values);
+    EXPECT_EQ(30, values.at("m3_unlit_db"));
+    EXPECT_EQ(0.75, values.at("m3_unlit_ssim"));
+}
+
 TEST(RateCurve, errors_count_the_better_the_smaller) {
     const std::vector<RdPoint> points{point_of("a", 20, 50, 4), point_of("b", 20, 50, 9), point_of("a", 50, 100, 2)};
     const auto curve = rate_curve(points, "a", measures()[0]);

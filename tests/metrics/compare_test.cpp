@@ -30,6 +30,9 @@ TEST(Compare, EveryMetricOfAMeshWithItselfIsPerfect) {
     EXPECT_TRUE(s.has_colour);
     EXPECT_NEAR(s.m2_mm, 0, 1e-6);
     EXPECT_TRUE(std::isinf(s.d1_db) && std::isinf(s.d2_db) && std::isinf(s.m3_foreground_db));
+    EXPECT_TRUE(s.has_unlit && std::isinf(s.m3_unlit_foreground_db));
+    EXPECT_NEAR(s.m3_ssim, 1, 1e-12);
+    EXPECT_NEAR(s.m3_unlit_ssim, 1, 1e-12);
     EXPECT_NEAR(s.peak_mm, 1000 * std::sqrt(3.0), 1e-6);
     EXPECT_GT(s.foreground_share, 0.1);
     EXPECT_EQ(frame->decoded_topology.euler, 2);
@@ -59,6 +62,30 @@ TEST(Compare, FramesAddUpAsTheMetricsSay) {
     EXPECT_DOUBLE_EQ(s.m2_worst_frame_mm, 3);
 }
 
+TEST(Compare, UnlitPicturesSeeTheColoursAlone) {
+    Mesh mesh = shapes::sphere(500, 3);
+    mesh.colours.assign(mesh.positions.size(), {100, 100, 100});
+    Mesh recoloured = mesh;
+    recoloured.colours.assign(mesh.positions.size(), {110, 110, 110});
+    const ComparisonSummary s = summarise(as_sequence(*compare_frame(mesh, recoloured, small_pictures())));
+    ASSERT_TRUE(s.has_unlit);
+    EXPECT_NEAR(s.m3_unlit_foreground_db, 20 * std::log10(255.0 / 10), 1e-9);
+    EXPECT_GT(s.m3_foreground_db, s.m3_unlit_foreground_db) << "shading makes the difference smaller";
+    EXPECT_LT(s.m3_unlit_ssim, 1);
+    EXPECT_GT(s.m3_unlit_ssim, 0.9);
+}
+
+TEST(Compare, WithoutColoursOfBothThereAreNoUnlitPictures) {
+    const Mesh plain = shapes::sphere(500, 2);
+    Mesh coloured = plain;
+    coloured.colours.assign(plain.positions.size(), {1, 2, 3});
+    EXPECT_FALSE(summarise(as_sequence(*compare_frame(plain, coloured, small_pictures()))).has_unlit);
+    EXPECT_TRUE(summarise(as_sequence(*compare_frame(coloured, coloured, small_pictures()))).has_unlit);
+    CompareOptions grey = small_pictures();
+    grey.render.colours = false;
+    EXPECT_FALSE(summarise(as_sequence(*compare_frame(coloured, coloured, grey))).has_unlit);
+}
+
 TEST(Compare, OnlyWhatIsAskedForIsMeasured) {
     const Mesh flat = shapes::plane(100, 4, 0);
     CompareOptions options = small_pictures();
@@ -84,6 +111,7 @@ TEST(Compare, IsTheSameForAnyThreadCount) {
     EXPECT_EQ(one.m2_mm, four.m2_mm);
     EXPECT_EQ(one.d2_db, four.d2_db);
     EXPECT_EQ(one.m3_foreground_db, four.m3_foreground_db);
+    EXPECT_EQ(one.m3_ssim, four.m3_ssim);
 }
 
 TEST(Compare, RefusesMeshesThatCannotBeMeasured) {
