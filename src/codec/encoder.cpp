@@ -56,15 +56,6 @@ namespace {
 
 using State = Encoder::State;
 
-// 1/16 mm, or finer if needed for a step of at least eight units.
-int lattice_bits(const EncoderOptions& options) {
-    if (options.lattice_bits > 0) return options.lattice_bits;
-    const bool controlled = options.rate.bits_per_second > 0 || options.rate.target_error > 0;
-    const double finest = controlled ? quality_steps(100).geometry_step : options.geometry_step;
-    const int needed = static_cast<int>(std::ceil(3 - std::log2(finest)));
-    return std::clamp(needed, 4, 16);
-}
-
 // The length on this subject that corresponds to a millimetre on an adult, in millimetres. Reaches, spacings and
 // thresholds are known for adults; those for a doll or a giant follow from its size. The extent of an adult depends on
 // the pose, so a subject from 1.1 to 2.5 m counts as an adult.
@@ -82,6 +73,18 @@ double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
     return size <= 0 || (size >= shortest && size <= longest) ? 1 : size / adult;
 }
 
+// 1/16 mm on an adult and on whoever is larger, or finer if needed for a step of at least eight units. As much finer on
+// a smaller subject as it is smaller, but not below a 64th of a step: the first frame may show little of a subject, and
+// a fine lattice does not reach far.
+int lattice_bits(const EncoderOptions& options, double adult) {
+    if (options.lattice_bits > 0) return options.lattice_bits;
+    const bool controlled = options.rate.bits_per_second > 0 || options.rate.target_error > 0;
+    const double finest = controlled ? quality_steps(100).geometry_step : options.geometry_step;
+    const auto bits_for = [&](double units) { return static_cast<int>(std::ceil(std::log2(units / finest))); };
+    const int of_size = 4 - static_cast<int>(std::lround(std::log2(adult)));
+    return std::clamp(std::max(bits_for(8), std::min(of_size, bits_for(64))), 4, 16);
+}
+
 // Short enough to need no memory itself.
 tl::unexpected<Error> out_of_memory() { return fail(ErrorKind::limit, "out of memory"); }
 
@@ -94,7 +97,8 @@ Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
     const auto origin = lattice_origin(mesh);
     if (!origin) return tl::unexpected(origin.error());
     header.lattice.origin = *origin;
-    header.lattice.bits = lattice_bits(options);
+    const double adult = adult_millimetre(options, mesh);
+    header.lattice.bits = lattice_bits(options, adult);
     auto tracker = make_pose_tracker(options.skeleton, mesh, pose);
     if (!tracker) return tl::unexpected(tracker.error());
     state.poses = std::move(*tracker);
@@ -107,7 +111,6 @@ Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
         radii = std::move(*calibrated);
     }
     const double units = configuration.units = 1.0 / header.lattice.step();
-    const double adult = adult_millimetre(options, mesh);
     configuration.adult_millimetre = adult * units;
     const auto on_lattice = [](double length) {
         return static_cast<std::int32_t>(std::lround(std::min(length, 1.0 * lattice_limit)));

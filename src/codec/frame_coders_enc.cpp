@@ -229,6 +229,7 @@ Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& st
     constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
     const auto& configuration = work.configuration;
     TrackedFrameOptions options;
+    options.millimetre = configuration.adult_millimetre;
     options.geometry_step = tracked_steps(steps).geometry;
     options.colour_step = coarser_colours * steps.colour;
     options.lambda = configuration.options.lambda;

@@ -23,6 +23,13 @@ FrameSteps steps_of(const Configuration& configuration, const QualitySteps& step
             static_cast<std::int32_t>(std::lround(steps.colour_step))};
 }
 
+// For quality that is derived, which means the same for every subject, whatever its size.
+FrameSteps steps_of_quality(const Configuration& configuration, double quality) {
+    auto steps = quality_steps(quality);
+    steps.geometry_step *= configuration.adult_millimetre / configuration.units;
+    return steps_of(configuration, steps);
+}
+
 bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
     return a.colours.empty() == b.colours.empty() && a.normals.empty() == b.normals.empty() &&
            a.texcoords.empty() == b.texcoords.empty();
@@ -394,7 +401,7 @@ tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, doub
 
 // The cheapest frame there is: the motion of the nodes or bones alone.
 Result<Candidate> code_stand_in(FrameWork& work, double quality) {
-    const auto steps = steps_of(work.configuration, quality_steps(quality));
+    const auto steps = steps_of_quality(work.configuration, quality);
     auto out =
         work.configuration.tracked() ? code_motion_alone(work, steps) : code_frame(FrameType::predicted, work, steps);
     if (out) out->stands_in = true;
@@ -408,7 +415,7 @@ Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, cons
     double quality = rate.quality(expected_type(work, force_intra)), bits = 0;
     constexpr double far_off = 3;
     for (int trials = 3;;) {
-        auto candidate = choose(work, steps_of(work.configuration, quality_steps(quality)), force_intra);
+        auto candidate = choose(work, steps_of_quality(work.configuration, quality), force_intra);
         if (!candidate) return candidate;
         candidate->quality = quality;
         bits = bits_of(*candidate);
@@ -448,7 +455,7 @@ Result<Candidate> code_to_error(FrameWork& work, ErrorController& control, bool 
     double nearest_off = 0;
     for (int attempt = 0; attempt < attempts; ++attempt) {
         const double quality = control.quality(type);
-        auto candidate = choose(work, steps_of(work.configuration, quality_steps(quality)), force_intra);
+        auto candidate = choose(work, steps_of_quality(work.configuration, quality), force_intra);
         if (!candidate) return candidate;
         candidate->quality = quality;
         type = candidate->type;

@@ -29,14 +29,16 @@ std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, s
     return out;
 }
 
-// For shifts, half the step of the displacement; for turns, steps so coarse that most stay as predicted: measured, see
-// docs/algorithm.md.
-NodeMotionOptions motion_options(double geometry_step) {
+// For shifts, half the step of the displacement; for turns, which are finer the smaller that step is beside the
+// subject, steps so coarse that most stay as predicted: measured, see docs/algorithm.md.
+NodeMotionOptions motion_options(double geometry_step, double millimetre) {
     constexpr double still_along = 1.3;
+    const auto exponent = [](double step, int more, int most) {
+        return std::clamp(static_cast<int>(std::lround(std::log2(std::max(step, 1.0)))) + more, 0, most);
+    };
     NodeMotionOptions out;
-    auto& steps = out.steps;
-    steps.shift_exponent = std::clamp(static_cast<int>(std::lround(std::log2(std::max(geometry_step, 1.0)))) - 1, 0, 8);
-    steps.rotation_exponent = std::clamp(steps.shift_exponent + 4, 0, NodeMotionSteps::most_rotation);
+    out.steps.shift_exponent = exponent(geometry_step, -1, NodeMotionSteps::most_shift);
+    out.steps.rotation_exponent = exponent(16 * geometry_step / millimetre, 3, NodeMotionSteps::most_rotation);
     out.still_along = still_along * geometry_step;
     return out;
 }
@@ -102,7 +104,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     StageClock clock(stages);
     const auto& triangles = reference.mesh.triangles;
     EncodedTrackedFrame out;
-    const auto of_motion = motion_options(options.geometry_step);
+    const auto of_motion = motion_options(options.geometry_step, options.millimetre);
     auto coded_motion = encode_node_motion(
         quantised(motion, reference.graph.pivots), reference.graph,
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},

@@ -17,6 +17,7 @@
 namespace htvm::internal {
 
 struct TrackedFrameOptions {
+    double millimetre = 16;     // lattice units: see Configuration::adult_millimetre
     double geometry_step = 32;  // lattice units: for the displacement along the normal
     double colour_step = 11;    // levels
     double lambda = 0.12;       // squared steps that one bit is worth
