@@ -11,8 +11,8 @@
 
 namespace htvm::app {
 
-// Frames of a group: as many as from one I-frame to the next, but at least ten, as a sequence header comes with each, and
-// at most sixty, so that a short capture makes work for several cores.
+// Frames of a group: as many as from one I-frame to the next, but at least ten, as a sequence header comes with each,
+// and at most sixty, so that a short capture makes work for several cores.
 constexpr std::size_t least_of_group = 10, most_of_group = 60;
 std::size_t frames_of_group(int key_interval);
 

@@ -309,7 +309,9 @@ void add_sweep_options(CLI::App& command, Options& o) {
     command.add_option("--measure-every", o.measure_every, "Measure errors on every n-th frame (default 1)")
         ->check(CLI::Range(1, 1000000));
     command.add_option("--views", o.views, "Views for M3 (default 10)")->check(CLI::Range(1, 1000));
-    command.add_option("--keyint", o.key_interval, "Frames from one I-frame to the next (default: 300 for htvm-t, 30 for others)")
+    command
+        .add_option("--keyint", o.key_interval,
+                    "Frames from one I-frame to the next (default: 300 for htvm-t, 30 for others)")
         ->check(CLI::Range(1, 1000000));
     command.add_flag("--geometry-only", o.geometry_only, "Leave the colours out");
 }
