@@ -350,6 +350,10 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     out.captured = captured;
     out.pose = work.pose;
     out.packets.push_back(frame_packet(PacketKind::patched, payload));
+    auto& history = out.nodes.emplace();
+    history.before_last = work.sequence.nodes.last;
+    if (history.before_last.empty()) history.before_last.resize(work.node_motion().size());
+    history.last = work.node_motion();
     auto& facts = out.intra.emplace(in_use.intra);
     facts.step = 1;
     facts.steps = steps;

@@ -78,6 +78,9 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
     else if (in_use->decoded.has_bones)
         in_use->search = make_reference_search(in_use->decoded.skinned);
+    if (patched && sent.nodes && !sent.nodes->before_last.empty())
+        out.nodes.gone_on = moved_on(before.reference->deformable, sent.nodes->before_last, sent.nodes->last,
+                                     in_use->deformable.handles);
     out.reference = std::move(in_use);
     return out;
 }
@@ -116,13 +119,28 @@ const std::vector<RigidMotion>& FrameWork::node_motion() {
     if (!node_motion_) {
         const auto& target = surface();
         StageClock clock(stages);
+        const auto& nodes = sequence.nodes;
         const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
         node_motion_ =
-            register_nodes(reference().deformable, target, {sequence.nodes.last, sequence.nodes.before_last, skeletal},
+            register_nodes(reference().deformable, target, {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
                            deformation_options(configuration));
         clock.done("registration");
     }
     return *node_motion_;
+}
+
+bool FrameWork::follow_lost_limbs() {
+    if (std::exchange(looked_for_limbs_, true)) return false;
+    auto motion = node_motion();
+    StageClock clock(stages);
+    const auto& nodes = sequence.nodes;
+    const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
+    const bool any = internal::follow_lost_limbs(reference().deformable, surface(),
+                                                 {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
+                                                 deformation_options(configuration), motion);
+    node_motion_ = std::move(motion);
+    clock.done("registration");
+    return any;
 }
 
 const AnimationFit& FrameWork::animation_fit() {

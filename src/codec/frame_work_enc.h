@@ -79,7 +79,9 @@ struct NodeHistory {
     std::optional<std::uint32_t> access;         // number of the last one that refers to the reference alone
     std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
     TrackedState state;                          // of the last one
-    double best_fit = 0;                         // RMS of the best so far; 0: none yet
+    std::vector<RigidMotion> gone_on;  // where each node goes next if it goes on as it did before a patch made
+                                       // it; empty but after a TP-frame
+    double best_fit = 0;               // RMS of the best so far; 0: none yet
 };
 
 // Trials of EP-frames against I-frames: when the next is due, and how often in a row EP-frames lost.
@@ -105,7 +107,7 @@ struct Candidate {
     // What it leaves for the sequence; one of the first three is set.
     std::optional<IntraFacts> intra;                   // I, TP; used only if it is referred to
     std::optional<BoneHistory> bones;                  // P, EP
-    std::optional<NodeHistory> nodes;                  // T
+    std::optional<NodeHistory> nodes;                  // T; TP: what its T-frame would have left
     std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
     CodedPose pose;                                    // I, TP
     std::vector<std::uint32_t> distance_order_counts;  // EP
@@ -153,6 +155,9 @@ public:
     // The motion of each bone, and of each node, relative to the reference.
     const FrameMotion& bone_motion();
     const std::vector<RigidMotion>& node_motion();
+    // Where tracking was lost: makes node_motion() follow limbs that another start finds. Gives whether there are any;
+    // looks only once.
+    bool follow_lost_limbs();
     const AnimationFit& animation_fit();  // how well the motion of the bones alone represents the frame
     // The distance between a decoded mesh and the captured one, in both directions.
     SurfaceErrors errors_of(const LatticeMesh& decoded);
@@ -164,6 +169,7 @@ private:
     std::optional<SurfaceIndex> surface_;
     std::optional<FrameMotion> bone_motion_;
     std::optional<std::vector<RigidMotion>> node_motion_;
+    bool looked_for_limbs_ = false;
     std::optional<AnimationFit> animation_fit_;
 };
 

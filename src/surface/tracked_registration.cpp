@@ -647,6 +647,71 @@ std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const Ri
     return next;
 }
 
+std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const RigidMotion> before,
+                                  std::span<const RigidMotion> last, std::span<const Vector3d> handles) {
+    std::vector<Vector3d> places;
+    for (std::size_t h = 0; h < last.size(); ++h) places.push_back(last[h](mesh.handles[h]));
+    std::vector<RigidMotion> next(places.empty() ? 0 : handles.size());
+    for (std::size_t i = 0; i < next.size(); ++i) {
+        const auto apart = [&](const Vector3d& place) { return (place - handles[i]).squaredNorm(); };
+        const auto nearest = std::min_element(places.begin(), places.end(),
+                                              [&](const auto& a, const auto& b) { return apart(a) < apart(b); });
+        const auto h = static_cast<std::size_t>(nearest - places.begin());
+        const auto back = last[h].inverse();
+        next[i].rotation = last[h].rotation * before[h].rotation.transpose();
+        next[i].shift = 2 * handles[i] - before[h](back(handles[i])) - next[i].rotation * handles[i];
+    }
+    return next;
+}
+
+namespace {
+
+// Settles motions that are near the target already.
+void settle(const DeformableMesh& mesh, const SurfaceIndex& target, const DeformationOptions& options,
+            std::vector<RigidMotion>& motions) {
+    auto near = options;
+    near.coarse_rounds = 0;
+    near.fine_rounds = 2;
+    near.middle_reach = options.near_reach;
+    near.first_stiffness = std::sqrt(options.first_stiffness * options.last_stiffness);
+    near.first_point_share = options.last_point_share;
+    motions = register_deformation(mesh, target, motions, near);
+}
+
+}  // namespace
+
+bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
+                       const DeformationOptions& options, std::vector<RigidMotion>& motions) {
+    constexpr double elsewhere = 15;  // mm
+    std::vector<bool> differs(motions.size());
+    for (std::size_t h = 0; h < motions.size(); ++h)
+        differs[h] = (motions[h](mesh.handles[h]) - other[h](mesh.handles[h])).norm() > elsewhere * options.millimetre;
+    std::vector<std::vector<std::uint16_t>> tied(motions.size());
+    for (const auto& pair : mesh.fine.pairs) {
+        tied[pair.first].push_back(pair.second);
+        tied[pair.second].push_back(pair.first);
+    }
+    double least = deformation_error(mesh, target, motions, options);
+    bool taken = false;
+    for (std::size_t seed = 0; seed < motions.size(); ++seed) {
+        if (!differs[seed]) continue;
+        std::vector<std::size_t> limb = {seed};
+        differs[seed] = false;
+        for (std::size_t i = 0; i < limb.size(); ++i)
+            for (const auto next : tied[limb[i]])
+                if (differs[next]) differs[next] = false, limb.push_back(next);
+        auto trial = motions;
+        for (const auto h : limb) trial[h] = other[h];
+        const double error = deformation_error(mesh, target, trial, options);
+        if (error >= least) continue;
+        least = error;
+        motions = std::move(trial);
+        taken = true;
+    }
+    if (taken) settle(mesh, target, options, motions);
+    return taken;
+}
+
 double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
                          const DeformationOptions& options) {
     if (mesh.samples.empty() || target.samples.empty()) return 0;

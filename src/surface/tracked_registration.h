@@ -131,6 +131,17 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
 std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const RigidMotion> before,
                                   std::span<const RigidMotion> last);
 
+// The same for another mesh, which is the deformed one as it was at `last`, or most of it: each of its handles repeats
+// the step that the nearest handle of `mesh` made. handles: their positions in the deformed mesh.
+std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const RigidMotion> before,
+                                  std::span<const RigidMotion> last, std::span<const Eigen::Vector3d> handles);
+
+// Parts of the reference that `other`, another registration to the same target, takes elsewhere follow it where they
+// lie nearer to the target then, by deformation_error(); the whole is settled once more. Gives whether any did.
+// motions: one per handle.
+bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
+                       const DeformationOptions& options, std::vector<RigidMotion>& motions);
+
 // Mean distance of the samples to the target's planes and of the target's samples to the reference, each limited to
 // near_reach; by this the encoder chooses between starts.
 double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,

@@ -237,6 +237,38 @@ TEST(MovedOn, RepeatsTheLastStepOfEachHandle) {
     EXPECT_LT((next[1].shift - Vector3d(3, 0, 0)).norm(), 1e-9);
 }
 
+TEST(MovedOn, HandlesOfAPatchedMeshRepeatTheStepOfThoseThatWereThere) {
+    const DeformationOptions options;
+    const auto mesh = with_handles_along_x(sweep(21, 10, arm), 0, 600, 2, options);
+    const auto shift = [](double x, double y) { return RigidMotion{Eigen::Matrix3d::Identity(), Vector3d(x, y, 0)}; };
+    const std::vector<RigidMotion> before = {shift(0, 10), shift(0, 0)}, last = {shift(0, 30), shift(0, -5)};
+    const std::vector<Vector3d> handles = {{590, 0, 0}, {20, 30, 0}, {0, 20, 0}};  // of the mesh as it lies at `last`
+    const auto next = moved_on(mesh, before, last, handles);
+    ASSERT_EQ(next.size(), 3u);
+    EXPECT_LT((next[0](handles[0]) - Vector3d(590, -5, 0)).norm(), 1e-9);
+    EXPECT_LT((next[1](handles[1]) - Vector3d(20, 50, 0)).norm(), 1e-9);
+    EXPECT_LT((next[2](handles[2]) - Vector3d(0, 40, 0)).norm(), 1e-9);
+    EXPECT_TRUE(moved_on(mesh, {}, {}, handles).empty());
+}
+
+TEST(TakeNearerLimbs, TakesThePartThatLiesNearerAndLeavesTheRest) {
+    const DeformationOptions options;
+    const auto surface = sweep(121, 40, arm);
+    const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
+    const auto target = target_of(surface, options);
+    const RigidMotion away{Eigen::Matrix3d::Identity(), Vector3d(0, 50, 0)};
+    std::vector<RigidMotion> motions(9), other(9);
+    motions[7] = motions[8] = away;         // this has lost one end,
+    other[0] = other[1] = other[2] = away;  // this the other
+    EXPECT_TRUE(take_nearer_limbs(mesh, target, other, options, motions));
+    EXPECT_LT(rest_after(mesh, target, motions).rms, 0.3);
+    for (std::size_t h = 0; h < motions.size(); ++h)
+        EXPECT_LT((motions[h](mesh.handles[h]) - mesh.handles[h]).norm(), 5) << h;
+    const auto settled = motions;
+    EXPECT_FALSE(take_nearer_limbs(mesh, target, other, options, motions));
+    EXPECT_EQ(motions[0].shift, settled[0].shift);
+}
+
 TEST(DeformationError, IsSmallerForTheBetterMotion) {
     const DeformationOptions options;
     const auto surface = sweep(121, 40, arm);

@@ -326,7 +326,15 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
-    const auto fit = work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
+    const auto fit_of = [&] {
+        return work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
+    };
+    auto fit = fit_of();
+    if (lost_track(work, fit) && work.follow_lost_limbs()) {
+        tracked = code_frame(FrameType::tracked, work, steps);
+        if (!tracked) return tracked;
+        fit = fit_of();
+    }
     const bool expensive = may_be_intra(work) && static_cast<double>(tracked->bytes()) > reference.bytes;
     const bool anew = expensive || relaid_texture(work, tracked->decoded);
     const bool lost = lost_track(work, fit);

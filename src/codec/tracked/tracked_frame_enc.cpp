@@ -77,24 +77,54 @@ DeformableMesh make_tracked_deformable(const TrackedReference& reference, const 
                            handles, pairs_of(reference), options);
 }
 
-std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
-                                        const NodeStarts& starts, const DeformationOptions& options) {
-    std::vector<std::vector<RigidMotion>> from;
+namespace {
+
+using NodeMotions = std::vector<RigidMotion>;
+
+std::vector<NodeMotions> motions_of(const NodeStarts& starts, const DeformableMesh& deformable) {
+    std::vector<NodeMotions> out;
     if (starts.last.empty())
-        from.emplace_back(deformable.handles.size());
+        out.emplace_back(deformable.handles.size());
     else
-        from.emplace_back(starts.last.begin(), starts.last.end());
-    if (!starts.before_last.empty()) from.push_back(moved_on(deformable, starts.before_last, starts.last));
-    if (!starts.skeletal.empty()) from.emplace_back(starts.skeletal.begin(), starts.skeletal.end());
+        out.emplace_back(starts.last.begin(), starts.last.end());
+    if (!starts.before_last.empty()) out.push_back(moved_on(deformable, starts.before_last, starts.last));
+    if (!starts.gone_on.empty()) out.emplace_back(starts.gone_on.begin(), starts.gone_on.end());
+    if (!starts.skeletal.empty()) out.emplace_back(starts.skeletal.begin(), starts.skeletal.end());
+    return out;
+}
+
+std::size_t nearest_of(const std::vector<NodeMotions>& starts, const DeformableMesh& deformable,
+                       const SurfaceIndex& surface, const DeformationOptions& options) {
     std::size_t best = 0;
     double least = 0;
-    for (std::size_t i = 0; from.size() > 1 && i < from.size(); ++i) {
-        const double error = deformation_error(deformable, surface, from[i], options);
+    for (std::size_t i = 0; starts.size() > 1 && i < starts.size(); ++i) {
+        const double error = deformation_error(deformable, surface, starts[i], options);
         if (i > 0 && error >= least) continue;
         best = i;
         least = error;
     }
-    return register_deformation(deformable, surface, from[best], options);
+    return best;
+}
+
+}  // namespace
+
+std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
+                                        const NodeStarts& starts, const DeformationOptions& options) {
+    const auto from = motions_of(starts, deformable);
+    return register_deformation(deformable, surface, from[nearest_of(from, deformable, surface, options)], options);
+}
+
+bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                       const DeformationOptions& options, std::vector<RigidMotion>& motion) {
+    const auto from = motions_of(starts, deformable);
+    const std::size_t nearest = nearest_of(from, deformable, surface, options);
+    bool any = false;
+    for (std::size_t i = 0; i < from.size(); ++i) {
+        if (i == nearest) continue;
+        const auto other = register_deformation(deformable, surface, from[i], options);
+        if (take_nearer_limbs(deformable, surface, other, options, motion)) any = true;
+    }
+    return any;
 }
 
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,

@@ -30,13 +30,17 @@ struct TrackedFrameOptions {
 DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options);
 
 // Possible starts of a registration, each one motion per node, or empty. last, before_last: of the two previous frames.
-// skeletal: where the skeleton moves each node.
+// gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node.
 struct NodeStarts {
-    std::span<const RigidMotion> last, before_last, skeletal;
+    std::span<const RigidMotion> last, before_last, gone_on, skeletal;
 };
 // The motion of each node, reference -> frame, registered from the start that lies nearest to the surface.
 std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
                                         const NodeStarts& starts, const DeformationOptions& options);
+// Registers from the other starts, too, and takes each limb from where it lies nearest to the surface: a start that is
+// best for the whole may lose a hand. motion: from register_nodes(). Gives whether any limb was taken from elsewhere.
+bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                       const DeformationOptions& options, std::vector<RigidMotion>& motion);
 
 struct TrackedRuns {
     std::vector<std::uint8_t> payload;
