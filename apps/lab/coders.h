@@ -90,8 +90,8 @@ EncoderOptions paper_options(int key_interval);
 // (EncoderOptions::animation_error).
 inline constexpr double default_still_below = 50;
 
-// paper, htvm-ep, htvm-motion, htvm-rd, htvm-t, tfan, tfan-mpeg, draco10, draco7.
-std::vector<CoderUnderTest> built_in_coders(int key_interval);
+// paper, htvm-ep, htvm-motion, htvm-rd, htvm-t, tfan, tfan-mpeg, draco10, draco7. denoise: of htvm-t.
+std::vector<CoderUnderTest> built_in_coders(int key_interval, Denoising denoise = Denoising::automatic);
 
 // ---- The time that coding takes, even while other cores of the machine are busy -------------------------------------
 

@@ -75,6 +75,7 @@ struct NodeHistory {
     std::optional<std::uint32_t> frame;          // number of the last one
     std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
     TrackedState state;                          // of the last one
+    TargetHistory targets;                       // what filtering left of the last one
     double best_fit = 0;                         // RMS of the best so far; 0: none yet
 };
 
@@ -103,6 +104,7 @@ struct Candidate {
     std::optional<NodeHistory> nodes;                  // T
     std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
     CodedPose pose;                                    // I, TP
+    TargetHistory targets;                             // TP: on the reference that it becomes
     std::vector<std::uint32_t> distance_order_counts;  // EP
     std::size_t bytes() const;
 };
