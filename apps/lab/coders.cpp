@@ -115,7 +115,7 @@ EncoderOptions paper_options(int key_interval) {
     return out;
 }
 
-std::vector<CoderUnderTest> built_in_coders(int key_interval) {
+std::vector<CoderUnderTest> built_in_coders(int key_interval, Denoising denoise) {
     EncoderOptions ours = default_options(Profile::topology);
     if (key_interval > 0) ours.key_interval = key_interval;
     EncoderOptions motion = ours;
@@ -124,6 +124,7 @@ std::vector<CoderUnderTest> built_in_coders(int key_interval) {
     chosen.topology.frame_choice = FrameChoice::rate_distortion;
     EncoderOptions tracked = default_options(Profile::tracked);
     if (key_interval > 0) tracked.key_interval = key_interval;
+    tracked.tracked.denoise = denoise;
     EncoderOptions intra = ours;
     intra.key_interval = 1;
     return {

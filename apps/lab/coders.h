@@ -90,9 +90,9 @@ EncoderOptions paper_options(int key_interval);
 // (EncoderOptions::animation_error).
 inline constexpr double default_still_below = 50;
 
-// key_interval: 0: each coder's own default.
+// key_interval: 0: each coder's own default. denoise: of htvm-t.
 // paper, htvm-ep, htvm-motion, htvm-rd, htvm-t, tfan, tfan-mpeg, draco10, draco7.
-std::vector<CoderUnderTest> built_in_coders(int key_interval);
+std::vector<CoderUnderTest> built_in_coders(int key_interval, Denoising denoise = Denoising::automatic);
 
 // ---- The time that coding takes, even while other cores of the machine are busy -------------------------------------
 

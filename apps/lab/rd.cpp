@@ -40,6 +40,7 @@ struct Options {
     std::uint64_t samples = 200000;
     std::size_t measure_every = 1;
     int key_interval = 0;
+    std::string denoise = "auto";
     int views = 10;
     std::size_t memory_megabytes = 1024;
     unsigned threads = 0, coder_threads = 1;
@@ -48,7 +49,8 @@ struct Options {
 };
 
 Result<std::vector<CoderUnderTest>> chosen_coders(const Options& options) {
-    const auto built_in = built_in_coders(options.key_interval);
+    const auto built_in =
+        built_in_coders(options.key_interval, options.denoise == "off" ? Denoising::off : Denoising::automatic);
     std::vector<CoderUnderTest> out;
     std::set<std::string> names;
     auto add = [&](const CoderUnderTest& coder) -> Result<void> {
@@ -313,6 +315,12 @@ void add_sweep_options(CLI::App& command, Options& o) {
         .add_option("--keyint", o.key_interval,
                     "Frames from one I-frame to the next (default: 300 for htvm-t, 30 for others)")
         ->check(CLI::Range(1, 1000000));
+    command
+        .add_option("--denoise", o.denoise,
+                    "Whether htvm-t leaves the capture's noise out: auto (default), as htvm encode, or off, for errors "
+                    "measured against captures that have noise")
+        ->check(CLI::IsMember({"auto", "off"}))
+        ->option_text("auto|off");
     command.add_flag("--geometry-only", o.geometry_only, "Leave the colours out");
 }
 

@@ -30,6 +30,7 @@ EncoderOptions any_options(fuzz::FuzzInput& input) {
     out.least_key_interval = 1 + (what & 1);
     if (tracked) {
         if (what & 32) out.tracked.references = TrackedReferences::intra;
+        if (what & 64) out.tracked.denoise = Denoising::off;
         out.tracked.node_spacing = 1 + 20 * input.u8();
         out.tracked.simplify = input.below(4) * 0.4;
     } else {

@@ -45,6 +45,11 @@ enum class TrackedReferences : std::uint8_t {
                // refers to the reference alone
 };
 
+enum class Denoising : std::uint8_t {
+    off,        // T-frames follow the capture, noise and all
+    automatic,  // they follow it without the noise that is measured, if any is: fewer bits, and nearer the true surface
+};
+
 // For Profile::tracked only; with other profiles, anything but the defaults is refused.
 struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
@@ -54,6 +59,7 @@ struct TrackedOptions {
                                // its surface in geometry steps; 0: it keeps all vertices and its connectivity
     double patch_share = 0.3;  // where tracking is lost, the largest share of the mesh that a patch may replace; where
                                // more is lost, an I-frame is sent; 0: always
+    Denoising denoise = Denoising::automatic;  // with a target error always off: that is measured against the capture
     double node_spacing = 0;  // mm between the nodes of the deformation graph; 0: 80 on an adult, in proportion to size
                               // on other subjects
 };

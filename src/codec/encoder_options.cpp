@@ -12,6 +12,7 @@ namespace htvm {
 namespace {
 
 constexpr std::array<const char*, 2> tracked_references = {"intra", "previous"};
+constexpr std::array<const char*, 2> denoising = {"off", "auto"};
 constexpr std::array<const char*, 4> frame_choices = {"fixed", "motion", "rd", "cheaper"};
 constexpr std::array<const char*, 7> up_axes = {"unknown", "x", "-x", "y", "-y", "z", "-z"};
 constexpr std::array<const char*, 2> reference_vertices = {"bone", "any"};
@@ -230,6 +231,15 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return o.tracked.patch_share; },
      .set = [](EncoderOptions& o, double value) { o.tracked.patch_share = value; },
      .flag = "--patch-share"},
+    {.name = "tracked.denoise",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::word,
+     .meaning = "noise of the capture: auto, it is measured, and where there is any, T-frames leave it out, for fewer "
+                "bits and a calmer picture; off, they follow it",
+     .words = denoising,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<int>(o.tracked.denoise); },
+     .set = [](EncoderOptions& o, double value) { o.tracked.denoise = static_cast<Denoising>(value); },
+     .flag = "--denoise"},
     {.name = "tracked.node_spacing",
      .group = OptionGroup::tracked,
      .kind = OptionKind::number,

@@ -222,6 +222,18 @@ Result<Candidate> code_enhanced(FrameWork& work, const FrameSteps& steps) {
     return out;
 }
 
+// Not where frames are to have an error that is measured against the capture, noise and all.
+bool denoises(const Configuration& configuration) {
+    return configuration.options.tracked.denoise == Denoising::automatic &&
+           configuration.options.rate.target_error <= 0;
+}
+
+TargetFilterOptions filter_options(const FrameWork& work) {
+    const auto& intra = work.reference().intra;
+    const auto steps = tracked_steps(intra.steps);
+    return {1.0 * steps.geometry, 1.0 * steps.colour, intra.edge};
+}
+
 // before: state of the frame that it refers to; null if that is the reference.
 Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts,
                                            const TrackedState* before) {
@@ -234,10 +246,11 @@ Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& st
     options.colour_step = coarser_colours * steps.colour;
     options.lambda = configuration.options.lambda;
     options.reach = reach * configuration.adult_millimetre;
+    if (denoises(configuration)) options.denoise = filter_options(work);
     options.motion_alone = parts == TrackedParts::motion_alone;
     options.threads = configuration.threads;
     return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.node_motion(),
-                                before, options, work.stages);
+                                before, work.sequence.nodes.targets, options, work.stages);
 }
 
 Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts) {
@@ -265,6 +278,7 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     history.before_last = nodes.last;
     history.last = work.node_motion();
     history.state = std::move(encoded->state);
+    history.targets = std::move(encoded->targets);
     history.best_fit = nodes.best_fit;
     return out;
 }
@@ -347,6 +361,11 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
                                                   {.step = coded_steps.geometry, .settled = patched->kept});
     if (!mesh.normals.empty())
         out.decoded.normals = quantised_normals(vertex_normals(out.decoded.positions, out.decoded.triangles));
+    std::vector<std::uint32_t> kept;
+    for (std::uint32_t v = 0; v < patch.removed.size(); ++v)
+        if (!patch.removed[v]) kept.push_back(v);
+    if (denoises(work.configuration))
+        out.targets = on_new_reference(tracked->targets, kept, out.decoded.positions.size(), filter_options(work));
     out.captured = captured;
     out.pose = work.pose;
     out.packets.push_back(frame_packet(PacketKind::patched, payload));

@@ -74,6 +74,7 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         in_use->patch_bytes = before.reference->patch_bytes + static_cast<double>(sent.bytes());
     }
     if (patched || sent.renewal) out.nodes.best_fit = before.nodes.best_fit;
+    out.nodes.targets = patched ? std::move(sent.targets) : on_new_reference(before.nodes.targets, {}, 0, {});
     if (in_use->decoded.tracked)
         in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
     else if (in_use->decoded.has_bones)

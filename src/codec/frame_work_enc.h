@@ -79,6 +79,7 @@ struct NodeHistory {
     std::optional<std::uint32_t> access;         // number of the last one that refers to the reference alone
     std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
     TrackedState state;                          // of the last one
+    TargetHistory targets;                       // what filtering left of the last one
     std::vector<RigidMotion> gone_on;  // where each node goes next if it goes on as it did before a patch made
                                        // it; empty but after a TP-frame
     double best_fit = 0;               // RMS of the best so far; 0: none yet
@@ -110,6 +111,7 @@ struct Candidate {
     std::optional<NodeHistory> nodes;                  // T; TP: what its T-frame would have left
     std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
     CodedPose pose;                                    // I, TP
+    TargetHistory targets;                             // TP: on the reference that it becomes
     std::vector<std::uint32_t> distance_order_counts;  // EP
     std::size_t bytes() const;
 };

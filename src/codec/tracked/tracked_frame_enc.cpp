@@ -129,8 +129,8 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
 
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
                                                  const TrackedReference& reference, std::span<const RigidMotion> motion,
-                                                 const TrackedState* before, const TrackedFrameOptions& options,
-                                                 std::vector<StageTime>& stages) {
+                                                 const TrackedState* before, const TargetHistory& targets_before,
+                                                 const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);
     const auto& triangles = reference.mesh.triangles;
     EncodedTrackedFrame out;
@@ -150,13 +150,20 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
                                        options.reach, options.threads);
     }
     clock.done("targets");
+    if (options.denoise) {
+        if (options.motion_alone)
+            out.targets = targets_before;
+        else
+            out.targets = filter_targets(targets, triangles, targets_before, *options.denoise);
+        clock.done("denoising");
+    }
 
     // A step so large that every difference from the prediction becomes zero.
     const double displacement_step = options.motion_alone ? field_limit : options.geometry_step;
     const double colour_step = options.motion_alone ? field_limit : options.colour_step;
     FieldOptions geometry;
     geometry.step = {displacement_step, displacement_step, displacement_step};
-    geometry.lambda = options.lambda;
+    geometry.lambda = options.lambda * price_of_bits(out.targets, displacement_step);
     FieldOptions colour;
     colour.step = {colour_step, colour_step, colour_step};
     colour.lambda = options.lambda;

@@ -5,9 +5,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "codec/tracked/target_filter_enc.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/thread.h"
 #include "entropy/decision_log.h"
@@ -22,6 +24,7 @@ struct TrackedFrameOptions {
     double colour_step = 11;    // levels
     double lambda = 0.12;       // squared steps that one bit is worth
     double reach = 480;         // lattice units: how far from the moved reference to search for the captured surface
+    std::optional<TargetFilterOptions> denoise;  // filters the targets over time
     bool motion_alone = false;  // displacement and colours stay as predicted: the smallest frame possible
     Threads threads = {};
 };
@@ -58,13 +61,14 @@ struct EncodedTrackedFrame {
     TrackedRuns runs;
     LatticeMesh mesh;  // the mesh that the decoder will have
     TrackedState state;
+    TargetHistory targets;  // empty without filtering
 };
 
 // mesh: as captured; surface: its index, see captured_surface(). motion: of each node, as registered. before: state of
-// the frame that this one refers to; null if that is the I-frame.
+// the frame that this one refers to; null if that is the I-frame. targets: what filtering left of the last frame.
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
                                                  const TrackedReference& reference, std::span<const RigidMotion> motion,
-                                                 const TrackedState* before, const TrackedFrameOptions& options,
-                                                 std::vector<StageTime>& stages);
+                                                 const TrackedState* before, const TargetHistory& targets,
+                                                 const TrackedFrameOptions& options, std::vector<StageTime>& stages);
 
 }  // namespace htvm::internal
