@@ -40,7 +40,7 @@ struct Options {
     std::uint64_t samples = 200000;
     std::size_t measure_every = 1;
     int key_interval = 0;
-    std::string denoise = "auto";
+    std::string denoise = "off";
     int views = 10;
     std::size_t memory_megabytes = 1024;
     unsigned threads = 0, coder_threads = 1;
@@ -316,9 +316,10 @@ void add_sweep_options(CLI::App& command, Options& o) {
                     "Frames from one I-frame to the next (default: 300 for htvm-t, 30 for others)")
         ->check(CLI::Range(1, 1000000));
     command
-        .add_option("--denoise", o.denoise,
-                    "Whether htvm-t leaves the capture's noise out: auto (default), as htvm encode, or off, for errors "
-                    "measured against captures that have noise")
+        .add_option(
+            "--denoise", o.denoise,
+            "Whether htvm-t leaves the capture's noise out: off (default), since errors are measured against the "
+            "capture, noise and all; or auto, as htvm encode does")
         ->check(CLI::IsMember({"auto", "off"}))
         ->option_text("auto|off");
     command.add_flag("--geometry-only", o.geometry_only, "Leave the colours out");
