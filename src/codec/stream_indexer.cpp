@@ -24,7 +24,7 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
     }
     const auto& rules = rules_of(*type);
     const auto header = told_header(packet);
-    const bool alone = rules.refers_to == RefersTo::nothing, referred = is_referred(header, rules);
+    const bool alone = stands_alone(*type), referred = is_referred(header, rules);
     if (!alone && !(referred && header.has(packet_flag::access))) return;
     if (!index_.points.empty() && number <= index_.points.back().frame) return;
     std::uint32_t back = 0;

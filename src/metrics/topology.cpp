@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <tuple>
 #include <vector>
 
+#include "core/disjoint_sets.h"
 #include "core/parallel.h"
 #include "metrics/mesh_measures.h"
 #include "metrics/surface_index.h"
@@ -16,21 +16,6 @@ namespace htvm {
 
 using namespace internal;
 namespace {
-
-// Sets that grow together (union-find with path halving; the lower index is the root).
-struct Sets {
-    std::vector<std::uint32_t> parent;
-    explicit Sets(std::size_t count) : parent(count) { std::iota(parent.begin(), parent.end(), 0u); }
-    std::uint32_t root(std::uint32_t v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    }
-    void join(std::uint32_t a, std::uint32_t b) {
-        a = root(a);
-        b = root(b);
-        parent[std::max(a, b)] = std::min(a, b);
-    }
-};
 
 // A side of a triangle with three different vertices, directed from `from` to `to` as in the triangle.
 struct Side {
@@ -89,7 +74,7 @@ void count_parts(const Mesh& mesh, Topology& out) {
     out.triangles = mesh.triangles.size();
     out.duplicate_triangles = count_duplicates(mesh);
     std::vector<bool> used(mesh.positions.size(), false);
-    Sets sets(mesh.positions.size());
+    DisjointSets sets(mesh.positions.size());
     std::int64_t whole = 0;
     for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
         const Triangle& v = mesh.triangles[t];
@@ -102,7 +87,7 @@ void count_parts(const Mesh& mesh, Topology& out) {
     }
     for (std::uint32_t v = 0; v < used.size(); ++v) {
         out.isolated_vertices += !used[v];
-        out.components += used[v] && sets.root(v) == v;
+        out.components += used[v] && sets.of(v) == v;
     }
     for_each_edge(sorted_sides(mesh), [&](const Side&, std::size_t triangles) {
         ++out.edges;
@@ -164,7 +149,7 @@ struct Counterpart {
 template <class VerticesOf>
 std::uint64_t count_groups(std::size_t vertices, const std::vector<std::uint32_t>& counterparts,
                            const VerticesOf& vertices_of) {
-    Sets sets(vertices);
+    DisjointSets sets(vertices);
     std::vector<std::uint32_t> roots;
     for (std::uint32_t i = 0; i < counterparts.size(); ++i) {
         if (counterparts[i] == none) continue;
@@ -173,7 +158,7 @@ std::uint64_t count_groups(std::size_t vertices, const std::vector<std::uint32_t
         for (std::uint32_t v : vertices_of(counterparts[i])) sets.join(own[0], v);
         roots.push_back(own[0]);
     }
-    for (auto& root : roots) root = sets.root(root);
+    for (auto& root : roots) root = sets.of(root);
     std::sort(roots.begin(), roots.end());
     return static_cast<std::uint64_t>(std::unique(roots.begin(), roots.end()) - roots.begin());
 }

@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "core/disjoint_sets.h"
 #include "core/parallel.h"
 
 namespace htvm::synth {
@@ -43,22 +43,17 @@ Vector3d area_vector(const Vector3d& a, const Vector3d& b, const Vector3d& c) { 
 // Keeps the triangles of components that have at least `fewest` triangles.
 std::vector<Triangle> large_components(std::size_t vertices, const std::vector<Triangle>& triangles,
                                        std::size_t fewest) {
-    std::vector<std::uint32_t> parent(vertices);
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto root = [&](std::uint32_t v) {
-        while (parent[v] != v) v = parent[v] = parent[parent[v]];
-        return v;
-    };
+    DisjointSets components(vertices);
     for (const auto& t : triangles) {
-        parent[root(t[1])] = root(t[0]);
-        parent[root(t[2])] = root(t[0]);
+        components.join(t[0], t[1]);
+        components.join(t[0], t[2]);
     }
     std::vector<std::size_t> size(vertices, 0);
-    for (const auto& t : triangles) ++size[root(t[0])];
+    for (const auto& t : triangles) ++size[components.of(t[0])];
     std::vector<Triangle> kept;
     kept.reserve(triangles.size());
     for (const auto& t : triangles)
-        if (size[root(t[0])] >= fewest) kept.push_back(t);
+        if (size[components.of(t[0])] >= fewest) kept.push_back(t);
     return kept;
 }
 

@@ -68,30 +68,14 @@ inline SurfacePatch patch_by_chance(const TrackedSurface& tracked, Removal what,
 inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra, std::int32_t node_spacing,
                                                const ChanceMotion& motion, unsigned seed) {
     std::mt19937 random(seed);
-    std::vector<Packet> out;
-    std::uint32_t frame = 0;
-    SequenceHeader header;
-    const auto add = [&](Packet packet, std::uint32_t reference) {
-        packet.frame = frame;
-        packet.reference = reference;
-        packet.flags = packet_flag::told | packet_flag::referred;
-        packet.timestamp_us = std::int64_t{frame++} * 33333;
-        out.push_back(std::move(packet));
-    };
+    StreamByChance out;
     for (const auto& packet : intra) {
-        if (packet.kind == PacketKind::sequence) {
-            header = *read_sequence_header(packet.payload);
-            header.node_spacing = node_spacing;
-            out.push_back(packet);
-            out.back().payload = write_sequence_header(header);
-        }
+        if (packet.kind == PacketKind::sequence) out.add_header(packet, node_spacing);
         if (packet.kind != PacketKind::intra) continue;
         const auto coded = *read_frame_payload(packet.payload);
-        std::uint32_t number = frame;
+        std::uint32_t number = out.frame;
         CapturedCounts captured{coded.header.source_vertices, coded.header.source_triangles};
-        auto mesh = *decode_intra_frame(coded, nullptr);
-        smooth_as_shown(mesh, static_cast<std::int32_t>(coded.header.geometry_step), false, header);
-        add(packet, number);
+        auto mesh = out.add_intra(packet, coded);
         for (int patches = 0;; ++patches) {
             auto reference = *make_tracked_reference(mesh, node_spacing, {});
             reference.captured = captured;
@@ -103,7 +87,7 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
                 DecodedTrackedFrame decoded;
                 if (!decode_tracked_frame(next.payload, reference, t > 0 ? &before : nullptr, {}, decoded)) break;
                 before = std::move(decoded.state);
-                add(std::move(next), t > 0 ? frame - 1 : number);
+                out.add(std::move(next), t > 0 ? out.frame - 1 : number);
             }
             if (patches == 2) break;
             FramePayload payload;
@@ -127,10 +111,10 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
             Packet next = packet;
             next.kind = PacketKind::patched;
             next.payload = write_frame_payload(payload);
-            add(std::move(next), std::exchange(number, frame));
+            out.add(std::move(next), std::exchange(number, out.frame));
         }
     }
-    return out;
+    return std::move(out.packets);
 }
 
 }  // namespace htvm::test

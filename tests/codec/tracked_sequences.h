@@ -74,36 +74,47 @@ inline std::vector<std::uint8_t> tracked_by_chance(const TrackedReference& refer
         .payload;
 }
 
+// A stream that is put together frame by frame.
+struct StreamByChance {
+    std::uint32_t frame = 0;  // number of the next one
+    SequenceHeader header;
+    std::vector<Packet> packets = {};
+    void add(Packet packet, std::uint32_t reference) {
+        packet.frame = frame;
+        packet.reference = reference;
+        packet.flags = packet_flag::told | packet_flag::referred;
+        packet.timestamp_us = std::int64_t{frame++} * 33333;
+        packets.push_back(std::move(packet));
+    }
+    // The header with nodes so far apart, in lattice units.
+    void add_header(const Packet& packet, std::int32_t node_spacing) {
+        header = *read_sequence_header(packet.payload);
+        header.node_spacing = node_spacing;
+        packets.push_back(packet);
+        packets.back().payload = write_sequence_header(header);
+    }
+    // Returns the mesh that decoders have of it.
+    LatticeMesh add_intra(const Packet& packet, const FramePayloadView& coded) {
+        auto mesh = *decode_intra_frame(coded, nullptr);
+        smooth_as_shown(mesh, static_cast<std::int32_t>(coded.header.geometry_step), false, header);
+        add(packet, frame);
+        return mesh;
+    }
+};
+
 // A stream of I-frames with a few T-frames after each: one from the I-frame, two from the previous frame, one more from
 // the I-frame. node_spacing: lattice units. first: the number of the first frame.
 inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra, std::int32_t node_spacing,
                                                const ChanceMotion& motion, std::uint32_t first, unsigned seed) {
     std::mt19937 random(seed);
-    std::vector<Packet> out;
-    std::uint32_t frame = first;
-    SequenceHeader header;
-    const auto add = [&](Packet packet, std::uint32_t reference) {
-        packet.frame = frame;
-        packet.reference = reference;
-        packet.flags = packet_flag::told | packet_flag::referred;
-        packet.timestamp_us = std::int64_t{frame++} * 33333;
-        out.push_back(std::move(packet));
-    };
+    StreamByChance out{.frame = first, .header = {}};
     for (const auto& packet : intra) {
-        if (packet.kind == PacketKind::sequence) {
-            header = *read_sequence_header(packet.payload);
-            header.node_spacing = node_spacing;
-            out.push_back(packet);
-            out.back().payload = write_sequence_header(header);
-        }
+        if (packet.kind == PacketKind::sequence) out.add_header(packet, node_spacing);
         if (packet.kind != PacketKind::intra) continue;
         const auto payload = *read_frame_payload(packet.payload);
-        auto mesh = *decode_intra_frame(payload, nullptr);
-        smooth_as_shown(mesh, static_cast<std::int32_t>(payload.header.geometry_step), false, header);
-        auto reference = *make_tracked_reference(mesh, node_spacing, {});
+        const std::uint32_t key = out.frame;
+        auto reference = *make_tracked_reference(out.add_intra(packet, payload), node_spacing, {});
         reference.captured = {payload.header.source_vertices, payload.header.source_triangles};
-        const std::uint32_t key = frame;
-        add(packet, key);
         TrackedState state;
         for (const bool refers_to_last : {false, true, true, false}) {
             auto tracked = tracked_by_chance(reference, refers_to_last ? &state : nullptr, motion, random);
@@ -113,10 +124,10 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
             Packet next = packet;
             next.kind = PacketKind::tracked;
             next.payload = std::move(tracked);
-            add(std::move(next), refers_to_last ? frame - 1 : key);
+            out.add(std::move(next), refers_to_last ? out.frame - 1 : key);
         }
     }
-    return out;
+    return std::move(out.packets);
 }
 
 }  // namespace htvm::test

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "core/disjoint_sets.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -62,29 +64,8 @@ private:
     std::vector<std::pair<Cell, std::uint32_t>> entries_;
 };
 
-// The connected piece of each vertex, represented by its lowest vertex.
-class Pieces {
-public:
-    explicit Pieces(std::size_t vertices) : parent_(vertices) {
-        for (std::uint32_t v = 0; v < vertices; ++v) parent_[v] = v;
-    }
-    std::uint32_t of(std::uint32_t v) {
-        while (parent_[v] != v) v = parent_[v] = parent_[parent_[v]];
-        return v;
-    }
-    bool join(std::uint32_t a, std::uint32_t b) {
-        a = of(a), b = of(b);
-        if (a == b) return false;
-        parent_[std::max(a, b)] = std::min(a, b);
-        return true;
-    }
-
-private:
-    std::vector<std::uint32_t> parent_;
-};
-
 // Links each vertex with the next one at the same place.
-void link_coincident(std::span<const LatticePoint> positions, Pieces& pieces, std::vector<VertexPair>& links) {
+void link_coincident(std::span<const LatticePoint> positions, DisjointSets& pieces, std::vector<VertexPair>& links) {
     std::vector<std::pair<LatticePoint, std::uint32_t>> order;
     order.reserve(positions.size());
     for (std::uint32_t v = 0; v < positions.size(); ++v) order.emplace_back(positions[v], v);
@@ -97,7 +78,7 @@ void link_coincident(std::span<const LatticePoint> positions, Pieces& pieces, st
 }
 
 // Links each vertex with the nearest one of another piece within reach. Of crowded cells only a part is searched.
-void link_near(std::span<const LatticePoint> positions, std::int32_t reach, Pieces& pieces,
+void link_near(std::span<const LatticePoint> positions, std::int32_t reach, DisjointSets& pieces,
                std::vector<VertexPair>& links) {
     bool several = false;
     for (std::uint32_t v = 1; v < positions.size() && !several; ++v) several = pieces.of(v) != pieces.of(0);
@@ -135,7 +116,7 @@ void keep_each_step_once(std::span<const LatticePoint> positions, Graph& graph) 
 }
 
 Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach) {
-    Pieces pieces(positions.size());
+    DisjointSets pieces(positions.size());
     for (const auto& t : triangles) {
         pieces.join(t[0], t[1]);
         pieces.join(t[1], t[2]);
@@ -366,7 +347,7 @@ std::vector<NodePair> touching_regions(const Graph& graph, const std::vector<std
 void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>& pairs) {
     const std::size_t count = places.size();
     if (count < 2) return;
-    Pieces groups(count);
+    DisjointSets groups(count);
     for (const auto& pair : pairs) groups.join(pair.first, pair.second);
     std::vector<std::int64_t> nearest(count, std::numeric_limits<std::int64_t>::max());
     std::vector<std::uint32_t> from(count, 0);

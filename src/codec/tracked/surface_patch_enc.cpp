@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <utility>
 
+#include "core/disjoint_sets.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 
@@ -106,23 +106,6 @@ std::vector<std::vector<std::uint32_t>> border_loops(const Sides& sides, const S
     }
     return out;
 }
-
-// Sets that can be united.
-class Groups {
-public:
-    explicit Groups(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0U); }
-    std::uint32_t of(std::uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
-    void unite(std::uint32_t a, std::uint32_t b) {
-        a = of(a), b = of(b);
-        parent_[std::max(a, b)] = std::min(a, b);
-    }
-
-private:
-    std::vector<std::uint32_t> parent_;
-};
 
 // ---- Closest points -------------------------------------------------------------------------------------------------
 
@@ -226,11 +209,11 @@ void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, c
     std::vector<bool> uncovered(mesh.positions.size());
     for (std::size_t v = 0; v < uncovered.size(); ++v)
         uncovered[v] = !capture.on_decoded[v].found() || distance_to(capture.on_decoded[v], 0) > options.lost;
-    Groups regions(uncovered.size());
+    DisjointSets regions(uncovered.size());
     std::vector<double> area(uncovered.size(), 0);
     for (const auto& t : mesh.triangles)
         for (std::size_t i = 0; i < 3; ++i)
-            if (uncovered[t[i]] && uncovered[t[(i + 1) % 3]]) regions.unite(t[i], t[(i + 1) % 3]);
+            if (uncovered[t[i]] && uncovered[t[(i + 1) % 3]]) regions.join(t[i], t[(i + 1) % 3]);
     for (const auto& t : mesh.triangles) {
         const double third = area_of(mesh.positions, t) / 3;
         for (const auto v : t)
@@ -284,10 +267,10 @@ std::vector<bool> find_lost(const LatticeMesh& decoded, std::span<const LatticeP
     add_rims_of_uncovered(capture, decoded, options, rims);
     const auto bad_shape = distorted(decoded, rest, sides, options);
     const auto doubtful = [&](std::uint32_t v) { return error[v] > options.lost / 2 || rims[v] || bad_shape[v]; };
-    Groups regions(vertices);
+    DisjointSets regions(vertices);
     std::vector<double> area(vertices, 0);
     for (std::uint32_t s = 0; s < sides.count(); ++s)
-        if (doubtful(sides.from(s)) && doubtful(sides.to(s))) regions.unite(sides.from(s), sides.to(s));
+        if (doubtful(sides.from(s)) && doubtful(sides.to(s))) regions.join(sides.from(s), sides.to(s));
     for (const auto& t : decoded.triangles) {
         const double third = area_of(decoded.positions, t) / 3;
         for (const auto v : t)
@@ -330,7 +313,7 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
         std::vector<std::uint32_t> kept(vertices, 0), gone(vertices, 0), lost_corners(vertices, 0),
             corners(vertices, 0);
         std::vector<Triangle> triangles;
-        Groups parts(vertices);
+        DisjointSets parts(vertices);
         for (const auto& t : decoded.triangles) {
             const bool stays = !removed[t[0]] && !removed[t[1]] && !removed[t[2]];
             for (std::size_t i = 0; i < 3; ++i) {
@@ -339,7 +322,7 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
                     ++corners[t[i]];
                     if (removed[t[other]]) ++lost_corners[t[i]];
                 }
-                parts.unite(t[i], stays ? t[(i + 1) % 3] : t[i]);
+                parts.join(t[i], stays ? t[(i + 1) % 3] : t[i]);
             }
             if (stays) triangles.push_back(t);
         }
@@ -524,9 +507,9 @@ LatticeMesh cut_piece(const Outside& outside, const Capture& capture, const Surf
             all.triangles.push_back({at_b, whole(c), at_c});
         }
     }
-    Groups parts(all.positions.size());
+    DisjointSets parts(all.positions.size());
     std::vector<double> area(all.positions.size(), 0);
-    for (const auto& t : all.triangles) parts.unite(t[0], t[1]), parts.unite(t[1], t[2]);
+    for (const auto& t : all.triangles) parts.join(t[0], t[1]), parts.join(t[1], t[2]);
     for (const auto& t : all.triangles) area[parts.of(t[0])] += area_of(all.positions, t);
     std::vector<bool> wanted(all.positions.size(), false);
     for (std::uint32_t v = 0; v < joins.size(); ++v)

@@ -42,6 +42,9 @@ std::vector<std::uint32_t> first_at_same_place(std::span<const LatticePoint> pos
 
 std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> positions,
                                                 std::span<const Triangle> triangles, const QuantiserCells& cells) {
+    std::vector<LatticePoint> out(positions.begin(), positions.end());
+    const std::int64_t reach = cells.step / 2;
+    if (reach == 0) return out;  // as of every mesh that is smoothed already
     struct Sum {
         std::int64_t x = 0, y = 0, z = 0, count = 0;
     };
@@ -64,8 +67,6 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
         sum.z += around[v].z;
         sum.count += around[v].count;
     }
-    const std::int64_t reach = cells.step / 2;
-    std::vector<LatticePoint> out(positions.begin(), positions.end());
     const auto halfway = [&](std::int32_t own, std::int64_t sum, std::int64_t count) {
         const std::int64_t change = divide_rounded(sum - count * own, 2 * count);
         return within_lattice(own + std::clamp(change, -reach, reach));
