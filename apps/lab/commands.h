@@ -5,6 +5,7 @@
 
 namespace htvm::lab {
 
+void add_decoding(CLI::App& app, app::Run& run);
 void add_rd(CLI::App& app, app::Run& run);
 void add_reproduce(CLI::App& app, app::Run& run);
 

@@ -10,8 +10,9 @@ int main(int argc, char** argv) {
     program.footer =
         "Begin with a capture: a folder of meshes, one per frame, or a synthetic one by 'htvm synth'.\n"
         "  htvm-lab rd CAPTURE -o out/rd              rates and errors of coders at several qualities\n"
+        "  htvm-lab decoding STREAM                   how long each frame takes to decode\n"
         "  htvm-lab reproduce CAPTURE -o out/report   the published experiments, as one page to look at";
-    program.commands = {add_rd, add_reproduce};
+    program.commands = {add_rd, add_decoding, add_reproduce};
     for (const char* name : {"synth", "encode", "decode", "info", "calibrate", "compare"})
         program.elsewhere[name] = std::string("htvm ") + name;
     return run_program(program, argc, argv);

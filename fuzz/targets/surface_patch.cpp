@@ -39,9 +39,10 @@ void check_decoded(const FramePayload& payload, const TrackedSurface& tracked, c
     const auto patched = decode_patch(view_of(payload), tracked, hierarchy);
     if (!patched) return;
     const auto& mesh = patched->mesh;
-    require(patched->kept <= tracked.positions.size() && patched->kept <= mesh.positions.size(),
+    require(patched->stays.size() <= tracked.positions.size() && patched->stays.size() <= mesh.positions.size(),
             "no more stay than were there");
-    require(mesh.positions.size() - patched->kept <= payload.header.vertices, "no more come than the header says");
+    require(mesh.positions.size() - patched->stays.size() <= payload.header.vertices,
+            "no more come than the header says");
     require(mesh.colours.size() == (tracked.colours.empty() ? 0 : mesh.positions.size()), "colours as before");
     require(fuzz::all_on_lattice(mesh.positions), "positions are on the lattice");
     require(fuzz::names_vertices(mesh.triangles, mesh.positions.size()), "triangles name vertices");
@@ -64,7 +65,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto patched = encode_patch(tracked, *hierarchy, any_patch(tracked, steps.geometry, input), steps, payload);
     require(patched.has_value(), "a patch at the open border can be encoded");
     const auto again = decode_patch(view_of(payload), tracked, *hierarchy);
-    require(again && again->kept == patched->kept && again->mesh.positions == patched->mesh.positions &&
+    require(again && again->stays == patched->stays && again->mesh.positions == patched->mesh.positions &&
                 again->mesh.triangles == patched->mesh.triangles && again->mesh.colours == patched->mesh.colours,
             "a patch comes back as the encoder promised");
 

@@ -125,9 +125,9 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
     const auto held = state.reference ? counts(state.reference->mesh()) : MeshCounts{};
     std::uint64_t kept = state.reference ? memory_of_reference(held) : 0;
     const bool nodes = state.reference && state.reference->tracked;
-    if (nodes || rules.refers_to == RefersTo::reference_or_before) kept += memory_of_tracking(held);
     // A patch adds to the mesh that it is put on.
     const bool adds = rules.renews && rules.refers_to != RefersTo::nothing;
+    if (nodes || adds || rules.refers_to == RefersTo::reference_or_before) kept += memory_of_tracking(held);
     const MeshCounts renewed{coded.vertices + (adds ? held.vertices : 0),
                              coded.triangles + (adds ? held.triangles : 0)};
     if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);

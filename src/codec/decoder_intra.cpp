@@ -27,12 +27,12 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
         state.alone = std::move(alone);
         return {};
     }
-    // T-frames need the nodes at once; what depends on bones is built when a frame asks for it.
-    const ReferenceFacts facts{.number = packet.frame,
-                               .step = step,
-                               .captured = {payload.header.source_vertices, payload.header.source_triangles}};
-    auto reference = make_reference(header, facts, std::move(*mesh), std::move(*pose), {.bones = false, .nodes = true},
-                                    state.threads);
+    // What depends on bones or nodes is built when a frame asks for it, so that no frame has to do the work of two.
+    ReferenceFacts facts{.number = packet.frame,
+                         .step = step,
+                         .captured = {payload.header.source_vertices, payload.header.source_triangles}};
+    auto reference = make_reference(header, std::move(facts), std::move(*mesh), std::move(*pose),
+                                    {.bones = false, .nodes = false}, state.threads);
     if (!reference) return tl::unexpected(reference.error());
     show(state, view_of(reference->mesh()), topology, std::move(shown));
     // Nothing can fail from here on.

@@ -28,18 +28,21 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     if (!patched) return tl::unexpected(patched.error());
     auto& mesh = patched->mesh;
     const auto step = static_cast<std::int32_t>(payload.header.geometry_step);
-    mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, {.step = step, .settled = patched->kept});
+    mesh.positions = smoothed_within_cells(
+        mesh.positions, mesh.triangles, {.step = step, .settled = static_cast<std::uint32_t>(patched->stays.size())});
     if (!reference.mesh.normals.empty())
         mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
     // With what the patch added, the mesh may be larger than its header says, and than its reference.
     if (auto ok = check_limits({}, {mesh.positions.size(), mesh.triangles.size()}, {}, 0, state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
-    const ReferenceFacts facts{.number = packet.frame,
-                               .captured = {payload.header.source_vertices, payload.header.source_triangles}};
+    ReferenceFacts facts{.number = packet.frame,
+                         .captured = {payload.header.source_vertices, payload.header.source_triangles},
+                         .kept = keep_nodes(reference.nodes, patched->stays)};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
-    auto renewed = make_reference(header, facts, std::move(mesh), std::move(*pose), {.bones = false, .nodes = true},
-                                  state.threads);
+    // Its nodes are for the next frame to derive, so that no frame has to do the work of two.
+    auto renewed = make_reference(header, std::move(facts), std::move(mesh), std::move(*pose),
+                                  {.bones = false, .nodes = false}, state.threads);
     if (!renewed) return tl::unexpected(renewed.error());
     show(state, view_of(renewed->mesh()), topology, std::move(shown));
     // Nothing can fail from here on.

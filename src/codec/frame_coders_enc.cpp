@@ -355,17 +355,18 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     out.type = FrameType::patched;
     out.reference = in_use.decoded.number;
     out.referred = true;
-    out.renewed = vertices > 0 ? static_cast<double>(vertices - patched->kept) / static_cast<double>(vertices) : 0;
+    out.renewed =
+        vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
     out.decoded = std::move(patched->mesh);
-    out.decoded.positions = smoothed_within_cells(out.decoded.positions, out.decoded.triangles,
-                                                  {.step = coded_steps.geometry, .settled = patched->kept});
+    out.decoded.positions = smoothed_within_cells(
+        out.decoded.positions, out.decoded.triangles,
+        {.step = coded_steps.geometry, .settled = static_cast<std::uint32_t>(patched->stays.size())});
     if (!mesh.normals.empty())
         out.decoded.normals = quantised_normals(vertex_normals(out.decoded.positions, out.decoded.triangles));
-    std::vector<std::uint32_t> kept;
-    for (std::uint32_t v = 0; v < patch.removed.size(); ++v)
-        if (!patch.removed[v]) kept.push_back(v);
     if (denoises(work.configuration))
-        out.targets = on_new_reference(tracked->targets, kept, out.decoded.positions.size(), filter_options(work));
+        out.targets =
+            on_new_reference(tracked->targets, patched->stays, out.decoded.positions.size(), filter_options(work));
+    out.kept = keep_nodes(in_use.decoded.tracked->nodes, patched->stays);
     out.captured = captured;
     out.pose = work.pose;
     out.packets.push_back(frame_packet(PacketKind::patched, payload));

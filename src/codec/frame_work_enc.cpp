@@ -61,8 +61,9 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         return out;
     }
     const bool patched = sent.type == FrameType::patched;
-    auto decoded = make_reference(configuration.header, {before.next_frame, sent.intra->step, sent.captured},
-                                  sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
+    auto decoded =
+        make_reference(configuration.header, {before.next_frame, sent.intra->step, sent.captured, std::move(sent.kept)},
+                       sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto in_use = std::make_shared<ReferenceInUse>();
     in_use->decoded = std::move(*decoded);

@@ -111,6 +111,7 @@ struct Candidate {
     std::optional<NodeHistory> nodes;                  // T; TP: what its T-frame would have left
     std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
     CodedPose pose;                                    // I, TP
+    KeptNodes kept;                                    // TP: what the reference that it becomes takes over
     TargetHistory targets;                             // TP: on the reference that it becomes
     std::vector<std::uint32_t> distance_order_counts;  // EP
     std::size_t bytes() const;

@@ -102,7 +102,7 @@ TEST(CodedPatch, OfAnyMeshComesBackWhateverGoesAndComes) {
                 const auto coding = coded(surface, patch, steps);
                 const auto again = decoded(surface, coding.payload);
                 ASSERT_TRUE(again.has_value()) << again.error().message;
-                EXPECT_EQ(again->kept, coding.surface.kept);
+                EXPECT_EQ(again->stays, coding.surface.stays);
                 EXPECT_EQ(again->mesh.positions, coding.surface.mesh.positions);
                 EXPECT_EQ(again->mesh.colours, coding.surface.mesh.colours);
                 EXPECT_EQ(again->mesh.triangles, coding.surface.mesh.triangles);
@@ -117,7 +117,7 @@ TEST(CodedPatch, OfAnyMeshComesBackWhateverGoesAndComes) {
                     }
                     ++kept;
                 }
-                EXPECT_EQ(kept, again->kept);
+                EXPECT_EQ(kept, again->stays.size());
                 // All triangles, the piece's too, are where they were.
                 auto positions = surface.positions;
                 positions.insert(positions.end(), patch.positions.begin(), patch.positions.end());
@@ -162,7 +162,7 @@ std::size_t bytes_of_filled_strip(std::uint32_t length) {
     }
     const auto coding = coded(surface, patch, {8, 4});
     EXPECT_EQ(coding.payload.header.vertices, 2 * (length - 2));
-    EXPECT_EQ(coding.surface.kept, coding.surface.mesh.positions.size());
+    EXPECT_EQ(coding.surface.stays.size(), coding.surface.mesh.positions.size());
     return coding.payload.of(Layer::geometry).size() + coding.payload.of(Layer::colour).size();
 }
 
@@ -179,7 +179,7 @@ TEST(CodedPatch, ThatOnlyTakesAwayARegionTakesFewBytes) {
     std::size_t bytes = 0;
     for (const auto& layer : coding.payload.layers) bytes += layer.size();
     EXPECT_LE(bytes, 60u);
-    EXPECT_EQ(coding.surface.kept, 3600 - 451u);
+    EXPECT_EQ(coding.surface.stays.size(), 3600 - 451u);
 }
 
 TEST(CodedPatch, ThatDoesNotFitItsMeshIsRefused) {
@@ -202,8 +202,8 @@ void expect_valid_or_corrupt(const TestSurface& surface, const FramePayload& pay
         return;
     }
     const auto& mesh = again->mesh;
-    EXPECT_LE(again->kept, surface.positions.size());
-    EXPECT_LE(mesh.positions.size(), again->kept + std::size_t{payload.header.vertices});
+    EXPECT_LE(again->stays.size(), surface.positions.size());
+    EXPECT_LE(mesh.positions.size(), again->stays.size() + std::size_t{payload.header.vertices});
     EXPECT_EQ(mesh.colours.size(), mesh.positions.size());
     EXPECT_TRUE(std::all_of(mesh.positions.begin(), mesh.positions.end(), [](auto p) { return on_lattice(p); }));
     for (const auto& t : mesh.triangles)

@@ -212,6 +212,119 @@ TEST(DeformationNodes, TheNearestNodesAreThoseThatDijkstraFinds) {
     }
 }
 
+// The columns from `begin` to before `end` of a strip taken out, and put back behind the others.
+struct PatchedStrip {
+    Strip mesh;
+    std::vector<std::uint32_t> stays;
+};
+PatchedStrip patched(const Strip& before, std::uint32_t begin, std::uint32_t end) {
+    PatchedStrip out;
+    std::vector<std::uint32_t> order;
+    const auto count = static_cast<std::uint32_t>(before.positions.size());
+    const auto goes = [&](std::uint32_t v) { return v / 2 >= begin && v / 2 < end; };
+    for (std::uint32_t v = 0; v < count; ++v)
+        if (!goes(v)) out.stays.push_back(v);
+    order = out.stays;
+    for (std::uint32_t v = 0; v < count; ++v)
+        if (goes(v)) order.push_back(v);
+    std::vector<std::uint32_t> number(count);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        number[order[i]] = i;
+        out.mesh.positions.push_back(before.positions[order[i]]);
+    }
+    for (const auto& t : before.triangles) out.mesh.triangles.push_back({number[t[0]], number[t[1]], number[t[2]]});
+    return out;
+}
+
+TEST(DeformationNodes, APatchChangesThemNearItAlone) {
+    const auto before = strip(60, 10);
+    const auto nodes = nodes_of(before, 25);
+    const auto after = patched(before, 20, 26);
+    const auto kept = keep_nodes(nodes, after.stays);
+    const auto renewed = choose_deformation_nodes(after.mesh.positions, after.mesh.triangles, {.spacing = 25}, kept);
+    expect_sound(after.mesh, renewed);
+    EXPECT_EQ(renewed.spacing, 25);
+    // Nodes that stay come first, in their order; none is new but in the hole.
+    ASSERT_LT(kept.vertex.size(), nodes.vertex.size());
+    ASSERT_LE(kept.vertex.size(), renewed.vertex.size());
+    EXPECT_TRUE(std::equal(kept.vertex.begin(), kept.vertex.end(), renewed.vertex.begin()));
+    for (std::size_t n = kept.vertex.size(); n < renewed.vertex.size(); ++n)
+        EXPECT_GE(renewed.vertex[n], after.stays.size());
+    // Five nodes lie within ten columns; away from the hole all is as it was.
+    for (std::uint32_t v = 0; v < after.stays.size(); ++v) {
+        const auto column = after.stays[v] / 2;
+        if (column >= 5 && column < 40) continue;
+        ASSERT_EQ(renewed.near[v].count, near_nodes);
+        for (std::size_t k = 0; k < near_nodes; ++k) {
+            EXPECT_EQ(renewed.near[v].near[k].distance, nodes.near[after.stays[v]].near[k].distance);
+            EXPECT_EQ(after.stays[renewed.vertex[renewed.near[v].near[k].node]],
+                      nodes.vertex[nodes.near[after.stays[v]].near[k].node]);
+        }
+    }
+}
+
+TEST(DeformationNodes, APatchThatChangesNothingKeepsThemAll) {
+    const auto mesh = strip(40, 10);
+    const auto nodes = nodes_of(mesh, 30);
+    std::vector<std::uint32_t> all(mesh.positions.size());
+    for (std::uint32_t v = 0; v < all.size(); ++v) all[v] = v;
+    const auto again = choose_deformation_nodes(mesh.positions, mesh.triangles, {}, keep_nodes(nodes, all));
+    EXPECT_EQ(again.vertex, nodes.vertex);
+    EXPECT_EQ(again.near, nodes.near);
+    EXPECT_EQ(again.weights, nodes.weights);
+    EXPECT_EQ(again.neighbours, nodes.neighbours);
+    EXPECT_EQ(again.searched, 0u);
+}
+
+TEST(DeformationNodes, WhatAPatchBringsMayFollowTheNodesAroundIt) {
+    // One column of many: those beside it reach over it.
+    const auto before = strip(21, 10);
+    const auto after = patched(before, 1, 2);
+    const auto kept = keep_nodes(nodes_of(before, 50), after.stays);
+    const auto renewed = choose_deformation_nodes(after.mesh.positions, after.mesh.triangles, {}, kept);
+    EXPECT_EQ(renewed.vertex, kept.vertex);
+    expect_sound(after.mesh, renewed);
+}
+
+TEST(DeformationNodes, WhereNoneStaysOrTooManyWouldBeNeededAllAreChosenAnew) {
+    const auto before = strip(30, 10);
+    const auto nodes = nodes_of(before, 25);
+    const auto without_nodes = [&] {
+        std::vector<std::uint32_t> out;
+        for (std::uint32_t v = 0; v < before.positions.size(); ++v)
+            if (std::find(nodes.vertex.begin(), nodes.vertex.end(), v) == nodes.vertex.end()) out.push_back(v);
+        return out;
+    }();
+    EXPECT_TRUE(keep_nodes(nodes, without_nodes).vertex.empty());
+    const auto after = patched(before, 10, 20);
+    const auto kept = keep_nodes(nodes, after.stays);
+    ASSERT_FALSE(kept.vertex.empty());
+    const DeformationNodeOptions few{.spacing = 200, .most_nodes = kept.vertex.size()};
+    const auto anew = choose_deformation_nodes(after.mesh.positions, after.mesh.triangles, few);
+    EXPECT_EQ(choose_deformation_nodes(after.mesh.positions, after.mesh.triangles, few, kept).vertex, anew.vertex);
+    expect_sound(after.mesh, anew);
+}
+
+TEST(DeformationNodes, AnyPatchesWillDo) {
+    std::mt19937 random(4);
+    for (int trial = 0; trial < 40; ++trial) {
+        auto mesh = strip(20 + static_cast<std::uint32_t>(random() % 40), 10);
+        auto nodes = nodes_of(mesh, 20 + static_cast<std::int32_t>(random() % 40), 15);
+        for (int patches = 0; patches < 4; ++patches) {
+            const auto columns = static_cast<std::uint32_t>(mesh.positions.size() / 2);
+            const auto begin = static_cast<std::uint32_t>(random() % columns);
+            auto after = patched(mesh, begin, begin + static_cast<std::uint32_t>(random() % 12));
+            for (std::size_t v = after.stays.size(); v < after.mesh.positions.size(); ++v)
+                after.mesh.positions[v].z += static_cast<std::int32_t>(random() % 9);
+            if (random() % 2 == 0) append(after.mesh, strip(3, 10, {0, 0, 12}));
+            const auto kept = keep_nodes(nodes, after.stays);
+            nodes = choose_deformation_nodes(after.mesh.positions, after.mesh.triangles, {.spacing = 30}, kept);
+            expect_sound(after.mesh, nodes);
+            mesh = std::move(after.mesh);
+        }
+    }
+}
+
 TEST(DeformationNodes, ExtremePlacesAndSpacingsAreLegal) {
     constexpr std::int32_t far = lattice_limit;
     const Strip mesh{{{-far, -far, -far}, {far, far, far}, {far, -far, far}}, {{0, 1, 2}}};

@@ -76,8 +76,9 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
         std::uint32_t number = out.frame;
         CapturedCounts captured{coded.header.source_vertices, coded.header.source_triangles};
         auto mesh = out.add_intra(packet, coded);
+        KeptNodes kept;
         for (int patches = 0;; ++patches) {
-            auto reference = *make_tracked_reference(mesh, node_spacing, {});
+            auto reference = *make_tracked_reference(mesh, node_spacing, {}, {}, kept);
             reference.captured = captured;
             TrackedState before;
             for (int t = 0; t < 1 + patches % 2; ++t) {
@@ -100,12 +101,14 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
             const auto patch =
                 patch_by_chance(surface, removals[below(random, 4)], below(random, 30), steps.geometry, random);
             auto patched = *encode_patch(surface, reference.hierarchy, patch, steps, payload);
+            kept = keep_nodes(reference.nodes, patched.stays);
             captured = {below(random, 70000), below(random, 140000)};
             payload.header.source_vertices = captured.vertices;
             payload.header.source_triangles = captured.triangles;
             mesh = std::move(patched.mesh);
-            mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles,
-                                                   {.step = steps.geometry, .settled = patched.kept});
+            mesh.positions = smoothed_within_cells(
+                mesh.positions, mesh.triangles,
+                {.step = steps.geometry, .settled = static_cast<std::uint32_t>(patched.stays.size())});
             if (!reference.mesh.normals.empty())
                 mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
             Packet next = packet;

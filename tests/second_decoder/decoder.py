@@ -16,7 +16,7 @@ from audio import read_audio
 from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from intra import decode_intra_mesh
-from nodes import smoothed
+from nodes import Kept, smoothed
 from reference import Reference, decode_pose
 from patched import decode_patched_mesh
 from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, PATCHED, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
@@ -37,14 +37,14 @@ def digest(mesh):
 class Group:
     """An I- or TP-frame and what T-frames make of it (8.11)."""
 
-    def __init__(self, mesh, frame, number, step=1):
-        self.mesh, self.frame, self.number, self.step = mesh, frame, number, step
+    def __init__(self, mesh, frame, number, step=1, kept=Kept()):
+        self.mesh, self.frame, self.number, self.step, self.kept = mesh, frame, number, step, kept
         self.reference = self.state = self.last = None
 
     def tracked_reference(self, header):
         check(header.node_spacing > 0, "the header allows no tracked frames")
         self.reference = self.reference or TrackedReference(
-            self.mesh, self.frame.captured, self.step, header.node_spacing)
+            self.mesh, self.frame.captured, self.step, header.node_spacing, self.kept)
         return self.reference
 
     def decode(self, packet, header):
@@ -61,8 +61,8 @@ class Group:
         check(packet.referred(), "a patched frame that nothing may refer to")
         frame = read_coded_frame(packet)
         joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
-        mesh = decode_patched_mesh(frame, self.tracked_reference(header))
-        return mesh, joints, Group(mesh, frame, packet.frame)
+        mesh, kept = decode_patched_mesh(frame, self.tracked_reference(header))
+        return mesh, joints, Group(mesh, frame, packet.frame, kept=kept)
 
 
 def decode_stream(data):

@@ -78,42 +78,82 @@ def steps_between(positions, triangles, spacing):
     return steps
 
 
-def find_nodes(steps, spacing):
+class Kept:
+    """What a patched mesh takes over: the nodes whose vertices stay, and the near nodes of the vertices that do."""
+
+    def __init__(self, nodes=None, stay=()):
+        self.vertices, self.near = [], []
+        if not nodes or not nodes.covered:
+            return
+        self.spacing = nodes.spacing
+        vertex_now = {v: i for i, v in enumerate(stay)}
+        number = {}
+        for n, v in enumerate(nodes.vertices):
+            if v in vertex_now:
+                number[n] = len(number)
+                self.vertices.append(vertex_now[v])
+        if number:
+            self.near = [[(d, number[n]) for d, n in nodes.near[v] if n in number] for v in stay]
+
+
+def spread(steps, spacing, cover, reached, seeds):
+    """From the seeds at once, each (length, vertex), wherever it is nearer than what came before."""
+    length, queue = {}, seeds
+    heapq.heapify(queue)
+    while queue:
+        d, v = heapq.heappop(queue)
+        if v in length:
+            continue
+        length[v] = d
+        for u, step in steps[v].items():
+            if d + step <= spacing and d + step < cover[u] and reached[u] < 16 and u not in length:
+                heapq.heappush(queue, (d + step, u))
+    for v, d in length.items():
+        cover[v] = d
+        reached[v] += 1
+
+
+def find_nodes(steps, spacing, kept):
     """The nodes' vertices, and whether they suffice."""
-    cover, reached, nodes = [INFINITY] * len(steps), [0] * len(steps), []
+    cover, reached, nodes = [INFINITY] * len(steps), [0] * len(steps), list(kept.vertices)
+    for v, entries in enumerate(kept.near):
+        if entries and entries[0][0] <= spacing:
+            cover[v] = entries[0][0]
+    rim = [v for v in range(len(kept.near)) if any(cover[u] == INFINITY for u in steps[v])]
+    spread(steps, spacing, cover, reached, [(cover[v], v) for v in rim if cover[v] < INFINITY])
     for start in range(len(steps)):
         if cover[start] < INFINITY:
             continue
-        if len(nodes) == MOST_NODES:
+        if len(nodes) >= MOST_NODES:
             return nodes, False
         nodes.append(start)
-        length, queue = {}, [(0, start)]
-        while queue:
-            d, v = heapq.heappop(queue)
-            if v in length:
-                continue
-            length[v] = d
-            for u, step in steps[v].items():
-                if d + step <= spacing and d + step < cover[u] and reached[u] < 16 and u not in length:
-                    heapq.heappush(queue, (d + step, u))
-        for v, d in length.items():
-            cover[v] = d
-            reached[v] += 1
+        spread(steps, spacing, cover, reached, [(0, start)])
     return nodes, True
 
 
-def find_near(steps, positions, nodes):
+def enter(entries, new):
+    """Among the five smallest, each node once; whether it was one of them."""
+    if (len(entries) == 5 and entries[-1] <= new) or any(n == new[1] and d <= new[0] for d, n in entries):
+        return False
+    entries[:] = sorted([entry for entry in entries if entry[1] != new[1]] + [new])[:5]
+    return True
+
+
+def find_near(steps, positions, nodes, kept):
     """Per vertex the five smallest (distance, node)."""
-    near = [[] for _ in steps]
-    queue = [(0, n, v) for n, v in enumerate(nodes)]
+    near = [list(entries) for entries in kept.near] + [[] for _ in range(len(steps) - len(kept.near))]
+    rim = [v for v in range(len(kept.near)) if any(len(near[u]) < 5 for u in steps[v])]
+    queue = [(d, n, v) for v in rim for d, n in near[v]]
+    for n in range(len(kept.vertices), len(nodes)):
+        if enter(near[nodes[n]], (0, n)):
+            queue.append((0, n, nodes[n]))
+    heapq.heapify(queue)
     while queue:
         d, n, v = heapq.heappop(queue)
-        if len(near[v]) == 5 or any(n == other for _, other in near[v]):
-            continue
-        near[v].append((d, n))
-        if d < 1 << 31:
+        if d < 1 << 31 and (d, n) in near[v]:
             for u, step in steps[v].items():
-                heapq.heappush(queue, (d + step, n, u))
+                if enter(near[u], (d + step, n)):
+                    heapq.heappush(queue, (d + step, n, u))
     for v, entries in enumerate(near):
         if not entries:
             entries.append((0, min((squared_distance(positions[v], positions[u]), n) for n, u in enumerate(nodes))[1]))
@@ -157,20 +197,29 @@ def lower_neighbours(steps, owner, pivots):
 
 
 class Nodes:
-    """vertices, pivots and lower neighbours by node; weights by vertex."""
+    """vertices, pivots and lower neighbours by node; near nodes and weights by vertex; the spacing, and whether the
+    nodes cover the mesh at it."""
 
-    def __init__(self, positions, triangles, spacing):
-        self.vertices, self.pivots, self.lower, self.weights = [], [], [], []
+    def __init__(self, positions, triangles, spacing, kept=Kept()):
+        self.vertices, self.pivots, self.lower, self.weights, self.near = [], [], [], [], []
+        self.covered = False
         if not positions:
             return
         steps = steps_between(positions, triangles, spacing)
-        nodes, covered = find_nodes(steps, spacing)
+        covered = False
+        if kept.vertices:
+            nodes, covered = find_nodes(steps, kept.spacing, kept)
+        if covered:
+            spacing = kept.spacing
+        else:
+            kept = Kept()
+            nodes, covered = find_nodes(steps, spacing, kept)
         for _ in range(8):
             if not covered:
                 spacing = min(spacing + spacing // 2 + 1, 2 * L)
-                nodes, covered = find_nodes(steps, spacing)
-        near = find_near(steps, positions, nodes)
-        self.vertices = nodes
+                nodes, covered = find_nodes(steps, spacing, kept)
+        self.near = find_near(steps, positions, nodes, kept)
+        self.vertices, self.spacing, self.covered = nodes, spacing, covered
         self.pivots = [positions[v] for v in nodes]
-        self.weights = [weights_of(entries, spacing) for entries in near]
-        self.lower = lower_neighbours(steps, [entries[0][1] for entries in near], self.pivots)
+        self.weights = [weights_of(entries, spacing) for entries in self.near]
+        self.lower = lower_neighbours(steps, [entries[0][1] for entries in self.near], self.pivots)

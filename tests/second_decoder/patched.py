@@ -4,7 +4,7 @@ from arithmetic import Decoder, Models, SignedModel
 from conventions import L, check, rdiv
 from fans import FanDecoder, NumberInTurn
 from intra import Mesh, Neighbourhood, decode_colours, decode_positions
-from nodes import smoothed
+from nodes import Kept, smoothed
 from stream import BORDER, COLOUR, FANS, GEOMETRY, REMOVED, TRACKED_RUN
 from tracked import decode_tracked_mesh, quantised_normals
 
@@ -87,7 +87,7 @@ def decode_places(data, triangles, vertices, border):
 
 
 def decode_patched_mesh(frame, reference):
-    """frame: its payload."""
+    """The mesh, and what it takes over of the reference's nodes. frame: its payload."""
     check(not reference.mesh.texcoords, "its reference has texture coordinates")
     tracked, _ = decode_tracked_mesh(frame.layer(TRACKED_RUN), 4, reference, None)
     removed = decode_removed(frame.layer(REMOVED), len(tracked.positions), reference.levels)
@@ -123,4 +123,4 @@ def decode_patched_mesh(frame, reference):
     mesh.positions = smoothed(mesh.positions, mesh.triangles, step, len(stay))
     if reference.mesh.normals:
         mesh.normals = quantised_normals(mesh)
-    return mesh
+    return mesh, Kept(reference.nodes, stay)

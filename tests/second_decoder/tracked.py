@@ -16,10 +16,10 @@ from stream import COLOUR, GEOMETRY, TRANSFORMS, read_frame_payload
 class TrackedReference:
     """What all T-frames of an I- or TP-frame share. step: of its positions, 1 if they were smoothed."""
 
-    def __init__(self, mesh, captured, step, spacing):
+    def __init__(self, mesh, captured, step, spacing, kept):
         self.mesh, self.captured = mesh, captured
         self.positions = smoothed(mesh.positions, mesh.triangles, step)
-        self.nodes = Nodes(self.positions, mesh.triangles, spacing)
+        self.nodes = Nodes(self.positions, mesh.triangles, spacing, kept)
         normals = normals_of(self.positions, mesh.triangles)
         self.node_normals = [normals[v] for v in self.nodes.vertices]
         self.levels = vertex_hierarchy(self.positions, mesh.triangles)

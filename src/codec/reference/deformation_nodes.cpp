@@ -64,17 +64,28 @@ private:
     std::vector<std::pair<Cell, std::uint32_t>> entries_;
 };
 
-// Links each vertex with the next one at the same place.
+// Links each vertex with the next one at the same place. Most vertices differ in x already, so numbers are sorted
+// instead of points.
 void link_coincident(std::span<const LatticePoint> positions, DisjointSets& pieces, std::vector<VertexPair>& links) {
-    std::vector<std::pair<LatticePoint, std::uint32_t>> order;
+    std::vector<std::uint64_t> order;  // x and vertex
     order.reserve(positions.size());
-    for (std::uint32_t v = 0; v < positions.size(); ++v) order.emplace_back(positions[v], v);
+    for (std::uint32_t v = 0; v < positions.size(); ++v)
+        order.push_back(std::uint64_t{static_cast<std::uint32_t>(positions[v].x) ^ 0x80000000u} << 32 | v);
     std::sort(order.begin(), order.end());
-    for (std::size_t i = 1; i < order.size(); ++i)
-        if (order[i - 1].first == order[i].first) {
-            links.emplace_back(order[i - 1].second, order[i].second);
-            pieces.join(order[i - 1].second, order[i].second);
+    std::vector<std::pair<LatticePoint, std::uint32_t>> plane;  // across x
+    for (std::size_t i = 0; i < order.size();) {
+        plane.clear();
+        for (const std::uint64_t x = order[i] >> 32; i < order.size() && order[i] >> 32 == x; ++i) {
+            const auto v = static_cast<std::uint32_t>(order[i]);
+            plane.emplace_back(positions[v], v);
         }
+        std::sort(plane.begin(), plane.end());
+        for (std::size_t k = 1; k < plane.size(); ++k)
+            if (plane[k - 1].first == plane[k].first) {
+                links.emplace_back(plane[k - 1].second, plane[k].second);
+                pieces.join(plane[k - 1].second, plane[k].second);
+            }
+    }
 }
 
 // Links each vertex with the nearest one of another piece within reach. Of crowded cells only a part is searched.
@@ -156,17 +167,15 @@ struct Cover {
 // node could otherwise search everything behind the hub.
 constexpr std::uint8_t most_reached = 16;
 
-// Dijkstra's algorithm from a new node, no further than `spacing`, and only where it is nearer than all nodes before
-// it.
-void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover& cover,
-                std::vector<std::pair<Distance, std::uint32_t>>& heap) {
-    cover.nodes.push_back(start);
-    cover.distance[start] = 0;
-    heap.assign(1, {0, start});
-    while (!heap.empty()) {
-        std::pop_heap(heap.begin(), heap.end(), std::greater<>());
-        const auto [distance, vertex] = heap.back();
-        heap.pop_back();
+using CoverQueue = std::vector<std::pair<Distance, std::uint32_t>>;  // a heap of vertices by their distance
+
+// Dijkstra's algorithm from the vertices in the queue, no further than `spacing`, and only where they are nearer than
+// all nodes before.
+void reach_from(const Graph& graph, CoverQueue& queue, Distance spacing, Cover& cover) {
+    while (!queue.empty()) {
+        std::pop_heap(queue.begin(), queue.end(), std::greater<>());
+        const auto [distance, vertex] = queue.back();
+        queue.pop_back();
         if (distance != cover.distance[vertex]) continue;
         ++cover.reached[vertex];
         ++cover.searched;
@@ -175,39 +184,47 @@ void reach_from(const Graph& graph, std::uint32_t start, Distance spacing, Cover
             if (there > spacing || there >= cover.distance[step.vertex]) continue;
             if (cover.reached[step.vertex] == most_reached) continue;
             cover.distance[step.vertex] = there;
-            heap.emplace_back(there, step.vertex);
-            std::push_heap(heap.begin(), heap.end(), std::greater<>());
+            queue.emplace_back(there, step.vertex);
+            std::push_heap(queue.begin(), queue.end(), std::greater<>());
         }
     }
 }
 
+// Starts with what kept nodes reach; what they do not reach of the vertices that stay and of the patch is for others.
+void cover_by_kept(const Graph& graph, const KeptNodes& kept, Distance spacing, Cover& cover) {
+    for (std::size_t v = 0; v < kept.near.size(); ++v) {
+        const auto& nearest = kept.near[v].near[0];
+        if (kept.near[v].count > 0 && nearest.distance <= spacing) cover.distance[v] = nearest.distance;
+    }
+    CoverQueue queue;
+    for (std::uint32_t v = 0; v < kept.near.size(); ++v) {
+        const auto steps = graph.from(v);
+        const bool at_rim = std::any_of(steps.begin(), steps.end(),
+                                        [&](const Step& step) { return cover.distance[step.vertex] == unreached; });
+        if (at_rim && cover.distance[v] != unreached) queue.emplace_back(cover.distance[v], v);
+    }
+    std::make_heap(queue.begin(), queue.end(), std::greater<>());
+    reach_from(graph, queue, spacing, cover);
+}
+
 // Covers all vertices with nodes, or stops if more than most_nodes are needed.
-bool cover_all(const Graph& graph, Distance spacing, std::size_t most_nodes, Cover& cover) {
+bool cover_all(const Graph& graph, const KeptNodes& kept, Distance spacing, std::size_t most_nodes, Cover& cover) {
     const std::size_t vertices = graph.first.size() - 1;
     cover.distance.assign(vertices, unreached);
     cover.reached.assign(vertices, 0);
-    cover.nodes.clear();
-    std::vector<std::pair<Distance, std::uint32_t>> heap;
+    cover.nodes = kept.vertex;
+    cover_by_kept(graph, kept, spacing, cover);
+    CoverQueue queue;
     for (std::uint32_t v = 0; v < vertices; ++v) {
         if (cover.distance[v] != unreached) continue;
-        if (cover.nodes.size() == most_nodes) return false;
-        reach_from(graph, v, spacing, cover, heap);
+        if (cover.nodes.size() >= most_nodes) return false;
+        cover.nodes.push_back(v);
+        cover.distance[v] = 0;
+        queue.assign(1, {0, v});
+        reach_from(graph, queue, spacing, cover);
     }
     return true;
 }
-
-// The few nodes nearest to a vertex along the mesh: those that move it, and one more, which determines where their
-// influence ends.
-struct NearNode {
-    Distance distance = 0;
-    std::uint16_t node = 0;
-    auto operator<=>(const NearNode&) const = default;
-};
-constexpr std::size_t near_nodes = handles_per_vertex + 1;
-struct NearNodes {
-    std::array<NearNode, near_nodes> near;
-    std::uint8_t count = 0;
-};
 
 // Enters a node if it is one of the nearest, or nearer than known; returns whether it was.
 bool enter(NearNodes& list, NearNode candidate) {
@@ -264,14 +281,23 @@ private:
 };
 
 // The shortest paths from all nodes at once. A node that is not among the nearest of a vertex is not among those of any
-// vertex that it reaches through it either, so the short lists are still exact.
-std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::uint32_t>& nodes) {
-    std::vector<NearNodes> lists(graph.first.size() - 1);
+// vertex that it reaches through it either, so the short lists are still exact. From kept nodes, ways go on where
+// vertices that know them meet others that know too few.
+std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::uint32_t>& nodes,
+                                     const KeptNodes& kept) {
+    std::vector<NearNodes> lists = kept.near;
+    lists.resize(graph.first.size() - 1);
     RadixQueue queue;
+    for (std::uint32_t v = 0; v < kept.near.size(); ++v) {
+        const auto steps = graph.from(v);
+        const bool at_rim = std::any_of(steps.begin(), steps.end(),
+                                        [&](const Step& step) { return lists[step.vertex].count < near_nodes; });
+        for (std::size_t k = 0; at_rim && k < lists[v].count; ++k) queue.push({v, lists[v].near[k]});
+    }
     auto reach = [&](std::uint32_t vertex, NearNode near) {
         if (enter(lists[vertex], near)) queue.push({vertex, near});
     };
-    for (std::size_t n = 0; n < nodes.size(); ++n) reach(nodes[n], {0, static_cast<std::uint16_t>(n)});
+    for (std::size_t n = kept.vertex.size(); n < nodes.size(); ++n) reach(nodes[n], {0, static_cast<std::uint16_t>(n)});
     while (!queue.empty()) {
         const Visit visit = queue.pop();
         const NearNodes& list = lists[visit.vertex];
@@ -329,17 +355,17 @@ void take_nearest_in_space(std::span<const LatticePoint> positions, const std::v
     }
 }
 
-void sort_and_merge(std::vector<NodePair>& pairs) {
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-}
-
-std::vector<NodePair> touching_regions(const Graph& graph, const std::vector<std::uint16_t>& node) {
+std::vector<NodePair> touching_regions(const Graph& graph, const std::vector<std::uint16_t>& node, std::size_t nodes) {
     std::vector<NodePair> pairs;
+    std::vector<bool> known(nodes * nodes);
     for (std::uint32_t v = 0; v < node.size(); ++v)
-        for (const Step& step : graph.from(v))
-            if (node[v] < node[step.vertex]) pairs.push_back({node[v], node[step.vertex]});
-    sort_and_merge(pairs);
+        for (const Step& step : graph.from(v)) {
+            const NodePair pair{node[v], node[step.vertex]};
+            if (pair.first >= pair.second || known[pair.first * nodes + pair.second]) continue;
+            known[pair.first * nodes + pair.second] = true;
+            pairs.push_back(pair);
+        }
+    std::sort(pairs.begin(), pairs.end());
     return pairs;
 }
 
@@ -348,7 +374,9 @@ void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>&
     const std::size_t count = places.size();
     if (count < 2) return;
     DisjointSets groups(count);
-    for (const auto& pair : pairs) groups.join(pair.first, pair.second);
+    std::size_t left = count;
+    for (const auto& pair : pairs) left -= groups.join(pair.first, pair.second) ? 1 : 0;
+    if (left == 1) return;
     std::vector<std::int64_t> nearest(count, std::numeric_limits<std::int64_t>::max());
     std::vector<std::uint32_t> from(count, 0);
     std::vector<bool> inside(count, false);
@@ -376,38 +404,65 @@ void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>&
                          static_cast<std::uint16_t>(std::max(next, from[next]))});
         take_group(groups.of(next));
     }
-    pairs.insert(pairs.end(), added.begin(), added.end());
-    sort_and_merge(pairs);
+    pairs.insert(pairs.end(), added.begin(), added.end());  // of different groups, so there are no repeats
+    std::sort(pairs.begin(), pairs.end());
 }
 
 }  // namespace
 
+KeptNodes keep_nodes(const DeformationNodes& nodes, std::span<const std::uint32_t> stays) {
+    KeptNodes kept;
+    if (nodes.spacing == 0) return kept;
+    kept.spacing = nodes.spacing;
+    constexpr auto gone = std::numeric_limits<std::uint16_t>::max();
+    std::vector<std::uint16_t> number(nodes.vertex.size(), gone);
+    for (std::size_t n = 0; n < nodes.vertex.size(); ++n) {
+        const auto it = std::lower_bound(stays.begin(), stays.end(), nodes.vertex[n]);
+        if (it == stays.end() || *it != nodes.vertex[n]) continue;
+        number[n] = static_cast<std::uint16_t>(kept.vertex.size());
+        kept.vertex.push_back(static_cast<std::uint32_t>(it - stays.begin()));
+    }
+    if (kept.vertex.empty()) return {};
+    kept.near.reserve(stays.size());
+    for (const auto v : stays) {
+        auto& list = kept.near.emplace_back();
+        const auto& before = nodes.near[v];
+        for (std::size_t k = 0; k < before.count; ++k)
+            if (number[before.near[k].node] != gone)
+                list.near[list.count++] = {before.near[k].distance, number[before.near[k].node]};
+    }
+    return kept;
+}
+
 DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
-                                          const DeformationNodeOptions& options) {
+                                          const DeformationNodeOptions& options, const KeptNodes& kept) {
     DeformationNodes nodes;
     if (positions.empty()) return nodes;
     const Graph graph = mesh_graph(positions, triangles, options.link_reach);
     const std::size_t most = std::clamp<std::size_t>(options.most_nodes, 1, most_deformation_nodes);
     Cover cover;
+    const bool goes_on =
+        !kept.vertex.empty() && cover_all(graph, kept, static_cast<Distance>(kept.spacing), most, cover);
+    std::int64_t spacing = goes_on ? kept.spacing : std::clamp<std::int64_t>(options.spacing, 1, 2 * lattice_limit);
+    bool covered = goes_on || cover_all(graph, {}, static_cast<Distance>(spacing), most, cover);
     // Eight steps of 1.5 make the spacing 25 times as wide.
-    std::int64_t spacing = std::clamp<std::int64_t>(options.spacing, 1, 2 * lattice_limit);
-    bool covered = cover_all(graph, static_cast<Distance>(spacing), most, cover);
     for (int attempt = 0; attempt < 8 && !covered; ++attempt) {
         spacing = std::min<std::int64_t>(spacing + spacing / 2 + 1, 2 * lattice_limit);
-        covered = cover_all(graph, static_cast<Distance>(spacing), most, cover);
+        covered = cover_all(graph, {}, static_cast<Distance>(spacing), most, cover);
     }
-    auto lists = nearest_nodes(graph, cover.nodes);
-    if (!covered) take_nearest_in_space(positions, cover.nodes, lists);
+    nodes.near = nearest_nodes(graph, cover.nodes, goes_on ? kept : KeptNodes{});
+    if (!covered) take_nearest_in_space(positions, cover.nodes, nodes.near);
 
     nodes.vertex = std::move(cover.nodes);
     nodes.searched = cover.searched;
+    nodes.spacing = covered ? static_cast<std::int32_t>(spacing) : 0;
     nodes.handle_of_vertex.reserve(positions.size());
     nodes.weights.reserve(positions.size());
-    for (const auto& list : lists) {
+    for (const auto& list : nodes.near) {
         nodes.handle_of_vertex.push_back(list.near[0].node);
         nodes.weights.push_back(weights_of(list, static_cast<Distance>(spacing)));
     }
-    nodes.neighbours = touching_regions(graph, nodes.handle_of_vertex);
+    nodes.neighbours = touching_regions(graph, nodes.handle_of_vertex, nodes.vertex.size());
     std::vector<LatticePoint> places;
     for (const std::uint32_t v : nodes.vertex) places.push_back(positions[v]);
     connect_groups(places, nodes.neighbours);

@@ -19,19 +19,21 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
 
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
-    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step}, threads);
+    auto tracked =
+        make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step}, threads, reference.kept);
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     reference.tracked->captured = reference.captured;
     return {};
 }
 
-Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFacts& facts, LatticeMesh mesh,
-                                 CodedPose pose, Derived derived, Threads threads) {
+Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts facts, LatticeMesh mesh, CodedPose pose,
+                                 Derived derived, Threads threads) {
     Reference out;
     out.number = facts.number;
     out.step = facts.step;
     out.captured = facts.captured;
+    out.kept = std::move(facts.kept);
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);
     out.skinned.orientations = std::move(pose.orientations);

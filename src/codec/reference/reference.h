@@ -21,6 +21,7 @@ struct Reference {
     ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
     bool has_bones = false;    // whether it was derived
     std::optional<TrackedReference> tracked;  // what depends on the nodes, if it was derived
+    KeptNodes kept;                           // of a patched mesh: what it takes over of the nodes before
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
 
@@ -35,6 +36,7 @@ struct ReferenceFacts {
     std::uint32_t number = 0;
     std::int32_t step = 1;
     CapturedCounts captured;
+    KeptNodes kept = {};  // of a TP-frame
 };
 
 // Smooths an I-frame's mesh within its quantiser cells, as it is shown in streams with nodes from
@@ -43,8 +45,8 @@ struct ReferenceFacts {
 std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, bool settled, const SequenceHeader& header);
 
 // mesh: as decoded. Errors: those of make_tracked_reference().
-Result<Reference> make_reference(const SequenceHeader& header, const ReferenceFacts& facts, LatticeMesh mesh,
-                                 CodedPose pose, Derived derived, Threads threads);
+Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts facts, LatticeMesh mesh, CodedPose pose,
+                                 Derived derived, Threads threads);
 
 // Derive later what was not derived at once. No effect if it exists already.
 void derive_bones(Reference& reference, const SequenceHeader& header, Threads threads);

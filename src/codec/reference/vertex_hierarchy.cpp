@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -61,13 +62,29 @@ std::uint64_t morton_code(const Vector3d& p) {
     return code;
 }
 
+// The nodes by ascending number of vertices, equal ones by their own number. Nodes of a level are of similar sizes, so
+// mostly they are only counted; of unusual ones the order is made by sorting.
+std::vector<std::uint32_t> smallest_first(const std::vector<std::uint32_t>& vertices) {
+    std::vector<std::uint32_t> order(vertices.size());
+    const std::uint32_t most = vertices.empty() ? 0 : *std::max_element(vertices.begin(), vertices.end());
+    if (most > 2 * vertices.size()) {
+        std::iota(order.begin(), order.end(), 0u);
+        std::stable_sort(order.begin(), order.end(),
+                         [&](std::uint32_t a, std::uint32_t b) { return vertices[a] < vertices[b]; });
+        return order;
+    }
+    std::vector<std::uint32_t> place(std::size_t{most} + 2, 0);
+    for (const auto count : vertices) ++place[count + 1];
+    std::partial_sum(place.begin(), place.end(), place.begin());
+    for (std::uint32_t v = 0; v < vertices.size(); ++v) order[place[vertices[v]]++] = v;
+    return order;
+}
+
 // The partner of each node, or no_node.
 std::vector<std::uint32_t> match(const Layer& layer) {
     const std::size_t n = layer.size();
-    std::vector<std::uint32_t> partner(n, no_node), order(n);
-    for (std::uint32_t v = 0; v < n; ++v) order[v] = v;
-    std::stable_sort(order.begin(), order.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return layer.vertices[a] < layer.vertices[b]; });
+    std::vector<std::uint32_t> partner(n, no_node);
+    const auto order = smallest_first(layer.vertices);
     std::size_t alone = n;
     for (const std::uint32_t v : order) {
         if (partner[v] != no_node) continue;
@@ -104,6 +121,13 @@ std::vector<std::uint32_t> match(const Layer& layer) {
 Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, HierarchyLevel& level) {
     Layer coarse;
     std::vector<std::uint32_t> parent(fine.size());
+    const std::size_t likely = fine.size() / 2 + fine.size() / 8 + 1;
+    level.first.reserve(likely);
+    level.second.reserve(likely);
+    level.second_share.reserve(likely);
+    level.split_scale.reserve(likely);
+    coarse.vertices.reserve(likely);
+    coarse.centre.reserve(likely);
     for (std::uint32_t v = 0; v < fine.size(); ++v) {
         const std::uint32_t u = partner[v];
         if (u != no_node && u < v) continue;
@@ -123,8 +147,9 @@ Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, Hierarc
         level.split_scale.push_back(static_cast<std::uint16_t>(scale + 0.5));
     }
     std::vector<std::uint32_t> seen(level.size(), no_node);
+    coarse.first_neighbour.reserve(level.size() + 1);
     coarse.first_neighbour.assign(1, 0);
-    coarse.neighbours.reserve(fine.neighbours.size() / 2);
+    coarse.neighbours.reserve(fine.neighbours.size() * 5 / 8);
     for (std::uint32_t p = 0; p < level.size(); ++p) {
         seen[p] = p;
         const std::size_t full = coarse.neighbours.size() + hierarchy_row_limit;
@@ -160,20 +185,21 @@ void find_slopes(const Layer& fine, const Layer& coarse, std::uint32_t p, Hierar
     const auto around = coarse.around(p);
     std::array<Vector3d, 3> m{};
     double trace = 0;
-    auto weight_of = [&](std::uint32_t q, const Vector3d& way) { return coarse.vertices[q] / (dot(way, way) + 1.0); };
-    for (const std::uint32_t q : around) {
-        const Vector3d way = coarse.centre[q] - coarse.centre[p];
-        const double weight = weight_of(q, way);
+    std::array<Vector3d, hierarchy_row_limit> ways;
+    std::array<double, hierarchy_row_limit> weights;
+    for (std::size_t k = 0; k < around.size(); ++k) {
+        const Vector3d way = ways[k] = coarse.centre[around[k]] - coarse.centre[p];
+        const double length = dot(way, way);
+        const double weight = weights[k] = coarse.vertices[around[k]] / (length + 1.0);
         for (std::size_t i = 0; i < 3; ++i)
             for (std::size_t j = 0; j < 3; ++j) m[i][j] += weight * way[i] * way[j];
-        trace += weight * dot(way, way);
+        trace += weight * length;
     }
     for (std::size_t i = 0; i < 3; ++i) m[i][i] += hold * trace + 1e-3;
     const Vector3d turned = solve(m, fine.centre[level.first[p]] - fine.centre[level.second[p]]);
     std::size_t at = coarse.first_neighbour[p];
-    for (const std::uint32_t q : around) {
-        const Vector3d way = coarse.centre[q] - coarse.centre[p];
-        const double slope = dot(way, turned) * weight_of(q, way) * (1 << slope_bits);
+    for (std::size_t k = 0; k < around.size(); ++k) {
+        const double slope = dot(ways[k], turned) * weights[k] * (1 << slope_bits);
         constexpr double most = 1 << 15;
         level.slopes[at++] = static_cast<std::int32_t>(std::floor(std::clamp(slope, -most, most) + 0.5));
     }

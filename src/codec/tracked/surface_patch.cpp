@@ -163,7 +163,8 @@ PatchedSurface joined(const TrackedSurface& tracked, const std::vector<bool>& re
     std::vector<std::uint32_t> number(tracked.positions.size(), none);
     for (std::size_t v = 0; v < number.size(); ++v) {
         if (removed[v]) continue;
-        number[v] = out.kept++;
+        number[v] = static_cast<std::uint32_t>(out.stays.size());
+        out.stays.push_back(static_cast<std::uint32_t>(v));
         mesh.positions.push_back(tracked.positions[v]);
         if (!tracked.colours.empty()) mesh.colours.push_back(tracked.colours[v]);
     }

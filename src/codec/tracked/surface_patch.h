@@ -38,8 +38,8 @@ struct TrackedSurface {
 };
 
 struct PatchedSurface {
-    LatticeMesh mesh;        // vertices that stay come first, in their order, then the new ones; triangles likewise
-    std::uint32_t kept = 0;  // how many vertices stay
+    LatticeMesh mesh;  // vertices that stay come first, in their order, then the new ones; triangles likewise
+    std::vector<std::uint32_t> stays;  // the vertices of the tracked mesh that stay, ascending
 };
 
 // The steps of an I-frame.

@@ -81,7 +81,7 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 }
 
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                const QuantiserCells& cells, Threads threads) {
+                                                const QuantiserCells& cells, Threads threads, const KeptNodes& kept) {
     TrackedReference out;
     out.mesh = mesh;
     out.mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, cells);
@@ -91,7 +91,7 @@ Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::in
     Result<VertexHierarchy> hierarchy;
     parallel_invoke(
         threads, [&] { hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles); },
-        [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options); });
+        [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options, kept); });
     out.graph = graph_of(out.nodes, out.mesh);
     if (!hierarchy) return tl::unexpected(hierarchy.error());
     out.hierarchy = std::move(*hierarchy);

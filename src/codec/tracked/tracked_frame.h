@@ -34,9 +34,11 @@ struct QuantiserCells {
     std::uint32_t settled = 0;  // the first so many vertices are not; smoothed again with each patch, they would shrink
     bool at_seams = false;      // vertices at the same place move as one, so that a texture's seams stay closed
 };
-// node_spacing: lattice units, > 0. threads: uses two at most.
+// node_spacing: lattice units, > 0. threads: uses two at most. kept: of a patched mesh, what it takes over of the nodes
+// before.
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                const QuantiserCells& cells, Threads threads = {});
+                                                const QuantiserCells& cells, Threads threads = {},
+                                                const KeptNodes& kept = {});
 
 // Moves each vertex that is not settled halfway to the mean of its neighbours, but in each coordinate no farther than
 // half a quantiser step. This removes the steps of a coarsely quantised surface at no cost in bits.
