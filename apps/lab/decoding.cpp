@@ -91,7 +91,7 @@ Result<void> run_decoding(const Options& options) {
         std::vector<std::uint32_t> vertices;
         auto listed = nlohmann::json::array();
         for (const auto& frame : *frames) {
-            const std::string kind(letter_of(frame.info.type));
+            const std::string kind = kind_of(frame.info.type).letter;
             times.push_back(frame.milliseconds);
             by_kind[kind].push_back(frame.milliseconds);
             vertices.push_back(frame.info.vertices);
@@ -104,8 +104,8 @@ Result<void> run_decoding(const Options& options) {
         of_file["p99_over_p50"] = of_file["p99_ms"].get<double>() / of_file["p50_ms"].get<double>();
         for (const auto& [kind, milliseconds] : by_kind) of_file["by_type"][kind] = summary(milliseconds);
         if (!options.json) {
-            fmt::print("{}, {} decoded vertices\n{:20} {:>7} {:>8} {:>8} {:>8}\n", file,
-                       vertices[vertices.size() / 2], "", "frames", "p50 ms", "p99 ms", "max ms");
+            fmt::print("{}, {} decoded vertices\n{:20} {:>7} {:>8} {:>8} {:>8}\n", file, vertices[vertices.size() / 2],
+                       "", "frames", "p50 ms", "p99 ms", "max ms");
             for (const auto& [kind, of] : of_file["by_type"].items()) fmt::print("{}", row(kind + "-frames", of));
             fmt::print("{}p99 is {:.1f} times p50\n", row("all", of_file), of_file["p99_over_p50"].get<double>());
         }
@@ -122,10 +122,8 @@ void add_decoding(CLI::App& app, app::Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("decoding", "How long each frame of a stream takes to decode");
     command->add_option("streams", options->inputs, ".htvm files")->required();
-    command->add_option("--threads", options->threads, "Threads of the decoder (default 1)")
-        ->check(CLI::Range(1, 256));
-    command
-        ->add_option("--repeat", options->repeat, "Rounds; of each frame the shortest time counts (default 5)")
+    command->add_option("--threads", options->threads, "Threads of the decoder (default 1)")->check(CLI::Range(1, 256));
+    command->add_option("--repeat", options->repeat, "Rounds; of each frame the shortest time counts (default 5)")
         ->check(CLI::Range(1, 1000));
     command->add_flag("--json", options->json, "Print the result, with each frame's time, as JSON on standard output");
     command->footer(

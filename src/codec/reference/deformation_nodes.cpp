@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/disjoint_sets.h"
+#include "core/geometry.h"
 
 namespace htvm::internal {
 namespace {
@@ -110,22 +111,6 @@ void link_near(std::span<const LatticePoint> positions, std::int32_t reach, Disj
     }
 }
 
-// An edge between two triangles appears twice in a row: keeps it once, and measures its length.
-void keep_each_step_once(std::span<const LatticePoint> positions, Graph& graph) {
-    std::uint32_t kept = 0;
-    for (std::uint32_t v = 0; v < positions.size(); ++v) {
-        const auto begin = graph.steps.begin() + graph.first[v], end = graph.steps.begin() + graph.first[v + 1];
-        std::sort(begin, end, [](const Step& a, const Step& b) { return a.vertex < b.vertex; });
-        graph.first[v] = kept;
-        for (auto it = begin; it != end; ++it) {
-            if (it != begin && it->vertex == graph.steps[kept - 1].vertex) continue;
-            graph.steps[kept++] = {it->vertex, integer_root(squared_distance(positions[v], positions[it->vertex]))};
-        }
-    }
-    graph.first.back() = kept;
-    graph.steps.resize(kept);
-}
-
 Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach) {
     DisjointSets pieces(positions.size());
     for (const auto& t : triangles) {
@@ -135,24 +120,28 @@ Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triang
     std::vector<VertexPair> links;
     link_coincident(positions, pieces, links);
     link_near(positions, reach, pieces, links);
+    for (std::size_t i = 0, count = links.size(); i < count; ++i) links.emplace_back(links[i].second, links[i].first);
+    std::sort(links.begin(), links.end());
 
     Graph graph;
-    graph.first.assign(positions.size() + 1, 0);
-    auto over_all = [&](const auto& visit) {
-        for (const auto& t : triangles)
-            for (std::size_t k = 0; k < 3; ++k)
-                if (t[k] != t[(k + 1) % 3]) visit(t[k], t[(k + 1) % 3]);
-        for (const auto& [a, b] : links) visit(a, b);
-    };
-    over_all([&](std::uint32_t a, std::uint32_t b) { ++graph.first[a + 1], ++graph.first[b + 1]; });
-    for (std::size_t v = 1; v < graph.first.size(); ++v) graph.first[v] += graph.first[v - 1];
-    graph.steps.resize(graph.first.back());
-    std::vector<std::uint32_t> next(graph.first.begin(), graph.first.end() - 1);
-    over_all([&](std::uint32_t a, std::uint32_t b) {
-        graph.steps[next[a]++].vertex = b;
-        graph.steps[next[b]++].vertex = a;
-    });
-    keep_each_step_once(positions, graph);
+    graph.first.reserve(positions.size() + 1);
+    graph.steps.reserve(3 * triangles.size() + links.size());
+    const auto around = triangles_around(positions.size(), triangles);
+    std::vector<std::uint32_t> seen(positions.size(), unreached);
+    auto link = links.begin();
+    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+        graph.first.push_back(static_cast<std::uint32_t>(graph.steps.size()));
+        seen[v] = v;
+        const auto step_to = [&](std::uint32_t u) {
+            if (seen[u] == v) return;
+            seen[u] = v;
+            graph.steps.push_back({u, integer_root(squared_distance(positions[v], positions[u]))});
+        };
+        for (const auto t : around.of(v))
+            for (const auto u : triangles[t]) step_to(u);
+        for (; link != links.end() && link->first == v; ++link) step_to(link->second);
+    }
+    graph.first.push_back(static_cast<std::uint32_t>(graph.steps.size()));
     return graph;
 }
 
