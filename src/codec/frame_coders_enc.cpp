@@ -137,14 +137,6 @@ Candidate code_moving_part(FrameWork& work, const FrameSteps& steps, const std::
     return code_residuals(work, source, steps);
 }
 
-// Of two fits of the same capture, the errors that a later frame may not exceed: what tracking leaves must not become
-// the measure of what may be left.
-TrackedFit least_of(TrackedFit fit, const TrackedFit& before) {
-    fit.stray_share = std::min(fit.stray_share, before.stray_share);
-    fit.worst_region = std::min(fit.worst_region, before.worst_region);
-    return fit;
-}
-
 // renewed: the tracked mesh, which is coded instead of the capture; or null.
 Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse use,
                              const LatticeMesh* renewed = nullptr) {
@@ -379,7 +371,7 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     facts.steps = steps;
     facts.edge = work.edge();
     clock.done("patch coding");
-    facts.fit = least_of(work.tracked_fit(out.decoded, facts.edge, {}), in_use.intra.fit);
+    facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
     return out;
 }
 

@@ -294,9 +294,10 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
     if (!found) return Patched();
     auto out = code_patched(work, steps, *found);
     if (!out) return tl::unexpected(out.error());
-    if (static_cast<double>(out->bytes()) > most_bytes * work.reference().bytes ||
-        lost_track(work, work.tracked_fit(out->decoded, work.reference().intra.edge, {})))
+    auto& fit = out->intra->fit;
+    if (static_cast<double>(out->bytes()) > most_bytes * work.reference().bytes || lost_track(work, fit))
         return Patched();
+    fit = least_of(std::move(fit), work.reference().intra.fit);
     return Patched(std::move(*out));
 }
 

@@ -319,6 +319,12 @@ TrackedFit fit_of_captured(const SurfaceSamples& captured, const SurfaceIndex& d
 
 }  // namespace
 
+TrackedFit least_of(TrackedFit fit, const TrackedFit& before) {
+    fit.stray_share = std::min(fit.stray_share, before.stray_share);
+    fit.worst_region = std::min(fit.worst_region, before.worst_region);
+    return fit;
+}
+
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const double> intra_squared, const TrackedFitOptions& options) {
     const auto points = points_of(decoded.positions);

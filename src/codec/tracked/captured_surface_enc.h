@@ -57,6 +57,10 @@ struct TrackedFitOptions {
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const double> intra_squared, const TrackedFitOptions& options);
 
+// Of the fits of a reference and of the one that it follows, what frames may not exceed: what tracking leaves must not
+// become the measure of what may be left.
+TrackedFit least_of(TrackedFit fit, const TrackedFit& before);
+
 struct SimplifiedReferenceOptions {
     double surface_error = 16;  // lattice units, > 0: see SimplificationOptions
     double colour_error = 16;   // levels, > 0
