@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <queue>
 
 namespace htvm::internal {
 namespace {
@@ -58,14 +58,41 @@ struct ColourCluster {
 };
 
 struct Collapse {
-    double cost = 0;
     std::uint32_t keep = 0, drop = 0;
     std::uint64_t age = 0;  // sum of the ages of both ends when the edge was judged
-    // Cheapest first, ties by index: every run gives the same order.
-    bool operator<(const Collapse& other) const {
-        if (cost != other.cost) return cost > other.cost;
-        return keep != other.keep ? keep > other.keep : drop > other.drop;
+};
+
+// Cheapest first, to within a hundredth; of those that cost the same, what came first. Most collapses that wait are
+// overtaken by others around them, so a queue that sorts them exactly would take more time than all else: here each
+// waits in a bucket by the leading bits of its cost.
+class CollapseQueue {
+public:
+    bool empty() const { return size_ == 0; }
+    void push(double cost, const Collapse& collapse) {  // cost: 0 to 1
+        const std::size_t bucket = bucket_of(cost);
+        waiting_[bucket].collapses.push_back(collapse);
+        lowest_ = std::min(lowest_, bucket);
+        ++size_;
     }
+    Collapse pop() {
+        while (waiting_[lowest_].next == waiting_[lowest_].collapses.size()) waiting_[lowest_++] = {};
+        --size_;
+        return waiting_[lowest_].collapses[waiting_[lowest_].next++];
+    }
+
+private:
+    static constexpr int mantissa_bits = 7, exponents = 24;  // what costs less than 2^-24 is one bucket
+    static std::size_t bucket_of(double cost) {
+        const auto bits = std::bit_cast<std::uint64_t>(std::max(cost, std::ldexp(1.0, -exponents)));
+        constexpr auto least = std::bit_cast<std::uint64_t>(1.0) >> (52 - mantissa_bits);
+        return (bits >> (52 - mantissa_bits)) - (least - (std::uint64_t{exponents} << mantissa_bits));
+    }
+    struct Bucket {
+        std::vector<Collapse> collapses;
+        std::size_t next = 0;
+    };
+    std::vector<Bucket> waiting_ = std::vector<Bucket>((std::size_t{exponents} << mantissa_bits) + 1);
+    std::size_t lowest_ = 0, size_ = 0;
 };
 
 struct Simplifier {
@@ -79,7 +106,7 @@ struct Simplifier {
     std::vector<ColourCluster> colours{};
     std::vector<std::uint64_t> age{};
     std::vector<bool> lives{};
-    std::priority_queue<Collapse> queue{};
+    CollapseQueue queue{};
     std::vector<std::uint32_t> ring_a{}, ring_b{};  // reused between calls
     mutable std::uint64_t looked_at = 0;            // triangles examined
 
@@ -215,7 +242,7 @@ void Simplifier::judge(std::uint32_t a, std::uint32_t b) {
     double cost = q.mean(merged_position(a, b)) / allowed_surface;
     const auto colour = colours[a].merged(colours[b]);
     cost += colour.squares / colour.count / (options.colour_error * options.colour_error);
-    if (cost <= 1) queue.push({cost, std::min(a, b), std::max(a, b), age[a] + age[b]});
+    if (cost <= 1) queue.push(cost, {std::min(a, b), std::max(a, b), age[a] + age[b]});
 }
 
 // 1 for an equilateral triangle, 0 for one without area.
@@ -348,8 +375,7 @@ SimplifiedMesh simplify(std::span<const Vector3d> positions, std::span<const Tri
     simplifier.prepare(colours);
     if (options.surface_error > 0) simplifier.add_borders();
     while (!simplifier.queue.empty()) {
-        const auto next = simplifier.queue.top();
-        simplifier.queue.pop();
+        const auto next = simplifier.queue.pop();
         const auto a = next.keep, b = next.drop;
         if (!simplifier.lives[a] || !simplifier.lives[b] || simplifier.age[a] + simplifier.age[b] != next.age) continue;
         const auto to = simplifier.merged_position(a, b);
