@@ -41,30 +41,6 @@ struct Graph {
 
 using VertexPair = std::pair<std::uint32_t, std::uint32_t>;
 
-// Vertices grouped by their cell of a cubic grid; ascending within a cell.
-class Cells {
-public:
-    using Cell = std::array<std::int32_t, 3>;
-    Cells(std::span<const LatticePoint> positions, std::int32_t side) : positions_(positions), side_(side) {
-        entries_.reserve(positions.size());
-        for (std::uint32_t v = 0; v < positions.size(); ++v) entries_.push_back({cell_of(positions[v]), v});
-        std::sort(entries_.begin(), entries_.end());
-    }
-    Cell cell_of(LatticePoint p) const { return {down(p.x), down(p.y), down(p.z)}; }
-    // Calls visit(vertex) for up to `most` vertices of a cell.
-    template <class Visit>
-    void visit(const Cell& cell, std::size_t most, const Visit& visit) const {
-        auto it = std::lower_bound(entries_.begin(), entries_.end(), std::pair{cell, std::uint32_t{0}});
-        for (; it != entries_.end() && it->first == cell && most > 0; ++it, --most) visit(it->second);
-    }
-
-private:
-    std::int32_t down(std::int32_t c) const { return c >= 0 ? c / side_ : -((-c - 1) / side_) - 1; }
-    std::span<const LatticePoint> positions_;
-    std::int32_t side_;
-    std::vector<std::pair<Cell, std::uint32_t>> entries_;
-};
-
 // Links each vertex with the next one at the same place. Most vertices differ in x already, so numbers are sorted
 // instead of points.
 void link_coincident(std::span<const LatticePoint> positions, DisjointSets& pieces, std::vector<VertexPair>& links) {
@@ -89,25 +65,67 @@ void link_coincident(std::span<const LatticePoint> positions, DisjointSets& piec
     }
 }
 
-// Links each vertex with the nearest one of another piece within reach. Of crowded cells only a part is searched.
+using Cell = std::array<std::int32_t, 3>;
+
+// Vertices by their cell of a cubic grid; ascending within a cell.
+struct CellEntry {
+    Cell cell;
+    std::uint32_t vertex;
+    auto operator<=>(const CellEntry&) const = default;
+};
+
+std::vector<CellEntry> by_cell(std::span<const LatticePoint> positions, std::int32_t side) {
+    const auto down = [&](std::int32_t c) { return c >= 0 ? c / side : -((-c - 1) / side) - 1; };
+    std::vector<CellEntry> out;
+    out.reserve(positions.size());
+    for (std::uint32_t v = 0; v < positions.size(); ++v)
+        out.push_back({{down(positions[v].x), down(positions[v].y), down(positions[v].z)}, v});
+    std::sort(out.begin(), out.end());
+    return out;
+}
+
+// Links each vertex with the nearest one of another piece within reach. Of crowded cells only a part is searched. The
+// cells around one are nine rows of three; as the cells are gone through in order, so is each of these rows.
 void link_near(std::span<const LatticePoint> positions, std::int32_t reach, DisjointSets& pieces,
                std::vector<VertexPair>& links) {
     bool several = false;
     for (std::uint32_t v = 1; v < positions.size() && !several; ++v) several = pieces.of(v) != pieces.of(0);
     if (!several || reach <= 0) return;
     constexpr std::size_t most_a_cell = 24;
-    const Cells cells(positions, reach);
-    for (std::uint32_t v = 0; v < positions.size(); ++v) {
-        const auto middle = cells.cell_of(positions[v]);
-        const std::uint32_t piece = pieces.of(v);
-        std::pair<std::int64_t, std::uint32_t> best{std::int64_t{reach} * reach, unreached};
-        for (int c = 0; c < 27; ++c)
-            cells.visit({middle[0] + c % 3 - 1, middle[1] + c / 3 % 3 - 1, middle[2] + c / 9 - 1}, most_a_cell,
-                        [&](std::uint32_t other) {
-                            if (pieces.of(other) == piece) return;
-                            best = std::min(best, {squared_distance(positions[v], positions[other]), other});
-                        });
-        if (best.second != unreached) links.emplace_back(v, best.second);
+    const auto entries = by_cell(positions, reach);
+    std::array<std::size_t, 9> rows{};
+    std::vector<std::uint32_t> around;
+    for (std::size_t i = 0, end = 0; i < entries.size(); i = end) {
+        const Cell middle = entries[i].cell;
+        for (end = i; end < entries.size() && entries[end].cell == middle; ++end) {
+        }
+        around.clear();
+        bool others = false;
+        for (int r = 0; r < 9; ++r) {
+            const std::int32_t x = middle[0] + r / 3 - 1, y = middle[1] + r % 3 - 1;
+            auto& row = rows[static_cast<std::size_t>(r)];
+            while (row < entries.size() && entries[row].cell < Cell{x, y, middle[2] - 1}) ++row;
+            std::size_t in_cell = 0;
+            for (auto at = row; at < entries.size() && entries[at].cell <= Cell{x, y, middle[2] + 1}; ++at) {
+                in_cell = at > row && entries[at].cell == entries[at - 1].cell ? in_cell + 1 : 0;
+                if (in_cell >= most_a_cell) continue;
+                around.push_back(entries[at].vertex);
+                others = others || pieces.of(entries[at].vertex) != pieces.of(entries[i].vertex);
+            }
+        }
+        if (!others && std::all_of(entries.begin() + static_cast<std::ptrdiff_t>(i),
+                                   entries.begin() + static_cast<std::ptrdiff_t>(end), [&](const CellEntry& entry) {
+                                       return pieces.of(entry.vertex) == pieces.of(entries[i].vertex);
+                                   }))
+            continue;
+        for (auto at = i; at < end; ++at) {
+            const auto v = entries[at].vertex;
+            std::pair<std::int64_t, std::uint32_t> best{std::int64_t{reach} * reach, unreached};
+            for (const auto other : around)
+                if (pieces.of(other) != pieces.of(v))
+                    best = std::min(best, {squared_distance(positions[v], positions[other]), other});
+            if (best.second != unreached) links.emplace_back(v, best.second);
+        }
     }
 }
 
