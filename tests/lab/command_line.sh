@@ -28,7 +28,7 @@ expect 0 "htvm-lab " "$lab" --version
 expect 2 "" "$lab"
 expect 2 "htvm-lab: error: there is no command 'nonsense'; 'htvm-lab --help' lists them" "$lab" nonsense
 expect 2 "it is 'htvm encode'" "$lab" encode capture -o x.htvm
-for command in rd reproduce; do expect 0 "Usage" "$lab" $command --help; done
+for command in rd decoding reproduce; do expect 0 "Usage" "$lab" $command --help; done
 
 # The sweep: tables, or only JSON on standard output; stored results are used again.
 expect 2 "--output is required" "$lab" rd capture
@@ -42,6 +42,14 @@ expect 0 "2 of 2 results are kept from earlier runs" "$lab" rd capture -o rd -q 
 "$lab" rd capture -o rd -q 40 --coders tfan,draco10 --json 2>/dev/null | cmp -s - rd/rd.json ||
     { echo "FAILED: --json does not print rd.json alone"; failures=$((failures + 1)); }
 expect 0 "htvm-lab: 2 of 2 results" "$lab" rd capture -o rd -q 40 --coders tfan,draco10
+
+# How long frames take to decode, by kind.
+"$htvm" encode capture -o stream.htvm --quiet >/dev/null 2>&1
+expect 0 "T-frames                   1" "$lab" decoding stream.htvm --repeat 1
+"$lab" decoding stream.htvm --repeat 1 --json 2>/dev/null | grep -q '"p99_over_p50"' ||
+    { echo "FAILED: no percentiles as JSON"; failures=$((failures + 1)); }
+expect 1 "nowhere.htvm" "$lab" decoding nowhere.htvm
+expect 1 "there is no frame" "$lab" decoding "$lab"
 
 [ $failures -eq 0 ] && echo "the laboratory's command line does what it should"
 exit $failures
