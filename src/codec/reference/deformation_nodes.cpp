@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "core/disjoint_sets.h"
@@ -71,7 +72,8 @@ using Cell = std::array<std::int32_t, 3>;
 struct CellEntry {
     Cell cell;
     std::uint32_t vertex;
-    auto operator<=>(const CellEntry&) const = default;
+    // Not <=>, which std::array does not have in libc++ 14.
+    bool operator<(const CellEntry& other) const { return std::tie(cell, vertex) < std::tie(other.cell, other.vertex); }
 };
 
 std::vector<CellEntry> by_cell(std::span<const LatticePoint> positions, std::int32_t side) {
