@@ -39,7 +39,7 @@ htvm_program_library(command_line command_line htvm_core htvm_io CLI11::CLI11 fm
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 include(cmake/live.cmake)
 htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_synth htvm_metrics htvm_live)
-htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_metrics)
+htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_synth htvm_metrics)
 add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)
 add_executable(htvm-lab apps/lab/main.cpp)

@@ -113,6 +113,7 @@ std::vector<Column> columns(const FrameComparison& frame, const CompareOptions& 
              {"m2_forward_mm", s.m2_forward.rms},
              {"m2_backward_mm", s.m2_backward.rms},
              {"hausdorff_mm", s.hausdorff_mm}});
+    if (options.regions) add({{"worst_region_mm", frame.region.worst_mm}});
     if (options.texcoords) add({{"texcoord_rms", s.texcoord_rms}, {"texcoord_elsewhere", s.texcoord_elsewhere}});
     if (options.cloud) add({{"d1_db", s.d1_db}, {"d2_db", s.d2_db}});
     if (options.pictures) {
@@ -391,6 +392,56 @@ nlohmann::json flicker_json(const std::vector<FlickerFrame>& frames) {
     return out;
 }
 
+// ---- The worst regions ----------------------------------------------------------------------------------------------
+
+// Frames of which the worst regions are summed up together. kind: of a stream's frame.
+struct RegionGroup {
+    const char* name;
+    const char* key;
+    bool (*has)(std::optional<FrameType> kind);
+};
+constexpr std::array region_groups = {
+    RegionGroup{"all frames", "all", [](std::optional<FrameType>) { return true; }},
+    RegionGroup{"I-frames", "intra", [](std::optional<FrameType> kind) { return kind == FrameType::intra; }},
+    RegionGroup{"the others", "between",
+                [](std::optional<FrameType> kind) { return kind && kind != FrameType::intra; }},
+};
+
+RegionErrorSummary worst_regions(const std::vector<FrameComparison>& frames,
+                                 const std::vector<std::optional<FrameType>>& kinds, const RegionGroup& group) {
+    std::vector<double> worst;
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        if (group.has(kinds[i])) worst.push_back(frames[i].region.worst_mm);
+    return summarise(std::move(worst));
+}
+
+std::string region_rows(const std::vector<FrameComparison>& frames,
+                        const std::vector<std::optional<FrameType>>& kinds) {
+    std::string out =
+        fmt::format("\n  {:<34}{:>12}{:>12}{:>12}\n", "worst region of 10 cm, RMS mm", "median", "99 %", "largest");
+    for (const auto& group : region_groups) {
+        const auto sums = worst_regions(frames, kinds, group);
+        if (sums.frames == 0) continue;
+        out +=
+            row(fmt::format("  of {} ({})", group.name, sums.frames), sums.median_mm, sums.p99_mm, sums.largest_mm, 3);
+    }
+    return out;
+}
+
+nlohmann::json regions_json(const std::vector<FrameComparison>& frames,
+                            const std::vector<std::optional<FrameType>>& kinds) {
+    nlohmann::json out;
+    for (const auto& group : region_groups) {
+        const auto sums = worst_regions(frames, kinds, group);
+        if (sums.frames == 0) continue;
+        out[group.key] = {{"frames", sums.frames},
+                          {"median_mm", sums.median_mm},
+                          {"p99_mm", sums.p99_mm},
+                          {"largest_mm", sums.largest_mm}};
+    }
+    return out;
+}
+
 // ---- The command ----------------------------------------------------------------------------------------------------
 
 struct Options {
@@ -424,6 +475,7 @@ void choose_metrics(Options& options) {
     const std::set<std::string> only(options.only.begin(), options.only.end());
     c.points = only.contains("m1");
     c.surface = only.contains("m2");
+    c.regions = only.contains("regions");
     c.texcoords = only.contains("texcoords");
     c.cloud = only.contains("d1") || only.contains("d2");
     c.pictures = c.pictures && only.contains("m3");
@@ -591,8 +643,9 @@ struct Measured {
     DriftMeter drift;                // if the truth is given
     std::vector<FrameDrift> drifts;  // of each frame, likewise
     std::vector<FrameComparison> frames;
-    std::vector<FlickerFrame> flickers;  // of each frame, if it is asked for
-    std::vector<std::size_t> places;     // the position of each among the originals
+    std::vector<FlickerFrame> flickers;           // of each frame, if it is asked for
+    std::vector<std::size_t> places;              // the position of each among the originals
+    std::vector<std::optional<FrameType>> kinds;  // of each, if it is known
 };
 
 Result<FrameDrift> measure_drift(Marks& marks, DriftMeter& meter, std::size_t original, const Mesh& decoded) {
@@ -628,6 +681,7 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         out.sums += *comparison;
         out.frames.push_back(*comparison);
         out.places.push_back(pair.original);
+        out.kinds.push_back(decoded.is_stream ? std::optional(decoded.kinds[pair.decoded]) : std::nullopt);
         if (marks) {
             const auto drift = measure_drift(*marks, out.drift, pair.original, *second);
             if (!drift) return tl::unexpected(drift.error());
@@ -703,6 +757,8 @@ nlohmann::json as_json(const Options& options, const Measured& measured, double 
         const auto& frame = measured.frames[i];
         auto line = summary_json(summarise(as_sequence(frame), peak_mm), options.compare);
         line["frame"] = measured.places[i];
+        if (options.compare.regions)
+            line["worst_region"] = {{"rms_mm", frame.region.worst_mm}, {"centre_mm", frame.region.centre}};
         line["original_vertices"] = frame.original_vertices;
         line["decoded_vertices"] = frame.decoded_vertices;
         if (options.compare.topology) {
@@ -720,6 +776,7 @@ nlohmann::json as_json(const Options& options, const Measured& measured, double 
     nlohmann::json out = {
         {"original", options.originals.front()}, {"decoded", options.decoded}, {"frames", std::move(frames)}};
     out["sequence"] = summary_json(summarise(measured.sums, peak_mm), options.compare);
+    if (options.compare.regions) out["sequence"]["worst_region"] = regions_json(measured.frames, measured.kinds);
     if (!measured.drifts.empty()) {
         auto& drift = out["sequence"]["drift"] = drift_json(measured.drift.overall());
         drift.erase("age");
@@ -760,6 +817,7 @@ Result<void> compare(Options options) {
         fmt::print("{}\n", as_json(options, *measured, peak_mm).dump(2));
     } else if (options.csv != "-") {
         fmt::print("{}", comparison_table(measured->sums, options.compare, options.peak_mm));
+        if (options.compare.regions) fmt::print("{}", region_rows(measured->frames, measured->kinds));
         if (!measured->drifts.empty()) fmt::print("{}", drift_rows(measured->drift));
         if (has_flicker(measured->flickers)) fmt::print("{}", flicker_rows(measured->flickers));
     }
@@ -807,6 +865,8 @@ void add_compare(CLI::App& app, Run& run) {
         "the order of their names if they have none:\n"
         "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
         "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
+        "  regions  the worst region of the surface, a ball of 10 cm: RMS distance there, in the worse direction; of\n"
+        "      frames their median, 99th percentile and largest, of a stream's I-frames and its others apart\n"
         "  texture coordinates, at closest points of the surface; where they differ by more than 1/16 of the atlas "
         "they\n"
         "      are elsewhere in it, and counted by themselves\n"
@@ -831,9 +891,10 @@ void add_compare(CLI::App& app, Run& run) {
     command->add_option("--frames", o.frames, "Compare at most this many frames; 0: all (default: all)");
     command
         ->add_option("--only", o.only,
-                     "Measure only some of m1, m2, texcoords, d1, d2, m3, flicker, topology, separated by commas")
+                     "Measure only some of m1, m2, regions, texcoords, d1, d2, m3, flicker, topology, separated by\n"
+                     "commas")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
+        ->check(CLI::IsMember({"m1", "m2", "regions", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
         ->option_text("LIST");
     command->add_option("--unit", o.unit, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
         ->check(CLI::IsMember({"auto", "mm", "cm", "m"}))

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <memory>
@@ -15,6 +16,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/running_time.hpp"
+#include "metrics/recoded_area.h"
 #include "rate_report.h"
 #include "stream_file.h"
 
@@ -40,16 +42,24 @@ void add_codebook(LayerBytes& bytes, const Packet& packet) {
 // one that cannot be decoded, all is overhead.
 class FrameInspector {
 public:
+    struct Inspected {
+        FrameInfo info;
+        std::optional<double> recoded;  // recoded_share(); nothing if it is not known
+    };
     explicit FrameInspector(Decoder& decoder) : decoder_(decoder) {}
-    Result<FrameInfo> inspect(const Packet& packet) {
+    Result<Inspected> inspect(const Packet& packet) {
         const auto type = frame_type(packet.kind);
         if (type == FrameType::intra && internal::is_referred(packet, internal::rules_of(*type))) intra_ = packet;
+        const auto sent = htvm::inspect(packet);
+        if (!sent) return tl::unexpected(sent.error());
         if (type == FrameType::tracked || type == FrameType::patched) {
             if (intra_) static_cast<void>(decoder_.decode(*intra_));
             intra_.reset();
-            if (const auto decoded = decoder_.decode(packet); decoded && *decoded) return (*decoded)->info;
+            if (const auto decoded = decoder_.decode(packet); decoded && *decoded)
+                return Inspected{(*decoded)->info, recoded_share((*decoded)->mesh, *sent)};
+            return Inspected{*sent, {}};
         }
-        return htvm::inspect(packet);
+        return Inspected{*sent, type == FrameType::predicted ? 0.0 : 1.0};
     }
 
 private:
@@ -147,6 +157,29 @@ void print_index(const StreamIndex& index) {
     fmt::print("\n");
 }
 
+// How much of the surface the patches of TP-frames replace, over all frames that refer to another mesh.
+struct PatchedArea {
+    std::size_t frames = 0, patched = 0;
+    double sum = 0, largest = 0;
+    double mean() const { return frames > 0 ? sum / static_cast<double>(frames) : 0; }
+};
+
+void add(PatchedArea& area, FrameType type, std::optional<double> recoded) {
+    if ((type != FrameType::tracked && type != FrameType::patched) || !recoded) return;
+    ++area.frames;
+    if (type == FrameType::patched) ++area.patched;
+    area.sum += *recoded;
+    area.largest = std::max(area.largest, *recoded);
+}
+
+nlohmann::json patched_area_json(const PatchedArea& area) {
+    if (area.frames == 0) return {};
+    return {{"frames", area.frames},
+            {"patched", area.patched},
+            {"mean_share", area.mean()},
+            {"largest_share", area.largest}};
+}
+
 // The sound of the whole stream.
 struct AudioTotals {
     std::uint64_t packets = 0, bytes = 0, samples = 0;  // samples: that are heard
@@ -184,6 +217,7 @@ Result<void> info(const Options& options) {
     RunningTime time;
     std::optional<StreamIndex> front;
     AudioTotals audio;
+    PatchedArea patched;
     nlohmann::json sequences = nlohmann::json::array();
     std::optional<SequenceInfo> first_sequence;
     std::optional<BufferModel> buffer;
@@ -216,8 +250,10 @@ Result<void> info(const Options& options) {
         }
         if (packet->kind == PacketKind::index || packet->kind == PacketKind::front_index) index = true;
         if (!frame_type(packet->kind)) continue;
-        auto frame = inspector.inspect(*packet);
-        if (!frame) return tl::unexpected(frame.error());
+        auto inspected = inspector.inspect(*packet);
+        if (!inspected) return tl::unexpected(inspected.error());
+        const auto& recoded = inspected->recoded;
+        auto* frame = &inspected->info;
         frame->bytes += codebooks;
         codebooks = {};
         frame->frame = numbers.of(frame->frame);
@@ -231,7 +267,11 @@ Result<void> info(const Options& options) {
         }
         ++count;
         add(totals, *frame);
-        if (options.json) frames.push_back(frame_json(*frame));
+        add(patched, frame->type, recoded);
+        if (options.json) {
+            frames.push_back(frame_json(*frame));
+            frames.back()["recoded_share"] = recoded ? nlohmann::json(*recoded) : nlohmann::json();
+        }
         if (!options.json && !options.summary) print_frame(*frame);
         if (input->is_live()) std::fflush(stdout);
     }
@@ -250,6 +290,7 @@ Result<void> info(const Options& options) {
                            {"bytes", bytes},
                            {"bytes_outside_frames", outside_frames},
                            {"audio", audio_json(audio)},
+                           {"patched_area", patched_area_json(patched)},
                            {"index", index},
                            {"front_index", front ? index_json(*front) : nlohmann::json()},
                            {"damaged_bytes", input->damaged_bytes()},
@@ -264,6 +305,9 @@ Result<void> info(const Options& options) {
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);
+        if (patched.patched > 0)
+            fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
+                       counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);
         fmt::print("{}{} in {:.2f} s, {} bytes ({} outside frames), {:.2f} Mbit/s{}\n", layer_table(totals),
                    counted(count, "frame"), seconds, bytes, outside_frames, megabits,
                    index ? ", with an index for seeking" : "");

@@ -35,11 +35,6 @@ namespace {
 
 constexpr int most_frames = 1000000;
 
-const std::map<std::string, SynthMotion> motions = {{"tour", SynthMotion::tour},
-                                                    {"calm", SynthMotion::calm},
-                                                    {"everyday", SynthMotion::everyday},
-                                                    {"fast", SynthMotion::fast}};
-
 struct Options {
     std::string folder, truth;  // truth: empty for none
     int frames = 60, first_frame = 0, marks = 1000;
@@ -205,6 +200,8 @@ Result<void> synthesise_live(const Options& options) {
 void add_synth(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto& o = *options;
+    std::map<std::string, SynthMotion> motions;
+    for (const auto& [motion, name] : synth_motions) motions[name] = motion;
     CLI::App* command = app.add_subcommand("synth", "Make a synthetic capture of a person: meshes and skeleton");
     command->description(
         "Make a synthetic capture of a person, to try the codec on: a dressed, coloured body, 1.75 m tall, that\n"

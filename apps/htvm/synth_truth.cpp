@@ -12,20 +12,6 @@
 namespace htvm::app {
 namespace {
 
-const char* name_of(LimbEventKind kind) {
-    switch (kind) {
-        case LimbEventKind::fast:
-            return "fast";
-        case LimbEventKind::touch:
-            return "touch";
-        case LimbEventKind::release:
-            return "release";
-        case LimbEventKind::occluded:
-            return "occluded";
-    }
-    return "";
-}
-
 double hundredths(double value) { return std::round(100 * value) / 100; }
 
 nlohmann::ordered_json mark_json(const SurfaceMark& mark) {
@@ -35,7 +21,7 @@ nlohmann::ordered_json mark_json(const SurfaceMark& mark) {
 }
 
 nlohmann::ordered_json event_json(const LimbEvent& event) {
-    nlohmann::ordered_json out = {{"event", name_of(event.kind)},
+    nlohmann::ordered_json out = {{"event", event_name(event.kind)},
                                   {"of", figure_name(event.part)},
                                   {"limb", part_name(event.part)},
                                   {"first", event.first},

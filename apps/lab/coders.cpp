@@ -16,6 +16,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/option_list.hpp"
 #include "io/mesh_file.h"
+#include "metrics/recoded_area.h"
 #include "tfan_mpeg.h"
 
 namespace htvm::lab {
@@ -44,7 +45,11 @@ Result<CodedFrame> decode_pending(Codec& codec) {
         auto frame = codec.decoder.push(*packet);
         *out.decode_ms += watch.milliseconds();
         if (!frame) return tl::unexpected(frame.error());
-        if (*frame) out.decoded = std::move((*frame)->mesh);
+        if (!*frame) continue;
+        out.decoded = std::move((*frame)->mesh);
+        const auto told = inspect(*packet);
+        if (!told) return tl::unexpected(told.error());
+        out.recoded = recoded_share(view_of(out.decoded), *told);
     }
     out.bytes.overhead += sent - out.bytes.total();
     return out;

@@ -51,7 +51,8 @@ QualityPoint quality_point(double quality);
 struct CodedFrame {
     Mesh decoded;
     FrameType type = FrameType::intra;
-    LayerBytes bytes;  // external_intra: bytes that a coder does not split up
+    LayerBytes bytes;    // external_intra: bytes that a coder does not split up
+    double recoded = 1;  // share of the decoded surface that it codes anew (metrics/recoded_area.h)
     double encode_ms = 0;
     std::optional<double> decode_ms;  // nothing if the coder does not time decoding separately; encode_ms is then the
                                       // sum of both

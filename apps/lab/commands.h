@@ -8,5 +8,7 @@ namespace htvm::lab {
 void add_decoding(CLI::App& app, app::Run& run);
 void add_rd(CLI::App& app, app::Run& run);
 void add_reproduce(CLI::App& app, app::Run& run);
+void add_events(CLI::App& app, app::Run& run);
+void add_endure(CLI::App& app, app::Run& run);
 
 }  // namespace htvm::lab

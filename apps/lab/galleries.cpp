@@ -241,7 +241,7 @@ Result<double> surface_error_of(const SourceFrames& source, std::size_t index, c
     const auto frame = source.frame(index);
     if (!frame) return tl::unexpected(frame.error());
     CompareOptions options;
-    options.points = options.cloud = options.pictures = options.topology = false;
+    options.points = options.regions = options.cloud = options.pictures = options.topology = false;
     options.surface_options.samples = 100000;
     const auto compared = compare_frame((*frame)->mesh, decoded, options);
     if (!compared) return tl::unexpected(compared.error());

@@ -388,7 +388,7 @@ std::vector<std::size_t> spread(const std::vector<std::size_t>& frames, std::siz
 
 Result<double> surface_error(const Mesh& original, const Mesh& decoded, unsigned threads) {
     CompareOptions options;
-    options.points = options.cloud = options.pictures = options.topology = false;
+    options.points = options.regions = options.cloud = options.pictures = options.topology = false;
     options.surface_options.samples = 100000;
     const internal::ThreadPool pool(threads);
     options.threads = pool.threads();

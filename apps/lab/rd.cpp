@@ -84,6 +84,7 @@ CompareOptions compare_options(const Options& options) {
     CompareOptions out;
     out.points = metrics.contains("m1");
     out.surface = metrics.contains("m2");
+    out.regions = metrics.contains("regions");
     out.pictures = metrics.contains("m3");
     out.cloud = metrics.contains("d1");
     out.topology = false;
@@ -195,6 +196,7 @@ std::string capture_title(const Options& options, const RdPoint& point) {
 void print_tables(const Options& options, const std::string& title, const std::vector<RdPoint>& points) {
     fmt::print("{}\n\n{}", title, rate_table(points));
     if (const auto table = enhanced_frame_table(points); !table.empty()) fmt::print("\n{}", table);
+    if (const auto table = region_table(points); !table.empty()) fmt::print("\n{}", table);
     for (const char* reference : rate_references)
         if (const auto table = rate_difference_table(points, reference); !table.empty()) fmt::print("\n{}", table);
     std::string crossings;
@@ -205,6 +207,11 @@ void print_tables(const Options& options, const std::string& title, const std::v
         "\n"
         "bpvf and layers: bits per captured vertex, all frames, including I-frames. one piece: what a coder does\n"
         "not split up (geometry with connectivity). Rate differences: Bjontegaard, n/a without a common range.\n");
+    if (std::ranges::find(options.metrics, "regions") != options.metrics.end())
+        fmt::print(
+            "regions: RMS error of a frame's worst region of 10 cm, 99th percentile over frames; patched: share of "
+            "the\n"
+            "surface that patches replace in a T- or TP-frame, on average.\n");
     if (std::ranges::find(options.metrics, "m3") != options.metrics.end())
         fmt::print("M3 fgr, SSIM: of the foreground of lit pictures; unlit, u.SSIM: of the same without shading.\n");
     if (options.coder_threads == 1)
@@ -301,9 +308,10 @@ void add_sweep_options(CLI::App& command, Options& o) {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command
         .add_option("--metrics", o.metrics,
-                    "Any of m1, m2, m3 (pictures, also unlit, PSNR and SSIM: slow), d1 (with d2); default m1,m2")
+                    "Any of m1, m2, m3 (pictures, also unlit, PSNR and SSIM: slow), d1 (with d2), regions (the worst\n"
+                    "region of 10 cm, of I-frames and of the others: 99th percentile over frames); default m1,m2")
         ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "m3", "d1"}))
+        ->check(CLI::IsMember({"m1", "m2", "m3", "d1", "regions"}))
         ->option_text("LIST");
     command.add_option(
         "--samples", o.samples,

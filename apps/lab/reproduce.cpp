@@ -149,7 +149,7 @@ SweepOptions sweep_options(const Laboratory& laboratory, const ExperimentPlan& p
     out.compare.points = true;
     out.compare.surface = surface;
     out.compare.pictures = pictures;
-    out.compare.cloud = out.compare.topology = false;
+    out.compare.regions = out.compare.cloud = out.compare.topology = false;
     out.compare.surface_options.samples = plan.surface_samples;
     out.measure_every = every;
     out.threads = laboratory.threads;

@@ -15,12 +15,16 @@ using namespace app;
 
 namespace {
 
-constexpr std::array<Measure, 12> all_measures = {{
+constexpr std::array<Measure, 15> all_measures = {{
     {"m1_mm", "M1, vertex to vertex, RMS", "M1", "mm", "m1", true, true, 3},
     {"m1_colour", "M1 colour, RMS", "M1 col", "levels", "m1", true, true, 2},
     {"m2_mm", "M2, point to surface, RMS", "M2", "mm", "m2", true, true, 3},
     {"hausdorff_mm", "largest distance", "Hausd.", "mm", "m2", true, false, 1},
     {"m2_worst_frame_mm", "M2 of the worst frame", "worst", "mm", "m2", true, false, 3},
+    {"region_p99_mm", "worst region of frames between I-frames, 99th percentile", "region", "mm", "regions", true,
+     false, 3},
+    {"region_intra_p99_mm", "worst region of I-frames, 99th percentile", "reg. I", "mm", "regions", true, false, 3},
+    {"patched_share", "share of the surface that patches replace", "patch", "of 1", "m2", true, false, 4},
     {"m3_foreground_db", "M3, pictures, PSNR of the foreground", "M3 fgr", "dB", "m3", false, true, 2},
     {"m3_full_db", "M3, pictures, PSNR of the full picture", "M3", "dB", "m3", false, false, 2},
     {"m3_ssim", "SSIM of M3's pictures", "SSIM", "of 1", "m3", false, true, 4},
@@ -49,10 +53,15 @@ std::optional<double> optional_number(const nlohmann::json& json, const char* ke
 }
 
 nlohmann::json frame_to_json(const RdFrame& frame) {
-    return {{"type", kind_of(frame.type).letter},          {"vertices", frame.vertices},
-            {"bytes", layers_json(frame.bytes)},           {"encode_ms", frame.encode_ms},
-            {"decode_ms", optional_json(frame.decode_ms)}, {"m1_mm", optional_json(frame.m1_mm)},
-            {"m2_mm", optional_json(frame.m2_mm)}};
+    return {{"type", kind_of(frame.type).letter},
+            {"vertices", frame.vertices},
+            {"bytes", layers_json(frame.bytes)},
+            {"encode_ms", frame.encode_ms},
+            {"decode_ms", optional_json(frame.decode_ms)},
+            {"m1_mm", optional_json(frame.m1_mm)},
+            {"m2_mm", optional_json(frame.m2_mm)},
+            {"worst_region_mm", optional_json(frame.worst_region_mm)},
+            {"recoded_share", frame.recoded}};
 }
 
 RdFrame frame_from_json(const nlohmann::json& json) {
@@ -65,6 +74,8 @@ RdFrame frame_from_json(const nlohmann::json& json) {
     frame.decode_ms = optional_number(json, "decode_ms");
     frame.m1_mm = optional_number(json, "m1_mm");
     frame.m2_mm = optional_number(json, "m2_mm");
+    frame.worst_region_mm = optional_number(json, "worst_region_mm");
+    frame.recoded = json.at("recoded_share").get<double>();
     return frame;
 }
 
@@ -138,6 +149,23 @@ void take_measures(const ComparisonSummary& s, const CompareOptions& options, st
     take("m3_unlit_ssim", options.pictures && s.has_unlit, s.m3_unlit_ssim);
     take("d1_db", options.cloud, s.d1_db);
     take("d2_db", options.cloud, s.d2_db);
+}
+
+void take_frame_measures(RdPoint& point) {
+    std::vector<double> intra, between;
+    double patched = 0;
+    std::size_t tracked = 0;
+    for (const auto& frame : point.frames) {
+        const bool is_intra = frame.type == FrameType::intra;
+        if (frame.worst_region_mm && std::isfinite(*frame.worst_region_mm))
+            (is_intra ? intra : between).push_back(*frame.worst_region_mm);
+        if (frame.type != FrameType::tracked && frame.type != FrameType::patched) continue;
+        ++tracked;
+        patched += frame.recoded;
+    }
+    if (!intra.empty()) point.values["region_intra_p99_mm"] = summarise(std::move(intra)).p99_mm;
+    if (!between.empty()) point.values["region_p99_mm"] = summarise(std::move(between)).p99_mm;
+    if (tracked > 0) point.values["patched_share"] = patched / static_cast<double>(tracked);
 }
 
 nlohmann::json to_json(const RdPoint& point) {
@@ -295,6 +323,27 @@ std::string enhanced_frame_table(std::span<const RdPoint> points) {
     if (rows.empty()) return {};
     return fmt::format("{:<10}{:>5}{:>9}{:>8}", "EP alone", "q", "frames", "bpvf") + layer_titles() +
            fmt::format("{:>14}\n", "conn.+mapping") + rows;
+}
+
+std::string region_table(std::span<const RdPoint> points) {
+    std::string rows;
+    for (const auto& point : points) {
+        const auto value = [&](const char* key, double scale, int digits) {
+            const auto found = point.values.find(key);
+            return found == point.values.end() ? "-" : fmt::format("{:.{}f}", scale * found->second, digits);
+        };
+        if (!point.values.contains("region_p99_mm") && !point.values.contains("region_intra_p99_mm") &&
+            totals(point, FrameType::patched).frames == 0)
+            continue;
+        rows += fmt::format("{:<10}{:>5g}{:>9}{:>9}{:>9}{:>12}{:>12}{:>14}\n", point.coder, point.quality,
+                            totals(point, FrameType::intra).frames, totals(point, FrameType::tracked).frames,
+                            totals(point, FrameType::patched).frames, value("region_intra_p99_mm", 1, 3),
+                            value("region_p99_mm", 1, 3), value("patched_share", 100, 3));
+    }
+    if (rows.empty()) return {};
+    return fmt::format("{:<10}{:>5}{:>9}{:>9}{:>9}{:>12}{:>12}{:>14}\n", "regions", "q", "I", "T", "TP", "of I, mm",
+                       "others, mm", "patched, %") +
+           rows;
 }
 
 std::string rate_difference_table(std::span<const RdPoint> points, const std::string& reference) {

@@ -34,7 +34,8 @@ struct RdFrame {
     LayerBytes bytes;
     double encode_ms = 0;
     std::optional<double> decode_ms;
-    std::optional<double> m1_mm, m2_mm;  // set if the frame was measured
+    double recoded = 1;                                   // CodedFrame::recoded
+    std::optional<double> m1_mm, m2_mm, worst_region_mm;  // set if the frame was measured
 };
 
 struct RdPoint {
@@ -62,6 +63,9 @@ std::vector<RatePoint> rate_curve(std::span<const RdPoint> points, const std::st
 void take_measures(const ComparisonSummary& summary, const CompareOptions& options,
                    std::map<std::string, double>& values);
 
+// Writes what follows from the frames one by one: the percentiles of their worst regions, and how much patches replace.
+void take_frame_measures(RdPoint& point);
+
 nlohmann::json to_json(const RdPoint& point);
 // Nothing if the JSON was not written by to_json.
 std::optional<RdPoint> rd_point_from_json(const nlohmann::json& json);
@@ -76,6 +80,10 @@ std::string rate_table(std::span<const RdPoint> points);
 
 // EP-frames only, bits per vertex by layer; empty if there are none.
 std::string enhanced_frame_table(std::span<const RdPoint> points);
+
+// The worst regions of I-frames and of the frames between, and how much of the surface patches replace; empty if there
+// are neither worst regions nor patches.
+std::string region_table(std::span<const RdPoint> points);
 
 // Bjontegaard rate differences of every coder relative to `reference`, for every measure that was taken; empty if the
 // reference was not measured.

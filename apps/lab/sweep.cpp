@@ -164,6 +164,7 @@ Result<RdFrame> run_frame(const SweepJob& job, const FrameCoder& coder, const So
     out.type = coded->type;
     out.vertices = static_cast<std::uint32_t>(source.mesh.positions.size());
     out.bytes = coded->bytes;
+    out.recoded = coded->recoded;
     out.encode_ms = coded->encode_ms;
     out.decode_ms = coded->decode_ms;
     if (source.index % options.measure_every == 0) {
@@ -171,6 +172,7 @@ Result<RdFrame> run_frame(const SweepJob& job, const FrameCoder& coder, const So
         if (!compared) return tl::unexpected(compared.error());
         if (options.compare.points) out.m1_mm = m1_geometry(compared->points);
         if (options.compare.surface) out.m2_mm = m2(compared->surface);
+        if (options.compare.regions) out.worst_region_mm = compared->region.worst_mm;
         sums += *compared;
     }
     if (auto kept = keep_frame(job.keep_frames, source, coded->decoded); !kept) return tl::unexpected(kept.error());
@@ -200,6 +202,7 @@ Result<RdPoint> run_job(const SweepJob& job, const SourceFrames& source, const S
         step();
     }
     take_measures(summarise(sums, diagonal(source.facts().box)), options.compare, point.values);
+    take_frame_measures(point);
     return point;
 }
 

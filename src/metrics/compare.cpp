@@ -69,6 +69,13 @@ Result<FrameComparison> compare_frame(const Mesh& original, const Mesh& decoded,
         if (!error) return tl::unexpected(error.error());
         out.surface = *error;
     }
+    if (options.regions) {
+        RegionErrorOptions regions;
+        regions.threads = options.threads;
+        const auto error = worst_region(original, decoded, regions);
+        if (!error) return tl::unexpected(error.error());
+        out.region = *error;
+    }
     if (options.texcoords) {
         const auto error = texcoord_error(original, decoded, options.threads);
         if (!error) return tl::unexpected(error.error());

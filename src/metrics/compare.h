@@ -12,6 +12,7 @@
 #include "metrics/mesh_measures.h"
 #include "metrics/picture_error.h"
 #include "metrics/point_error.h"
+#include "metrics/region_error.h"
 #include "metrics/surface_error.h"
 #include "metrics/texcoord_error.h"
 #include "metrics/topology.h"
@@ -21,6 +22,7 @@ namespace htvm {
 struct CompareOptions {
     bool points = true;     // M1, geometry and colour
     bool surface = true;    // M2
+    bool regions = true;    // the worst region
     bool texcoords = true;  // if both meshes have them
     bool cloud = true;      // D1 and D2
     bool pictures = true;   // M3 and SSIM; and unlit, where both meshes have colours
@@ -41,6 +43,7 @@ struct FrameComparison {
     Box original_box;
     PointError points;
     SurfaceError surface;
+    RegionError region;
     TexcoordError texcoords;
     CloudError cloud;
     PictureErrorSums pictures;        // as CompareOptions::render says

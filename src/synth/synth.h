@@ -3,6 +3,7 @@
 // own, and is the same for any number of threads.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "core/thread.h"
@@ -17,6 +18,18 @@ enum class SynthMotion : std::uint8_t {
     calm,      // stands and gestures; hands touch each other, the chin, the hips, an arm
     everyday,  // walks, sits down on a chair and gets up, hands in pockets, picks up a ball; somebody comes in at times
     fast,      // dances: kicks, jumps, spins, claps; limbs move 30 cm and more in a thirtieth of a second
+};
+
+// How a motion is called on command lines.
+struct SynthMotionName {
+    SynthMotion motion;
+    const char* name;
+};
+inline constexpr std::array synth_motions = {
+    SynthMotionName{SynthMotion::tour, "tour"},
+    SynthMotionName{SynthMotion::calm, "calm"},
+    SynthMotionName{SynthMotion::everyday, "everyday"},
+    SynthMotionName{SynthMotion::fast, "fast"},
 };
 
 struct SynthOptions {

@@ -208,6 +208,20 @@ std::string part_name(std::size_t part) {
     return part == left_pocket ? "left pocket" : part == right_pocket ? "right pocket" : figure_name(part);
 }
 
+std::string event_name(LimbEventKind kind) {
+    switch (kind) {
+        case LimbEventKind::fast:
+            return "fast";
+        case LimbEventKind::touch:
+            return "touch";
+        case LimbEventKind::release:
+            return "release";
+        case LimbEventKind::occluded:
+            return "occluded";
+    }
+    return {};
+}
+
 TrueFrame true_frame(const SynthOptions& options, std::span<const SurfaceMark> marks, int frame, Threads threads) {
     const PosedScene scene = scene_at(options, frame);
     TrueFrame out;

@@ -50,6 +50,8 @@ enum class LimbEventKind : std::uint8_t {
     occluded,  // more than half of it is covered
 };
 
+std::string event_name(LimbEventKind kind);  // "fast" and so on
+
 struct LimbEvent {
     LimbEventKind kind = LimbEventKind::fast;
     std::size_t part = 0, other = 0;  // the limb; touch and release: what it touches

@@ -28,7 +28,7 @@ expect 0 "htvm-lab " "$lab" --version
 expect 2 "" "$lab"
 expect 2 "htvm-lab: error: there is no command 'nonsense'; 'htvm-lab --help' lists them" "$lab" nonsense
 expect 2 "it is 'htvm encode'" "$lab" encode capture -o x.htvm
-for command in rd decoding reproduce; do expect 0 "Usage" "$lab" $command --help; done
+for command in rd decoding reproduce events endure; do expect 0 "Usage" "$lab" $command --help; done
 
 # The sweep: tables, or only JSON on standard output; stored results are used again.
 expect 2 "--output is required" "$lab" rd capture
@@ -50,6 +50,20 @@ expect 0 "T-frames                   1" "$lab" decoding stream.htvm --repeat 1
     { echo "FAILED: no percentiles as JSON"; failures=$((failures + 1)); }
 expect 1 "nowhere.htvm" "$lab" decoding nowhere.htvm
 expect 1 "there is no frame" "$lab" decoding "$lab"
+
+# The worst regions and what patches replace, on request.
+expect 0 "of I, mm" "$lab" rd capture -o regions -q 40 --coders htvm-t --metrics m2,regions
+
+# Events and endurance: a capture of their own, the same again with the same options.
+expect 0 "followed, %" "$lab" events --motion calm --frames 4 --vertices 800
+"$lab" events --motion fast --first-frame 40 --frames 6 --vertices 800 --json >events.json 2>/dev/null
+"$lab" events --motion fast --first-frame 40 --frames 6 --vertices 800 --threads 2 --json 2>/dev/null | cmp -s - events.json ||
+    { echo "FAILED: events are not the same again"; failures=$((failures + 1)); }
+grep -q '"followed_share"' events.json || { echo "FAILED: no share of events"; failures=$((failures + 1)); }
+expect 2 "" "$lab" events --motion sleeping
+expect 0 "less than five rows" "$lab" endure --minutes 0.01 --vertices 800
+"$lab" endure --minutes 0.01 --vertices 800 --json -o long >endure.json 2>/dev/null && cmp -s endure.json long/endure.json ||
+    { echo "FAILED: endure --json does not print endure.json"; failures=$((failures + 1)); }
 
 [ $failures -eq 0 ] && echo "the laboratory's command line does what it should"
 exit $failures

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 namespace htvm::lab {
 
@@ -114,6 +115,32 @@ TEST(TakeMeasures, unlit_pictures_only_where_there_are_colours) {
     take_measures(summary, options, values);
     EXPECT_EQ(30, values.at("m3_unlit_db"));
     EXPECT_EQ(0.75, values.at("m3_unlit_ssim"));
+}
+
+TEST(TakeFrameMeasures, worst_regions_of_i_frames_and_of_others_and_what_patches_replace) {
+    RdPoint point;
+    for (const auto& [type, worst, recoded] :
+         {std::tuple{FrameType::intra, 2.0, 1.0}, std::tuple{FrameType::tracked, 3.0, 0.0},
+          std::tuple{FrameType::patched, 5.0, 0.04}, std::tuple{FrameType::tracked, 4.0, 0.0}}) {
+        point.frames.push_back(frame_of(type, 100, 10));
+        point.frames.back().worst_region_mm = worst;
+        point.frames.back().recoded = recoded;
+    }
+    point.coder = "htvm-t";
+    take_frame_measures(point);
+    EXPECT_EQ(2, point.values.at("region_intra_p99_mm"));
+    EXPECT_EQ(5, point.values.at("region_p99_mm"));
+    EXPECT_DOUBLE_EQ(0.04 / 3, point.values.at("patched_share"));
+    const std::string table = region_table(std::vector{point});
+    EXPECT_NE(std::string::npos, table.find("2.000       5.000         1.333")) << table;
+}
+
+TEST(TakeFrameMeasures, nothing_of_frames_by_themselves_that_were_not_measured) {
+    auto point = point_of("tfan", 50, 70, 1);
+    const auto before = point.values;
+    take_frame_measures(point);
+    EXPECT_EQ(before, point.values);
+    EXPECT_EQ("", region_table(std::vector{point}));
 }
 
 TEST(RateCurve, errors_count_the_better_the_smaller) {

@@ -1,0 +1,39 @@
+#include "metrics/recoded_area.h"
+
+#include <algorithm>
+
+#include "metrics/mesh_measures.h"
+
+namespace htvm {
+
+double surface_area(std::span<const Vector3f> positions, std::span<const Triangle> triangles) {
+    double area = 0;
+    for (const auto& t : triangles) {
+        const Point3 a = to_point(positions[t[0]]);
+        area += length(cross(to_point(positions[t[1]]) - a, to_point(positions[t[2]]) - a)) / 2;
+    }
+    return area;
+}
+
+std::size_t kept_triangles(const MeshView& decoded, const FrameInfo& sent) {
+    const std::size_t all = decoded.triangles.size();
+    switch (sent.type) {
+        case FrameType::intra:
+        case FrameType::enhanced:
+            return 0;
+        case FrameType::predicted:
+        case FrameType::tracked:
+            return all;
+        case FrameType::patched:
+            return all - std::min<std::size_t>(sent.triangles, all);
+    }
+    return all;
+}
+
+double recoded_share(const MeshView& decoded, const FrameInfo& sent) {
+    const double area = surface_area(decoded.positions, decoded.triangles);
+    if (!(area > 0)) return 0;
+    return surface_area(decoded.positions, decoded.triangles.subspan(kept_triangles(decoded, sent))) / area;
+}
+
+}  // namespace htvm
