@@ -742,7 +742,7 @@ std::string drift_rows(const DriftMeter& meter) {
         out += fmt::format("  {:<34}{:>12.3f}{:>12.3f}\n", what, drift.mean_mm, drift.p95_mm);
     };
     for (const std::size_t age : {0, 1, 2, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000})
-        if (age < by_age.size())
+        if (age < by_age.size() && by_age[age].marks > 0)
             add(age == 0 ? "  at the reference" : fmt::format("  after {}", counted(age, "frame")), by_age[age]);
     if (all.marks > 0)
         add("  all frames but references", all);

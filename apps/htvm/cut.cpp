@@ -66,6 +66,12 @@ Result<void> write(Cut& cut, Packet packet) {
     return cut.output.write(packet);
 }
 
+// Whether every frame asked for has been read.
+bool has_all(const Cut& cut) {
+    const auto& options = cut.options;
+    return cut.started && options.frames > 0 && cut.last_number + 1 == options.first + options.frames;
+}
+
 // Whether no later frame needs anything before this one but the sequence header.
 bool can_start_here(const Cut& cut) {
     const auto& dependencies = cut.numbers.dependencies();
@@ -156,6 +162,17 @@ void skip_to_part(Cut& cut, StreamInput& input) {
     input.go_on_with({std::move(*front), std::move(*header)}, first->offset);
 }
 
+// An error if the input, as far as it was read, was not whole. An end that is cut off behind the part is not missed.
+Result<void> check_whole_up_to_part(const Cut& cut, const StreamInput& input) {
+    const auto& options = cut.options;
+    if (!cut.started || input.refusal() || input.damaged_bytes() > 0 || input.oversized_packets() > 0)
+        return check_whole(input, options.input);
+    if (has_all(cut)) return {};
+    return check_whole(input, options.input,
+                       fmt::format("--first {} --frames {} copies what is whole", cut.first_asked,
+                                   cut.last_number - cut.first_asked + 1));
+}
+
 std::string no_such_frames(const Cut& cut) {
     const auto& input = cut.options.input;
     if (cut.waiting.empty()) return fmt::format("{} has no such frames; 'htvm info' tells which it has", input);
@@ -176,7 +193,7 @@ Result<void> run_cut(const Options& options) {
         if (!more) return tl::unexpected(more.error());
         if (!*more) break;
     }
-    if (auto fine = check_whole(*input, options.input); !fine) return fine;
+    if (auto fine = check_whole_up_to_part(cut, *input); !fine) return fine;
     if (!cut.started)
         return fail(ErrorKind::bad_input, cut.header
                                               ? no_such_frames(cut)
@@ -186,7 +203,7 @@ Result<void> run_cut(const Options& options) {
     note(fmt::format(
         "{}: {}, numbers {} to {} of {}{}", options.output, counted(cut.frames, "frame"), cut.start_number,
         cut.last_number, options.input,
-        widened ? fmt::format(", from frame {} on because decoding can start there", cut.start_number) : ""));
+        widened ? fmt::format(", from I-frame {} on, which frame {} needs", cut.start_number, cut.first_asked) : ""));
     return {};
 }
 
@@ -207,9 +224,10 @@ void add_cut(CLI::App& app, Run& run) {
     to->check(CLI::NonNegativeNumber)->excludes(first)->excludes(frames);
     add_packet_limits(*command, options->limits);
     command->footer(
-        "The part begins at the last I-frame at or before the first frame that decoding can start at; the command "
-        "says\n"
-        "which that is. Its frames are numbered from 0 and keep their timestamps.\n"
+        "The part begins with an I-frame, the first frame asked for or the last before it: what follows refers to it,\n"
+        "also at the places between where players start (encode --access-interval). What is to be cut closely is\n"
+        "encoded with a smaller --keyint. Frames are numbered from 0 and keep their timestamps.\n"
+        "Of a stream whose end is missing, --frames takes what is whole.\n"
         "Examples:\n"
         "  htvm cut person.htvm --first 300 --frames 150 -o part.htvm\n"
         "  htvm cut person.htvm --from 10 --to 15 -o part.htvm");

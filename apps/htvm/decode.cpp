@@ -467,10 +467,10 @@ void add_decode(CLI::App& app, Run& run) {
     add_decoder_limits(*command, options->limits);
     command->footer(
         "If a stream is damaged or truncated, every undamaged frame is decoded, losses are reported, and the\n"
-        "exit code is 3; likewise if frames are missing. A lost P- or EP-frame costs no other frame; a lost T-frame\n"
-        "costs those up to the next I-frame, unless encoded with --tracked-from intra; a damaged sequence header "
-        "costs\n"
-        "all frames until it is repeated, with an I-frame at least ten frames later.\n"
+        "exit code is 3; likewise if frames are missing. A lost P- or EP-frame costs no other frame; a lost T-frame,\n"
+        "unless encoded with --tracked-from intra, those up to the next place to start (encode --access-interval); a\n"
+        "lost I- or TP-frame those up to the next I-frame; a damaged sequence header all frames until it is repeated,\n"
+        "with an I-frame at least ten frames later.\n"
         "Examples:\n"
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"

@@ -67,18 +67,21 @@ private:
     std::optional<Packet> intra_;  // the last that may be referred to, as long as nothing needed it
 };
 
-void print_frame(const FrameInfo& f) {
+// start: whether the index names it as a place to start; that of I- and TP-frames goes without saying.
+void print_frame(const FrameInfo& f, bool start) {
     auto bpv = [&](std::size_t bytes) { return bits_per_vertex(bytes, f.source_vertices); };
     const auto& b = f.bytes;
     fmt::print(
         "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>9} {:>9} {:>15.3f} {:>8.3f} {:>8.3f} {:>17.3f} {:>8.3f} {:>8.3f} "
-        "{:>14.3f} "
-        "{:>8.3f}\n",
-        f.frame, kind_of(f.type).letter, f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices,
-        f.triangles, b.total(), bpv(b[Layer::pose] + b[Layer::transforms]),
-        bpv(b[Layer::geometry] + b[Layer::external_intra]), bpv(b[Layer::colour]),
-        bpv(b[Layer::normals] + b[Layer::texcoords]), bpv(b[Layer::mapping]), bpv(b[Layer::fans]),
-        bpv(b[Layer::distance_orders]), bpv(b.total()));
+        "{:>14.3f} {:>22.3f} {:>8.3f}\n",
+        f.frame,
+        std::string(kind_of(f.type).letter) +
+            (start && f.type != FrameType::intra && f.type != FrameType::patched ? "*" : ""),
+        f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices, f.triangles, b.total(),
+        bpv(b[Layer::pose] + b[Layer::transforms]), bpv(b[Layer::geometry] + b[Layer::external_intra]),
+        bpv(b[Layer::colour]), bpv(b[Layer::normals] + b[Layer::texcoords]), bpv(b[Layer::mapping]),
+        bpv(b[Layer::fans]), bpv(b[Layer::distance_orders]),
+        bpv(b[Layer::tracked] + b[Layer::removed] + b[Layer::border]), bpv(b.total()));
 }
 
 const char* axis_name(UpAxis up) {
@@ -146,6 +149,10 @@ nlohmann::json index_json(const StreamIndex& index) {
     nlohmann::json out = {{"frames", index.frames}, {"seconds", static_cast<double>(index.duration_us) / 1e6}};
     if (index.bounds) out["bounds_mm"] = {index.bounds->low, index.bounds->high};
     return out;
+}
+
+bool is_start(const StreamIndex& index, std::uint64_t frame) {
+    return std::ranges::binary_search(index.points, frame, {}, &AccessPoint::frame);
 }
 
 void print_index(const StreamIndex& index) {
@@ -234,9 +241,11 @@ Result<void> info(const Options& options) {
             if (!options.json && first && front) print_index(*front);
             if (!options.json && first && !options.summary)
                 fmt::print(
-                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>15} {:>8} {:>8} {:>17} {:>8} {:>8} {:>14} {:>8}\n",
+                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>15} {:>8} {:>8} {:>17} {:>8} {:>8} {:>14} {:>22} "
+                    "{:>8}\n",
                     "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "pose/transforms", "geometry",
-                    "colour", "normals/texcoords", "mapping", "fans", "distance order", "bpv");
+                    "colour", "normals/texcoords", "mapping", "fans", "distance order", "tracked/removed/border",
+                    "bpv");
         }
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
         if (packet->kind == PacketKind::audio)
@@ -272,7 +281,7 @@ Result<void> info(const Options& options) {
             frames.push_back(frame_json(*frame));
             frames.back()["recoded_share"] = recoded ? nlohmann::json(*recoded) : nlohmann::json();
         }
-        if (!options.json && !options.summary) print_frame(*frame);
+        if (!options.json && !options.summary) print_frame(*frame, front && is_start(*front, frame->frame));
         if (input->is_live()) std::fflush(stdout);
     }
     if (input->refusal()) return tl::unexpected(*input->refusal());
@@ -301,7 +310,8 @@ Result<void> info(const Options& options) {
         if (!options.summary)
             fmt::print(
                 "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
-                "mesh\n\n");
+                "mesh\n"
+                "*: a place to start, as every I- and TP-frame is\n\n");
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);
@@ -342,9 +352,11 @@ void add_info(CLI::App& app, Run& run) {
         ->check(CLI::Range(0.01, 3600.0))
         ->needs(bitrate);
     command->footer(
-        "Columns: pose is the skeleton (I), transforms are the bones' (EP); fans and distance order are the\n"
-        "connectivity's two parts; texcoords are texture coordinates; bpv is the frame's total, with packet and layer\n"
-        "headers, counts and ends of runs (overhead, below). All in bits per vertex of the captured mesh.\n"
+        "Columns: ref is the frame that it refers to; pose is the skeleton (I), transforms are the bones' (EP) or the\n"
+        "nodes' (T); fans and distance order are the connectivity's two parts; texcoords are texture coordinates; of\n"
+        "TP-frames tracked is what a T-frame has too, in one, removed what the patch replaces, border where it joins,\n"
+        "and the other columns are the patch's; bpv is the frame's total, with packet and layer headers, counts and\n"
+        "ends of runs (overhead, below). All in bits per vertex of the captured mesh.\n"
         "T-frames are decoded to tell their parts; one that cannot be counts as overhead.\n"
         "Decoded positions lie on the lattice; the step of the quality (encode -q) is coarser.");
     command->callback([options, &run] { run = [options] { return info(*options); }; });

@@ -155,7 +155,7 @@ std::string picture_lines(std::span<const RdPoint> points, const Measure& measur
     const double least_range = std::pow(10, 2 - measure.digits);
     out += axis_lines('y', measure.is_error ? error_axis(ys) : psnr_axis(ys, least_range),
                       fmt::format("{}, {}{}", measure.title, measure.unit, measure.is_error ? " (log scale)" : ""));
-    out += fmt::format("set key {} noenhanced\n", measure.is_error ? "top right" : "bottom right");
+    out += "set key tmargin center horizontal noenhanced\n";  // inside, it would cover points
     const auto path = curves.folder / file_name(measure, by_bits_per_vertex);
     out += "set terminal svg size 900,620 font 'Helvetica,Arial,sans-serif,16' background 'white'\n";
     out += fmt::format("set output {}\nplot{}\n", quoted(path.string() + ".svg"), plots);
@@ -227,7 +227,7 @@ std::string curve_script(std::span<const RdPoint> points, const Curves& curves) 
     std::string out = "# Rate-distortion curves; run gnuplot on this file to draw them again.\n";
     out += fmt::format("set title {} noenhanced\n", quoted(curves.capture));
     out += "set grid linetype 1 linecolor rgb '#dddddd' linewidth 1\nset border 3 linecolor rgb '#444444'\n";
-    out += "set tics nomirror out scale 0.6\nset key opaque box linecolor rgb '#bbbbbb' spacing 1.25 samplen 2.5\n\n";
+    out += "set tics nomirror out scale 0.6\nset key spacing 1.25 samplen 2.5\n\n";
     for (const auto& measure : measures())
         if (drawn(points, measure))
             for (const bool by_bits_per_vertex : {true, false})

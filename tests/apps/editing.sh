@@ -75,6 +75,11 @@ packets walk.htvm | grep -q ' 5 ' && fail "walk.htvm has an index at its end too
 expect 0 "index: 12 frames, 0.40 s, 3 places to start, within" "$htvm" info walk.htvm
 "$htvm" info walk.htvm | head -n 1 | grep -q "^walk.htvm: 30 frames/s" || fail "info does not begin with the file's name"
 expect 0 "bits per captured vertex" "$htvm" info walk.htvm
+"$htvm" encode walk --keyint 12 --access-interval 4 -o spaced.htvm 2>/dev/null
+"$htvm" info spaced.htvm >said.txt
+grep -q ' T\* ' said.txt || fail "no T-frame is a place to start"
+[ "$(awk '$2 == "I" || $2 == "TP" || $2 == "T*"' said.txt | wc -l)" -eq "$(grep -o '[0-9]* places' said.txt | cut -d' ' -f1)" ] ||
+    fail "info marks other places to start than the index has"
 "$htvm" encode walk --keyint 4 -o - 2>/dev/null >live.htvm
 expect 0 '"front_index": null' "$htvm" info live.htvm --json
 
@@ -120,7 +125,7 @@ cmp -s indexed.htvm again.htvm || fail "an index that is written again is anothe
 expect 0 "12 frames in 1 sequence, all sound, with an index" "$htvm" verify indexed.htvm
 
 # Cutting: from the I-frame at or before the first frame on.
-expect 0 "5 frames, numbers 4 to 8 of walk.htvm, from frame 4 on because decoding can start there" \
+expect 0 "5 frames, numbers 4 to 8 of walk.htvm, from I-frame 4 on, which frame 5 needs" \
     "$htvm" cut walk.htvm --first 5 --frames 4 -o cut.htvm
 rm -rf part
 expect 0 "5 frames to part" "$htvm" decode cut.htvm -o part
@@ -192,6 +197,11 @@ head -n 1 said.txt | grep -q "not part of an undamaged packet" || fail "verify d
 expect 3 "frame 5 is not in the stream" "$htvm" decode lost.htvm -o x
 { head -c "${next[0]}" walk.htvm; } >tail.htvm
 expect 3 "frames 8 to 11 are not in the stream" "$htvm" decode tail.htvm -o x
+head -c $((next[0] + 100)) walk.htvm >tail.htvm
+expect 3 "ends in the middle of a packet; --first 5 --frames 3 copies what is whole" "$htvm" cut tail.htvm --first 5 -o saved.htvm
+expect 3 "--first 5 --frames 3 copies" "$htvm" cut tail.htvm --first 5 --frames 4 -o saved.htvm
+expect 0 "numbers 4 to 7" "$htvm" cut tail.htvm --first 5 --frames 3 -o saved.htvm
+expect 0 "4 frames in 1 sequence, all sound" "$htvm" verify saved.htvm
 expect 3 "is not sound" "$htvm" verify capture/skeleton.json
 for command in cut join index; do
     cp walk.htvm kept.htvm

@@ -165,7 +165,8 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
     if (version < oldest_version || version > stream_version)
         return fail(ErrorKind::unsupported, "the stream has version " + std::to_string(version) +
                                                 ", this decoder reads versions " + std::to_string(oldest_version) +
-                                                " to " + std::to_string(stream_version));
+                                                " to " + std::to_string(stream_version) +
+                                                (version > stream_version ? "; a newer htvm is needed" : ""));
     SequenceHeader out;
     out.version = version;
     out.lattice.bits = in.u8();
