@@ -82,7 +82,7 @@ std::string picture_rows(const SequenceComparison& sums, const ComparisonSummary
                                                          static_cast<double>(sums.pictures.foreground_pixels)
                                                    : 0,
                3);
-    if (s.has_unlit)
+    if (s.has_unlit && options.render.shading != Shading::unlit)
         out += "  unlit M3, the same pictures without shading\n" +
                single("PSNR of the foreground, dB", s.m3_unlit_foreground_db, 2) +
                single("PSNR of the full picture, dB", s.m3_unlit_full_db, 2) +
@@ -318,7 +318,7 @@ std::vector<FrameType> kinds_in(const std::vector<FlickerFrame>& frames) {
     return out;
 }
 
-std::string flicker_rows(const std::vector<FlickerFrame>& frames) {
+std::string flicker_rows(const std::vector<FlickerFrame>& frames, Shading shading_of_lit) {
     std::string out = fmt::format("\n  {:<34}{:>12}{:>12}{:>12}{:>12}  {}\n", "flicker: change from frame to frame",
                                   "original", "decoded", "ratio", "still", "over T beside: median, largest");
     const auto add = [&](const std::string& what, const FlickerTotal& total) {
@@ -331,7 +331,7 @@ std::string flicker_rows(const std::vector<FlickerFrame>& frames) {
     for (const auto& [name, shading] :
          {std::pair{"RMS levels", &FrameFlicker::lit}, std::pair{"unlit, RMS levels", &FrameFlicker::unlit}}) {
         const auto all = flicker_total(frames, shading, {});
-        if (all.sums.pixels == 0) continue;
+        if (all.sums.pixels == 0 || (shading == &FrameFlicker::unlit && shading_of_lit == Shading::unlit)) continue;
         add(name, all);
         for (const auto kind : kinds_in(frames)) {
             const auto total = flicker_total(frames, shading, kind);
@@ -627,14 +627,12 @@ Result<Marks> open_marks(const Options& options, const MeshSource& original) {
     auto source = open_meshes({(std::filesystem::path(options.truth) / "marks").string()}, {"mm", "", options.limits});
     if (!source) return tl::unexpected(source.error());
     Marks marks{std::move(*source), std::vector<std::size_t>(original.frames)};
-    std::ranges::fill(marks.place_of, marks.source.frames);
-    const bool by_number = !original.numbers.empty() && !marks.source.numbers.empty();
-    std::vector<FramePair> pairs;
-    if (by_number)
-        pairs = pair_by_number(original.numbers, marks.source.numbers);
-    else
-        for (std::size_t k = 0; k < std::min(original.frames, marks.source.frames); ++k) pairs.push_back({k, k});
-    for (const auto& pair : pairs) marks.place_of[pair.original] = pair.decoded;
+    const auto& numbers = marks.source.numbers;
+    const bool by_number = !original.numbers.empty() && !numbers.empty();
+    for (std::size_t k = 0; k < original.frames; ++k)
+        marks.place_of[k] =
+            by_number ? static_cast<std::size_t>(std::ranges::find(numbers, original.numbers[k]) - numbers.begin())
+                      : std::min(k, marks.source.frames);
     return marks;
 }
 
@@ -648,9 +646,12 @@ struct Measured {
     std::vector<std::optional<FrameType>> kinds;  // of each, if it is known
 };
 
-Result<FrameDrift> measure_drift(Marks& marks, DriftMeter& meter, std::size_t original, const Mesh& decoded) {
+// original: its position, with that number.
+Result<FrameDrift> measure_drift(Marks& marks, DriftMeter& meter, std::size_t original, std::uint64_t number,
+                                 const Mesh& decoded) {
     if (marks.place_of[original] == marks.source.frames)
-        return fail(ErrorKind::bad_input, fmt::format("{} has no frame for frame {}", marks.source.name, original));
+        return fail(ErrorKind::bad_input,
+                    fmt::format("{} has no frame {}; is it the truth of these originals?", marks.source.name, number));
     const auto mesh = marks.source.mesh_at(marks.source, marks.place_of[original]);
     if (!mesh) return tl::unexpected(mesh.error());
     return meter.add(*mesh, decoded);
@@ -683,7 +684,8 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         out.places.push_back(pair.original);
         out.kinds.push_back(decoded.is_stream ? std::optional(decoded.kinds[pair.decoded]) : std::nullopt);
         if (marks) {
-            const auto drift = measure_drift(*marks, out.drift, pair.original, *second);
+            const auto number = original.numbers.empty() ? pair.original : original.numbers[pair.original];
+            const auto drift = measure_drift(*marks, out.drift, pair.original, number, *second);
             if (!drift) return tl::unexpected(drift.error());
             out.drifts.push_back(*drift);
         }
@@ -819,7 +821,8 @@ Result<void> compare(Options options) {
         fmt::print("{}", comparison_table(measured->sums, options.compare, options.peak_mm));
         if (options.compare.regions) fmt::print("{}", region_rows(measured->frames, measured->kinds));
         if (!measured->drifts.empty()) fmt::print("{}", drift_rows(measured->drift));
-        if (has_flicker(measured->flickers)) fmt::print("{}", flicker_rows(measured->flickers));
+        if (has_flicker(measured->flickers))
+            fmt::print("{}", flicker_rows(measured->flickers, options.compare.render.shading));
     }
     return {};
 }

@@ -120,6 +120,8 @@ expect 0 "into 2 I-frames" "$htvm" compare walk walk.htvm --only flicker --views
 mkdir gap && cp whole/0000[02].ply gap
 "$htvm" compare walk gap "${measure[@]}" >gap.json
 [ "$(field gap.json frames 1 frame) $(field gap.json frames 1 flicker)" = "2 none" ] || fail "flicker across a gap"
+[ "$("$htvm" compare walk walk.htvm --only m3,flicker --views 1 "${small[@]}" --frames 2 --shading unlit 2>/dev/null |
+    grep -c 'PSNR of the foreground\|RMS levels')" -eq 2 ] || fail "unlit pictures are told twice"
 "$htvm" compare walk walk.htvm --only flicker --views 1 "${small[@]}" --frames 2 --csv - --quiet | cut -d, -f 6,7 >cells
 [ "$(head -2 cells | paste -sd ' ')" = "kind,flicker_lit I," ] && grep -q "^T,[0-9]" cells || fail "cells: $(cat cells)"
 

@@ -22,6 +22,9 @@ expect 0 "no frame has the same triangles as the one before" "$htvm" compare dan
 "$htvm" compare dance dance.htvm --only m2 --truth truth --csv - 2>/dev/null | head -1 |
     grep -q ',drift_age,drift_mean_mm,drift_p95_mm$' || fail "the CSV has no drift"
 expect 1 "nowhere" "$htvm" compare dance dance.htvm --truth nowhere
+"$htvm" synth later --motion fast --frames 4 --first-frame 31 --vertices 1500 --truth later_truth --truth-marks 20 --quiet
+expect 1 "later_truth/marks has no frame 30; is it the truth of these originals?" \
+    "$htvm" compare dance dance.htvm --only m2 --truth later_truth
 expect 1 "the tour has one person" "$htvm" synth two --people 2 --frames 1
 expect 2 "--motion" "$htvm" synth two --motion sleep
 
