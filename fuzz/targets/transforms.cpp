@@ -2,7 +2,7 @@
 // range.
 #include "codec/reference/transforms.h"
 
-#include "codec/tracked/node_motion.h"
+#include "codec/tracked/node_motion_enc.h"
 #include "small_mesh.h"
 
 namespace {
@@ -67,7 +67,12 @@ void check_node_motion(const std::vector<QuantisedTransform>& wanted, fuzz::Fuzz
     NodeMotionOptions options;
     options.steps.rotation_exponent = static_cast<int>(input.below(11));
     options.steps.shift_exponent = static_cast<int>(input.below(21));
-    options.still_along = input.below(100);
+    DeformationForm form;
+    form.diagonal.assign(input.flag() ? wanted.size() : 0, Matrix6::Identity() * input.below(1000));
+    for (std::uint16_t node = 1; node < form.diagonal.size(); ++node)
+        form.above.push_back({static_cast<std::uint16_t>(node - 1), node, Matrix6::Constant(input.below(100))});
+    options.form = &form;
+    options.price = input.below(100000);
     const auto encoded = encode_node_motion(wanted, graph, before, options);
     const auto decoded_from = [&](std::span<const std::uint8_t> run, NodeMotionSyntax syntax) {
         RangeDecoder decoder(run);

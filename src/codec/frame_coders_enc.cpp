@@ -241,7 +241,7 @@ Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& st
     if (denoises(configuration)) options.denoise = filter_options(work);
     options.motion_alone = parts == TrackedParts::motion_alone;
     options.threads = configuration.threads;
-    return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.node_motion(),
+    return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.registered_nodes(),
                                 before, work.sequence.nodes.targets, options, work.stages);
 }
 
@@ -268,7 +268,7 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     history.frame = work.sequence.next_frame;
     history.access = from_last ? nodes.access : history.frame;
     history.before_last = nodes.last;
-    history.last = work.node_motion();
+    history.last = work.registered_nodes().motion;
     history.state = std::move(encoded->state);
     history.targets = std::move(encoded->targets);
     history.best_fit = nodes.best_fit;
@@ -364,8 +364,8 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     out.packets.push_back(frame_packet(PacketKind::patched, payload));
     auto& history = out.nodes.emplace();
     history.before_last = work.sequence.nodes.last;
-    if (history.before_last.empty()) history.before_last.resize(work.node_motion().size());
-    history.last = work.node_motion();
+    if (history.before_last.empty()) history.before_last.resize(work.registered_nodes().motion.size());
+    history.last = work.registered_nodes().motion;
     auto& facts = out.intra.emplace(in_use.intra);
     facts.step = 1;
     facts.steps = steps;

@@ -117,30 +117,30 @@ const FrameMotion& FrameWork::bone_motion() {
     return *bone_motion_;
 }
 
-const std::vector<RigidMotion>& FrameWork::node_motion() {
-    if (!node_motion_) {
+const NodeRegistration& FrameWork::registered_nodes() {
+    if (!registered_nodes_) {
         const auto& target = surface();
         StageClock clock(stages);
         const auto& nodes = sequence.nodes;
         const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
-        node_motion_ =
+        registered_nodes_ =
             register_nodes(reference().deformable, target, {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
                            deformation_options(configuration));
         clock.done("registration");
     }
-    return *node_motion_;
+    return *registered_nodes_;
 }
 
 bool FrameWork::follow_lost_limbs() {
     if (std::exchange(looked_for_limbs_, true)) return false;
-    auto motion = node_motion();
+    auto registered = registered_nodes();
     StageClock clock(stages);
     const auto& nodes = sequence.nodes;
     const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
     const bool any = internal::follow_lost_limbs(reference().deformable, surface(),
                                                  {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
-                                                 deformation_options(configuration), motion);
-    node_motion_ = std::move(motion);
+                                                 deformation_options(configuration), registered);
+    registered_nodes_ = std::move(registered);
     clock.done("registration");
     return any;
 }

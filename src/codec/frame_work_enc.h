@@ -157,9 +157,9 @@ public:
     const SurfaceIndex& surface();  // the captured surface; indexed by direction too if nodes are registered to it
     // The motion of each bone, and of each node, relative to the reference.
     const FrameMotion& bone_motion();
-    const std::vector<RigidMotion>& node_motion();
-    // Where tracking was lost: makes node_motion() follow limbs that another start finds. Gives whether there are any;
-    // looks only once.
+    const NodeRegistration& registered_nodes();
+    // Where tracking was lost: makes registered_nodes() follow limbs that another start finds. Gives whether there
+    // are any; looks only once.
     bool follow_lost_limbs();
     const AnimationFit& animation_fit();  // how well the motion of the bones alone represents the frame
     // The distance between a decoded mesh and the captured one, in both directions.
@@ -171,7 +171,7 @@ private:
     std::optional<double> edge_;
     std::optional<SurfaceIndex> surface_;
     std::optional<FrameMotion> bone_motion_;
-    std::optional<std::vector<RigidMotion>> node_motion_;
+    std::optional<NodeRegistration> registered_nodes_;
     bool looked_for_limbs_ = false;
     std::optional<AnimationFit> animation_fit_;
 };

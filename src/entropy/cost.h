@@ -35,4 +35,15 @@ private:
     double bits_ = 0;
 };
 
+// The same for one symbol as the next: no model is adapted.
+class CostOfNext {
+public:
+    void bit(const BinaryModel& model, bool bit) { bits_ += decision_cost(model, bit); }
+    void raw(std::uint32_t, int n) { bits_ += n; }
+    double bits() const { return bits_; }
+
+private:
+    double bits_ = 0;
+};
+
 }  // namespace htvm::internal

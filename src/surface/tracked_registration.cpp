@@ -524,9 +524,13 @@ double apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>&
     return farthest;
 }
 
-// Gives the largest distance that a handle moved, see apply_step.
-double run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell, BlockSystem (&systems)[2],
-                 Guesses& guesses, const DeformationOptions& options) {
+struct RoundResult {
+    double farthest = 0;  // the largest distance that a handle moved, see apply_step
+    double weight = 0;    // of all matches
+};
+
+RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell,
+                      BlockSystem (&systems)[2], Guesses& guesses, const DeformationOptions& options) {
     const Moved moved = move_samples(stage, options.threads);
     const auto matches = find_matches(moved, target, round, cell, options, guesses);
     std::vector<Vector3d> centres(stage.centre.size());
@@ -550,8 +554,22 @@ double run_round(Stage& stage, const SurfaceIndex& target, const Round& round, f
         diagonal.topLeftCorner<3, 3>().diagonal().array() += 10 * load * unit;
         diagonal.bottomRightCorner<3, 3>().diagonal().array() += 0.01 * load;
     }
-    return apply_step(solve(stage.level.pattern, systems[0], options.solver_iterations, 1e-3), centres,
-                      100 * options.millimetre, stage);
+    RoundResult out;
+    out.farthest = apply_step(solve(stage.level.pattern, systems[0], options.solver_iterations, 1e-3), centres,
+                              100 * options.millimetre, stage);
+    for (const Match& match : matches) out.weight += static_cast<double>(match.weight);
+    return out;
+}
+
+// The step that was made since hardly changes the form.
+DeformationForm form_of(const BlockPattern& pattern, BlockSystem system, double weight) {
+    DeformationForm out;
+    out.diagonal = std::move(system.diagonal);
+    out.above.reserve(pattern.place.size());
+    for (std::size_t i = 0; i < pattern.place.size(); ++i)
+        out.above.push_back({pattern.place[i].first, pattern.place[i].second, system.above[i]});
+    out.weight = weight;
+    return out;
 }
 
 Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
@@ -602,7 +620,8 @@ double between(double from, double to, int step, int steps) {
 }  // namespace
 
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const SurfaceIndex& target,
-                                              std::span<const RigidMotion> start, const DeformationOptions& options) {
+                                              std::span<const RigidMotion> start, const DeformationOptions& options,
+                                              DeformationForm* form) {
     std::vector<RigidMotion> motion(start.begin(), start.end());
     motion.resize(mesh.handles.size());
     if (mesh.samples.empty() || target.samples.empty()) return motion;
@@ -617,7 +636,7 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
             const double reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
-            const double moved = run_round(coarse, target, round, cell, systems, guesses, options);
+            const double moved = run_round(coarse, target, round, cell, systems, guesses, options).farthest;
             if (moved < options.settled * unit)
                 i = std::max(i, options.coarse_rounds - 2);  // the next round is the
                                                              // last
@@ -626,13 +645,15 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     }
     BlockSystem systems[2] = {BlockSystem(mesh.fine.pattern), BlockSystem(mesh.fine.pattern)};
     Guesses guesses;
+    double weight = 0;
     for (int i = 0; i < options.fine_rounds; ++i) {
         auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
         const Round round = {value(options.middle_reach, options.near_reach) * unit,
                              value(options.first_stiffness, options.last_stiffness),
                              value(options.first_point_share, options.last_point_share), 0.5f * mesh.sample_gap, false};
-        run_round(fine, target, round, cell, systems, guesses, options);
+        weight = run_round(fine, target, round, cell, systems, guesses, options).weight;
     }
+    if (form && options.fine_rounds > 0) *form = form_of(mesh.fine.pattern, std::move(systems[0]), weight);
     return fine.motion;
 }
 
@@ -668,20 +689,20 @@ namespace {
 
 // Settles motions that are near the target already.
 void settle(const DeformableMesh& mesh, const SurfaceIndex& target, const DeformationOptions& options,
-            std::vector<RigidMotion>& motions) {
+            std::vector<RigidMotion>& motions, DeformationForm* form) {
     auto near = options;
     near.coarse_rounds = 0;
     near.fine_rounds = 2;
     near.middle_reach = options.near_reach;
     near.first_stiffness = std::sqrt(options.first_stiffness * options.last_stiffness);
     near.first_point_share = options.last_point_share;
-    motions = register_deformation(mesh, target, motions, near);
+    motions = register_deformation(mesh, target, motions, near, form);
 }
 
 }  // namespace
 
 bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
-                       const DeformationOptions& options, std::vector<RigidMotion>& motions) {
+                       const DeformationOptions& options, std::vector<RigidMotion>& motions, DeformationForm* form) {
     constexpr double elsewhere = 15;  // mm
     std::vector<bool> differs(motions.size());
     for (std::size_t h = 0; h < motions.size(); ++h)
@@ -708,7 +729,7 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
         motions = std::move(trial);
         taken = true;
     }
-    if (taken) settle(mesh, target, options, motions);
+    if (taken) settle(mesh, target, options, motions, form);
     return taken;
 }
 

@@ -122,10 +122,26 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
                                HandleWeights weights, std::span<const Eigen::Vector3d> handles,
                                std::vector<HandlePair> pairs, const DeformationOptions& options);
 
+// What the data say about the motions that were found: the squared distances of the matches, each with its weight, grow
+// by x' F x if the handles move by x, of each a turn in radians about where it lies now, then a shift. Along the
+// surface F is next to nothing, as the data leave the motion open there. Its blocks below the diagonal are the
+// transposes of those above.
+struct DeformationForm {
+    struct Block {
+        std::uint16_t row = 0, column = 0;  // row < column
+        Matrix6 matrix;
+    };
+    std::vector<Matrix6> diagonal;  // one per handle; none if nothing could be registered
+    std::vector<Block> above;       // ascending by row, then column
+    double weight = 0;              // of all matches together
+};
+
 // The motions reference -> frame, one per handle, that align the reference with the target. Begins at `start` (one per
-// handle, or empty: no motion). The result is the same for any number of threads.
+// handle, or empty: no motion). form, if not null, is set to that of the last fine round. The result is the same for
+// any number of threads.
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const SurfaceIndex& target,
-                                              std::span<const RigidMotion> start, const DeformationOptions& options);
+                                              std::span<const RigidMotion> start, const DeformationOptions& options,
+                                              DeformationForm* form = nullptr);
 
 // A start for the next frame: each handle repeats its step from `before` to `last`. One motion per handle in each.
 std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const RigidMotion> before,
@@ -138,9 +154,10 @@ std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const Ri
 
 // Parts of the reference that `other`, another registration to the same target, takes elsewhere follow it where they
 // lie nearer to the target then, by deformation_error(); the whole is settled once more. Gives whether any did.
-// motions: one per handle.
+// motions: one per handle. form: as above, if any did.
 bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
-                       const DeformationOptions& options, std::vector<RigidMotion>& motions);
+                       const DeformationOptions& options, std::vector<RigidMotion>& motions,
+                       DeformationForm* form = nullptr);
 
 // Mean distance of the samples to the target's planes and of the target's samples to the reference, each limited to
 // near_reach; by this the encoder chooses between starts.

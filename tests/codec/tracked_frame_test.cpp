@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "codec/enhanced_options.h"
 #include "codec/hostile_bytes.h"
@@ -11,6 +12,7 @@
 #include "codec/reference/reference.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
+#include "codec/tracked/node_motion_enc.h"
 #include "codec/tracked/tracked_frame_enc.h"
 #include "surface/surface_distance.h"
 
@@ -436,15 +438,128 @@ TEST(NodeMotion, IsPredictedByTheMeanStepOfAllLowerNeighbours) {
               encode_node_motion(as_one, graph, before, options).decisions.bits());
 }
 
-TEST(NodeMotion, OfSmallResidualsAlongTheSurfaceIsNotSentButThatAcrossIs) {
+// Of nodes that the data hold across a floor only, and hardly against turning.
+DeformationForm held_across(std::size_t nodes) {
+    DeformationForm out;
+    Matrix6 form = Matrix6::Zero();
+    form.diagonal() << 1, 1, 1, 1e-4, 1e-4, 1;
+    out.diagonal.assign(nodes, form);
+    return out;
+}
+
+TEST(NodeMotion, WhereTheDataLeaveItOpenIsNotSentButThatAcrossIs) {
     const auto graph = floor_graph();
-    const std::vector<QuantisedTransform> wanted = {{{}, {20, -20, 24}}, {{}, {20, -20, 24}}, {{}, {200, 0, 24}}};
+    const std::vector<QuantisedTransform> wanted = {{{}, {20, -20, 24}}, {{}, {20, -20, 24}}, {{}, {60, 0, 24}}};
     const std::vector<QuantisedTransform> before(3);
-    const NodeMotionOptions options{.steps = {.rotation_exponent = 0, .shift_exponent = 3}, .still_along = 32};
+    auto form = held_across(3);
+    form.diagonal[2](3, 3) = 1;  // the third is held along x, too
+    const NodeMotionOptions options{.steps = {.rotation_exponent = 0, .shift_exponent = 2}, .form = &form, .price = 1};
     const auto coded = encode_node_motion(wanted, graph, before, options).transforms;
     EXPECT_EQ(coded[0].shift, (LatticePoint{0, 0, 24}));
     EXPECT_EQ(coded[1].shift, (LatticePoint{0, 0, 24}));
-    EXPECT_EQ(coded[2].shift, (LatticePoint{200, 0, 24}));
+    EXPECT_EQ(coded[2].shift, (LatticePoint{60, 0, 24}));
+}
+
+TEST(NodeMotion, MakesUpForWhatTheNodesBeforeItWereSentWith) {
+    const auto graph = floor_graph();
+    // What lies between the first two follows both alike, so that only the sum of their shifts counts.
+    const std::vector<QuantisedTransform> wanted = {{{}, {0, 0, 4}}, {{}, {0, 0, 4}}, {}};
+    const std::vector<QuantisedTransform> before(3);
+    auto form = held_across(3);
+    Matrix6 between = Matrix6::Zero();
+    between(5, 5) = 1;
+    const NodeMotionOptions options{
+        .steps = {.rotation_exponent = 0, .shift_exponent = 3}, .form = &form, .price = 0.01};
+    const auto height = [&] {
+        const auto coded = encode_node_motion(wanted, graph, before, options).transforms;
+        return coded[0].shift.z + coded[1].shift.z;
+    };
+    EXPECT_NE(height(), 8);
+    form.above.push_back({0, 1, between});
+    EXPECT_EQ(height(), 8);
+}
+
+TEST(NodeMotion, IsSentMoreCoarselyTheMoreABitIsWorth) {
+    std::mt19937 random(1);
+    const auto graph = any_graph(random, 60);
+    const std::vector<QuantisedTransform> before(60);
+    auto wanted = before;
+    for (auto& transform : wanted) {
+        transform.shift = {between(random, -90, 90), between(random, -90, 90), between(random, -90, 90)};
+        for (auto& c : transform.rotation.others) c = static_cast<std::int16_t>(between(random, -300, 300));
+    }
+    DeformationForm form;
+    form.diagonal.assign(60, Vector6(1e6, 1e6, 1e6, 1, 1, 1).asDiagonal().toDenseMatrix());
+    double last = std::numeric_limits<double>::max();
+    for (const double price : {0.0, 10.0, 100.0, 1e9}) {
+        const NodeMotionOptions options{.steps = {4, 3}, .form = &form, .price = price};
+        const auto encoded = encode_node_motion(wanted, graph, before, options);
+        EXPECT_LT(encoded.decisions.bits(), last) << price;
+        last = encoded.decisions.bits();
+        if (price > 0) continue;
+        for (std::size_t i = 0; i < wanted.size(); ++i)
+            EXPECT_LE(distance(encoded.transforms[i].shift, wanted[i].shift), 0.5 * 8 * std::sqrt(3.0) + 0.9);
+    }
+    EXPECT_LT(last, 30);  // nothing but that all is as predicted
+}
+
+// A floor that slides under the nodes and rises: nothing tells how far it slides, and nothing is sent of that.
+TEST(NodeMotion, AlongAFloorThatSlidesIsNotSent) {
+    constexpr std::uint32_t side = 41, nodes = 3;
+    constexpr std::int32_t spacing = 400;
+    std::vector<Point3f> positions;
+    std::vector<Triangle> triangles;
+    for (std::uint32_t y = 0; y < side; ++y)
+        for (std::uint32_t x = 0; x < side; ++x)
+            positions.push_back({static_cast<float>(100 * x), static_cast<float>(100 * y), 0});
+    for (std::uint32_t y = 0; y + 1 < side; ++y)
+        for (std::uint32_t x = 0; x + 1 < side; ++x) {
+            const std::uint32_t a = y * side + x;
+            triangles.push_back({a, a + 1, a + side});
+            triangles.push_back({a + 1, a + side + 1, a + side});
+        }
+    NodeGraph graph;
+    std::vector<Eigen::Vector3d> handles;
+    std::vector<HandlePair> pairs;
+    for (std::uint32_t i = 0; i < nodes; ++i) {
+        const std::int32_t at = 2000 + spacing * (static_cast<std::int32_t>(i) - 1);
+        graph.pivots.push_back({at, 2000, 0});
+        graph.lower.emplace_back(i > 0 ? 1 : 0, i - 1);
+        graph.normals.push_back({0, 0, 1});
+        handles.emplace_back(at, 2000, 0);
+        if (i > 0)
+            pairs.push_back(
+                {static_cast<std::uint16_t>(i - 1), static_cast<std::uint16_t>(i), {at - spacing / 2.0, 2000, 0}});
+    }
+    // Each strip of the floor follows one node.
+    HandleWeights weights(positions.size());
+    for (std::size_t v = 0; v < positions.size(); ++v) {
+        const auto nearest = std::clamp((positions[v][0] - 1800) / spacing, 0.0f, 2.0f);
+        weights[v].handle[0] = static_cast<std::uint16_t>(nearest);
+        weights[v].weight[0] = 1 << weight_bits;
+    }
+    DeformationOptions options;
+    options.millimetre = 16;
+    const auto mesh = make_deformable(positions, triangles, weights, handles, pairs, options);
+    for (auto& p : positions) p = {p[0] + 90, p[1] - 70, p[2] + 64};
+    const SurfaceIndex target(positions, triangles, {.cell = 320, .samples = options.back_samples});
+    DeformationForm form;
+    const auto motion = register_deformation(mesh, target, {}, options, &form);
+    std::vector<QuantisedTransform> wanted;
+    for (std::size_t i = 0; i < nodes; ++i) {
+        const Eigen::Vector3d shift = motion[i](handles[i]) - handles[i];
+        EXPECT_NEAR(shift.z(), 64, 1);
+        // As jitter has it along the floor.
+        wanted.push_back(
+            {{}, {i == 1 ? 14 : -9, i == 0 ? 11 : -16, static_cast<std::int32_t>(std::lround(shift.z()))}});
+    }
+    const std::vector<QuantisedTransform> before(nodes);
+    const double step = 32;
+    const NodeMotionOptions of_motion{.steps = {.rotation_exponent = 5, .shift_exponent = 4},
+                                      .form = &form,
+                                      .price = 0.036 * step * step * form.weight / nodes};
+    for (const auto& coded : encode_node_motion(wanted, graph, before, of_motion).transforms)
+        EXPECT_EQ(coded.shift, (LatticePoint{0, 0, 64}));
 }
 
 TEST(NodeMotion, ThatIsAsBeforeTakesNextToNothing) {

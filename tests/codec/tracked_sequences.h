@@ -9,6 +9,7 @@
 #include "codec/reference/reference.h"
 #include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
+#include "codec/tracked/node_motion_enc.h"
 #include "codec/tracked/tracked_frame_enc.h"
 
 namespace htvm::test {

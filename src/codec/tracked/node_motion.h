@@ -3,9 +3,7 @@
 // Nodes are coded in ascending order. Each node's transform is predicted from those neighbours that were decoded before
 // it and, if the frame refers to the previous one, from its own transform there: as the node was, moved by the mean
 // step that these neighbours have made since. The residual of the shift is coded across and along the surface: across
-// it a node's motion shows in the shape, along it mostly in nothing, so the encoder leaves small residuals out there.
-// This keeps the registration's jitter along the surface, which would otherwise be most of the layer, out of the
-// stream.
+// it a node's motion shows in the shape, along it mostly in nothing, so that the encoder sends little of it there.
 //
 // Range coded for each node: whether the rotation's largest component is the predicted one (if not, which, raw), the
 // other three components, the three of the shift.
@@ -17,7 +15,6 @@
 
 #include "codec/reference/transforms.h"
 #include "core/geometry.h"
-#include "entropy/decision_log.h"
 #include "entropy/range_coder.h"
 #include "htvm/result.hpp"
 
@@ -38,25 +35,11 @@ struct NodeMotionSteps {
     bool operator==(const NodeMotionSteps&) const = default;
 };
 
-struct NodeMotionOptions {
-    NodeMotionSteps steps;
-    double still_along = 0;  // lattice units: a residual along the surface below this is not coded
-};
-
 // The axes in which shifts are coded, and what predicts them.
 enum class NodeMotionSyntax : std::uint8_t {
     axes_of_space,  // version 1 of the stream: predicted by the lowest neighbour alone
     surface,        // across and along the surface, predicted by all lower neighbours
 };
-
-struct EncodedNodeMotion {
-    DecisionLog decisions;
-    std::vector<QuantisedTransform> transforms;  // the transforms that the decoder will have
-};
-
-// wanted: one per node. before: the transforms of the frame that predicts them, or empty.
-EncodedNodeMotion encode_node_motion(std::span<const QuantisedTransform> wanted, const NodeGraph& graph,
-                                     std::span<const QuantisedTransform> before, const NodeMotionOptions& options);
 
 // before: as given to the encoder. corrupt_stream if the run ends early.
 Result<std::vector<QuantisedTransform>> decode_node_motion(RangeDecoder& decoder, const NodeMotionSteps& steps,

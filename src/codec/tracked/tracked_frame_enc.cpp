@@ -6,6 +6,7 @@
 #include "codec/paper/motion_enc.h"
 #include "codec/stage_clock_enc.h"
 #include "codec/tracked/captured_surface_enc.h"
+#include "codec/tracked/node_motion_enc.h"
 
 namespace htvm::internal {
 namespace {
@@ -29,18 +30,22 @@ std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, s
     return out;
 }
 
-// For shifts, half the step of the displacement; for turns, which are finer the smaller that step is beside the
-// subject, steps so coarse that most stay as predicted: measured, see docs/algorithm.md.
-NodeMotionOptions motion_options(double geometry_step, double millimetre) {
-    constexpr double still_along = 1.3;
-    const auto exponent = [](double step, int more, int most) {
-        return std::clamp(static_cast<int>(std::lround(std::log2(std::max(step, 1.0)))) + more, 0, most);
+// For shifts, half the step of the displacement; for turns steps that shrink somewhat faster than that step does:
+// measured, see docs/algorithm.md.
+NodeMotionSteps motion_steps(double geometry_step, double millimetre) {
+    const auto exponent = [](double step, double slope, double more, int most) {
+        return std::clamp(static_cast<int>(std::lround(slope * std::log2(std::max(step, 1.0)) + more)), 0, most);
     };
-    NodeMotionOptions out;
-    out.steps.shift_exponent = exponent(geometry_step, -1, NodeMotionSteps::most_shift);
-    out.steps.rotation_exponent = exponent(16 * geometry_step / millimetre, 3, NodeMotionSteps::most_rotation);
-    out.still_along = still_along * geometry_step;
-    return out;
+    return {.rotation_exponent = exponent(16 * geometry_step / millimetre, 1.25, 1.4, NodeMotionSteps::most_rotation),
+            .shift_exponent = exponent(geometry_step, 1, -1, NodeMotionSteps::most_shift)};
+}
+
+// A bit of node motion is worth 0.3 of what a bit of the displacement is worth to each sample that a node moves: most
+// of what a node leaves the displacement takes up in a few differences.
+double price_of_motion(const DeformationForm& form, const TrackedFrameOptions& options) {
+    constexpr double share = 0.3;
+    const double samples = form.weight / static_cast<double>(std::max<std::size_t>(form.diagonal.size(), 1));
+    return share * options.lambda * options.geometry_step * options.geometry_step * samples;
 }
 
 }  // namespace
@@ -108,35 +113,41 @@ std::size_t nearest_of(const std::vector<NodeMotions>& starts, const DeformableM
 
 }  // namespace
 
-std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
-                                        const NodeStarts& starts, const DeformationOptions& options) {
+NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                                const DeformationOptions& options) {
     const auto from = motions_of(starts, deformable);
-    return register_deformation(deformable, surface, from[nearest_of(from, deformable, surface, options)], options);
+    NodeRegistration out;
+    out.motion = register_deformation(deformable, surface, from[nearest_of(from, deformable, surface, options)],
+                                      options, &out.form);
+    return out;
 }
 
 bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
-                       const DeformationOptions& options, std::vector<RigidMotion>& motion) {
+                       const DeformationOptions& options, NodeRegistration& registered) {
     const auto from = motions_of(starts, deformable);
     const std::size_t nearest = nearest_of(from, deformable, surface, options);
     bool any = false;
     for (std::size_t i = 0; i < from.size(); ++i) {
         if (i == nearest) continue;
         const auto other = register_deformation(deformable, surface, from[i], options);
-        if (take_nearer_limbs(deformable, surface, other, options, motion)) any = true;
+        if (take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form)) any = true;
     }
     return any;
 }
 
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
-                                                 const TrackedReference& reference, std::span<const RigidMotion> motion,
+                                                 const TrackedReference& reference, const NodeRegistration& registered,
                                                  const TrackedState* before, const TargetHistory& targets_before,
                                                  const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);
     const auto& triangles = reference.mesh.triangles;
     EncodedTrackedFrame out;
-    const auto of_motion = motion_options(options.geometry_step, options.millimetre);
+    NodeMotionOptions of_motion;
+    of_motion.steps = motion_steps(options.geometry_step, options.millimetre);
+    of_motion.form = &registered.form;
+    of_motion.price = price_of_motion(registered.form, options);
     auto coded_motion = encode_node_motion(
-        quantised(motion, reference.graph.pivots), reference.graph,
+        quantised(registered.motion, reference.graph.pivots), reference.graph,
         before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
         of_motion);
     const auto moved = moved_by_nodes(reference, coded_motion.transforms, options.threads);

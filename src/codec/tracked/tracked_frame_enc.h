@@ -37,13 +37,17 @@ DeformableMesh make_tracked_deformable(const TrackedReference& reference, const 
 struct NodeStarts {
     std::span<const RigidMotion> last, before_last, gone_on, skeletal;
 };
-// The motion of each node, reference -> frame, registered from the start that lies nearest to the surface.
-std::vector<RigidMotion> register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface,
-                                        const NodeStarts& starts, const DeformationOptions& options);
+struct NodeRegistration {
+    std::vector<RigidMotion> motion;  // of each node, reference -> frame
+    DeformationForm form;             // how well the captured surface determines it
+};
+// From the start that lies nearest to the surface.
+NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                                const DeformationOptions& options);
 // Registers from the other starts, too, and takes each limb from where it lies nearest to the surface: a start that is
-// best for the whole may lose a hand. motion: from register_nodes(). Gives whether any limb was taken from elsewhere.
+// best for the whole may lose a hand. registered: by register_nodes(). Gives whether any limb was taken from elsewhere.
 bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
-                       const DeformationOptions& options, std::vector<RigidMotion>& motion);
+                       const DeformationOptions& options, NodeRegistration& registered);
 
 struct TrackedRuns {
     std::vector<std::uint8_t> payload;
@@ -64,10 +68,10 @@ struct EncodedTrackedFrame {
     TargetHistory targets;  // empty without filtering
 };
 
-// mesh: as captured; surface: its index, see captured_surface(). motion: of each node, as registered. before: state of
-// the frame that this one refers to; null if that is the I-frame. targets: what filtering left of the last frame.
+// mesh: as captured; surface: its index, see captured_surface(). registered: to this surface. before: state of the
+// frame that this one refers to; null if that is the I-frame. targets: what filtering left of the last frame.
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
-                                                 const TrackedReference& reference, std::span<const RigidMotion> motion,
+                                                 const TrackedReference& reference, const NodeRegistration& registered,
                                                  const TrackedState* before, const TargetHistory& targets,
                                                  const TrackedFrameOptions& options, std::vector<StageTime>& stages);
 
