@@ -53,7 +53,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     mesh.triangles = small.triangles;
     if (input.flag()) mesh.colours.resize(mesh.positions.size());
     if (input.flag()) mesh.normals.resize(mesh.positions.size());
-    auto reference = make_tracked_reference(mesh, 1 + static_cast<std::int32_t>(input.below(2000)), {16});
+    auto reference = make_tracked_reference(mesh, 1 + static_cast<std::int32_t>(input.below(2000)), 16);
     require(reference.has_value(), "any mesh can be a reference");
     reference->captured = {any_count(input), any_count(input)};
     DecodedTrackedFrame last, next;

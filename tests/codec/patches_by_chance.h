@@ -78,7 +78,7 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
         auto mesh = out.add_intra(packet, coded);
         KeptNodes kept;
         for (int patches = 0;; ++patches) {
-            auto reference = *make_tracked_reference(mesh, node_spacing, {}, {}, kept);
+            auto reference = *make_tracked_reference(mesh, node_spacing, 1, {}, kept);
             reference.captured = captured;
             TrackedState before;
             for (int t = 0; t < 1 + patches % 2; ++t) {

@@ -184,7 +184,7 @@ FirstTrackedFrame first_tracked_frame() {
     const auto intra = read_frame_payload(coded.packets[1].payload).value();
     auto mesh = decode_intra_frame(intra, nullptr).value();
     smooth_as_shown(mesh, static_cast<std::int32_t>(intra.header.geometry_step), false, header);
-    auto reference = make_tracked_reference(mesh, header.node_spacing, {}).value();
+    auto reference = make_tracked_reference(mesh, header.node_spacing, 1).value();
     reference.captured = {intra.header.source_vertices, intra.header.source_triangles};
     return {std::move(reference), coded.packets[2].payload};
 }
@@ -349,13 +349,41 @@ TEST(SmoothedWithinCells, MovesNoCoordinateByMoreThanHalfAStep) {
     EXPECT_EQ(smoothed_within_cells(positions, {}, {64}), positions);
 }
 
-TEST(SmoothedWithinCells, TakesAVertexHalfwayToItsNeighbours) {
-    // The hub of four triangles stands 40 above its rim.
+TEST(SmoothedWithinCells, TakesAnEighthOffWhatBendsMoreThanTheNeighboursDo) {
+    // The hub of four triangles stands 40 above its rim, whose vertices' neighbours are 20 above them.
     const std::vector<LatticePoint> positions = {{0, 0, 40}, {100, 0, 0}, {0, 100, 0}, {-100, 0, 0}, {0, -100, 0}};
     const std::vector<Triangle> triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 1}};
-    EXPECT_EQ(smoothed_within_cells(positions, triangles, {64})[0], (LatticePoint{0, 0, 20}));
+    EXPECT_EQ(smoothed_within_cells(positions, triangles, {64})[0], (LatticePoint{0, 0, 32}));
     EXPECT_EQ(smoothed_within_cells(positions, triangles, {10})[0], (LatticePoint{0, 0, 35}));
     EXPECT_EQ(smoothed_within_cells(positions, triangles, {.step = 64, .settled = 1})[0], positions[0]);
+    EXPECT_EQ(averaged_within_cells(positions, triangles, 64)[0], (LatticePoint{0, 0, 20}));
+    EXPECT_EQ(averaged_within_cells(positions, triangles, 10)[0], (LatticePoint{0, 0, 35}));
+}
+
+TEST(SmoothedWithinCells, LeavesARoundSurfaceAsItIs) {
+    // A trough: all vertices inside bend alike.
+    const auto mesh = tfan_test::grid(9, 9);
+    std::vector<LatticePoint> positions;
+    for (int k = 0; k < 81; ++k) positions.push_back({100 * (k % 9), 100 * (k / 9), 10 * (k % 9 - 4) * (k % 9 - 4)});
+    const auto smooth = smoothed_within_cells(positions, mesh.triangles, {64});
+    const auto averaged = averaged_within_cells(positions, mesh.triangles, 64);
+    for (const int k : {20, 30, 40, 50, 60}) {  // two rings from the border
+        EXPECT_EQ(smooth[static_cast<std::size_t>(k)], positions[static_cast<std::size_t>(k)]);
+        EXPECT_NE(averaged[static_cast<std::size_t>(k)], positions[static_cast<std::size_t>(k)]);
+    }
+}
+
+TEST(SmoothedWithinCells, VerticesAtASeamMoveAsOne) {
+    // Two triangles whose common side was cut.
+    const std::vector<LatticePoint> positions = {{0, 0, 0},  {90, 0, 0},  {0, 90, 31},
+                                                 {90, 0, 0}, {0, 90, 31}, {99, 99, 0}};
+    const std::vector<Triangle> triangles = {{0, 1, 2}, {3, 5, 4}};
+    const auto smooth = smoothed_within_cells(positions, triangles, {.step = 64, .at_seams = true});
+    EXPECT_EQ(smooth[1], smooth[3]);
+    EXPECT_EQ(smooth[2], smooth[4]);
+    EXPECT_NE(smooth[2], positions[2]);
+    const auto apart = smoothed_within_cells(positions, triangles, {.step = 64});
+    EXPECT_NE(apart[2], apart[4]);
 }
 
 // Each node has some of the lower ones as neighbours; some surfaces have no normal.

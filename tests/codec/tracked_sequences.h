@@ -114,7 +114,7 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
         if (packet.kind != PacketKind::intra) continue;
         const auto payload = *read_frame_payload(packet.payload);
         const std::uint32_t key = out.frame;
-        auto reference = *make_tracked_reference(out.add_intra(packet, payload), node_spacing, {});
+        auto reference = *make_tracked_reference(out.add_intra(packet, payload), node_spacing, 1);
         reference.captured = {payload.header.source_vertices, payload.header.source_triangles};
         TrackedState state;
         for (const bool refers_to_last : {false, true, true, false}) {

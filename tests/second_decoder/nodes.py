@@ -10,22 +10,42 @@ INFINITY = float("inf")
 MOST_NODES = 1024
 
 
-def smoothed(positions, triangles, step, settled=0, at_seams=False):
-    reach = step // 2
-    places = positions if at_seams else range(len(positions))
+def surroundings(values, triangles, places):
+    """Per place the sum over the neighbours there, once for each triangle, and their number."""
     total, count = defaultdict(lambda: [0, 0, 0]), defaultdict(int)
     for t in triangles:
         for i in range(3):
             place = places[t[i]]
             count[place] += 2
             for k in range(3):
-                total[place][k] += positions[t[(i + 1) % 3]][k] + positions[t[(i + 2) % 3]][k]
+                total[place][k] += values[t[(i + 1) % 3]][k] + values[t[(i + 2) % 3]][k]
+    return total, count
+
+
+def moved_within(p, changes, reach):
+    return tuple(clamp(x + clamp(change, -reach, reach), -L, L) for x, change in zip(p, changes))
+
+
+def averaged(positions, triangles, step):
+    """Of versions 1 to 3."""
+    total, count = surroundings(positions, triangles, range(len(positions)))
+    return [moved_within(p, (rdiv(total[v][k] - count[v] * p[k], 2 * count[v]) for k in range(3)), step // 2)
+            if count[v] > 0 else p for v, p in enumerate(positions)]
+
+
+def smoothed(positions, triangles, step, settled=0, at_seams=False):
+    places = positions if at_seams else range(len(positions))
+    total, count = surroundings(positions, triangles, places)
+    bend = []
+    for p, place in zip(positions, places):
+        n = count[place]
+        bend.append(tuple(rdiv(total[place][k] - n * p[k], n) if n > 0 else 0 for k in range(3)))
+    total, _ = surroundings(bend, triangles, places)
     out = []
-    for v, p in enumerate(positions):
-        s, n = total[places[v]], count[places[v]]
+    for v, (p, place) in enumerate(zip(positions, places)):
+        s, n = total[place], count[place]
         if n > 0 and v >= settled:
-            changes = (clamp(rdiv(s[k] - n * p[k], 2 * n), -reach, reach) for k in range(3))
-            p = tuple(clamp(x + change, -L, L) for x, change in zip(p, changes))
+            p = moved_within(p, (rdiv(n * bend[v][k] - s[k], 8 * n) for k in range(3)), step // 2)
         out.append(p)
     return out
 

@@ -8,7 +8,7 @@ from field import decode_field, decode_field_layer
 from hierarchy import cross, dot, vertex_hierarchy
 from intra import Mesh
 from node_motion import decode_node_motion, decode_node_motion_layer
-from nodes import Nodes, smoothed
+from nodes import Nodes, averaged
 from reference import matrix
 from stream import COLOUR, GEOMETRY, TRANSFORMS, read_frame_payload
 
@@ -18,7 +18,7 @@ class TrackedReference:
 
     def __init__(self, mesh, captured, step, spacing, kept):
         self.mesh, self.captured = mesh, captured
-        self.positions = smoothed(mesh.positions, mesh.triangles, step)
+        self.positions = averaged(mesh.positions, mesh.triangles, step)
         self.nodes = Nodes(self.positions, mesh.triangles, spacing, kept)
         normals = normals_of(self.positions, mesh.triangles)
         self.node_normals = [normals[v] for v in self.nodes.vertices]

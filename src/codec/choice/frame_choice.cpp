@@ -247,11 +247,15 @@ Result<Candidate> choose_by_cost(FrameWork& work, const FrameSteps& steps) {
 // such as a hand.
 bool lost_track(const FrameWork& work, const TrackedFit& fit) {
     constexpr double more_strays = 0.004, worst_to_best = 2.2, region_to_best = 7, region_to_intra = 1.5;
+    constexpr double quantised = 0.5;                      // steps
     constexpr double visible = 6, visible_in_edges = 0.5;  // mm on an adult; in mean edges of the capture
     const auto& reference = work.reference();
     const double best_fit = work.sequence.nodes.best_fit;
     const double best = best_fit > 0 ? best_fit : fit.rms;
-    return fit.stray_share > reference.intra.fit.stray_share + more_strays || fit.rms > worst_to_best * best ||
+    // On a clean, smooth capture the best T-frame may be far better than quantisation lets an I-frame or a patch be.
+    const double too_far =
+        std::max(worst_to_best * best, quantised * static_cast<double>(reference.intra.steps.geometry));
+    return fit.stray_share > reference.intra.fit.stray_share + more_strays || fit.rms > too_far ||
            fit.worst_region >
                std::max({region_to_best * best, region_to_intra * reference.intra.fit.worst_region,
                          visible * work.configuration.adult_millimetre, visible_in_edges * reference.intra.edge});
@@ -310,12 +314,13 @@ bool patches_have_grown(const FrameWork& work) {
 }
 
 // Whether an I-frame of the tracked mesh is as good as one of the capture: it does not have many more vertices, nor was
-// it made for much coarser or finer steps.
+// it made for much coarser or finer steps. (Where an error is asked for, the steps of I- and T-frames are far apart.)
 bool may_be_renewed(const FrameWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
     constexpr double most_vertices = 1.3, most_steps = 1.5;
     const auto& intra = work.reference().intra;
     const double ratio = static_cast<double>(steps.geometry) / intra.steps.geometry;
-    return static_cast<double>(tracked.positions.size()) <= most_vertices * static_cast<double>(intra.vertices) &&
+    return work.configuration.options.rate.target_error <= 0 &&
+           static_cast<double>(tracked.positions.size()) <= most_vertices * static_cast<double>(intra.vertices) &&
            ratio <= most_steps && ratio >= 1 / most_steps;
 }
 

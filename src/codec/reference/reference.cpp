@@ -20,7 +20,7 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
     auto tracked =
-        make_tracked_reference(reference.mesh(), header.node_spacing, {reference.step}, threads, reference.kept);
+        make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads, reference.kept);
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     reference.tracked->captured = reference.captured;

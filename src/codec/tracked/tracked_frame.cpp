@@ -38,53 +38,90 @@ std::vector<std::uint32_t> first_at_same_place(std::span<const LatticePoint> pos
     return out;
 }
 
+using Triple = std::array<std::int64_t, 3>;
+Triple triple(LatticePoint p) { return {p.x, p.y, p.z}; }
+
+// The sum of what a vertex's neighbours have, once for each triangle that they share with it, and how often that is.
+struct Surroundings {
+    Triple sum{};
+    std::int64_t count = 0;
+};
+
+// leader: whose surroundings are those of each vertex too; or empty, where each has its own.
+std::vector<Surroundings> surroundings(std::span<const Triple> values, std::span<const Triangle> triangles,
+                                       std::span<const std::uint32_t> leader) {
+    std::vector<Surroundings> out(values.size());
+    for (const auto& t : triangles)
+        for (std::size_t i = 0; i < 3; ++i) {
+            auto& of = out[leader.empty() ? t[i] : leader[t[i]]];
+            for (const auto neighbour : {t[(i + 1) % 3], t[(i + 2) % 3]})
+                for (std::size_t c = 0; c < 3; ++c) of.sum[c] += values[neighbour][c];
+            of.count += 2;
+        }
+    for (std::size_t v = 0; v < leader.size(); ++v) out[v] = out[leader[v]];
+    return out;
+}
+
+std::vector<Triple> triples(std::span<const LatticePoint> positions) {
+    std::vector<Triple> out;
+    out.reserve(positions.size());
+    for (const auto p : positions) out.push_back(triple(p));
+    return out;
+}
+
+LatticePoint moved_within(const Triple& from, const Triple& change, std::int64_t reach) {
+    const auto moved = [&](std::size_t c) { return within_lattice(from[c] + std::clamp(change[c], -reach, reach)); };
+    return {moved(0), moved(1), moved(2)};
+}
+
 }  // namespace
 
-std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> positions,
-                                                std::span<const Triangle> triangles, const QuantiserCells& cells) {
+std::vector<LatticePoint> averaged_within_cells(std::span<const LatticePoint> positions,
+                                                std::span<const Triangle> triangles, std::int32_t step) {
     std::vector<LatticePoint> out(positions.begin(), positions.end());
-    const std::int64_t reach = cells.step / 2;
-    if (reach == 0) return out;  // as of every mesh that is smoothed already
-    struct Sum {
-        std::int64_t x = 0, y = 0, z = 0, count = 0;
-    };
-    std::vector<Sum> around(positions.size());
-    for (const auto& t : triangles)
-        for (std::size_t i = 0; i < 3; ++i)
-            for (const auto neighbour : {t[(i + 1) % 3], t[(i + 2) % 3]}) {
-                auto& sum = around[t[i]];
-                sum.x += positions[neighbour].x;
-                sum.y += positions[neighbour].y;
-                sum.z += positions[neighbour].z;
-                ++sum.count;
-            }
-    const auto leader = cells.at_seams ? first_at_same_place(positions) : std::vector<std::uint32_t>{};
-    for (std::size_t v = 0; v < leader.size(); ++v) {
-        if (leader[v] == v) continue;
-        auto& sum = around[leader[v]];
-        sum.x += around[v].x;
-        sum.y += around[v].y;
-        sum.z += around[v].z;
-        sum.count += around[v].count;
-    }
-    const auto halfway = [&](std::int32_t own, std::int64_t sum, std::int64_t count) {
-        const std::int64_t change = divide_rounded(sum - count * own, 2 * count);
-        return within_lattice(own + std::clamp(change, -reach, reach));
-    };
-    for (std::size_t v = cells.settled; v < out.size(); ++v) {
-        const auto& sum = around[cells.at_seams ? leader[v] : v];
-        if (sum.count == 0) continue;
-        out[v] = {halfway(positions[v].x, sum.x, sum.count), halfway(positions[v].y, sum.y, sum.count),
-                  halfway(positions[v].z, sum.z, sum.count)};
+    const std::int64_t reach = step / 2;
+    if (reach == 0) return out;
+    const auto own = triples(positions);
+    const auto around = surroundings(own, triangles, {});
+    for (std::size_t v = 0; v < out.size(); ++v) {
+        const auto& [sum, count] = around[v];
+        if (count == 0) continue;
+        Triple change;
+        for (std::size_t c = 0; c < 3; ++c) change[c] = divide_rounded(sum[c] - count * own[v][c], 2 * count);
+        out[v] = moved_within(own[v], change, reach);
     }
     return out;
 }
 
-Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                const QuantiserCells& cells, Threads threads, const KeptNodes& kept) {
+std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> positions,
+                                                std::span<const Triangle> triangles, const QuantiserCells& cells) {
+    constexpr std::int64_t share = 8;
+    std::vector<LatticePoint> out(positions.begin(), positions.end());
+    const std::int64_t reach = cells.step / 2;
+    if (reach == 0) return out;
+    const auto leader = cells.at_seams ? first_at_same_place(positions) : std::vector<std::uint32_t>{};
+    const auto own = triples(positions);
+    auto around = surroundings(own, triangles, leader);
+    std::vector<Triple> bend(own.size(), Triple{});  // from each vertex to the mean of its neighbours
+    for (std::size_t v = 0; v < own.size(); ++v)
+        for (std::size_t c = 0; c < 3 && around[v].count > 0; ++c)
+            bend[v][c] = divide_rounded(around[v].sum[c] - around[v].count * own[v][c], around[v].count);
+    around = surroundings(bend, triangles, leader);
+    for (std::size_t v = cells.settled; v < out.size(); ++v) {
+        const auto& [sum, count] = around[v];
+        if (count == 0) continue;
+        Triple change;
+        for (std::size_t c = 0; c < 3; ++c) change[c] = divide_rounded(count * bend[v][c] - sum[c], share * count);
+        out[v] = moved_within(own[v], change, reach);
+    }
+    return out;
+}
+
+Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing, std::int32_t step,
+                                                Threads threads, const KeptNodes& kept) {
     TrackedReference out;
     out.mesh = mesh;
-    out.mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles, cells);
+    out.mesh.positions = averaged_within_cells(mesh.positions, mesh.triangles, step);
     DeformationNodeOptions options;
     options.spacing = node_spacing;
     options.link_reach = std::max(node_spacing / 10, 1);

@@ -22,28 +22,35 @@ namespace htvm::internal {
 
 // What both sides derive once from the decoded I-frame.
 struct TrackedReference {
-    LatticeMesh mesh;  // as decoded, with positions smoothed within their quantiser cells
+    LatticeMesh mesh;  // as decoded, with positions averaged if they were not smoothed
     DeformationNodes nodes;
     NodeGraph graph;
     VertexHierarchy hierarchy;
     CapturedCounts captured;  // what the I-frame was captured with; make_tracked_reference() does not know it
 };
+// node_spacing: lattice units, > 0. step: of the mesh's positions, lattice units, where they are still to be averaged,
+// as in streams before shown_smoothed_version; else 1. threads: uses two at most. kept: of a patched mesh, what it
+// takes over of the nodes before.
+Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing, std::int32_t step,
+                                                Threads threads = {}, const KeptNodes& kept = {});
+
 // How a mesh's positions are quantised.
 struct QuantiserCells {
     std::int32_t step = 1;      // lattice units
-    std::uint32_t settled = 0;  // the first so many vertices are not; smoothed again with each patch, they would shrink
+    std::uint32_t settled = 0;  // the first so many vertices are not
     bool at_seams = false;      // vertices at the same place move as one, so that a texture's seams stay closed
 };
-// node_spacing: lattice units, > 0. threads: uses two at most. kept: of a patched mesh, what it takes over of the nodes
-// before.
-Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing,
-                                                const QuantiserCells& cells, Threads threads = {},
-                                                const KeptNodes& kept = {});
 
-// Moves each vertex that is not settled halfway to the mean of its neighbours, but in each coordinate no farther than
-// half a quantiser step. This removes the steps of a coarsely quantised surface at no cost in bits.
+// Takes off an eighth of what bends the surface at a vertex more than at its neighbours, but moves no coordinate
+// farther than half a quantiser step, nor what is settled. This removes most of the steps of a coarsely quantised
+// surface at no cost in bits, and leaves round ones as they are.
 std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> positions,
                                                 std::span<const Triangle> triangles, const QuantiserCells& cells);
+
+// Moves each vertex halfway to the mean of its neighbours, but in each coordinate no farther than half a quantiser
+// step: so are the references of streams before shown_smoothed_version. Where edges are long, round limbs shrink.
+std::vector<LatticePoint> averaged_within_cells(std::span<const LatticePoint> positions,
+                                                std::span<const Triangle> triangles, std::int32_t step);
 
 // What a frame leaves for the next one.
 struct TrackedState {
