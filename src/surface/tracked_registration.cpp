@@ -229,6 +229,63 @@ SampleBlend over_groups(const SampleBlend& fine, const std::vector<SampleBlend>&
     return strongest(std::move(parts));
 }
 
+// The colours around a vertex, and how well they fit a slope; zero slope and trust if they do not. normal: unit length.
+SampleTexture texture_at(const DeformableMesh& mesh, std::span<const Colour> colours, const TrianglesAround& around,
+                         std::uint32_t vertex, const Vector3d& normal) {
+    // Of colours by chance at six neighbours a slope explains a third; trust begins where it explains two thirds.
+    constexpr double chance = 3, least_moment = 0.02;
+    const auto place_of = [&](std::uint32_t v) {
+        return Vector3d(mesh.positions[v][0], mesh.positions[v][1], mesh.positions[v][2]);
+    };
+    const auto colour_of = [&](std::uint32_t v) { return Vector3d(colours[v][0], colours[v][1], colours[v][2]); };
+    SampleTexture out;
+    out.colour = colour_of(vertex).cast<float>();
+    const auto visit_neighbours = [&](auto&& use) {
+        for (const auto t : around.of(vertex))
+            for (const auto other : mesh.triangles[t]) {
+                if (other == vertex) continue;
+                const Vector3d apart = place_of(other) - place_of(vertex);
+                use(Vector3d(apart - normal.dot(apart) * normal), Vector3d(colour_of(other) - colour_of(vertex)));
+            }
+    };
+    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero(), products = Eigen::Matrix3d::Zero();
+    double size = 0, changes = 0;
+    std::size_t count = 0;
+    visit_neighbours([&](const Vector3d& apart, const Vector3d& change) {
+        moments += apart * apart.transpose();
+        products += change * apart.transpose();
+        size += apart.squaredNorm();
+        changes += change.squaredNorm();
+        ++count;
+    });
+    if (count < 4 || !(size > 0) || !(changes > 0)) return out;
+    // The plane's normal, and a direction in which there are hardly any neighbours, get no slope.
+    moments += size * normal * normal.transpose() + least_moment * size * Eigen::Matrix3d::Identity();
+    const Eigen::Matrix3d slope = products * moments.inverse();
+    double rest = 0;
+    visit_neighbours(
+        [&](const Vector3d& apart, const Vector3d& change) { rest += (change - slope * apart).squaredNorm(); });
+    const double trust = 1 - chance * rest / changes;
+    if (!(trust > 0)) return out;
+    out.trust = static_cast<float>(trust);
+    out.slope = slope.cast<float>();
+    out.unevenness = static_cast<float>(rest / (3 * static_cast<double>(count)));
+    return out;
+}
+
+// None if no slope can be trusted: then colours tell nothing of where the surface is.
+std::vector<SampleTexture> textures_of_samples(const DeformableMesh& mesh, std::span<const Colour> colours) {
+    std::vector<SampleTexture> out;
+    if (colours.empty()) return out;
+    const auto around = triangles_around(mesh.positions.size(), mesh.triangles);
+    for (std::size_t i = 0; i < mesh.samples.size(); ++i) {
+        const auto& n = mesh.sample_normals[i];
+        out.push_back(texture_at(mesh, colours, around, mesh.samples[i], {n[0], n[1], n[2]}));
+    }
+    if (std::none_of(out.begin(), out.end(), [](const auto& texture) { return texture.trust > 0; })) out.clear();
+    return out;
+}
+
 }  // namespace
 
 SampleBlend blend_of(const VertexWeights& weights) {
@@ -243,7 +300,7 @@ SampleBlend blend_of(const VertexWeights& weights) {
 
 DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<const Triangle> triangles,
                                HandleWeights weights, std::span<const Vector3d> handles, std::vector<HandlePair> pairs,
-                               const DeformationOptions& options) {
+                               const DeformationOptions& options, std::span<const Colour> colours) {
     DeformableMesh mesh;
     mesh.positions.assign(positions.begin(), positions.end());
     mesh.triangles.assign(triangles.begin(), triangles.end());
@@ -258,6 +315,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         mesh.sample_normals.push_back(normals[v]);
         mesh.fine.blends.push_back(blend_of(mesh.weights[v]));
     }
+    mesh.sample_textures = textures_of_samples(mesh, colours);
     for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
     mesh.fine.pairs = std::move(pairs);
     group_handles(mesh, options.coarse_spacing * options.millimetre);
@@ -286,6 +344,7 @@ struct Stage {
     std::vector<Vector3d> centre;              // of the handles, at rest
     std::vector<HandlePair> pairs;             // with their points at rest
     std::vector<RigidMotion> motion;
+    std::span<const SampleTexture> textures;  // one per sample, or none
 };
 
 struct Moved {
@@ -338,6 +397,7 @@ struct Round {
     float gap = 0;          // spacing of the reference's samples
     bool far = false;       // search among the target's samples; distant matches still count
     std::size_t every = 1;  // use only every n-th sample
+    bool colours = false;   // match colours, too; both sides must have them
 };
 
 // Near matches have full weight, which fades to zero at the reach; distant ones all have the same small pull.
@@ -428,6 +488,106 @@ std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& move
         pull.metric.noalias() += (weight - share) * normal * normal.transpose();
         pull.metric.diagonal().array() += share;
         pull.force += weight * across * normal + share * along;
+    }
+    return pulls;
+}
+
+// ---- Colours: where the reference's colours have a slope, a difference tells how far it has slid along the surface.
+
+// The samples' slopes as they lie now, along the moved surface.
+std::vector<Matrix3d> turned_slopes(const Stage& stage, const Moved& moved) {
+    std::vector<Matrix3d> out(stage.textures.size(), Matrix3d::Zero());
+    for (std::size_t i = 0; i < out.size(); ++i) {
+        if (!(stage.textures[i].trust > 0)) continue;
+        const SampleBlend& blend = stage.level.blends[i];
+        Matrix3d turn = Matrix3d::Zero();
+        for (std::size_t k = 0; k < blend.count; ++k)
+            turn += static_cast<double>(blend.weight[k]) * stage.motion[blend.handle[k]].rotation;
+        const Vector3d normal = vector_of(moved.normals[i]);
+        out[i].noalias() = stage.textures[i].slope.cast<double>() * turn.transpose();
+        out[i] -= (out[i] * normal).eval() * normal.transpose();
+    }
+    return out;
+}
+
+// For each match, what the reference's colour would be at the target's vertex, minus the vertex's: levels.
+std::vector<Vector3d> colour_differences(const Stage& stage, const std::vector<Match>& matches, const Moved& moved,
+                                         const std::vector<Matrix3d>& slopes, const SurfaceIndex& target) {
+    std::vector<Vector3d> out;
+    out.reserve(matches.size());
+    for (const Match& match : matches) {
+        const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
+        const Colour& seen = target.colours[match.vertex];
+        out.emplace_back(stage.textures[match.sample].colour.cast<double>() + slopes[match.sample] * apart -
+                         Vector3d(seen[0], seen[1], seen[2]));
+    }
+    return out;
+}
+
+// Variance of the components, from the median of the squares as if these were Gaussian: so what has slid far does not
+// count as noise.
+double colour_noise(const std::vector<Vector3d>& differences) {
+    constexpr double mean_by_median = 2.2, rounding = 1;
+    std::vector<double> squares;
+    squares.reserve(differences.size());
+    for (const auto& difference : differences) squares.push_back(difference.squaredNorm() / 3);
+    const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+    std::nth_element(squares.begin(), middle, squares.end());
+    return mean_by_median * std::max(rounding, *middle);
+}
+
+// 1 for a difference of zero; beyond three standard deviations it soon stops to count: a shadow, or another place.
+double colour_trust(const Vector3d& difference, double variance) {
+    const double size = difference.squaredNorm() / 3 / (9 * variance);
+    return 1 / ((1 + size) * (1 + size));
+}
+
+// The mean difference around each handle, as another exposure or light makes it.
+std::vector<Vector3d> mean_differences(const Stage& stage, const std::vector<Match>& matches,
+                                       const std::vector<Vector3d>& differences, double noise) {
+    std::vector<Vector3d> sums(stage.centre.size(), Vector3d::Zero());
+    std::vector<double> weights(stage.centre.size(), 0);
+    for (std::size_t m = 0; m < matches.size(); ++m) {
+        const SampleBlend& blend = stage.level.blends[matches[m].sample];
+        const double weight = static_cast<double>(matches[m].weight) * colour_trust(differences[m], noise);
+        for (std::size_t k = 0; k < blend.count; ++k) {
+            const double share = weight * static_cast<double>(blend.weight[k]);
+            sums[blend.handle[k]] += share * differences[m];
+            weights[blend.handle[k]] += share;
+        }
+    }
+    for (std::size_t h = 0; h < sums.size(); ++h)
+        if (weights[h] > 0) sums[h] /= weights[h];
+    return sums;
+}
+
+// How the colours pull each sample along the surface.
+std::vector<Pull> colour_pulls(const Stage& stage, const std::vector<Match>& matches, const Moved& moved,
+                               const SurfaceIndex& target, const DeformationOptions& options) {
+    constexpr double least_slope = 0.1;  // noise per mm: a slope that changes less is not told from it in a centimetre
+    std::vector<Pull> pulls(stage.rest.size());
+    if (matches.empty()) return pulls;
+    const auto slopes = turned_slopes(stage, moved);
+    const auto differences = colour_differences(stage, matches, moved, slopes, target);
+    const double noise = colour_noise(differences), unit = options.millimetre * options.millimetre;
+    const auto means = mean_differences(stage, matches, differences, noise);
+    for (std::size_t m = 0; m < matches.size(); ++m) {
+        const Match& match = matches[m];
+        const SampleTexture& texture = stage.textures[match.sample];
+        const Matrix3d& slope = slopes[match.sample];
+        const double steepness = slope.squaredNorm() * unit;  // levels^2/mm^2
+        if (!(steepness > least_slope * least_slope * noise)) continue;
+        const SampleBlend& blend = stage.level.blends[match.sample];
+        Vector3d left = differences[m];
+        for (std::size_t k = 0; k < blend.count; ++k)
+            left -= static_cast<double>(blend.weight[k]) * means[blend.handle[k]];
+        const double variance = noise + static_cast<double>(texture.unevenness);
+        // At most as much as a match by distance.
+        const double weight = static_cast<double>(match.weight * texture.trust) * colour_trust(left, variance) * unit *
+                              std::min(options.colour_weight / variance, 1 / steepness);
+        Pull& pull = pulls[match.sample];
+        pull.metric.noalias() += weight * slope.transpose() * slope;
+        pull.force.noalias() += weight * slope.transpose() * left;
     }
     return pulls;
 }
@@ -533,15 +693,21 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
                       BlockSystem (&systems)[2], Guesses& guesses, const DeformationOptions& options) {
     const Moved moved = move_samples(stage, options.threads);
     const auto matches = find_matches(moved, target, round, cell, options, guesses);
+    std::vector<Pull> of_colours;
+    if (round.colours) of_colours = colour_pulls(stage, matches, moved, target, options);
     std::vector<Vector3d> centres(stage.centre.size());
     for (std::size_t h = 0; h < centres.size(); ++h) centres[h] = stage.motion[h](stage.centre[h]);
     // Always in two halves, so that the sums do not depend on the number of threads.
     auto add_half = [&](std::size_t half) {
         systems[half].clear();
         const std::size_t begin = half * stage.rest.size() / 2, end = (half + 1) * stage.rest.size() / 2;
-        const auto pulls = sum_pulls(matches, moved, target, round.point_share, begin, end);
+        auto pulls = sum_pulls(matches, moved, target, round.point_share, begin, end);
+        for (std::size_t i = begin; i < end && !of_colours.empty(); ++i) {
+            pulls[i - begin].metric += of_colours[i].metric;
+            pulls[i - begin].force += of_colours[i].force;
+        }
         for (std::size_t i = begin; i < end; ++i)
-            if (pulls[i - begin].metric(0, 0) > 0) add_pull(stage, centres, i, pulls[i - begin], systems[half]);
+            if (pulls[i - begin].metric.trace() > 0) add_pull(stage, centres, i, pulls[i - begin], systems[half]);
     };
     parallel_invoke(
         options.threads, [&] { add_half(1); }, [&] { add_half(0); });
@@ -573,7 +739,7 @@ DeformationForm form_of(const BlockPattern& pattern, BlockSystem system, double 
 }
 
 Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
-    Stage stage{mesh.fine, {}, {}, mesh.handles, mesh.fine.pairs, std::move(motion)};
+    Stage stage{mesh.fine, {}, {}, mesh.handles, mesh.fine.pairs, std::move(motion), mesh.sample_textures};
     for (std::size_t i = 0; i < mesh.samples.size(); ++i) {
         stage.rest.push_back(vector_of(mesh.positions[mesh.samples[i]]));
         stage.rest_normals.push_back(vector_of(mesh.sample_normals[i]));
@@ -583,7 +749,7 @@ Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
 
 // Groups of handles start from where `fine` has their handles.
 Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, Threads threads) {
-    Stage stage{mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size())};
+    Stage stage{mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size()), {}};
     const Moved moved = move_samples(fine, threads);
     for (const std::uint32_t i : mesh.coarse.samples) {
         stage.rest.push_back(vector_of(moved.points[i]));
@@ -648,9 +814,11 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     double weight = 0;
     for (int i = 0; i < options.fine_rounds; ++i) {
         auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
-        const Round round = {value(options.middle_reach, options.near_reach) * unit,
-                             value(options.first_stiffness, options.last_stiffness),
-                             value(options.first_point_share, options.last_point_share), 0.5f * mesh.sample_gap, false};
+        Round round = {value(options.middle_reach, options.near_reach) * unit,
+                       value(options.first_stiffness, options.last_stiffness),
+                       value(options.first_point_share, options.last_point_share), 0.5f * mesh.sample_gap, false};
+        round.colours = i + options.colour_rounds >= options.fine_rounds && !target.colours.empty() &&
+                        !mesh.sample_textures.empty();
         weight = run_round(fine, target, round, cell, systems, guesses, options).weight;
     }
     if (form && options.fine_rounds > 0) *form = form_of(mesh.fine.pattern, std::move(systems[0]), weight);

@@ -80,6 +80,8 @@ struct DeformationOptions {
     double last_point_share = 0.2;
     double agreement = 0.2;      // least dot product of the normals of a match
     int solver_iterations = 40;  // at most, of conjugate gradients, per round
+    int colour_rounds = 3;       // last fine rounds in which colours are matched as well, where both sides have them
+    double colour_weight = 5;    // mm^2: variance of a distance that counts as much as the noise of a colour does
     Threads threads = {};
 };
 
@@ -104,6 +106,14 @@ struct DeformationLevel {
     BlockPattern pattern;
 };
 
+// The reference's colour at a sample, and how it changes along the surface at rest.
+struct SampleTexture {
+    Eigen::Vector3f colour = Eigen::Vector3f::Zero();  // levels
+    Eigen::Matrix3f slope = Eigen::Matrix3f::Zero();   // a row per component: levels per unit of the positions
+    float trust = 0;       // 1: the neighbours' colours lie on the slope; 0: they could as well be chance
+    float unevenness = 0;  // mean square of their distances from it, levels^2
+};
+
 // A reference mesh prepared for deformation; built once per I-frame.
 struct DeformableMesh {
     std::vector<Point3f> positions;
@@ -112,15 +122,18 @@ struct DeformableMesh {
     std::vector<Eigen::Vector3d> handles;  // positions of the handles
     std::vector<std::uint32_t> samples;    // indices of vertices
     std::vector<Point3f> sample_normals;
-    float sample_gap = 0;  // approximate spacing of neighbouring samples
+    std::vector<SampleTexture> sample_textures;  // one per sample, or none if nothing is textured
+    float sample_gap = 0;                        // approximate spacing of neighbouring samples
     DeformationLevel fine, coarse;
     std::vector<SampleBlend> groups;  // how each handle follows the groups
 };
 
-// weights: one per vertex, with handles < handles.size(); pairs likewise. Without handles, nothing ever moves.
+// weights: one per vertex, with handles < handles.size(); pairs likewise. Without handles, nothing ever moves. colours:
+// one per vertex, or none.
 DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<const Triangle> triangles,
                                HandleWeights weights, std::span<const Eigen::Vector3d> handles,
-                               std::vector<HandlePair> pairs, const DeformationOptions& options);
+                               std::vector<HandlePair> pairs, const DeformationOptions& options,
+                               std::span<const Colour> colours = {});
 
 // What the data say about the motions that were found: the squared distances of the matches, each with its weight, grow
 // by x' F x if the handles move by x, of each a turn in radians about where it lies now, then a shift. Along the

@@ -50,7 +50,7 @@ Surface moved(Surface surface, const std::function<Vector3d(const Vector3d&)>& m
 
 // Handles along the x axis; each vertex follows the two that it lies between.
 DeformableMesh with_handles_along_x(const Surface& surface, double first, double last, std::size_t count,
-                                    const DeformationOptions& options) {
+                                    const DeformationOptions& options, std::span<const Colour> colours = {}) {
     std::vector<Vector3d> handles;
     std::vector<HandlePair> pairs;
     const double apart = (last - first) / static_cast<double>(count - 1);
@@ -76,7 +76,8 @@ DeformableMesh with_handles_along_x(const Surface& surface, double first, double
         if (w.weight[1] == 0) w.handle[1] = 0;
         weights.push_back(w);
     }
-    return make_deformable(surface.first, surface.second, std::move(weights), handles, std::move(pairs), options);
+    return make_deformable(surface.first, surface.second, std::move(weights), handles, std::move(pairs), options,
+                           colours);
 }
 
 struct Rest {
@@ -222,6 +223,69 @@ TEST(RegisterDeformation, SoupsOfTrianglesGiveFiniteMotions) {
         EXPECT_TRUE(motion.shift.allFinite());
         EXPECT_NEAR(motion.rotation.determinant(), 1, 1e-6);
     }
+}
+
+// A round sleeve along x, 600 mm long, 80 mm wide: its shape does not tell how far it has turned about its axis.
+Vector3d sleeve(double u, double v) {
+    const Vector3d p = arm(u, v);
+    return {p.x(), p.y(), p.z() * 40 / 25};
+}
+
+// Four stripes along the sleeve, soft and between 30 and 230, as they lie once it has turned by `angle`.
+std::vector<Colour> striped(const Surface& surface, double angle) {
+    std::vector<Colour> out;
+    for (const auto& p : surface.first) {
+        const double around = std::atan2(static_cast<double>(p[2]), static_cast<double>(p[1])) - angle;
+        const auto level = static_cast<std::uint8_t>(std::lround(130 + 100 * std::sin(4 * around)));
+        out.push_back({level, level, 60});
+    }
+    return out;
+}
+
+// The mean turn about the axis, radians, that is found if the sleeve is captured so; `shown` are its colours.
+double turn_found(const std::vector<Colour>& shown, const std::vector<Colour>& reference_colours) {
+    const DeformationOptions options;
+    const auto reference = sweep(121, 40, sleeve);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, options, reference_colours);
+    auto target = target_of(sweep(97, 52, sleeve), options);
+    target.colours = shown;
+    double turn = 0;
+    const auto motions = register_deformation(mesh, target, {}, options);
+    for (const auto& motion : motions) turn += std::atan2(motion.rotation(2, 1), motion.rotation(1, 1));
+    return turn / static_cast<double>(motions.size());
+}
+
+constexpr double turn_of_sleeve = 0.12;  // 5 mm at its surface
+
+TEST(RegisterDeformation, StripesOnASleeveThatTurnsAboutItsAxisTurnTheMesh) {
+    const auto reference = striped(sweep(121, 40, sleeve), 0);
+    const auto shown = striped(sweep(97, 52, sleeve), turn_of_sleeve);
+    EXPECT_NEAR(turn_found(shown, reference), turn_of_sleeve, 0.01);
+    EXPECT_NEAR(turn_found({}, reference), 0, 0.005);  // without the colours of either it stays as it lies
+    EXPECT_NEAR(turn_found(shown, {}), 0, 0.005);
+}
+
+TEST(RegisterDeformation, StripesAreFollowedInAnotherLightAndPastAShadow) {
+    const auto captured = sweep(97, 52, sleeve);
+    auto shown = striped(captured, turn_of_sleeve);
+    for (std::size_t v = 0; v < shown.size(); ++v) {
+        const bool in_shadow = captured.first[v][0] > 250 && captured.first[v][0] < 330 && captured.first[v][1] > 0;
+        for (auto& level : shown[v]) level = static_cast<std::uint8_t>(in_shadow ? level / 4 : level + 25);
+    }
+    EXPECT_NEAR(turn_found(shown, striped(sweep(121, 40, sleeve), 0)), turn_of_sleeve, 0.02);
+}
+
+TEST(RegisterDeformation, ColoursWithoutAPatternChangeNothing) {
+    const auto captured = sweep(97, 52, sleeve);
+    const std::vector<Colour> shown = striped(captured, 0.1), plain(sweep(121, 40, sleeve).first.size(), {90, 120, 60});
+    EXPECT_EQ(turn_found(shown, plain), turn_found(shown, {}));
+    std::vector<Colour> chance;
+    std::uint32_t state = 1;
+    for (std::size_t v = 0; v < plain.size(); ++v) {
+        state = state * 1664525 + 1013904223;
+        chance.push_back({static_cast<std::uint8_t>(100 + (state >> 28)), 120, 60});
+    }
+    EXPECT_NEAR(turn_found(shown, chance), 0, 0.005);
 }
 
 TEST(MovedOn, RepeatsTheLastStepOfEachHandle) {

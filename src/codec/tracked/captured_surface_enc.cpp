@@ -205,9 +205,11 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
     // eighth triangle gives a good enough estimate of the edges.
     const double edge =
         std::max({mean_edge(mesh.positions, mesh.triangles, 8), options.far_reach * options.millimetre / 48, 1.0});
-    return {points_of(mesh.positions),
-            mesh.triangles,
-            {.cell = static_cast<float>(2 * edge), .samples = options.back_samples, .threads = options.threads}};
+    SurfaceIndex out(
+        points_of(mesh.positions), mesh.triangles,
+        {.cell = static_cast<float>(2 * edge), .samples = options.back_samples, .threads = options.threads});
+    out.colours = mesh.colours;
+    return out;
 }
 
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,

@@ -79,7 +79,7 @@ DeformableMesh make_tracked_deformable(const TrackedReference& reference, const 
     std::vector<Eigen::Vector3d> handles;
     for (const auto pivot : reference.graph.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
     return make_deformable(points_of(reference.mesh.positions), reference.mesh.triangles, reference.nodes.weights,
-                           handles, pairs_of(reference), options);
+                           handles, pairs_of(reference), options, reference.mesh.colours);
 }
 
 namespace {
