@@ -266,7 +266,7 @@ TEST(TrackedRate, AFrameThatFitsNoBufferIsTheMotionAlone) {
     auto sequence = walking(15);
     sequence.skeleton = {};  // without a skeleton a P-frame would be one rigid body
     for (auto& frame : sequence.frames) frame.pose.reset();
-    auto options = at_rate(60e3, 0.4, Profile::tracked);
+    auto options = at_rate(55e3, 0.4, Profile::tracked);
     options.tracked.denoise = Denoising::off;  // without their noise most frames fit
     const auto run = coded_by(sequence, options);
     EXPECT_TRUE(run.errors.empty());
