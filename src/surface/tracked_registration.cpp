@@ -727,10 +727,23 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
     return out;
 }
 
-// The step that was made since hardly changes the form.
+// The step that was made since hardly changes the form. Where a handle has hardly any matches, as in a lost limb, the
+// data leave all of its motion open, and it would be let go: so each is held at its place by a small share of what
+// holds the others on average.
 DeformationForm form_of(const BlockPattern& pattern, BlockSystem system, double weight) {
+    constexpr double share = 0.03;
     DeformationForm out;
     out.diagonal = std::move(system.diagonal);
+    double turns = 0, shifts = 0;
+    for (const auto& block : out.diagonal) {
+        turns += block.diagonal().head<3>().sum() / 3;
+        shifts += block.diagonal().tail<3>().sum() / 3;
+    }
+    const auto count = static_cast<double>(std::max<std::size_t>(out.diagonal.size(), 1));
+    for (auto& block : out.diagonal) {
+        block.diagonal().head<3>().array() += share * turns / count;
+        block.diagonal().tail<3>().array() += share * shifts / count;
+    }
     out.above.reserve(pattern.place.size());
     for (std::size_t i = 0; i < pattern.place.size(); ++i)
         out.above.push_back({pattern.place[i].first, pattern.place[i].second, system.above[i]});
