@@ -173,14 +173,15 @@ def test_damage_is_an_exception_behind_which_iterating_goes_on(kind):
     at = len(b"".join(packets[:5]))
     whole = b"".join(packets)
     spoilt = bytearray(whole)
-    spoilt[at + 40] ^= 1  # in frame 4, which frame 5 refers to
+    last = at + len(packets[5]) - 1
+    spoilt[last] ^= 1  # in frame 4, which frame 5 refers to
     numbers, sentences = taken_until_damage(kind(bytes(spoilt)))
     assert numbers == [0, 1, 2, 3, 6, 7, 8]
     assert sentences[0].startswith("frame 4: ") and sentences[1].startswith("frame 5: ")
     numbers, sentences = taken_until_damage(kind(whole[:at] + b"garbage" * 9 + whole[at:]))
     assert numbers == list(range(9)) and sentences == [f"63 bytes from byte {at} on are damaged, cut short, or a "
                                                    "packet larger than max_packet_bytes"]
-    numbers, sentences = taken_until_damage(kind(whole[:at + 50]))
+    numbers, sentences = taken_until_damage(kind(whole[:last]))
     assert numbers == [0, 1, 2, 3] and "cut short" in sentences[0]
 
 
