@@ -14,6 +14,7 @@
 #include "commands.h"
 #include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
+#include "metrics/percentile.h"
 
 namespace htvm::lab {
 namespace {
@@ -60,12 +61,6 @@ Result<std::vector<TimedFrame>> timed_frames(const std::string& file, const Opti
     }
     if (out.empty()) return fail(ErrorKind::bad_input, file + ": there is no frame");
     return out;
-}
-
-// The least value that at least so many percent of the values do not exceed.
-double percentile(const std::vector<double>& ascending, int percent) {
-    const std::size_t rank = (ascending.size() * static_cast<std::size_t>(percent) + 99) / 100;
-    return ascending[std::max<std::size_t>(rank, 1) - 1];
 }
 
 nlohmann::json summary(std::vector<double> milliseconds) {

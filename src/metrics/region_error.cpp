@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "core/parallel.h"
+#include "metrics/percentile.h"
 #include "metrics/surface_index.h"
 
 namespace htvm {
@@ -153,12 +154,8 @@ RegionErrorSummary summarise(std::vector<double> worst_mm) {
     out.frames = worst_mm.size();
     if (worst_mm.empty()) return out;
     std::ranges::sort(worst_mm);
-    const auto of_rank = [&](double share) {
-        const double rank = std::ceil(share * static_cast<double>(worst_mm.size()));
-        return worst_mm[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
-    };
-    out.median_mm = of_rank(0.5);
-    out.p99_mm = of_rank(0.99);
+    out.median_mm = percentile(worst_mm, 50);
+    out.p99_mm = percentile(worst_mm, 99);
     out.largest_mm = worst_mm.back();
     return out;
 }

@@ -34,8 +34,7 @@ Result<RegionError> worst_region(const Mesh& original, const Mesh& decoded, cons
 // Of several frames.
 struct RegionErrorSummary {
     std::size_t frames = 0;
-    double median_mm = 0, p99_mm = 0, largest_mm = 0;  // of the frames' worst regions; percentiles by nearest rank: the
-                                                       // least value that so many do not exceed
+    double median_mm = 0, p99_mm = 0, largest_mm = 0;  // of the frames' worst regions; see percentile.h
 };
 RegionErrorSummary summarise(std::vector<double> worst_mm);
 
