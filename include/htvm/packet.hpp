@@ -21,8 +21,7 @@ enum class PacketKind : std::uint8_t {
     predicted = 6,    // P-frame: the I-frame's mesh moved
     tracked = 7,      // T-frame: the I-frame's mesh laid on the captured surface
     front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
-    checkpoint = 9,   // reserved: a reference for viewers who join late; not shown
-    audio = 10,       // sound of the time from a frame to the next (audio.hpp); optional
+    audio = 10,       // (9 is not used) sound of the time from a frame to the next (audio.hpp); optional
     patched = 11,     // TP-frame: a T-frame of which a part is replaced; a reference itself
 };
 
