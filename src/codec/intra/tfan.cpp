@@ -29,7 +29,7 @@ struct NextNumberOfDecoder {
 EncodedTfan encode_tfan(std::uint32_t vertex_count, std::span<const Triangle> triangles) {
     RangeEncoder encoder;
     WritingCoder<RangeEncoder> coder{encoder};
-    const auto models = std::make_unique<FanModels>();
+    const auto models = std::unique_ptr<FanModels>(new FanModels);
     NextNumberOfEncoder discovery;
     FanOrder fans = encode_fans(coder, *models, vertex_count, triangles, discovery);
     std::vector<bool> visited(vertex_count);

@@ -158,6 +158,8 @@ struct FanHints {
     std::uint32_t right = 0;  // 0 .. 7: the angle at the end candidate that the right triangle would fill
 };
 
+// Made by `new FanModels`, without parentheses: every model has its initial value, and zeroing 650 KB before, as
+// std::make_unique does, would only take time.
 struct FanModels {
     std::array<std::array<std::array<BinaryModel, 4>, 3>, 16> more_fans;  // indexed by triangles, start and end
                                                                           // candidates
@@ -432,7 +434,7 @@ template <class Discovery>
 bool decode_fans(RangeDecoder& decoder, std::uint32_t triangle_count, Discovery& discovery,
                  std::vector<Triangle>& triangles) {
     ReadingCoder<RangeDecoder> coder{decoder};
-    const auto models_owner = std::make_unique<FanModels>();
+    const auto models_owner = std::unique_ptr<FanModels>(new FanModels);
     FanModels& models = *models_owner;
     OpenEdges edges;
     const auto discover = [&](const FanState& fan) {

@@ -383,7 +383,7 @@ EncodedMtfan encode_mtfan(std::span<const LatticePoint> decoded_positions, std::
     if (triangles.empty()) return result;
     RangeEncoder encoder;
     WritingCoder<RangeEncoder> coder{encoder};
-    const auto models = std::make_unique<FanModels>();
+    const auto models = std::unique_ptr<FanModels>(new FanModels);
     // On the heap, because the models and candidates are large.
     const auto discovery = std::unique_ptr<EncodedOrders>(
         new EncodedOrders{{decoded_positions, m, threads}, {}, std::move(result.distance_order_counts)});
