@@ -13,6 +13,7 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
         return fail(ErrorKind::corrupt_stream, "a patched frame that nothing may refer to");
     auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
     if (!pose) return tl::unexpected(pose.error());
+    const bool derives_for_itself = !state.reference->tracked;
     if (auto ok = derive_nodes(*state.reference, header, state.threads); !ok) return tl::unexpected(ok.error());
     const auto& reference = *state.reference->tracked;
     if (!reference.mesh.texcoords.empty())
@@ -26,12 +27,9 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     const auto& triangles = reference.mesh.triangles;
     auto patched = decode_patch(payload, {tracked.positions, triangles, tracked.colours}, reference.hierarchy);
     if (!patched) return tl::unexpected(patched.error());
+    smooth_what_is_new(*patched, static_cast<std::int32_t>(payload.header.geometry_step),
+                       !reference.mesh.normals.empty());
     auto& mesh = patched->mesh;
-    const auto step = static_cast<std::int32_t>(payload.header.geometry_step);
-    mesh.positions = smoothed_within_cells(
-        mesh.positions, mesh.triangles, {.step = step, .settled = static_cast<std::uint32_t>(patched->stays.size())});
-    if (!reference.mesh.normals.empty())
-        mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
     // With what the patch added, the mesh may be larger than its header says, and than its reference.
     if (auto ok = check_limits({}, {mesh.positions.size(), mesh.triangles.size()}, {}, 0, state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
@@ -40,10 +38,12 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
                          .kept = keep_nodes(reference.nodes, patched->stays)};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
-    // Its nodes are for the next frame to derive, so that no frame has to do the work of two.
+    // Its nodes are for the next frame to derive, so that no frame has to do the work of two. A part is done here by a
+    // frame that found its own reference's nodes derived.
     auto renewed = make_reference(header, std::move(facts), std::move(mesh), std::move(*pose),
                                   {.bones = false, .nodes = false}, state.threads);
     if (!renewed) return tl::unexpected(renewed.error());
+    if (!derives_for_itself) derive_hierarchy(*renewed, header);
     show(state, view_of(renewed->mesh()), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*renewed);

@@ -349,12 +349,8 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     out.referred = true;
     out.renewed =
         vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
+    smooth_what_is_new(*patched, coded_steps.geometry, !mesh.normals.empty());
     out.decoded = std::move(patched->mesh);
-    out.decoded.positions = smoothed_within_cells(
-        out.decoded.positions, out.decoded.triangles,
-        {.step = coded_steps.geometry, .settled = static_cast<std::uint32_t>(patched->stays.size())});
-    if (!mesh.normals.empty())
-        out.decoded.normals = quantised_normals(vertex_normals(out.decoded.positions, out.decoded.triangles));
     if (denoises(work.configuration))
         out.targets =
             on_new_reference(tracked->targets, patched->stays, out.decoded.positions.size(), filter_options(work));

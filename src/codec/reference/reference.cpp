@@ -17,10 +17,16 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
     reference.has_bones = true;
 }
 
+void derive_hierarchy(Reference& reference, const SequenceHeader& header) {
+    if (header.node_spacing == 0 || reference.step != 1 || reference.tracked || reference.hierarchy) return;
+    auto hierarchy = build_vertex_hierarchy(reference.mesh().positions, reference.mesh().triangles);
+    if (hierarchy) reference.hierarchy = std::move(*hierarchy);  // else derive_nodes() says what is wrong
+}
+
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
-    auto tracked =
-        make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads, reference.kept);
+    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads,
+                                          reference.kept, std::exchange(reference.hierarchy, std::nullopt));
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     reference.tracked->captured = reference.captured;

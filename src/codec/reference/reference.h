@@ -20,8 +20,9 @@ struct Reference {
     CapturedCounts captured;   // what its frame was captured with
     ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
     bool has_bones = false;    // whether it was derived
-    std::optional<TrackedReference> tracked;  // what depends on the nodes, if it was derived
-    KeptNodes kept;                           // of a patched mesh: what it takes over of the nodes before
+    std::optional<TrackedReference> tracked;   // what depends on the nodes, if it was derived
+    KeptNodes kept;                            // of a patched mesh: what it takes over of the nodes before
+    std::optional<VertexHierarchy> hierarchy;  // of what depends on the nodes, if only this was derived so far
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
 
@@ -50,6 +51,9 @@ Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts fa
 
 // Derive later what was not derived at once. No effect if it exists already.
 void derive_bones(Reference& reference, const SequenceHeader& header, Threads threads);
+// Derives a part of what depends on the nodes, so that the frame that needs them has less to do. No effect in streams
+// without nodes, and in those whose references are still to be averaged.
+void derive_hierarchy(Reference& reference, const SequenceHeader& header);
 // Needs a header with a node spacing.
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads);
 

@@ -12,6 +12,7 @@
 #include "codec/intra/neighbours.h"
 #include "codec/intra/positions.h"
 #include "codec/intra/tfan.h"
+#include "codec/tracked/tracked_frame.h"
 #include "core/geometry.h"
 #include "entropy/range_coder.h"
 
@@ -315,6 +316,13 @@ Result<PatchedSurface> decode_patch(const FramePayloadView& payload, const Track
         p = from_grid(p, step);
     }
     return joined(tracked, removed, border, *place, *triangles, *positions, colours);
+}
+
+void smooth_what_is_new(PatchedSurface& patched, std::int32_t step, bool with_normals) {
+    auto& mesh = patched.mesh;
+    mesh.positions = smoothed_within_cells(mesh.positions, mesh.triangles,
+                                           {.step = step, .settled = static_cast<std::uint32_t>(patched.stays.size())});
+    if (with_normals) mesh.normals = quantised_normals(vertex_normals(mesh.positions, mesh.triangles));
 }
 
 }  // namespace htvm::internal

@@ -58,6 +58,10 @@ Result<PatchedSurface> encode_patch(const TrackedSurface& tracked, const VertexH
 Result<PatchedSurface> decode_patch(const FramePayloadView& payload, const TrackedSurface& tracked,
                                     const VertexHierarchy& hierarchy);
 
+// Makes the mesh what is shown and referred to: what is new is smoothed within its quantiser cells, and normals, if the
+// reference has them, follow from the surface. step: of the new positions, as coded.
+void smooth_what_is_new(PatchedSurface& patched, std::int32_t step, bool with_normals);
+
 // The vertices that stay and have both triangles that stay and triangles that go, each once: along the edges at which
 // the mesh opens, so that neighbours on the border have places next to each other.
 std::vector<std::uint32_t> open_border(std::span<const Triangle> triangles, const std::vector<bool>& removed);

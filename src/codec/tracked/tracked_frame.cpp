@@ -118,7 +118,8 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 }
 
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing, std::int32_t step,
-                                                Threads threads, const KeptNodes& kept) {
+                                                Threads threads, const KeptNodes& kept,
+                                                std::optional<VertexHierarchy> ahead) {
     TrackedReference out;
     out.mesh = mesh;
     out.mesh.positions = averaged_within_cells(mesh.positions, mesh.triangles, step);
@@ -127,7 +128,13 @@ Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::in
     options.link_reach = std::max(node_spacing / 10, 1);
     Result<VertexHierarchy> hierarchy;
     parallel_invoke(
-        threads, [&] { hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles); },
+        threads,
+        [&] {
+            if (ahead)
+                hierarchy = std::move(*ahead);
+            else
+                hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles);
+        },
         [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options, kept); });
     out.graph = graph_of(out.nodes, out.mesh);
     if (!hierarchy) return tl::unexpected(hierarchy.error());

@@ -30,9 +30,10 @@ struct TrackedReference {
 };
 // node_spacing: lattice units, > 0. step: of the mesh's positions, lattice units, where they are still to be averaged,
 // as in streams before shown_smoothed_version; else 1. threads: uses two at most. kept: of a patched mesh, what it
-// takes over of the nodes before.
+// takes over of the nodes before. ahead: the mesh's hierarchy, where it is known already; then step must be 1.
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing, std::int32_t step,
-                                                Threads threads = {}, const KeptNodes& kept = {});
+                                                Threads threads = {}, const KeptNodes& kept = {},
+                                                std::optional<VertexHierarchy> ahead = {});
 
 // How a mesh's positions are quantised.
 struct QuantiserCells {
