@@ -220,6 +220,7 @@ namespace Htvm
         [DllImport(Library)] public static extern void htvm_encoder_destroy(IntPtr encoder);
         [DllImport(Library)] public static extern IntPtr htvm_encoder_last_error(IntPtr encoder);
         [DllImport(Library)] public static extern Status htvm_encoder_send_mesh(IntPtr encoder, ref Mesh mesh, IntPtr pose, long timestamp_us, int force_intra);
+        [DllImport(Library)] public static extern Status htvm_encoder_set_bitrate(IntPtr encoder, double bits_per_second);
         [DllImport(Library)] public static extern Status htvm_encoder_finish(IntPtr encoder);
         [DllImport(Library)] public static extern Status htvm_encoder_receive_packet(IntPtr encoder, byte[] buffer, UIntPtr capacity, out UIntPtr size);
         [DllImport(Library)] public static extern Status htvm_encoder_front_index(IntPtr encoder, byte[] buffer, UIntPtr capacity, out UIntPtr size);
@@ -664,6 +665,13 @@ namespace Htvm
                 Check(Native.htvm_encoder_send_mesh(handle, ref mesh, placed, timestampUs, forceIntra ? 1 : 0));
             }
             return Receive();
+        }
+
+        // From the next frame on the line carries so many bits a second; the quality follows within half a second. For an
+        // encoder that was made with a bitrate.
+        public void SetBitrate(double bitsPerSecond)
+        {
+            Check(Native.htvm_encoder_set_bitrate(handle, bitsPerSecond));
         }
 
         // Ends the stream, and returns its last packets.

@@ -56,6 +56,10 @@ public:
     // kept. Timestamps must ascend. After an error the frame is not part of the stream, and the next may be pushed.
     // Under rate control, a frame that does not fit the buffer even at the lowest quality is a limit error.
     Result<void> push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra = false);
+    // From the next frame on the line carries so many bits a second; the quality follows within half a second. A buffer
+    // of rate.buffer_seconds then holds as much of the new rate. bad_input unless the options gave a rate, or if this
+    // is not a rate that they could have given.
+    Result<void> set_bitrate(double bits_per_second);
     // Ends the sequence: queues the index of I-frames.
     void finish();
     // The next packet in stream order; nothing if more must be pushed first.

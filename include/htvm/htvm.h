@@ -497,6 +497,10 @@ const char* htvm_encoder_last_error(const htvm_encoder* encoder);
 htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh, const htvm_pose* pose,
                                    int64_t timestamp_us, int force_intra);
 
+/* From the next frame on the line carries so many bits a second; the quality follows within half a second.
+ * HTVM_BAD_INPUT: the options gave no rate.bits_per_second, or this is not one that they could have given. */
+htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_second);
+
 /* Ends the sequence. No mesh may be sent afterwards. */
 htvm_status htvm_encoder_finish(htvm_encoder* encoder);
 

@@ -220,6 +220,14 @@ class Encoder:
         self._write(packets)
         return packets
 
+    def set_bitrate(self, bits_per_second: float) -> None:
+        """From the next frame on the line carries so many bits a second; the quality follows within half a second.
+
+        For an encoder that was made with a bitrate; else BadInput.
+        """
+        self._check_open()
+        self._check(c.library.htvm_encoder_set_bitrate(self._handle, bits_per_second))
+
     def finish(self) -> List[bytes]:
         """Ends the stream, and returns its last packets. A file is complete then, and in its place."""
         if self._finished:

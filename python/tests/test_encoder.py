@@ -96,6 +96,21 @@ def test_a_file_object_gets_the_packets_and_stays_open(stream):
     assert file.getvalue() == stream and stream.startswith(b"".join(returned))
 
 
+def test_a_bitrate_changes_while_frames_are_pushed():
+    encoder = htvm.Encoder(subject_size=1000, quality=None, rate_bits_per_second=80e3, key_interval=1)
+
+    def size_of(first, last):
+        return sum(len(packet) for number in range(first, last) for packet in encoder.push(sheet(number)))
+
+    size_of(0, 30)
+    before = size_of(30, 60)
+    encoder.set_bitrate(40e3)
+    size_of(60, 75)
+    assert size_of(75, 105) < 0.7 * before
+    with pytest.raises(htvm.BadInput, match="rate.bits_per_second"):
+        htvm.Encoder(subject_size=1000).set_bitrate(1e6)
+
+
 def test_a_mesh_that_cannot_be_coded_is_left_out():
     encoder = htvm.Encoder(subject_size=1000)
     packets = encoder.push(sheet(0))

@@ -322,6 +322,14 @@ htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh,
     });
 }
 
+htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_second) {
+    if (!encoder) return HTVM_BAD_INPUT;
+    return guarded(encoder->error, [&] {
+        const auto set = encoder->encoder.set_bitrate(bits_per_second);
+        return set ? htvm_status{HTVM_OK} : encoder->error.set(set.error());
+    });
+}
+
 htvm_status htvm_encoder_finish(htvm_encoder* encoder) {
     if (!encoder) return HTVM_BAD_INPUT;
     return guarded(encoder->error, [&] {

@@ -327,6 +327,19 @@ Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t time
     return out_of_memory();
 }
 
+Result<void> Encoder::set_bitrate(double bits_per_second) {
+    auto& rate = state_->control.rate;
+    if (!rate)
+        return fail(ErrorKind::bad_input,
+                    "this encoder keeps to no bitrate: give it rate.bits_per_second when it is made");
+    auto options = state_->configuration.options;
+    options.rate.bits_per_second = bits_per_second;
+    if (!(bits_per_second > 0)) return fail(ErrorKind::bad_input, "a bitrate is above 0");
+    if (auto ok = check(options); !ok) return ok;
+    rate->change_rate(bits_per_second);
+    return {};
+}
+
 void Encoder::finish() try {
     auto& state = *state_;
     if (state.finished || !state.begun) return;

@@ -381,6 +381,17 @@ TEST(CEncoder, WrongMeshesAndPosesAreErrorsAndTheNextFrameIsFine) {
     EXPECT_EQ(decode_packets(read_packets(bytes, 100)).frames.size(), 1u);
 }
 
+TEST(CEncoder, ABitrateIsChangedWhereOneWasGiven) {
+    const auto free = make_encoder();
+    EXPECT_EQ(htvm_encoder_set_bitrate(free.get(), 1e6), HTVM_BAD_INPUT);
+    EXPECT_NE(std::string(htvm_encoder_last_error(free.get())).find("rate.bits_per_second"), std::string::npos);
+    const auto options = make_options();
+    ASSERT_EQ(htvm_encoder_options_set_number(options.get(), "rate.bits_per_second", 1e6), HTVM_OK);
+    const auto encoder = make_encoder(options.get());
+    EXPECT_EQ(htvm_encoder_set_bitrate(encoder.get(), 2e6), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_set_bitrate(encoder.get(), -1), HTVM_BAD_INPUT);
+}
+
 TEST(CEncoder, TheMeshWithoutVerticesIsAFrame) {
     const auto encoder = make_encoder();
     htvm_mesh mesh;
@@ -393,6 +404,7 @@ TEST(CEncoder, SurvivesNullHandles) {
     EXPECT_EQ(htvm_encoder_send_mesh(nullptr, nullptr, nullptr, 0, 0), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_encoder_receive_packet(nullptr, nullptr, 0, &size), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_encoder_finish(nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_set_bitrate(nullptr, 1e6), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_encoder_last_frame(nullptr, nullptr, 0), HTVM_BAD_INPUT);
     EXPECT_STREQ(htvm_encoder_last_error(nullptr), "");
     htvm_encoder_destroy(nullptr);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "codec/enhanced_options.h"
@@ -336,6 +337,43 @@ TEST(TrackedError, ATargetThatNoQualityIsBadEnoughForIsNotExceeded) {
         EXPECT_LT(error_of(sequence.frames[f].mesh, run.shown[f]), 5);
         EXPECT_EQ(run.costs[f].quality, 0) << f;
     }
+}
+
+TEST(EncoderRate, FollowsABitrateThatIsChangedBetweenFrames) {
+    const auto sequence = walking(90);
+    EncoderOptions options;
+    options.skeleton = sequence.skeleton;
+    options.rate.bits_per_second = 300e3;
+    auto encoder = Encoder::create(options);
+    ASSERT_TRUE(encoder);
+    std::array<double, 2> bits{};  // of the 30 frames before the change, and of 30 from half a second behind it
+    for (int f = 0; f < 90; ++f) {
+        if (f == 45) {
+            ASSERT_TRUE(encoder->set_bitrate(100e3));
+        }
+        const auto& frame = sequence.frames[static_cast<std::size_t>(f)];
+        ASSERT_TRUE(encoder->push(frame.mesh, frame.pose ? &*frame.pose : nullptr, 33333 * f));
+        while (encoder->pull()) {
+        }
+        if (f >= 15 && f < 45) bits[0] += encoder->last_cost().bits;
+        if (f >= 60) bits[1] += encoder->last_cost().bits;
+    }
+    EXPECT_NEAR(bits[0], 300e3, 0.2 * 300e3);
+    EXPECT_NEAR(bits[1], 100e3, 0.2 * 100e3);
+}
+
+TEST(EncoderRate, IsChangedOnlyWhereThereIsOneAndToWhatOptionsCouldHaveSaid) {
+    auto free = Encoder::create({});
+    ASSERT_TRUE(free);
+    EXPECT_EQ(free->set_bitrate(1e6).error().message,
+              "this encoder keeps to no bitrate: give it rate.bits_per_second when it is made");
+    EncoderOptions options;
+    options.rate.bits_per_second = 1e6;
+    auto encoder = Encoder::create(options);
+    ASSERT_TRUE(encoder);
+    EXPECT_TRUE(encoder->set_bitrate(2e6));
+    for (const double wrong : {0.0, -1.0, 999.0, 1e13, std::nan("")})
+        EXPECT_EQ(encoder->set_bitrate(wrong).error().kind, ErrorKind::bad_input) << wrong;
 }
 
 }  // namespace

@@ -213,5 +213,52 @@ TEST(RatePlan, LowersOnlyWhatOverfillsTheBuffer) {
 
 TEST(RatePlan, OfNoFramesIsEmpty) { EXPECT_TRUE(plan_qualities({}, {}, 0.04).empty()); }
 
+// The average size of the frames from `first` on, in units of what the line carries at the new rate.
+double after_change(double before, double after, int first, int frames) {
+    Capture capture;
+    capture.key_interval = 1000;
+    RateControlOptions options;
+    options.bits_per_second = before;
+    options.key_interval = 30;
+    RateController rate(options);
+    constexpr int change_at = 90;
+    double bits = 0;
+    for (int f = 0; f < change_at + first + frames; ++f) {
+        if (f == change_at) rate.change_rate(after);
+        const auto type = f == 0 ? FrameType::intra : FrameType::enhanced;
+        const double quality = rate.quality(type), size = size_of(capture, f, type, quality, 1);
+        if (f >= change_at + first) bits += size;
+        rate.coded({type, quality, size});
+    }
+    return bits / frames / (after / options.frames_per_second);
+}
+
+TEST(RateControl, FollowsARateThatIsChangedWithinHalfASecond) {
+    for (const auto& [before, after] : {std::pair{8e6, 4e6}, {8e6, 2e6}, {2e6, 8e6}, {4e6, 5e6}})
+        EXPECT_NEAR(after_change(before, after, 15, 15), 1, 0.2) << before << " to " << after;
+}
+
+TEST(RateControl, KeepsToTheBufferOfTheChangedRateFromTheFirstFrameOn) {
+    RateControlOptions options;
+    options.bits_per_second = 8e6;
+    RateController rate(options);
+    rate.coded({FrameType::intra, 50, 7e6});
+    rate.change_rate(2e6);
+    EXPECT_EQ(rate.room(), 1e6) << "half of a second at 2 Mbit/s";
+    rate.change_rate(0);
+    rate.change_rate(-1);
+    EXPECT_EQ(rate.room(), 1e6) << "no rate changes nothing";
+}
+
+TEST(RateControl, DropsThePlanOfAFirstPassWhenTheRateChanges) {
+    RateControlOptions options;
+    options.bits_per_second = 8e6;
+    const std::vector<FrameCost> first_pass(100, {FrameType::enhanced, 50, 270e3});
+    RateController rate(options, first_pass);
+    const double planned = rate.quality(FrameType::enhanced);
+    rate.change_rate(2e6);
+    EXPECT_NEAR(rate.quality(FrameType::enhanced), planned - 2 / 0.04, 12);
+}
+
 }  // namespace
 }  // namespace htvm::internal

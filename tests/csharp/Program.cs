@@ -237,6 +237,7 @@ static class Program
                 Fails(() => encoder.Push(positions, indices.ToArray(), null, 1, new Pose { Joints = new double[3] }),
                       Status.BadInput, "joints must have 6");
             }
+            Fails(() => encoder.SetBitrate(1e6), Status.BadInput, "rate.bits_per_second");
             FrameInfo last;
             Require(encoder.LastFrame(out last) && last.Frame == 3 && last.Type == FrameKind.Tracked, "the last frame");
             Fails(() => encoder.FrontIndex(), Status.BadInput, "finished");

@@ -97,12 +97,9 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
 
 RateController::RateController(const RateControlOptions& options, std::vector<FrameCost> first_pass)
     : options_(sane(options)), first_pass_(std::move(first_pass)) {
-    per_frame_ = options_.bits_per_second / options_.frames_per_second;
-    capacity_ = options_.bits_per_second * options_.buffer_seconds;
+    take_line();
     level_ = (options_.lowest_quality + options_.highest_quality) / 2;
     model_.intra_extra = options_.intra_extra;
-    // With a large buffer there is no need to follow small changes.
-    model_.usual_belief = std::clamp(3 * per_frame_ / capacity_, 0.05, 0.15);
     // Before any frame is seen, assume as many I-frames as the key interval asks for.
     recent_.assign(static_cast<std::size_t>(std::clamp(options_.key_interval, 1, 1000)), RateClass::between);
     recent_[0] = RateClass::intra;
@@ -118,6 +115,28 @@ RateController::RateController(const RateControlOptions& options, std::vector<Fr
         rest_[i][rules_of(first_pass_[i].type).rate == RateClass::moved ? 0 : 1] +=
             bits_at(first_pass_[i], plan_[i], plan_slope_);
     }
+}
+
+void RateController::take_line() {
+    per_frame_ = options_.bits_per_second / options_.frames_per_second;
+    capacity_ = options_.bits_per_second * options_.buffer_seconds;
+    // With a large buffer there is no need to follow small changes.
+    model_.usual_belief = std::clamp(3 * per_frame_ / capacity_, 0.05, 0.15);
+}
+
+void RateController::change_rate(double bits_per_second) {
+    const double before = options_.bits_per_second;
+    if (!std::isfinite(bits_per_second) || !(bits_per_second > 0) || bits_per_second == before) return;
+    options_.bits_per_second = bits_per_second;
+    take_line();
+    plan_.clear();
+    // A slower line has more waiting than it may have: dropping frames until that is gone would stop the picture, so
+    // the line is taken to begin half full. What it did not carry before is not made up for.
+    buffer_ = std::min(buffer_, capacity_ / 2);
+    idle_bits_ = 0;
+    level_ = std::clamp(level_ + std::log2(bits_per_second / before) / model_.slope, options_.lowest_quality,
+                        options_.highest_quality);
+    hurries_ = static_cast<int>(std::ceil(options_.frames_per_second / 2));
 }
 
 double RateController::room() const { return capacity_ - buffer_; }
@@ -171,7 +190,8 @@ double RateController::live_quality(FrameType type) const {
     if (is_guess(type)) return low;
     // At an I-frame and the frame after it, quality can change without extra cost.
     const bool free = since_intra_ == 1 || rules_of(type).rate == RateClass::intra;
-    const double change = low - level_, step = std::max(options_.largest_step / (free ? 2 : 1), 20.0 / seen);
+    const double usual = options_.largest_step * (hurries_ > 0 ? 4 : 1) / (free ? 2 : 1);
+    const double change = low - level_, step = std::max(usual, 20.0 / seen);
     if (std::abs(change) < (free ? 0.5 : options_.stay)) return level_;
     return level_ + std::clamp(change, -step, step);
 }
@@ -253,6 +273,7 @@ void RateController::coded(const FrameCost& frame) {
     buffer_ = std::max(0.0, buffer_ - per_frame_);
     ++frames_;
     calls_ = 0;
+    hurries_ = std::max(0, hurries_ - 1);
     if (frames_ + 10 <= plan_.size()) correct_plan(rate);
 }
 

@@ -73,10 +73,14 @@ public:
     bool is_guess(FrameType type) const;
     // The frame as finally coded; a dropped frame takes 0 bits.
     void coded(const FrameCost& frame);
+    // The line carries so many bits a second from the next frame on. The quality follows at once, as far as the model
+    // knows how, and then in larger steps than usual for half a second. What was planned from a first pass is dropped.
+    void change_rate(double bits_per_second);
     double buffer_bits() const { return buffer_; }
     double total_bits() const { return total_bits_; }  // of all frames so far
 
 private:
+    void take_line();            // what follows from the bitrate
     double wanted_bits() const;  // per frame on average, from now on
     double live_quality(FrameType type) const;
     double planned_quality() const;
@@ -92,7 +96,8 @@ private:
     double buffer_ = 0, idle_bits_ = 0;
     std::size_t frames_ = 0;
     double total_bits_ = 0;
-    int calls_ = 0;  // number of calls of lower_quality for the next frame
+    int calls_ = 0;    // number of calls of lower_quality for the next frame
+    int hurries_ = 0;  // number of frames from now on in which the quality may change by more
     int since_intra_ = 0;
     bool sent_between_ = false;                // whether an EP- or T-frame was sent
     double level_ = 0;                         // the quality shared by I- and EP-frames
