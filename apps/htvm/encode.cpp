@@ -18,6 +18,7 @@
 #include "encode_pass.h"
 #include "htvm/running_time.hpp"
 #include "io/number_text.h"
+#include "line_rate.h"
 #include "live/hub_address.h"
 #include "rate_passes.h"
 #include "rate_report.h"
@@ -200,6 +201,10 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
                 .rate = rate};
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
             if (hub) pass.wants_key_frame = [hub] { return hub->wants_key_frame(); };
+            if (hub && rate.rate_controlled() && !options.publishing.fixed_bitrate)
+                pass.bitrate = [hub, line = LineRate(rate.bits_per_second)]() mutable {
+                    return line.follow(hub->line());
+                };
             auto done = encode_frames(pass);
             if (!done) return writes ? ended_early(pass, *output, done.error()) : done;
             if (done = finish(pass); !done) return done;
@@ -289,6 +294,11 @@ void add_encode(CLI::App& app, Run& run) {
         ->allow_extra_args(false)
         ->group(hubs);
     add_publishing_options(*command, options->publishing, hubs);
+    command
+        ->add_flag("--fixed-bitrate", options->publishing.fixed_bitrate,
+                   "Keep to --bitrate where the hub's line does not carry it, and drop frames instead (default: less\n"
+                   "is sent while it does not)")
+        ->group(hubs);
     add_audio_options(*command, options->audio);
     add_encoding_options(*command, options->encoding);
     command

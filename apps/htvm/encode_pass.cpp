@@ -27,7 +27,21 @@ std::string progress_text(const Pass& pass, const FrameInfo& info) {
     std::string text = fmt::format("{} {:.2f} bpv", kind_of(info.type).letter,
                                    bits_per_vertex(info.bytes.total(), info.source_vertices));
     if (pass.rate.controlled()) text += fmt::format(", quality {:.0f}", pass.encoder.last_cost().quality);
+    if (pass.slower_line > 0) text += fmt::format(" for a line of {:.2f} Mbit/s", pass.slower_line / 1e6);
     return text;
+}
+
+// A line that does not carry what is made, or does again.
+Result<void> follow_line(Pass& pass) {
+    const auto bits_per_second = pass.bitrate ? pass.bitrate() : std::nullopt;
+    if (!bits_per_second) return {};
+    const bool slower = *bits_per_second < pass.rate.bits_per_second;
+    if (slower && pass.slower_line == 0)
+        warn_of_frame(pass, FrameWarnings::slower_line,
+                      fmt::format("the line does not carry {:.2f} Mbit/s; less is sent until it does",
+                                  pass.rate.bits_per_second / 1e6));
+    pass.slower_line = slower ? *bits_per_second : 0;
+    return pass.encoder.set_bitrate(*bits_per_second);
 }
 
 // What became of a mesh.
@@ -63,6 +77,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     }
     if (auto written = drain(pass); !written) return tl::unexpected(written.error());
     extend(summary.bounds, pass.encoder.bounds());
+    if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());
     pass.step(progress_text(pass, info));
     return Coded::yes;
 }

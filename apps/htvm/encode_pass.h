@@ -36,12 +36,12 @@ void add(Summary& summary, Summary behind);
 // Warnings of single frames, from any thread: of hundreds of a kind the first few tell enough.
 class FrameWarnings {
 public:
-    enum Kind : std::uint8_t { bad, missing, dropped };
+    enum Kind : std::uint8_t { bad, missing, dropped, slower_line };
     void tell(Kind kind, const std::string& line);
 
 private:
     std::mutex mutex_;
-    std::array<std::size_t, 3> told_{};
+    std::array<std::size_t, 4> told_{};
 };
 
 struct Pass {
@@ -54,8 +54,10 @@ struct Pass {
     FrameWarnings* warnings;                       // null: what is wrong with the capture was said before
     Summary& summary;
     RateReport& rate;
-    std::function<bool()> wants_key_frame = {};  // asked before each frame: whether it should be an I-frame
-    bool saw_triangles = false;                  // in a frame so far, or of those before
+    std::function<bool()> wants_key_frame = {};           // asked before each frame: whether it should be an I-frame
+    std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
+    double slower_line = 0;      // the bitrate that the line carries at present, where it is below the one asked for
+    bool saw_triangles = false;  // in a frame so far, or of those before
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
     std::optional<Mesh> last = {};
     std::optional<Pose> last_pose = {};

@@ -110,6 +110,11 @@ Result<void> Publishing::send(const Packet& packet) {
     return publisher_.send(packet);
 }
 
+LineState Publishing::line() const {
+    const auto state = publisher_.state();
+    return {Clock::now(), state.connected, state.queue_time, state.sent_bytes};
+}
+
 std::string Publishing::progress() {
     const auto state = publisher_.state();
     const auto now = Clock::now();

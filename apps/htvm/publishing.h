@@ -9,6 +9,7 @@
 #include "htvm/packet.hpp"
 #include "htvm/publisher.hpp"
 #include "htvm/result.hpp"
+#include "line_rate.h"
 
 namespace CLI {
 class App;
@@ -29,6 +30,7 @@ struct PublishingOptions {
     std::vector<std::string> other_hubs;
     HubTrust trust;
     bool stamps = false;
+    bool fixed_bitrate = false;  // while encoding: a full line does not lower the rate
 };
 // Adds --token, --token-file, --stamps and those of the trust.
 void add_publishing_options(CLI::App& command, PublishingOptions& options, const std::string& group);
@@ -43,6 +45,7 @@ public:
     Result<void> send(const Packet& packet);
     bool wants_key_frame() { return publisher_.wants_key_frame(); }
     PublisherState state() const { return publisher_.state(); }
+    LineState line() const;
     // For the line of progress: the rate of the last seconds, viewers, what waits, what was dropped.
     std::string progress();
     // The end of the stream, once the hub has all of it.
