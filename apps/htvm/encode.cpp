@@ -76,9 +76,9 @@ tl::unexpected<Error> ended_early(Pass& pass, StreamOutput& output, const Error&
         if (finish(pass)) (void)hub->finish();  // of the two errors, the first says why
         return tl::unexpected(error);
     }
-    const auto frames = pass.summary.totals.all().frames;
-    if (frames == 0 || !pass.options.keep_partial) return tl::unexpected(error);
+    if (pass.summary.totals.all().frames == 0 || !pass.options.keep_partial) return tl::unexpected(error);
     const bool whole = finish(pass).has_value();
+    const auto frames = pass.summary.totals.all().frames;
     const auto kept = output.keep();
     std::string message = fmt::format("{}; {} encoded before", error.message,
                                       counted(frames, "frame") + (frames == 1 ? " was" : " were"));
@@ -257,7 +257,8 @@ void check_jobs(const EncodeOptions& options, bool random_session) {
 // A group's packets come once its last frame is captured.
 void check_groups(const EncodeOptions& options) {
     if (is_given(options.encoding, "tracked.group") && live::looks_like_hub_address(options.output))
-        throw CLI::ValidationError("--group", "holds frames back, which who watches live would wait for; it is for files");
+        throw CLI::ValidationError("--group",
+                                   "holds frames back, which who watches live would wait for; it is for files");
 }
 
 }  // namespace

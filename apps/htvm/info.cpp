@@ -314,8 +314,9 @@ Result<void> info(const Options& options) {
                 "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
                 "mesh\n"
                 "*: a place to start, as every I- and TP-frame is\n{}\n",
-                grouped ? "T1/8: the first of a group of eight T-frames; its packet, and others, bring frames that follow\n"
-                        : "");
+                grouped
+                    ? "T1/8: the first of a group of eight T-frames; its packet, and others, bring frames that follow\n"
+                    : "");
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);

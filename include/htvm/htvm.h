@@ -55,7 +55,8 @@ extern "C" {
 /* Version of the linked library: major * 65536 + minor * 256 + patch, and as text, "0.1.0". */
 uint32_t htvm_version(void);
 const char* htvm_version_string(void);
-/* Version of the streams that it writes where T-frames do not come in groups; it reads all up to 5 (docs/bitstream.md). */
+/* Version of the streams that it writes where T-frames do not come in groups; it reads all up to 5 (docs/bitstream.md).
+ */
 uint32_t htvm_stream_version(void);
 
 /* ---- status --------------------------------------------------------------------------------------------------- */

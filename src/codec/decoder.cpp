@@ -120,11 +120,13 @@ Result<void> take_codebook(DecoderState& state, const Packet& packet) {
 
 MeshCounts counts(const LatticeMesh& mesh) { return {mesh.positions.size(), mesh.triangles.size()}; }
 
-// How many frames besides the shown one this packet may leave the decoder with: those of its group and of the one before.
+// How many frames of groups there may be at once while this packet is decoded: those of the group in force, of its own,
+// and the mean of two of them.
 std::size_t hidden_frames(const DecoderState& state, const Packet& packet) {
-    const bool grouped = packet.kind == PacketKind::tracked && state.header->version >= grouped_version;
-    const auto place = grouped ? read_group_place(packet.payload) : Result<GroupPlace>();
-    return state.tracked.group.length + (place ? place->length - 1 : 0);
+    const std::size_t held = state.tracked.group.length;
+    if (packet.kind != PacketKind::tracked || state.header->version < grouped_version) return held;
+    const auto place = read_group_place(packet.payload);
+    return place && place->length > 1 ? held + place->length + 1 : held;
 }
 
 // Memory that the decoder holds, including what this frame still has to derive.
@@ -159,7 +161,8 @@ Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& pac
     const MeshCounts coded{header.vertices, header.triangles};
     const bool refers = rules.refers_to != RefersTo::nothing && state.reference;
     const auto reference = refers ? counts(state.reference->mesh()) : MeshCounts{};
-    if (auto ok = check_limits(rules.memory, coded, reference, kept_memory(state, packet, rules, coded), state.options); !ok)
+    if (auto ok = check_limits(rules.memory, coded, reference, kept_memory(state, packet, rules, coded), state.options);
+        !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
     if (rules.refers_to == RefersTo::reference)
         if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());

@@ -1,5 +1,5 @@
-// Decodes T-frames: the I-frame's mesh, moved by the nodes of a deformation graph and displaced. In groups, a packet may
-// bring several of them, one of which is shown.
+// Decodes T-frames: the I-frame's mesh, moved by the nodes of a deformation graph and displaced. In groups, a packet
+// may bring several of them, one of which is shown.
 #include <string>
 #include <utility>
 
@@ -65,7 +65,8 @@ Result<void> decode_single(DecoderState& state, const Packet& packet, const Fram
     const auto of_last = refers_to_last(state, packet);
     if (!of_last) return tl::unexpected(of_last.error());
     if (auto ok = derive_nodes(*state.reference, *state.header, state.threads); !ok) return tl::unexpected(ok.error());
-    if (history.newest == &history.next) history.newest = history.frame ? &history.last : nullptr;  // it is written over
+    if (history.newest == &history.next)
+        history.newest = history.frame ? &history.last : nullptr;  // it is written over
     const auto& reference = *state.reference->tracked;
     const auto* before = *of_last ? &history.last.state : nullptr;
     if (auto ok = state.header->version >= tracked_run_version
@@ -104,8 +105,8 @@ Result<std::vector<DecodedTrackedFrame>> decode_brought(const TrackedReference& 
         if (frame.later > 0)
             between = state_between(
                 reference, {state_of(frame.earlier), state_of(frame.later), &state_of(frame.above)->head}, frame);
-        if (auto ok = decode_tracked_frame(payload.frames[i], reference, between ? &*between : state_of(0), threads,
-                                           out[i]);
+        if (auto ok =
+                decode_tracked_frame(payload.frames[i], reference, between ? &*between : state_of(0), threads, out[i]);
             !ok)
             return tl::unexpected(ok.error());
     }
@@ -165,7 +166,8 @@ Result<void> continue_group(DecoderState& state, const Packet& packet, const Gro
     const bool goes_on = group.length == length && std::uint64_t{group.first} + frame - 1 == packet.frame &&
                          packet.reference == group.first + needed - 1 && group.is_there[needed];
     if (!goes_on)
-        return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + ", one of a group, refers to frame " +
+        return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) +
+                                                   ", one of a group, refers to frame " +
                                                    std::to_string(packet.reference) + ", which is not there");
     auto brought = decode_brought(
         *state.reference->tracked, payload,

@@ -199,7 +199,8 @@ struct Outcome {
 };
 
 // Numbers and queues a frame's packets, and counts their bytes by layer.
-void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us, const FrameCost& cost, Outcome& outcome) {
+void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us, const FrameCost& cost,
+                Outcome& outcome) {
     FrameInfo info;
     LayerBytes codebooks;
     for (auto& packet : candidate.packets) {
@@ -282,8 +283,7 @@ Result<void> hold(State& state, FrameWork& work, Candidate& chosen, std::int64_t
     Outcome outcome;
     auto& held = state.held;
     const bool place_to_start = chosen.access && (state.anchor || !held.empty());
-    held.push_back(
-        {state.sequence.next_frame, timestamp_us, work.give_up(), chosen.steps, std::move(chosen.noise)});
+    held.push_back({state.sequence.next_frame, timestamp_us, work.give_up(), chosen.steps, std::move(chosen.noise)});
     const std::span<const HeldFrame> all = held;
     const auto own = all.last(1);
     if (place_to_start) {

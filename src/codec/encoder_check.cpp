@@ -33,7 +33,8 @@ Result<void> check_that_options_go_together(const EncoderOptions& o) {
         if (o.rate.bits_per_second > 0 || o.rate.target_error > 0)
             return bad("tracked.group goes with fixed steps only, not with rate.bits_per_second or rate.target_error");
         if (o.tracked.references == TrackedReferences::intra)
-            return bad("tracked.group does not go with tracked.references intra: frames of a group refer to each other");
+            return bad(
+                "tracked.group does not go with tracked.references intra: frames of a group refer to each other");
         if (o.key_interval == 1) return bad("tracked.group does nothing with key_interval 1: there are no T-frames");
     }
     if (o.topology.frame_choice != FrameChoice::motion) {

@@ -134,7 +134,8 @@ TEST(GroupPayload, ComesBack) {
     EXPECT_EQ(payload->place.frame, 1u);
     ASSERT_EQ(payload->frames.size(), 4u);
     for (std::size_t i = 0; i < 4; ++i)
-        EXPECT_TRUE(std::equal(frames[i].begin(), frames[i].end(), payload->frames[i].begin(), payload->frames[i].end()));
+        EXPECT_TRUE(
+            std::equal(frames[i].begin(), frames[i].end(), payload->frames[i].begin(), payload->frames[i].end()));
     EXPECT_EQ(write_group_payload({8, 2}, {}).size(), 1u);
 }
 
@@ -325,7 +326,8 @@ TEST(GroupedStream, WhatNoneNeedsIsDroppable) {
         bool needed = packet.frame == 9;  // a group behind it might
         for (std::size_t i = 0; i < headers.size(); ++i)
             for (const auto place : closure(headers, i))
-                if (headers[place].frame == packet.frame && headers[i].frame != packet.frame && is_frame(grouped().packets[place]))
+                if (headers[place].frame == packet.frame && headers[i].frame != packet.frame &&
+                    is_frame(grouped().packets[place]))
                     needed = true;
         EXPECT_EQ(packet.has(packet_flag::referred), needed) << packet.frame;
         EXPECT_EQ(packet.has(packet_flag::droppable), !needed) << packet.frame;
