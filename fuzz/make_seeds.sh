@@ -59,7 +59,7 @@ stream() {
         printf '\x06\x05\x09\x03\x05\xff\x07\x00\xff\x01\x00\x00\x04\x06\xff'
         cat "$work/$name.htvm"
     } >"$out/c_decoder/$name"
-    [[ $name =~ ^tiny_(enhanced|tracked)$ ]] || return 0
+    [[ $name =~ ^tiny_(enhanced|tracked|grouped)$ ]] || return 0
     # A lost packet, one that comes twice, a changed byte of a layer.
     {
         printf '\x03\x00\x03\x00\x00\x01\x02\x05\x00\x0f\x04\x05\x09'
@@ -75,6 +75,7 @@ stream tiny_predicted tiny --unit mm -q 10 --decide motion --predicted-below 500
 stream tiny_in_part tiny --unit mm -q 20 --still-below 60 --animation-error 0 --keyint 4 -s "$tiny"
 stream tiny_tracked tiny --unit mm -q 30 --profile tracked -s "$tiny"
 stream tiny_tracked_intra tiny --unit mm -q 30 --profile tracked --tracked-from intra
+stream tiny_grouped tiny --unit mm -q 30 --profile tracked --group 3
 stream tiny_paper tiny --unit mm -q 10 --profile paper -s "$tiny"
 
 head -c 100 "$work/normals/frame_00060.ply" >"$out/import_ply/cut_off"

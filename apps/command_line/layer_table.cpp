@@ -100,16 +100,18 @@ LayerBytes layers_from_json(const nlohmann::json& json) {
 }
 
 nlohmann::json frame_json(const FrameInfo& info) {
-    return {{"frame", info.frame},
-            {"type", kind_of(info.type).letter},
-            {"reference", info.reference},
-            {"timestamp_us", info.timestamp_us},
-            {"source_vertices", info.source_vertices},
-            {"source_triangles", info.source_triangles},
-            {"vertices", info.vertices},
-            {"triangles", info.triangles},
-            {"bytes", layers_json(info.bytes)},
-            {"bits_per_vertex", bits_per_vertex(info.bytes.total(), info.source_vertices)}};
+    nlohmann::json out = {{"frame", info.frame},
+                          {"type", kind_of(info.type).letter},
+                          {"reference", info.reference},
+                          {"timestamp_us", info.timestamp_us},
+                          {"source_vertices", info.source_vertices},
+                          {"source_triangles", info.source_triangles},
+                          {"vertices", info.vertices},
+                          {"triangles", info.triangles},
+                          {"bytes", layers_json(info.bytes)},
+                          {"bits_per_vertex", bits_per_vertex(info.bytes.total(), info.source_vertices)}};
+    if (info.group > 1) out["group"] = {{"frames", info.group}, {"place", info.place}};
+    return out;
 }
 
 }  // namespace htvm::app

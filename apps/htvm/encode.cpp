@@ -77,9 +77,9 @@ tl::unexpected<Error> ended_early(Pass& pass, StreamOutput& output, const Error&
         if (finish(pass)) (void)hub->finish();  // of the two errors, the first says why
         return tl::unexpected(error);
     }
-    const auto frames = pass.summary.totals.all().frames;
-    if (frames == 0 || !pass.options.keep_partial) return tl::unexpected(error);
+    if (pass.summary.totals.all().frames == 0 || !pass.options.keep_partial) return tl::unexpected(error);
     const bool whole = finish(pass).has_value();
+    const auto frames = pass.summary.totals.all().frames;
     const auto kept = output.keep();
     std::string message = fmt::format("{}; {} encoded before", error.message,
                                       counted(frames, "frame") + (frames == 1 ? " was" : " were"));
@@ -259,6 +259,13 @@ void check_jobs(const EncodeOptions& options, bool random_session) {
                                    "all the same number");
 }
 
+// A group's packets come once its last frame is captured.
+void check_groups(const EncodeOptions& options) {
+    if (is_given(options.encoding, "tracked.group") && live::looks_like_hub_address(options.output))
+        throw CLI::ValidationError("--group",
+                                   "holds frames back, which who watches live would wait for; it is for files");
+}
+
 }  // namespace
 
 Result<void> encode(const EncodeOptions& options) {
@@ -354,6 +361,7 @@ void add_encode(CLI::App& app, Run& run) {
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();
+        check_groups(*options);
         check_jobs(*options, !sessions.empty() && sessions[0] == "random");
         if (live::looks_like_hub_address(options->output) && options->in_groups())
             throw CLI::ValidationError("--jobs", "encodes groups of frames at once: for files, not for what is live");

@@ -80,7 +80,8 @@ Result<CodedGroup> code_group(Work& work, Capture& capture, const Group& group) 
               .encoder = *encoder,
               .write =
                   [&](Packet packet) {
-                      out.packets.push_back(std::move(packet));
+                      // The index is the whole stream's.
+                      if (packet.kind != PacketKind::index) out.packets.push_back(std::move(packet));
                       return Result<void>();
                   },
               .step =
@@ -96,6 +97,7 @@ Result<CodedGroup> code_group(Work& work, Capture& capture, const Group& group) 
     capture.restrict_to(group.first, group.frames);
     find_stand_in(pass, group);
     if (auto done = encode_frames(pass); !done) return tl::unexpected(done.error());
+    if (auto done = finish(pass); !done) return tl::unexpected(done.error());
     out.costs = std::move(rate.costs);
     return out;
 }

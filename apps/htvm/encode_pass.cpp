@@ -23,7 +23,22 @@ Result<void> drain(const Pass& pass) {
     return {};
 }
 
-std::string progress_text(const Pass& pass, const FrameInfo& info) {
+// Counts the frames that were coded last, and writes their packets.
+Result<void> take_coded(Pass& pass) {
+    auto& summary = pass.summary;
+    for (const auto& [info, cost] : pass.encoder.coded_frames()) {
+        add(summary.totals, info);
+        add_coded(pass.rate, cost);
+        if (!pass.options.json || !pass.write) continue;
+        summary.list.push_back(frame_json(info));
+        if (pass.rate.controlled()) summary.list.back()["quality"] = cost.quality;
+    }
+    extend(summary.bounds, pass.encoder.bounds());
+    return drain(pass);
+}
+
+std::string progress_text(const Pass& pass) {
+    const auto& info = pass.encoder.last_frame();
     std::string text = fmt::format("{} {:.2f} bpv", kind_of(info.type).letter,
                                    bits_per_vertex(info.bytes.total(), info.source_vertices));
     if (pass.rate.controlled()) text += fmt::format(", quality {:.0f}", pass.encoder.last_cost().quality);
@@ -68,17 +83,9 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         pass.step("dropped");
         return Coded::dropped;
     }
-    const auto& info = pass.encoder.last_frame();
-    add(summary.totals, info);
-    add_coded(pass.rate, pass.encoder.last_cost());
-    if (pass.options.json && pass.write) {
-        summary.list.push_back(frame_json(info));
-        if (pass.rate.controlled()) summary.list.back()["quality"] = pass.encoder.last_cost().quality;
-    }
-    if (auto written = drain(pass); !written) return tl::unexpected(written.error());
-    extend(summary.bounds, pass.encoder.bounds());
+    if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
     if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());
-    pass.step(progress_text(pass, info));
+    pass.step(progress_text(pass));
     return Coded::yes;
 }
 
@@ -198,8 +205,11 @@ Result<void> encode_frames(Pass& pass) {
 }
 
 Result<void> finish(Pass& pass) {
-    pass.encoder.finish();
-    return drain(pass);
+    const auto start = std::chrono::steady_clock::now();
+    const auto finished = pass.encoder.finish();
+    pass.summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!finished) return finished;
+    return pass.encoder.coded_frames().empty() ? drain(pass) : take_coded(pass);
 }
 
 }  // namespace htvm::app

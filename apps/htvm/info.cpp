@@ -75,7 +75,7 @@ void print_frame(const FrameInfo& f, bool start) {
         "{:>6} {:>4} {:>6} {:>10.3f} {:>8} {:>9} {:>9} {:>15.3f} {:>8.3f} {:>8.3f} {:>17.3f} {:>8.3f} {:>8.3f} "
         "{:>14.3f} {:>22.3f} {:>8.3f}\n",
         f.frame,
-        std::string(kind_of(f.type).letter) +
+        std::string(kind_of(f.type).letter) + (f.group > 1 ? fmt::format("{}/{}", f.place, f.group) : "") +
             (start && f.type != FrameType::intra && f.type != FrameType::patched ? "*" : ""),
         f.reference, static_cast<double>(f.timestamp_us) / 1e6, f.vertices, f.triangles, b.total(),
         bpv(b[Layer::pose] + b[Layer::transforms]), bpv(b[Layer::geometry] + b[Layer::external_intra]),
@@ -223,6 +223,7 @@ Result<void> info(const Options& options) {
     FrameNumbers numbers;
     RunningTime time;
     std::optional<StreamIndex> front;
+    bool grouped = false;
     AudioTotals audio;
     PatchedArea patched;
     nlohmann::json sequences = nlohmann::json::array();
@@ -275,6 +276,7 @@ Result<void> info(const Options& options) {
             sequences.back()["first_frame"] = frame->frame;
         }
         ++count;
+        grouped = grouped || frame->group > 1;
         add(totals, *frame);
         add(patched, frame->type, recoded);
         if (options.json) {
@@ -311,7 +313,10 @@ Result<void> info(const Options& options) {
             fmt::print(
                 "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
                 "mesh\n"
-                "*: a place to start, as every I- and TP-frame is\n\n");
+                "*: a place to start, as every I- and TP-frame is\n{}\n",
+                grouped
+                    ? "T1/8: the first of a group of eight T-frames; its packet, and others, bring frames that follow\n"
+                    : "");
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);

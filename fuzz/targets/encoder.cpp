@@ -33,6 +33,7 @@ EncoderOptions any_options(fuzz::FuzzInput& input) {
         if (what & 64) out.tracked.denoise = Denoising::off;
         out.tracked.node_spacing = 1 + 20 * input.u8();
         out.tracked.simplify = input.below(4) * 0.4;
+        if (what & 128) out.tracked.group = static_cast<int>(input.below(10));
     } else {
         out.topology.scene_changes = (what & 2) != 0;
         out.topology.merge_duplicates = (what & 4) != 0;
@@ -62,7 +63,8 @@ void check_options(EncoderOptions options, const fuzz::AnyCapture& capture) {
     DecoderOptions limits;
     limits.threads = 1;
     Decoder decoder(limits);
-    const auto decode = [&](const Mesh& promised, bool of_frame) {
+    // coded: how many frames the last call coded.
+    const auto decode = [&](std::size_t coded) {
         std::size_t frames = 0;
         while (const auto packet = encoder->pull()) {
             const auto packets = fuzz::read_packets(write_packet(*packet), 1 << 20);
@@ -71,21 +73,24 @@ void check_options(EncoderOptions options, const fuzz::AnyCapture& capture) {
             if (!frame) std::cerr << frame.error().message << '\n';
             require(frame.has_value(), "what the encoder sends can be decoded");
             if (!*frame) continue;
-            ++frames;
             fuzz::require_sound((*frame)->mesh, limits);
-            require(fuzz::same((*frame)->mesh, promised), "the decoded mesh is the one that the encoder promised");
+            require(frames < coded, "no packets but of the frames coded");
+            require(fuzz::same((*frame)->mesh, encoder->reconstruction(frames++)),
+                    "the decoded mesh is the one that the encoder promised");
         }
-        require(frames == (of_frame ? 1 : 0), "one packet a frame");
+        require(frames == coded, "one packet a frame");
     };
     std::int64_t time = 0;
     for (const auto& frame : capture.frames) {
         const auto pushed = encoder->push(frame.mesh, frame.pose ? &*frame.pose : nullptr, time += 33333);
         if (!pushed) require(!pushed.error().message.empty(), "an error says what is wrong");
         if (pushed) require(check_mesh(frame.mesh).has_value(), "a mesh that is none is refused");
-        decode(pushed ? encoder->reconstruction() : Mesh{}, pushed.has_value());
+        decode(pushed ? encoder->coded_frames().size() : 0);
     }
-    encoder->finish();
-    decode({}, false);
+    const std::size_t held = encoder->held_frames();
+    require(encoder->finish().has_value(), "what is held can be coded");
+    require(encoder->coded_frames().size() == held, "all that is held is coded at the end");
+    decode(held);
 }
 
 }  // namespace

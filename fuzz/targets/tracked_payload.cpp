@@ -1,9 +1,10 @@
 // The payload of T-frames on any mesh: heads come back; frames after frames of any bytes give meshes on the lattice, or
-// an error.
+// an error; so do the parts of a group's packet, and frames between two others.
 #include "codec/tracked/tracked_payload.h"
 
 #include <cstdlib>
 
+#include "codec/tracked/frame_group.h"
 #include "codec/tracked/tracked_frame.h"
 #include "small_mesh.h"
 
@@ -43,6 +44,29 @@ void check_head(const KnownOfHead& known, fuzz::FuzzInput& input) {
     require(decoder.position() == position, "both sides say where it ends");
 }
 
+void check_group(std::span<const std::uint8_t> bytes) {
+    const auto payload = read_group_payload(bytes);
+    if (!payload) return;
+    require(payload->frames.size() == brought_by(payload->place.frame, payload->place.length).size(),
+            "as many frames as it brings");
+    std::vector<std::vector<std::uint8_t>> frames;
+    for (const auto& frame : payload->frames) frames.emplace_back(frame.begin(), frame.end());
+    const auto again = write_group_payload(payload->place, frames);
+    const auto read = read_group_payload(again);
+    require(read && read->frames.size() == frames.size(), "a group's payload comes back");
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        require(std::equal(frames[i].begin(), frames[i].end(), read->frames[i].begin(), read->frames[i].end()),
+                "and so do its frames");
+}
+
+// The first frame of a group of two, between the reference and its last.
+void check_between(const TrackedReference& reference, const TrackedState& last, std::span<const std::uint8_t> payload) {
+    const auto state = state_between(reference, {nullptr, &last, &last.head}, path_to(1, 2).back());
+    DecodedTrackedFrame between;
+    if (!decode_tracked_frame(payload, reference, &state, {}, between)) return;
+    require(fuzz::all_on_lattice(between.positions), "positions between are on the lattice");
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -61,6 +85,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (int frame = 0; frame < 4; ++frame) {
         check_head({before ? &before->head : nullptr, reference->captured, !mesh.colours.empty()}, input);
         const auto payload = frame < 3 ? input.take(input.u16() % 512) : input.rest();
+        check_group(payload);
+        if (before) check_between(*reference, *before, payload);
         if (!decode_tracked_frame(payload, *reference, before, {}, next)) continue;
         require(next.positions.size() == mesh.positions.size() && next.colours.size() == mesh.colours.size() &&
                     next.normals.size() == mesh.normals.size(),

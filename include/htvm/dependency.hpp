@@ -70,6 +70,7 @@ private:
     void take_codebook(const PacketHeader& header, std::uint64_t place);
     void take_frame(const PacketHeader& header, std::uint64_t place);
     void forget_reference();
+    std::size_t chained_up_to(std::uint32_t number) const;
     std::vector<std::uint64_t> places(std::size_t references, const Codebooks& codebooks, std::size_t chained) const;
 
     std::size_t most_;
@@ -84,7 +85,8 @@ private:
     std::optional<std::uint32_t> highest_frame_;
     std::vector<Frame> references_;                // the I-frame, and the frames that patched it, each referring to
                                                    // the one before; the last is in force
-    std::vector<Frame> chain_;                     // T-frames since, each referring to the one before
+    std::vector<Frame> chain_;                     // T-frames since, each referring to the one before; the last group
+                                                   // may have some that the next one does not need
     Codebooks codebooks_;                          // since the I-frame
     std::vector<std::uint64_t> untold_codebooks_;  // of either purpose, all since the I-frame
     Newest newest_;

@@ -5,12 +5,14 @@
 //   while (auto packet = encoder->pull()) send(htvm::write_packet(*packet));
 //   encoder->finish();                                    // then pull the rest
 //
-// Memory is bounded by a few frames, whatever the length of the sequence.
+// Where T-frames are coded in groups (TrackedOptions::group), frames are held until their group is whole: a push may
+// queue the packets of none, or of several. Memory is bounded by a few frames, whatever the length of the sequence.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,6 +41,12 @@ struct StageTime {
     double milliseconds;
 };
 
+// A frame whose packet was queued.
+struct EncodedFrame {
+    FrameInfo info;
+    FrameCost cost;
+};
+
 class Encoder {
 public:
     struct State;  // opaque
@@ -60,16 +68,24 @@ public:
     // of rate.buffer_seconds then holds as much of the new rate. bad_input unless the options gave a rate, or if this
     // is not a rate that they could have given.
     Result<void> set_bitrate(double bits_per_second);
-    // Ends the sequence: queues the index of I-frames.
-    void finish();
+    // Ends the sequence: codes what is held, and queues the index of I-frames. After an error nothing has ended.
+    Result<void> finish();
     // The next packet in stream order; nothing if more must be pushed first.
     std::optional<Packet> pull();
 
-    // About the last frame pushed: its type and sizes, the mesh that the decoder will show, and the time of its stages.
+    // The frames whose packets the last push() or finish() queued, in the order of the stream: one for each push() but
+    // where T-frames are coded in groups.
+    std::span<const EncodedFrame> coded_frames() const;
+    // How many frames were pushed whose packets are still to come.
+    std::size_t held_frames() const;
+    // About the last frame whose packet was queued: its type and sizes, and the mesh that the decoder will show.
     const FrameInfo& last_frame() const;
     FrameCost last_cost() const;
     Mesh reconstruction() const;
-    std::optional<SpaceBounds> bounds() const;  // of the reconstruction; nothing if it has no vertices
+    Mesh reconstruction(std::size_t coded) const;  // the same of one of coded_frames()
+    // Of the reconstructions of all frames queued with that one; nothing if they have no vertices.
+    std::optional<SpaceBounds> bounds() const;
+    // How long the stages of the last push() or finish() took.
     const std::vector<StageTime>& stage_times() const;
     // About the last EP-frame: how often each distance order was coded, the escapes last (paper, Fig. 23).
     const std::vector<std::uint32_t>& distance_order_counts() const;

@@ -55,8 +55,10 @@ struct TrackedOptions {
     TrackedReferences references = TrackedReferences::previous;
     int access_interval = 30;  // with `previous`: largest distance, in frames, between places where decoding can start
                                // for whoever has the I-frame and its patches: T-frames that refer to nothing else
-    double simplify = 0.4;     // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
-                               // its surface in geometry steps; 0: it keeps all vertices and its connectivity
+    int group = 1;          // T-frames coded in groups of up to so many, 1 to 8: the last first, the others between two
+                            // each: fewer bits, but packets come up to so many frames late. 1: each behind the last
+    double simplify = 0.4;  // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
+                            // its surface in geometry steps; 0: it keeps all vertices and its connectivity
     double patch_share = 0.3;  // where tracking is lost, the largest share of the mesh that a patch may replace; where
                                // more is lost, an I-frame is sent; 0: always
     Denoising denoise = Denoising::automatic;  // with a target error always off: that is measured against the capture

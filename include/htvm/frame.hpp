@@ -103,6 +103,8 @@ struct FrameInfo {
     std::int64_t timestamp_us = 0;  // microseconds
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
     std::uint32_t vertices = 0, triangles = 0;                // of the decoded mesh
+    std::uint8_t group = 1, place = 1;  // T: of how many frames its group is, and the how many-eth of them it is. Its
+                                        // bytes are those of its packet, which may bring others of the group
     LayerBytes bytes;
 };
 

@@ -55,7 +55,8 @@ extern "C" {
 /* Version of the linked library: major * 65536 + minor * 256 + patch, and as text, "0.1.0". */
 uint32_t htvm_version(void);
 const char* htvm_version_string(void);
-/* Version of the streams that it writes and reads (docs/bitstream.md). */
+/* Version of the streams that it writes where T-frames do not come in groups; it reads all up to 5 (docs/bitstream.md).
+ */
 uint32_t htvm_stream_version(void);
 
 /* ---- status --------------------------------------------------------------------------------------------------- */
@@ -493,7 +494,8 @@ const char* htvm_encoder_last_error(const htvm_encoder* encoder);
 /* Codes one frame; the arrays are only read during the call. pose: for the skeleton of the options; NULL if the tracker
  * lost it (not allowed for the first frame), or if there is no skeleton. Timestamps must ascend. force_intra: 1 for an
  * I-frame. HTVM_BAD_INPUT: the mesh or pose is invalid; HTVM_LIMIT: under rate control, a frame that does not fit the
- * buffer. After an error the frame is not part of the stream, and the next may be sent. */
+ * buffer. After an error the frame is not part of the stream, and the next may be sent. With the option tracked.group,
+ * frames are held until their group is whole: none or several packets come at once then. */
 htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh, const htvm_pose* pose,
                                    int64_t timestamp_us, int force_intra);
 
@@ -501,7 +503,7 @@ htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh,
  * HTVM_BAD_INPUT: the options gave no rate.bits_per_second, or this is not one that they could have given. */
 htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_second);
 
-/* Ends the sequence. No mesh may be sent afterwards. */
+/* Ends the sequence: codes what is held. No mesh may be sent afterwards. HTVM_OUT_OF_MEMORY: nothing has ended. */
 htvm_status htvm_encoder_finish(htvm_encoder* encoder);
 
 /* Copies the next packet, ready to be stored or sent. *size is set to its size in bytes. HTVM_BUFFER_TOO_SMALL if
@@ -514,7 +516,7 @@ htvm_status htvm_encoder_receive_packet(htvm_encoder* encoder, uint8_t* buffer, 
  * above. HTVM_AGAIN before htvm_encoder_receive_packet() has returned HTVM_END; HTVM_END: the stream has no frames. */
 htvm_status htvm_encoder_front_index(htvm_encoder* encoder, uint8_t* buffer, size_t capacity, size_t* size);
 
-/* About the last frame sent: its type and how many bytes it took. HTVM_AGAIN before any. */
+/* About the last frame whose packet can be received: its type and how many bytes it took. HTVM_AGAIN before any. */
 htvm_status htvm_encoder_last_frame(htvm_encoder* encoder, htvm_frame_info* info, size_t info_size);
 
 #ifdef __cplusplus

@@ -333,7 +333,9 @@ htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_seco
 htvm_status htvm_encoder_finish(htvm_encoder* encoder) {
     if (!encoder) return HTVM_BAD_INPUT;
     return guarded(encoder->error, [&] {
-        if (!encoder->finished) encoder->encoder.finish();
+        if (encoder->finished) return htvm_status{HTVM_OK};
+        if (const auto finished = encoder->encoder.finish(); !finished) return encoder->error.set(finished.error());
+        if (const auto bounds = encoder->encoder.bounds()) encoder->indexer.add(*bounds);
         encoder->finished = true;
         return htvm_status{HTVM_OK};
     });

@@ -120,8 +120,17 @@ Result<void> take_codebook(DecoderState& state, const Packet& packet) {
 
 MeshCounts counts(const LatticeMesh& mesh) { return {mesh.positions.size(), mesh.triangles.size()}; }
 
+// How many frames of groups there may be at once while this packet is decoded: those of the group in force, of its own,
+// and the mean of two of them.
+std::size_t hidden_frames(const DecoderState& state, const Packet& packet) {
+    const std::size_t held = state.tracked.group.length;
+    if (packet.kind != PacketKind::tracked || state.header->version < grouped_version) return held;
+    const auto place = read_group_place(packet.payload);
+    return place && place->length > 1 ? held + place->length + 1 : held;
+}
+
 // Memory that the decoder holds, including what this frame still has to derive.
-std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, MeshCounts coded) {
+std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const FrameRules& rules, MeshCounts coded) {
     const auto held = state.reference ? counts(state.reference->mesh()) : MeshCounts{};
     std::uint64_t kept = state.reference ? memory_of_reference(held) : 0;
     const bool nodes = state.reference && state.reference->tracked;
@@ -132,6 +141,7 @@ std::uint64_t kept_memory(const DecoderState& state, const FrameRules& rules, Me
                              coded.triangles + (adds ? held.triangles : 0)};
     if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);
     if (state.alone) kept += memory_of_reference(counts(state.alone->mesh));
+    kept += hidden_frames(state, packet) * memory_of_tracked_frame(held);
     return kept;
 }
 
@@ -151,7 +161,8 @@ Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& pac
     const MeshCounts coded{header.vertices, header.triangles};
     const bool refers = rules.refers_to != RefersTo::nothing && state.reference;
     const auto reference = refers ? counts(state.reference->mesh()) : MeshCounts{};
-    if (auto ok = check_limits(rules.memory, coded, reference, kept_memory(state, rules, coded), state.options); !ok)
+    if (auto ok = check_limits(rules.memory, coded, reference, kept_memory(state, packet, rules, coded), state.options);
+        !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
     if (rules.refers_to == RefersTo::reference)
         if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
@@ -181,11 +192,17 @@ FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView&
     return out;
 }
 
-FrameInfo describe(const Packet& packet, const DecodedTrackedFrame& decoded) {
+FrameInfo describe(const Packet& packet, const DecoderState& state) {
     auto out = describe(packet, FrameType::tracked);
-    out.source_vertices = decoded.state.head.captured.vertices;
-    out.source_triangles = decoded.state.head.captured.triangles;
-    out.bytes = with_overhead(decoded.shares, packet);
+    const auto& captured = state.tracked.newest->state.head.captured;
+    out.source_vertices = captured.vertices;
+    out.source_triangles = captured.triangles;
+    out.bytes = with_overhead(state.tracked.shares, packet);
+    if (state.header->version >= grouped_version) {
+        const auto place = *read_group_place(packet.payload);
+        out.group = static_cast<std::uint8_t>(place.length);
+        out.place = static_cast<std::uint8_t>(place.frame);
+    }
     return out;
 }
 
@@ -218,8 +235,7 @@ Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet)
         if (!payload) return tl::unexpected(payload.error());
         if (auto ok = rules.decode(state, packet, *payload); !ok) return tl::unexpected(ok.error());
         if (!stands_alone(*type)) state.alone.reset();
-        auto info = *type == FrameType::tracked ? describe(packet, state.tracked.of_newest())
-                                                : describe(packet, *type, *payload);
+        auto info = *type == FrameType::tracked ? describe(packet, state) : describe(packet, *type, *payload);
         info.sequence = state.sequences - 1;
         return Taken{lend(state.shown, info)};
     }
@@ -278,7 +294,9 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
 std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) try {
     auto& state = *state_;
     take_back(state.shown);
-    if (!show_intra_alone(state) && !show_last_tracked(state) && !show_moved_by_bones(state)) return std::nullopt;
+    if (!show_intra_alone(state) && !show_hidden(state, frame) && !show_last_tracked(state) &&
+        !show_moved_by_bones(state))
+        return std::nullopt;
     FrameInfo info;
     info.sequence = state.sequences - 1;
     info.type = FrameType::predicted;

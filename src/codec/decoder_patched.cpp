@@ -19,8 +19,8 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     if (!reference.mesh.texcoords.empty())
         return fail(ErrorKind::corrupt_stream, "a patched frame whose reference has texture coordinates");
     auto& history = state.tracked;
-    using enum DecodedNodes::Newest;
-    if (history.newest == next) history.newest = history.frame ? last : none;  // its arrays are written over
+    if (history.newest == &history.next)
+        history.newest = history.frame ? &history.last : nullptr;  // it is written over
     auto& tracked = history.next;
     if (auto ok = decode_tracked_frame(payload.of(Layer::tracked), reference, nullptr, state.threads, tracked); !ok)
         return ok;

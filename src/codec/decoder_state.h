@@ -1,6 +1,7 @@
 // What a decoder keeps from frame to frame, and how a decoded mesh is shown.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -9,6 +10,7 @@
 #include "codec/paper/codebook.h"
 #include "codec/reference/reference.h"
 #include "codec/stream/sequence.h"
+#include "codec/tracked/frame_group.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/thread.h"
 #include "htvm/decoder.hpp"
@@ -48,14 +50,25 @@ struct DecodedBones {
     std::optional<NumberedCodebook> geometry_codebook, colour_codebook;
 };
 
+// The group of T-frames that the last packets were of (tracked/frame_group.h). Its last frame is DecodedNodes::last.
+struct DecodedGroup {
+    std::uint32_t first = 0;                     // number of its first frame
+    std::size_t length = 0;                      // 0: there is none
+    bool of_reference = false;                   // whether it refers to the reference alone, else to `earlier`
+    DecodedTrackedFrame earlier;                 // the last frame of the group before
+    std::vector<DecodedTrackedFrame> between;    // frames 1 to length - 1; keeps its arrays for the next group
+    std::array<bool, most_in_group> is_there{};  // which of these were decoded
+};
+
 // State left by the T-frames since the I-frame: the last one that later ones may refer to, and arrays for the next. A
 // frame that nothing refers to stays in those.
 struct DecodedNodes {
-    std::optional<std::uint32_t> frame;  // number of the last one that may be referred to, if any
+    std::optional<std::uint32_t> frame;  // number that names the last one that may be referred to, if any
     DecodedTrackedFrame last, next;
-    enum class Newest : std::uint8_t { none, last, next } newest = Newest::none;
-    Pose pose;  // of the newest
-    const DecodedTrackedFrame& of_newest() const { return newest == Newest::last ? last : next; }
+    DecodedGroup group;
+    const DecodedTrackedFrame* newest = nullptr;  // the one shown last; null if there is none
+    LayerBytes shares;                            // of its packet's payload
+    Pose pose;                                    // of the newest
 };
 
 // An I-frame that nothing refers to: kept only to be shown again where the frame behind it is missing.
@@ -102,6 +115,7 @@ Rotation product(const Rotation& a, const Rotation& b);
 
 // Stand-ins for a missing frame, shown as if decoded. False if there is nothing to derive one from.
 bool show_intra_alone(DecoderState& state);
+bool show_hidden(DecoderState& state, std::uint32_t frame);  // the frame itself: an earlier packet brought it
 bool show_last_tracked(DecoderState& state);
 bool show_moved_by_bones(DecoderState& state);
 

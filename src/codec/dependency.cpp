@@ -5,6 +5,7 @@
 #include "codec/frame_kinds.h"
 #include "codec/paper/codebook.h"
 #include "codec/stream/sequence.h"
+#include "codec/tracked/frame_group.h"
 #include "core/crc32.h"
 
 namespace htvm {
@@ -83,21 +84,28 @@ void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
         references_.push_back({header.frame, place});
         return;
     }
-    const bool of_frame_before =
-        rules.refers_to == RefersTo::reference_or_before && !chain_.empty() && chain_.back().number == header.reference;
-    if (references_.empty() || (!of_frame_before && references_.back().number != header.reference)) return;
+    const auto chained = rules.refers_to == RefersTo::reference_or_before ? chained_up_to(header.reference) : 0;
+    if (references_.empty() || (chained == 0 && references_.back().number != header.reference)) return;
     newest_ = {.place = place,
                .references = references_.size(),
                .codebooks = rules.codebooks ? codebooks_ : Codebooks{},
-               .chained = of_frame_before ? chain_.size() : 0,
+               .chained = chained,
                .known = true};
     if (!referred) return;
-    if (!of_frame_before) chain_.clear();
     // The newest frame itself is the last of these now; what it needs is what comes before it there.
+    chain_.resize(chained);
     (rules.renews ? references_ : chain_).push_back({header.frame, place});
     if (references_.size() + chain_.size() <= most_ + 1) return;
     forget_reference();
     newest_ = {};
+}
+
+// How many frames of chain_ one needs that refers to this one; 0 if it is none of them. Only within a group of T-frames
+// may it be another than the last.
+std::size_t Dependencies::chained_up_to(std::uint32_t number) const {
+    for (std::size_t i = chain_.size(); i > 0 && chain_.size() - i < most_in_group; --i)
+        if (chain_[i - 1].number == number) return i;
+    return 0;
 }
 
 std::vector<std::uint64_t> Dependencies::places(std::size_t references, const Codebooks& codebooks,

@@ -1,6 +1,7 @@
 // The encoder at a glance. A captured mesh and its pose are put on the lattice. The frame's work derives from them, the
 // configuration and the sequence so far. The choice codes the frame in one or several ways and returns the candidate to
-// send. The sequence advances by it, and its packets are numbered and queued.
+// send. The sequence advances by it, and its packets are numbered and queued. Where T-frames are coded in groups, those
+// chosen are held until their group is whole, which then is coded anew.
 #include "htvm/encoder.hpp"
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include "codec/choice/frame_choice.h"
 #include "codec/encoder_check.h"
 #include "codec/encoder_pose.h"
+#include "codec/frame_group_enc.h"
 #include "codec/frame_kinds.h"
 #include "codec/frame_work_enc.h"
 #include "codec/stream/sequence.h"
@@ -44,10 +46,12 @@ struct Encoder::State {
     QualityControl control;
     Output output;
     std::optional<std::int64_t> last_timestamp;
-    // Cost of the last frame.
-    FrameCost cost;
-    FrameInfo info;
-    LatticeMesh decoded;
+    std::vector<HeldFrame> held;        // T-frames of the group that is not whole yet
+    std::optional<GroupAnchor> anchor;  // what the next group may refer to; none: the reference alone
+    // Of the frames whose packets the last call queued; if it queued none, of the last one before.
+    std::vector<EncodedFrame> coded;
+    std::vector<LatticeMesh> decoded;
+    bool coded_none = true;
     std::vector<StageTime> stages;
     std::vector<std::uint32_t> distance_order_counts;
 };
@@ -87,6 +91,18 @@ int lattice_bits(const EncoderOptions& options, double adult) {
 
 // Short enough to need no memory itself.
 tl::unexpected<Error> out_of_memory() { return fail(ErrorKind::limit, "out of memory"); }
+
+// What the work gives, or that there is not enough memory for it.
+template <class Work>
+Result<void> guarded(const Work& work) {
+    try {
+        return work();
+    } catch (const std::bad_alloc&) {
+        return out_of_memory();
+    } catch (const std::length_error&) {
+        return out_of_memory();
+    }
+}
 
 // Completes the configuration from the first frame: the origin of the lattice, the subject's size and, where not given,
 // the skeleton and the radii.
@@ -130,6 +146,7 @@ Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
             return fail(ErrorKind::bad_input, "the floor is too far from the first frame's mesh");
         header.floor = static_cast<std::int32_t>(floor);
     }
+    if (options.tracked.group > 1) header.version = grouped_version;
     header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
     header.weight_width = on_lattice(options.topology.weight_width * units);
     if (configuration.tracked()) {
@@ -174,8 +191,17 @@ std::uint8_t flags_of(const Candidate& candidate) {
                                      (candidate.renewal ? settled : 0));
 }
 
+// What a call codes, until nothing can fail any more.
+struct Outcome {
+    std::vector<EncodedFrame> coded;
+    std::vector<LatticeMesh> decoded;
+    std::optional<GroupAnchor> anchor;  // none: as it was
+};
+
 // Numbers and queues a frame's packets, and counts their bytes by layer.
-void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us) {
+void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us, const FrameCost& cost,
+                Outcome& outcome) {
+    FrameInfo info;
     LayerBytes codebooks;
     for (auto& packet : candidate.packets) {
         packet.frame = state.sequence.next_frame;
@@ -189,20 +215,88 @@ void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us) {
             continue;
         }
         packet.flags |= flags_of(candidate);
-        state.info = *inspect(packet);
-        if (state.info.type == FrameType::tracked) {
-            state.info.source_vertices = candidate.captured.vertices;
-            state.info.source_triangles = candidate.captured.triangles;
-            state.info.bytes = with_overhead(candidate.shares, packet);
+        info = *inspect(packet);
+        if (info.type == FrameType::tracked) {
+            info.source_vertices = candidate.captured.vertices;
+            info.source_triangles = candidate.captured.triangles;
+            info.bytes = with_overhead(candidate.shares, packet);
         }
-        state.info.vertices = static_cast<std::uint32_t>(candidate.decoded.positions.size());
-        state.info.triangles = static_cast<std::uint32_t>(candidate.decoded.triangles.size());
-        state.info.bytes += codebooks;
+        info.vertices = static_cast<std::uint32_t>(candidate.decoded.positions.size());
+        info.triangles = static_cast<std::uint32_t>(candidate.decoded.triangles.size());
+        info.bytes += codebooks;
         // Where nothing refers to it while others are referred to, it is no place to start from.
         if (stands_alone(candidate.type) && (candidate.referred || state.configuration.intra_alone()))
             state.output.index.push_back({packet.frame, packet.timestamp_us, state.output.stream_bytes});
     }
     for (auto& packet : candidate.packets) send(state.output, std::move(packet));
+    outcome.coded.push_back({info, cost});
+    outcome.decoded.push_back(std::move(candidate.decoded));
+}
+
+// Codes these frames as a group. Returns what the next one may refer to.
+Result<GroupAnchor> send_group(State& state, const GroupAnchor* before, std::span<const HeldFrame> held,
+                               Outcome& outcome) {
+    auto group = code_group(state.configuration, *state.sequence.reference, before, held, state.stages);
+    if (!group) return tl::unexpected(group.error());
+    for (std::size_t i = 0; i < held.size(); ++i) {
+        auto& frame = group->frames[i];
+        const auto& captured = held[i].work.mesh;
+        auto info = *inspect(frame.packet);
+        info.source_vertices = static_cast<std::uint32_t>(captured.positions.size());
+        info.source_triangles = static_cast<std::uint32_t>(captured.triangles.size());
+        info.vertices = static_cast<std::uint32_t>(frame.decoded.positions.size());
+        info.triangles = static_cast<std::uint32_t>(frame.decoded.triangles.size());
+        info.bytes = with_overhead(frame.shares, frame.packet);
+        info.group = static_cast<std::uint8_t>(held.size());
+        info.place = static_cast<std::uint8_t>(i + 1);
+        FrameCost cost;
+        cost.type = info.type;
+        cost.bits = 8.0 * static_cast<double>(info.bytes.total());
+        send(state.output, std::move(frame.packet));
+        outcome.coded.push_back({info, cost});
+        outcome.decoded.push_back(std::move(frame.decoded));
+    }
+    return std::move(group->anchor);
+}
+
+// Codes the frames held, if there are any, as a group of what came before.
+Result<void> send_held(State& state, std::span<const HeldFrame> held, Outcome& outcome) {
+    if (held.empty()) return {};
+    auto anchor = send_group(state, state.anchor ? &*state.anchor : nullptr, held, outcome);
+    if (!anchor) return tl::unexpected(anchor.error());
+    outcome.anchor = std::move(*anchor);
+    return {};
+}
+
+// Nothing can fail here.
+void commit(State& state, Outcome outcome) {
+    if (outcome.anchor) state.anchor = std::move(outcome.anchor);
+    state.coded_none = outcome.coded.empty();
+    if (state.coded_none) return;
+    state.coded = std::move(outcome.coded);
+    state.decoded = std::move(outcome.decoded);
+}
+
+// Holds a T-frame, and codes its group once that has all its frames. Where the frame refers to the reference alone, for
+// decoding to start there, the group before ends, and it is one by itself.
+Result<void> hold(State& state, FrameWork& work, Candidate& chosen, std::int64_t timestamp_us) {
+    Outcome outcome;
+    auto& held = state.held;
+    const bool place_to_start = chosen.access && (state.anchor || !held.empty());
+    held.push_back({state.sequence.next_frame, timestamp_us, work.give_up(), chosen.steps, std::move(chosen.noise)});
+    const std::span<const HeldFrame> all = held;
+    const auto own = all.last(1);
+    if (place_to_start) {
+        if (auto sent = send_held(state, all.first(all.size() - 1), outcome); !sent) return sent;
+        auto anchor = send_group(state, nullptr, own, outcome);
+        if (!anchor) return tl::unexpected(anchor.error());
+        outcome.anchor = std::move(*anchor);
+    } else if (all.size() == static_cast<std::size_t>(state.configuration.options.tracked.group)) {
+        if (auto sent = send_held(state, all, outcome); !sent) return sent;
+    }
+    if (!outcome.coded.empty()) held.clear();
+    commit(state, std::move(outcome));
+    return {};
 }
 
 Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
@@ -221,16 +315,23 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     auto sequence = advance(state.configuration, state.sequence, *chosen);
     if (!sequence) return tl::unexpected(sequence.error());
     derivation.done("reference");
-    if (brings_header(state, *chosen)) send_header(state, timestamp_us);
-    send_frame(state, *chosen, timestamp_us);
-    // Nothing can fail from here on.
+    if (chosen->type == FrameType::tracked && state.configuration.options.tracked.group > 1) {
+        if (auto done = hold(state, work, *chosen, timestamp_us); !done) return done;
+    } else {
+        Outcome outcome;
+        if (auto sent = send_held(state, state.held, outcome); !sent) return sent;
+        if (brings_header(state, *chosen)) send_header(state, timestamp_us);
+        send_frame(state, *chosen, timestamp_us, cost, outcome);
+        // Nothing can fail from here on.
+        state.held.clear();
+        commit(state, std::move(outcome));
+        if (sequence->reference != state.sequence.reference) state.anchor.reset();
+        state.distance_order_counts = std::move(chosen->distance_order_counts);
+    }
     state.sequence = std::move(*sequence);
     state.begun = true;
     state.last_timestamp = timestamp_us;
-    state.cost = cost;
     if (state.control.rate) state.control.rate->coded(cost);
-    state.decoded = std::move(chosen->decoded);
-    state.distance_order_counts = std::move(chosen->distance_order_counts);
     return {};
 }
 
@@ -240,17 +341,21 @@ struct Queued {
     std::size_t packets, index;
     std::uint64_t stream_bytes;
     std::uint32_t header_sent;
+    std::size_t held;
 };
 
-Queued queued(const Output& output) {
-    return {output.packets.size(), output.index.size(), output.stream_bytes, output.header_sent};
+Queued queued(const State& state) {
+    const auto& output = state.output;
+    return {output.packets.size(), output.index.size(), output.stream_bytes, output.header_sent, state.held.size()};
 }
 
-void take_back(Output& output, const Queued& before) {
+void take_back(State& state, const Queued& before) {
+    auto& output = state.output;
     output.packets.resize(before.packets);
     output.index.resize(before.index);
     output.stream_bytes = before.stream_bytes;
     output.header_sent = before.header_sent;
+    state.held.erase(state.held.begin() + static_cast<std::ptrdiff_t>(before.held), state.held.end());
 }
 
 RateControlOptions rate_options(const EncoderOptions& options) {
@@ -306,7 +411,7 @@ Result<void> Encoder::begin(const Mesh& first, const Pose* pose) try {
 Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
     auto& state = *state_;
     state.stages.clear();
-    const auto before = queued(state.output);
+    const auto before = queued(state);
     const auto code = [&]() -> Result<void> {
         if (state.finished) return fail(ErrorKind::bad_input, "the sequence was finished; start a new encoder");
         if (state.last_timestamp && timestamp_us <= *state.last_timestamp)
@@ -315,16 +420,9 @@ Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t time
             if (auto ok = configure(state, mesh, pose); !ok) return ok;
         return push_frame(state, mesh, pose, timestamp_us, force_intra);
     };
-    try {
-        auto done = code();
-        if (!done) take_back(state.output, before);
-        return done;
-    } catch (const std::bad_alloc&) {
-        take_back(state.output, before);
-    } catch (const std::length_error&) {
-        take_back(state.output, before);
-    }
-    return out_of_memory();
+    auto done = guarded(code);
+    if (!done) take_back(state, before);
+    return done;
 }
 
 Result<void> Encoder::set_bitrate(double bits_per_second) {
@@ -340,19 +438,36 @@ Result<void> Encoder::set_bitrate(double bits_per_second) {
     return {};
 }
 
-void Encoder::finish() try {
+Result<void> Encoder::finish() {
     auto& state = *state_;
-    if (state.finished || !state.begun) return;
+    if (state.finished || !state.begun) return {};
+    state.stages.clear();
+    const auto before = queued(state);
+    const auto code_the_rest = [&]() -> Result<void> {
+        Outcome outcome;
+        if (auto sent = send_held(state, state.held, outcome); !sent) return sent;
+        state.held.clear();
+        commit(state, std::move(outcome));
+        return {};
+    };
+    auto done = guarded(code_the_rest);
+    if (!done) {
+        take_back(state, before);
+        return done;
+    }
     state.finished = true;
-    Packet packet;
-    packet.kind = PacketKind::index;
-    packet.flags = packet_flag::told;
-    packet.frame = state.sequence.next_frame;
-    packet.timestamp_us = *state.last_timestamp;
-    packet.payload = write_sequence_index(state.output.index);
-    send(state.output, std::move(packet));
-} catch (const std::bad_alloc&) {
-    // A stream may end without an index.
+    try {
+        Packet packet;
+        packet.kind = PacketKind::index;
+        packet.flags = packet_flag::told;
+        packet.frame = state.sequence.next_frame;
+        packet.timestamp_us = *state.last_timestamp;
+        packet.payload = write_sequence_index(state.output.index);
+        send(state.output, std::move(packet));
+    } catch (const std::bad_alloc&) {
+        // A stream may end without an index.
+    }
+    return {};
 }
 
 std::optional<Packet> Encoder::pull() {
@@ -363,23 +478,39 @@ std::optional<Packet> Encoder::pull() {
     return packet;
 }
 
-const FrameInfo& Encoder::last_frame() const { return state_->info; }
-FrameCost Encoder::last_cost() const { return state_->cost; }
+std::span<const EncodedFrame> Encoder::coded_frames() const {
+    return state_->coded_none ? std::span<const EncodedFrame>() : state_->coded;
+}
+std::size_t Encoder::held_frames() const { return state_->held.size(); }
+
+const FrameInfo& Encoder::last_frame() const {
+    static const FrameInfo none;
+    return state_->coded.empty() ? none : state_->coded.back().info;
+}
+FrameCost Encoder::last_cost() const { return state_->coded.empty() ? FrameCost() : state_->coded.back().cost; }
+
 std::optional<SpaceBounds> Encoder::bounds() const {
-    const auto& positions = state_->decoded.positions;
-    if (positions.empty()) return std::nullopt;
     // Rounding to single precision keeps the order, so the corners can be found on the lattice.
-    std::vector<LatticePoint> corners(2, positions[0]);
-    for (const auto& p : positions) {
-        corners[0] = {std::min(corners[0].x, p.x), std::min(corners[0].y, p.y), std::min(corners[0].z, p.z)};
-        corners[1] = {std::max(corners[1].x, p.x), std::max(corners[1].y, p.y), std::max(corners[1].z, p.z)};
-    }
+    std::optional<std::vector<LatticePoint>> corners;
+    for (const auto& mesh : state_->decoded)
+        for (const auto& p : mesh.positions) {
+            if (!corners) corners.emplace(2, p);
+            auto &low = corners->front(), &high = corners->back();
+            low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+            high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+        }
+    if (!corners) return std::nullopt;
     std::vector<Vector3f> in_millimetres;
-    to_millimetres(corners, state_->configuration.header.lattice, in_millimetres);
+    to_millimetres(*corners, state_->configuration.header.lattice, in_millimetres);
     return bounds_of(in_millimetres);
 }
 
-Mesh Encoder::reconstruction() const { return to_mesh(state_->decoded, state_->configuration.header.lattice); }
+Mesh Encoder::reconstruction() const {
+    return state_->decoded.empty() ? Mesh() : reconstruction(state_->decoded.size() - 1);
+}
+Mesh Encoder::reconstruction(std::size_t coded) const {
+    return to_mesh(state_->decoded[coded], state_->configuration.header.lattice);
+}
 const std::vector<StageTime>& Encoder::stage_times() const { return state_->stages; }
 const std::vector<std::uint32_t>& Encoder::distance_order_counts() const { return state_->distance_order_counts; }
 

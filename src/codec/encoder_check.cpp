@@ -29,6 +29,14 @@ Result<void> check_that_options_go_together(const EncoderOptions& o) {
             return bad("rate.buffer_seconds does nothing without rate.bits_per_second");
         if (!o.rate.first_pass.empty()) return bad("rate.first_pass does nothing without rate.bits_per_second");
     }
+    if (o.tracked.group > 1) {
+        if (o.rate.bits_per_second > 0 || o.rate.target_error > 0)
+            return bad("tracked.group goes with fixed steps only, not with rate.bits_per_second or rate.target_error");
+        if (o.tracked.references == TrackedReferences::intra)
+            return bad(
+                "tracked.group does not go with tracked.references intra: frames of a group refer to each other");
+        if (o.key_interval == 1) return bad("tracked.group does nothing with key_interval 1: there are no T-frames");
+    }
     if (o.topology.frame_choice != FrameChoice::motion) {
         if (o.topology.predicted_below != usual.topology.predicted_below)
             return bad("topology.predicted_below does nothing unless topology.frame_choice is motion");

@@ -207,6 +207,18 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return o.tracked.access_interval; },
      .set = [](EncoderOptions& o, double value) { o.tracked.access_interval = static_cast<int>(value); },
      .flag = "--access-interval"},
+    {.name = "tracked.group",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::whole_number,
+     .unit = "frames",
+     .least = 1,
+     .most = 8,
+     .meaning =
+         "T-frames that are coded as a group, the last one first, the others from two around them each: fewer bits "
+         "for files; packets come up to so many frames late, and encoding takes longer",
+     .get = [](const EncoderOptions& o) -> double { return o.tracked.group; },
+     .set = [](EncoderOptions& o, double value) { o.tracked.group = static_cast<int>(value); },
+     .flag = "--group"},
     {.name = "tracked.simplify",
      .group = OptionGroup::tracked,
      .kind = OptionKind::number,

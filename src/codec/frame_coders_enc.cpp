@@ -229,18 +229,11 @@ TargetFilterOptions filter_options(const FrameWork& work) {
 // before: state of the frame that it refers to; null if that is the reference.
 Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts,
                                            const TrackedState* before) {
-    // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
-    constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
     const auto& configuration = work.configuration;
-    TrackedFrameOptions options;
-    options.millimetre = configuration.adult_millimetre;
-    options.geometry_step = tracked_steps(steps).geometry;
-    options.colour_step = coarser_colours * steps.colour;
-    options.lambda = configuration.options.lambda;
-    options.reach = reach * configuration.adult_millimetre;
+    auto options = tracked_frame_options(configuration, steps);
     if (denoises(configuration)) options.denoise = filter_options(work);
+    options.keeps_noise = configuration.options.tracked.group > 1;
     options.motion_alone = parts == TrackedParts::motion_alone;
-    options.threads = configuration.threads;
     return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.registered_nodes(),
                                 before, work.sequence.nodes.targets, options, work.stages);
 }
@@ -264,6 +257,8 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     out.decoded = std::move(encoded->mesh);
     out.captured = counts_of(work.mesh);
     out.shares = encoded->runs.shares;
+    out.steps = steps;
+    out.noise = std::move(encoded->noise);
     auto& history = out.nodes.emplace();
     history.frame = work.sequence.next_frame;
     history.access = from_last ? nodes.access : history.frame;
@@ -287,6 +282,19 @@ constexpr std::array<FrameCoder, frame_type_count - 1> frame_coders = {
 static_assert(frame_coders.size() == static_cast<std::size_t>(FrameType::patched));
 
 }  // namespace
+
+TrackedFrameOptions tracked_frame_options(const Configuration& configuration, const FrameSteps& steps) {
+    // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
+    constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
+    TrackedFrameOptions out;
+    out.millimetre = configuration.adult_millimetre;
+    out.geometry_step = tracked_steps(steps).geometry;
+    out.colour_step = coarser_colours * steps.colour;
+    out.lambda = configuration.options.lambda;
+    out.reach = reach * configuration.adult_millimetre;
+    out.threads = configuration.threads;
+    return out;
+}
 
 SimplifiedReferenceOptions simplification_options(const Configuration& configuration, const FrameSteps& steps) {
     constexpr double longest_edge = 40, reach = 30;  // mm on an adult

@@ -13,6 +13,9 @@ namespace htvm::internal {
 // same attributes as the frame.
 Result<Candidate> code_frame(FrameType type, FrameWork& work, const FrameSteps& steps);
 
+// How T-frames are coded at these steps.
+TrackedFrameOptions tracked_frame_options(const Configuration& configuration, const FrameSteps& steps);
+
 // How far an I-frame that T-frames refer to, or a patch, may be simplified.
 SimplifiedReferenceOptions simplification_options(const Configuration& configuration, const FrameSteps& steps);
 

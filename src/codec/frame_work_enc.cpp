@@ -184,4 +184,6 @@ TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_e
     return out;
 }
 
+TrackedWork FrameWork::give_up() { return {mesh, std::move(*surface_), std::move(*registered_nodes_)}; }
+
 }  // namespace htvm::internal

@@ -101,6 +101,8 @@ struct Candidate {
     LatticeMesh decoded;          // the mesh that the decoder will have
     CapturedCounts captured;      // of the mesh that it was made of
     LayerBytes shares;            // T: its layers' of its bytes, which its packet does not tell
+    FrameSteps steps;             // T: the steps asked for
+    RemovedNoise noise;           // T that is to be coded again in a group: what filtering took off
     bool renewal = false;         // I: whether it was made of the tracked mesh, not of the capture
     double renewed = 0;           // TP: the share of its vertices that are new
     double quality = 50;          // the quality setting used, under rate or error control
@@ -129,6 +131,13 @@ struct Sequence {
 // The sequence after this candidate was sent; parts of the candidate are moved into it. Errors: those of
 // make_reference().
 Result<Sequence> advance(const Configuration& configuration, const Sequence& before, Candidate& sent);
+
+// What of a frame's work it takes to code it again as a T-frame, in a group.
+struct TrackedWork {
+    LatticeMesh mesh;  // as captured
+    SurfaceIndex surface;
+    NodeRegistration registered;
+};
 
 // What is derived from one frame, computed on first use and kept. Lengths are in lattice units.
 class FrameWork {
@@ -166,6 +175,8 @@ public:
     SurfaceErrors errors_of(const LatticeMesh& decoded);
     // Whether a tracked mesh still represents the captured one. intra_squared: see measure_tracked_fit().
     TrackedFit tracked_fit(const LatticeMesh& decoded, double reference_edge, std::span<const double> intra_squared);
+    // Of a frame that was registered. Nothing else may be asked for afterwards.
+    TrackedWork give_up();
 
 private:
     std::optional<double> edge_;

@@ -177,6 +177,11 @@ inline CodedSequence encode(const TestSequence& sequence, EncoderOptions options
     EXPECT_TRUE(encoder.has_value());
     if (!encoder) return out;
     const auto drain = [&] {
+        const auto coded = encoder->coded_frames();
+        for (std::size_t i = 0; i < coded.size(); ++i) {
+            out.reconstructions.push_back(encoder->reconstruction(i));
+            out.infos.push_back(coded[i].info);
+        }
         while (auto packet = encoder->pull()) {
             const auto bytes = write_packet(*packet);
             out.bytes.insert(out.bytes.end(), bytes.begin(), bytes.end());
@@ -186,15 +191,12 @@ inline CodedSequence encode(const TestSequence& sequence, EncoderOptions options
     std::int64_t time = -40000;
     for (const auto& frame : sequence.frames) {
         const auto pushed = encoder->push(frame.mesh, frame.pose ? &*frame.pose : nullptr, time += 33333);
-        if (pushed) {
-            out.reconstructions.push_back(encoder->reconstruction());
-            out.infos.push_back(encoder->last_frame());
-        } else {
+        if (pushed)
+            drain();
+        else
             out.errors.push_back(pushed.error().message);
-        }
-        drain();
     }
-    encoder->finish();
+    EXPECT_TRUE(encoder->finish().has_value());
     drain();
     return out;
 }

@@ -15,6 +15,7 @@ import zlib
 from audio import read_audio
 from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
+from group import FrameGroup, read_group_payload
 from intra import decode_intra_mesh
 from nodes import Kept, smoothed
 from reference import Reference, decode_pose
@@ -39,7 +40,7 @@ class Group:
 
     def __init__(self, mesh, frame, number, step=1, kept=Kept()):
         self.mesh, self.frame, self.number, self.step, self.kept = mesh, frame, number, step, kept
-        self.reference = self.state = self.last = None
+        self.reference = self.state = self.last = self.group = None
 
     def tracked_reference(self, header):
         check(header.node_spacing > 0, "the header allows no tracked frames")
@@ -48,11 +49,32 @@ class Group:
         return self.reference
 
     def decode(self, packet, header):
+        if header.version < 5:
+            return self.decode_single(packet, header, packet.payload)
+        length, frame, brought = read_group_payload(packet.payload)
+        if length == 1:
+            return self.decode_single(packet, header, brought[0][1])
+        if frame > 1:
+            check(self.group, "its group is not there")
+            self.group.check_goes_on(packet, length, frame)
+            return self.group.take(header.version, self.tracked_reference(header), frame, brought)
+        before = self.before(packet)
+        check(packet.referred(), "a group that nothing may refer to")
+        group = FrameGroup(packet.frame, length, before)
+        mesh = group.take(header.version, self.tracked_reference(header), frame, brought)
+        self.group, self.state, self.last = group, group.states[length], packet.frame
+        return mesh
+
+    def before(self, packet):
         before = self.state if self.last == packet.reference else None
         check(before or self.number == packet.reference, "its reference is not there")
-        mesh, state = decode_tracked_mesh(packet.payload, header.version, self.tracked_reference(header), before)
+        return before
+
+    def decode_single(self, packet, header, payload):
+        before = self.before(packet)
+        mesh, state = decode_tracked_mesh(payload, header.version, self.tracked_reference(header), before)
         if packet.referred():
-            self.state, self.last = state, packet.frame
+            self.state, self.last, self.group = state, packet.frame, None
         return mesh
 
     def decode_patched(self, packet, header):

@@ -58,19 +58,45 @@ class Component:
 class Field:
     """turned and components: what the next frame may be predicted from; values: by vertex, a list each."""
 
+    def sums(self, levels, c, k):
+        """slope_sum() of component c at each node of level k that has two children."""
+        mean = self.components[c].mean[k + 1]
+        return [0 if second is None else slope_sum(levels[k], mean, p) for p, second in enumerate(levels[k].second)]
+
+
+class FieldBetween:
+    """What stands for the field of the frame before in one between two others (8.18): the mean of theirs, mixed() of
+    their numbers. earlier: None for the reference."""
+
+    def __init__(self, earlier, later, mixed):
+        self.earlier, self.later, self.mixed, self.turned = earlier, later, mixed, later.turned
+        self.components = []
+        for c, component in enumerate(later.components):
+            before = earlier.components[c] if earlier else None
+            between = Component(0, [])
+            between.mean = [self.mix(before and before.mean[k], mean) for k, mean in enumerate(component.mean)]
+            between.size = [self.mix(before and before.size[k], size) for k, size in enumerate(component.size)]
+            self.components.append(between)
+
+    def mix(self, earlier, later):
+        return [self.mixed(earlier[i] if earlier else 0, x) for i, x in enumerate(later)]
+
+    def sums(self, levels, c, k):
+        return self.mix(self.earlier and self.earlier.sums(levels, c, k), self.later.sums(levels, c, k))
+
 
 def slope_sum(level, mean, p):
     total = sum(slope * (mean[q] - mean[p]) for q, slope in level.slope[p].items())
     return clamp(total >> 12, -2 * M, 2 * M)
 
 
-def predict(level, k, p, component, before):
+def predict(level, k, p, component, before, sums_before):
     total = component.slope_weight * slope_sum(level, component.mean[k + 1], p)
     if before and component.before_weight > 0:
         mean = before.mean[k]
         total += component.before_weight * (mean[level.first[p]] - mean[level.second[p]])
         weight = component.slope_weight * component.before_weight
-        total -= (weight * slope_sum(level, before.mean[k + 1], p)) >> 2
+        total -= (weight * sums_before[p]) >> 2
     return clamp((total + 2) >> 2, -2 * M, 2 * M)
 
 
@@ -92,7 +118,7 @@ def context_of(level, k, p, component, before, others, predicted, unit):
     return c
 
 
-def decode_level(decoder, level, k, component, step, before, others, same, coded_models):
+def decode_level(decoder, level, k, component, step, before, sums_before, others, same, coded_models):
     component.coded = decoder.bit(coded_models[component.coded])
     if not decoder.bit(same):
         component.slope_weight = decoder.raw(3)
@@ -103,7 +129,7 @@ def decode_level(decoder, level, k, component, step, before, others, same, coded
         if second is None:
             finer[first] = mean[p]
             continue
-        predicted = predict(level, k, p, component, before)
+        predicted = predict(level, k, p, component, before, sums_before)
         unit = max(1, (step * level.scale[p]) >> 14)
         if component.coded:
             c = context_of(level, k, p, component, before, others, predicted, unit)
@@ -163,7 +189,8 @@ def decode_field(decoder, turned, steps, vertices, levels, before):
         for c, component in enumerate(components):
             if steps[c] > 0:
                 others = [other.rest for other in reversed(components[:c])]
-                decode_level(decoder, level, k, component, steps[c], befores[c], others, same, coded_models)
+                sums = before.sums(levels, c, k) if before else None
+                decode_level(decoder, level, k, component, steps[c], befores[c], sums, others, same, coded_models)
         if k > 0:
             for component in components:
                 above, component.above = component.above, [0] * len(levels[k - 1].count)

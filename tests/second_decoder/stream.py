@@ -58,8 +58,8 @@ def read_sequence_header(payload):
     header = Header()
     check(read.take(4) == b"htvm", "this is no htvm stream")
     version = read.field("H")
-    if not 1 <= version <= 4:
-        raise Unsupported("version %d; this decoder reads 1 to 4" % version)
+    if not 1 <= version <= 5:
+        raise Unsupported("version %d; this decoder reads 1 to 5" % version)
     header.version = version
     header.bits = read.field("B")
     header.origin = [read.field("i") for _ in range(3)]

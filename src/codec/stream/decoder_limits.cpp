@@ -18,6 +18,8 @@ std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes >> 20)
 
 std::uint64_t memory_of_reference(MeshCounts mesh) { return each(mesh, 128, 48); }
 std::uint64_t memory_of_tracking(MeshCounts mesh) { return each(mesh, 416, 48); }
+// What is measured for tracking has two of them.
+std::uint64_t memory_of_tracked_frame(MeshCounts mesh) { return memory_of_tracking(mesh) / 2; }
 
 std::uint64_t memory_of_frame(const MemoryBound& bound, MeshCounts coded, MeshCounts reference) {
     return memory_of_models + each(coded, bound.coded_vertex, bound.coded_triangle) +

@@ -162,11 +162,11 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
     if (!in.ok() || !std::equal(bytes.begin(), bytes.end(), magic.begin()))
         return fail(ErrorKind::corrupt_stream, "sequence header: this is not an htvm stream");
     const auto version = in.u16();
-    if (version < oldest_version || version > stream_version)
+    if (version < oldest_version || version > newest_version)
         return fail(ErrorKind::unsupported, "the stream has version " + std::to_string(version) +
                                                 ", this decoder reads versions " + std::to_string(oldest_version) +
-                                                " to " + std::to_string(stream_version) +
-                                                (version > stream_version ? "; a newer htvm is needed" : ""));
+                                                " to " + std::to_string(newest_version) +
+                                                (version > newest_version ? "; a newer htvm is needed" : ""));
     SequenceHeader out;
     out.version = version;
     out.lattice.bits = in.u8();

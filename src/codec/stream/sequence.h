@@ -16,9 +16,9 @@
 
 namespace htvm::internal {
 
-// Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version on are
-// read.
-inline constexpr std::uint16_t stream_version = 4;
+// Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version to
+// newest_version are read, stream_version is written, and grouped_version where T-frames come in groups.
+inline constexpr std::uint16_t stream_version = 4, newest_version = 5;
 inline constexpr std::uint16_t oldest_version = 1;
 
 // From this version on a sequence header has a session. The headers of all versions since have the same syntax.
@@ -28,6 +28,8 @@ inline constexpr std::uint16_t tracked_run_version = 3;
 // From this version on the meshes of a stream with nodes are shown smoothed within their quantiser cells
 // (reference/reference.h); before, only what T-frames move is smoothed.
 inline constexpr std::uint16_t shown_smoothed_version = 4;
+// From this version on a T-frame's payload begins with its place in a group (tracked/frame_group.h).
+inline constexpr std::uint16_t grouped_version = 5;
 
 // The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (paper/mtfan.h). The
 // paper's are 8, 16 and 32.

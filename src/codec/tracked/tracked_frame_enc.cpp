@@ -48,6 +48,12 @@ double price_of_motion(const DeformationForm& form, const TrackedFrameOptions& o
     return share * options.lambda * options.geometry_step * options.geometry_step * samples;
 }
 
+// What was taken off, as long as the values can be coded without it.
+void take_off(std::vector<std::int32_t>& values, const std::vector<std::int32_t>& noise) {
+    for (std::size_t i = 0; i < noise.size(); ++i)
+        values[i] = std::clamp(values[i] - noise[i], -field_limit, field_limit);
+}
+
 }  // namespace
 
 TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
@@ -143,7 +149,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     const auto& triangles = reference.mesh.triangles;
     EncodedTrackedFrame out;
     NodeMotionOptions of_motion;
-    of_motion.steps = motion_steps(options.geometry_step, options.millimetre);
+    of_motion.steps = options.motion.value_or(motion_steps(options.geometry_step, options.millimetre));
     of_motion.form = &registered.form;
     of_motion.price = price_of_motion(registered.form, options);
     auto coded_motion = encode_node_motion(
@@ -162,11 +168,19 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     }
     clock.done("targets");
     if (options.denoise) {
+        if (options.keeps_noise) out.noise.targets = targets;
         if (options.motion_alone)
             out.targets = targets_before;
         else
             out.targets = filter_targets(targets, triangles, targets_before, *options.denoise);
+        if (options.keeps_noise) {
+            take_off(out.noise.targets.displacement, targets.displacement);
+            take_off(out.noise.targets.colours, targets.colours);
+        }
         clock.done("denoising");
+    } else if (options.noise) {
+        take_off(targets.displacement, options.noise->targets.displacement);
+        take_off(targets.colours, options.noise->targets.colours);
     }
 
     // A step so large that every difference from the prediction becomes zero.
@@ -174,7 +188,9 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     const double colour_step = options.motion_alone ? field_limit : options.colour_step;
     FieldOptions geometry;
     geometry.step = {displacement_step, displacement_step, displacement_step};
-    geometry.lambda = options.lambda * price_of_bits(out.targets, displacement_step);
+    const double price = options.noise ? options.noise->price : price_of_bits(out.targets, displacement_step);
+    if (options.keeps_noise) out.noise.price = price;
+    geometry.lambda = options.lambda * price;
     FieldOptions colour;
     colour.step = {colour_step, colour_step, colour_step};
     colour.lambda = options.lambda;

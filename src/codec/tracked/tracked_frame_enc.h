@@ -18,13 +18,22 @@
 
 namespace htvm::internal {
 
+// What filtering took off a frame's targets, for when the frame is coded once more from others.
+struct RemovedNoise {
+    TrackedTargets targets;  // to take off what is found; empty without filtering
+    double price = 1;        // by how much less a bit should cost: price_of_bits()
+};
+
 struct TrackedFrameOptions {
     double millimetre = 16;     // lattice units: see Configuration::adult_millimetre
     double geometry_step = 32;  // lattice units: for the displacement along the normal
     double colour_step = 11;    // levels
     double lambda = 0.12;       // squared steps that one bit is worth
     double reach = 480;         // lattice units: how far from the moved reference to search for the captured surface
+    std::optional<NodeMotionSteps> motion;       // none: those that suit the geometry step
     std::optional<TargetFilterOptions> denoise;  // filters the targets over time
+    const RemovedNoise* noise = nullptr;         // else: what to take off them
+    bool keeps_noise = false;                    // whether to tell what filtering took off
     bool motion_alone = false;  // displacement and colours stay as predicted: the smallest frame possible
     Threads threads = {};
 };
@@ -66,6 +75,7 @@ struct EncodedTrackedFrame {
     LatticeMesh mesh;  // the mesh that the decoder will have
     TrackedState state;
     TargetHistory targets;  // empty without filtering
+    RemovedNoise noise;     // empty unless it was to be told
 };
 
 // mesh: as captured; surface: its index, see captured_surface(). registered: to this surface. before: state of the
