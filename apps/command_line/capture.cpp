@@ -5,12 +5,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "command_line/terminal.h"
 #include "io/mesh_file.h"
 #include "io/skeleton_align.h"
 #include "io/skeleton_file.h"
+#include "io/texture_colours.h"
 
 namespace htvm::app {
 namespace {
@@ -110,6 +112,28 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
     command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)");
     command.add_option("--skeleton-offset", options.skeleton_offset,
                        "Seconds to add to the skeleton's clock, if it is early or late");
+    add_texture_options(command, options.texture);
+    command
+        .add_option("--texture-as", options.texture_as,
+                    "What becomes of a texture: colours at the vertices, or coordinates, which are kept as they are while\n"
+                    "the image is left out (default: colours, unless the meshes have vertex colours of their own)")
+        ->check(CLI::IsMember({"colours", "coordinates"}));
+}
+
+void add_texture_options(CLI::App& command, TextureOptions& options) {
+    command
+        .add_option("--texture", options.files,
+                    "The texture, PNG, JPEG or WebP: an image for all meshes, a pattern such as tex_%05d.jpg for one each,\n"
+                    "or none (default: the image that the meshes' files name, else the one beside a mesh that is called\n"
+                    "like it)")
+        ->type_name("FILE");
+    const std::map<std::string, TextureOrigin> origins{{"bottom", TextureOrigin::bottom}, {"top", TextureOrigin::top}};
+    command
+        .add_option("--texture-origin", options.origin,
+                    "From which edge of the image the files count texture coordinates (default: top for glTF, bottom for\n"
+                    "the other formats)")
+        ->transform(CLI::CheckedTransformer(origins))
+        ->option_text("bottom|top");
 }
 
 bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
@@ -126,6 +150,10 @@ std::string key_of(const CaptureOptions& options) {
     if (options.scale != 1) key += fmt::format(", scale {}", options.scale);
     if (options.height > 0) key += fmt::format(", height {}, up {}", options.height, options.up);
     if (!options.timestamps.empty()) key += ", timestamps " + options.timestamps;
+    if (!options.texture.files.empty()) key += ", texture " + options.texture.files;
+    if (!options.texture_as.empty()) key += ", texture as " + options.texture_as;
+    if (options.texture.origin != TextureOrigin::by_format)
+        key += options.texture.origin == TextureOrigin::top ? ", texture from the top" : ", texture from the bottom";
     return key;
 }
 
@@ -137,8 +165,12 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
     } else if (auto found = capture.find_files(); !found) {
         return tl::unexpected(found.error());
     }
+    auto textures = TextureFiles::open(options.texture, capture.files_);
+    if (!textures) return tl::unexpected(textures.error());
+    capture.textures_ = std::move(*textures);
     if (auto found = capture.find_poses(); !found) return tl::unexpected(found.error());
     if (auto found = capture.find_unit(); !found) return tl::unexpected(found.error());
+    capture.tell_of_texture();
     return capture;
 }
 
@@ -272,16 +304,16 @@ Result<void> Capture::find_unit() {
         if (mesh) peeked_ = std::move(**mesh);
         if (mesh) peeked_at_ = *at_;
         if (!mesh && !error) error = mesh.error();
-        if (pipe_ || (peeked_ && !peeked_->positions.empty()) || next_ == end) break;
+        if (pipe_ || (peeked_ && !peeked_->mesh.positions.empty()) || next_ == end) break;
     }
     if (!peeked_ && error) return tl::unexpected(*error);
     if (!peeked_)
         return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
     const bool guessed = options_.unit == "auto" && options_.height == 0 && options_.scale == 1;
     const auto of_format = pipe_ ? std::nullopt : unit_of_format(files_.paths[peeked_at_]);
-    const auto unit = options_.unit == "auto" ? of_format.value_or(guess_unit(*peeked_)) : *length_unit(options_.unit);
+    const auto unit = options_.unit == "auto" ? of_format.value_or(guess_unit(peeked_->mesh)) : *length_unit(options_.unit);
     millimetres_per_unit_ = options_.scale * millimetres_per(unit);
-    const double tall = height_of(*peeked_, options_.up);
+    const double tall = height_of(peeked_->mesh, options_.up);
     if (options_.height > 0) {
         if (!(tall > 0)) return fail(ErrorKind::bad_input, "--height: the first mesh is flat; give --scale or --up");
         // In whole micrometres, as the stream keeps it.
@@ -298,7 +330,7 @@ Result<void> Capture::find_unit() {
         else if (unit != LengthUnit::millimetre && !of_format)
             note(looks + " (see --unit)");
     }
-    if (auto ok = scale_positions(*peeked_, millimetres_per_unit_); !ok) return ok;
+    if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) return ok;
     find_floor();
     // From files all is read again but what is kept.
     if (!pipe_) next_ = begin_;
@@ -313,7 +345,7 @@ void Capture::find_floor() {
     const bool down = options_.up.front() == '-';
     up_ = static_cast<UpAxis>(1 + 2 * axis + (down ? 1 : 0));
     bool any = false;
-    for (const auto& p : peeked_->positions) {
+    for (const auto& p : peeked_->mesh.positions) {
         const double c = static_cast<double>(p[axis]);
         if (!std::exchange(any, true) || (down ? c > lowest_ : c < lowest_)) lowest_ = c;
     }
@@ -321,8 +353,42 @@ void Capture::find_floor() {
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------
 
-Result<std::optional<Mesh>> Capture::read_file() {
-    if (next_ == begin_ + frames_) return std::optional<Mesh>{};
+TextureUse Capture::texture_use() const {
+    if (options_.texture_as == "coordinates") return TextureUse::none;
+    return options_.texture_as == "colours" ? TextureUse::always : TextureUse::where_colourless;
+}
+
+// What becomes of the first mesh's texture.
+void Capture::tell_of_texture() const {
+    const auto& image = textures_.image_name();
+    const auto& [mesh, texture] = *peeked_;
+    if (texture) {
+        note(fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
+                         "coordinates keeps its coordinates instead",
+                         image, texture->width, texture->height));
+    } else if (mesh.texcoords.empty() || options_.texture.files == "none") {
+        return;
+    } else if (image.empty()) {
+        note("the meshes have texture coordinates, but no image was found for them; --texture gives its place");
+    } else if (options_.texture_as == "coordinates") {
+        note(fmt::format("the texture coordinates are encoded, their image ({}) is not", image));
+    } else {
+        note(fmt::format("the meshes have vertex colours, so their texture ({}) is not used; --texture-as colours takes "
+                         "its colours",
+                         image));
+    }
+}
+
+// Colours at vertices in place of the texture.
+Mesh Capture::as_encoded(TexturedMesh captured) {
+    textured_.reset();
+    if (!captured.texture) return std::move(captured.mesh);
+    textured_ = std::make_shared<const TexturedMesh>(std::move(captured));
+    return with_vertex_colours(*textured_);
+}
+
+Result<std::optional<TexturedMesh>> Capture::read_file() {
+    if (next_ == begin_ + frames_) return std::optional<TexturedMesh>{};
     const std::size_t place = next_++;
     const std::int64_t before = timestamp_us_;
     missing_ = place > options_.first ? static_cast<std::size_t>(places_[place] - places_[place - 1] - 1) : 0;
@@ -332,12 +398,12 @@ Result<std::optional<Mesh>> Capture::read_file() {
     if (peeked_ && place == peeked_at_) return std::exchange(peeked_, std::nullopt);
     MeshFileOptions options;
     options.millimetres_per_unit = millimetres_per_unit_;
-    auto mesh = read_mesh(files_.paths[place], options);
+    auto mesh = textures_.read(place, texture_use(), options);
     if (!mesh) return tl::unexpected(mesh.error());
-    return std::optional<Mesh>{std::move(*mesh)};
+    return std::optional<TexturedMesh>{std::move(*mesh)};
 }
 
-Result<std::optional<Mesh>> Capture::read_pipe() {
+Result<std::optional<TexturedMesh>> Capture::read_pipe() {
     if (peeked_) {
         at_ = peeked_at_;
         return std::exchange(peeked_, std::nullopt);
@@ -345,13 +411,17 @@ Result<std::optional<Mesh>> Capture::read_pipe() {
     for (;;) {
         auto piped = pipe_->next();
         if (!piped) return tl::unexpected(piped.error());
-        if (!*piped) return std::optional<Mesh>{};
-        auto& [mesh, place, timestamp] = **piped;
+        if (!*piped) return std::optional<TexturedMesh>{};
+        auto& [mesh, place, timestamp, image] = **piped;
         if (place < options_.first) continue;
         at_ = place;
         if (auto ok = find_piped_time(place, timestamp); !ok) return tl::unexpected(ok.error());
         if (auto ok = scale_positions(mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
-        return std::optional<Mesh>{std::move(mesh)};
+        TextureReference said;
+        if (!image.empty()) add_image(said, image);
+        auto textured = textures_.with_image(std::move(mesh), said, texture_use());
+        if (!textured) return fail(textured.error().kind, fmt::format("{}: {}", name(), textured.error().message));
+        return std::optional<TexturedMesh>{std::move(*textured)};
     }
 }
 
@@ -373,9 +443,11 @@ Result<void> Capture::find_piped_time(std::size_t place, const std::string& time
 
 Result<std::optional<Mesh>> Capture::next() {
     if (options_.frames > 0 && taken_ >= options_.frames) return std::optional<Mesh>{};
-    auto mesh = pipe_ ? read_pipe() : read_file();
-    if (!mesh || *mesh) ++taken_;
-    return mesh;
+    auto captured = pipe_ ? read_pipe() : read_file();
+    if (!captured || *captured) ++taken_;
+    if (!captured) return tl::unexpected(captured.error());
+    if (!*captured) return std::optional<Mesh>{};
+    return std::optional<Mesh>{as_encoded(std::move(**captured))};
 }
 
 void Capture::rewind() {
@@ -390,7 +462,7 @@ void Capture::restrict_to(std::size_t first, std::size_t frames) {
     rewind();
 }
 
-Mesh Capture::take_first() { return *std::exchange(peeked_, std::nullopt); }
+Mesh Capture::take_first() { return as_encoded(*std::exchange(peeked_, std::nullopt)); }
 
 const Pose* Capture::pose_at(std::size_t place) const {
     return poses_.empty() ? nullptr : &poses_[std::min(place, poses_.size() - 1)];

@@ -14,6 +14,7 @@
 #include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
 #include "io/sequence.h"
+#include "io/texture_file.h"
 #include "io/timestamps.h"
 
 namespace CLI {
@@ -35,11 +36,17 @@ struct CaptureOptions {
     std::size_t frames = 0;      // at most; 0: all
     std::size_t first = 0;       // frames to leave out at the beginning
     double skeleton_offset = 0;  // seconds added to the skeleton's clock
+    TextureOptions texture;      // where images are
+    std::string texture_as;      // colours: at the vertices; coordinates: the image is left out; empty: colours of what
+                                 // has no vertex colours of its own
     bool drop_late = false;      // of standard input: drops frames that come faster than they are taken
 };
 
 // Adds the options above to a command.
 void add_capture_options(CLI::App& command, CaptureOptions& options);
+
+// Of these, --texture and --texture-origin, for commands that read meshes otherwise.
+void add_texture_options(CLI::App& command, TextureOptions& options);
 
 // Whether the meshes come from standard input.
 bool is_piped(const CaptureOptions& options);
@@ -54,7 +61,7 @@ class Capture {
 public:
     // Opens the input, reads the skeleton and says on the terminal what it found and assumed.
     static Result<Capture> open(const CaptureOptions& options);
-    // The next frame's mesh in mm, or nothing at the end. After an error of a file the next call gives the next file.
+    // The next frame's mesh in mm, as it is to be encoded, or nothing at the end. After an error of a file the next call gives the next file.
     Result<std::optional<Mesh>> next();
     // Whether there can be a next frame after an error: standard input is lost with its place.
     bool survives_errors() const { return !pipe_; }
@@ -71,6 +78,8 @@ public:
     const Pose* pose() const { return pose_at(*at_); }  // null where there is no skeleton
     std::int64_t timestamp_us() const { return timestamp_us_; }
     std::string name() const;                                // its file, or its place on standard input
+    // With its texture, before that became colours at vertices; null if it has none.
+    std::shared_ptr<const TexturedMesh> textured() const { return textured_; }
     std::size_t missing_before() const { return missing_; }  // frames of the numbers between it and the one before
     std::int64_t missing_timestamp_us(std::size_t k) const;  // of those, k from 0
 
@@ -93,8 +102,11 @@ private:
     Result<void> find_poses();
     Result<void> find_unit();
     void find_floor();
-    Result<std::optional<Mesh>> read_file();
-    Result<std::optional<Mesh>> read_pipe();
+    void tell_of_texture() const;
+    TextureUse texture_use() const;
+    Result<std::optional<TexturedMesh>> read_file();
+    Result<std::optional<TexturedMesh>> read_pipe();
+    Mesh as_encoded(TexturedMesh captured);
     Result<void> find_piped_time(std::size_t place, const std::string& timestamp);
     std::int64_t regular_time(std::uint64_t place) const;
     const Pose* pose_at(std::size_t place) const;
@@ -114,12 +126,14 @@ private:
     std::vector<double> radii_;
     std::size_t begin_ = 0, frames_ = 0;  // place of the first frame; their number, 0 where it is not known
 
-    std::optional<Mesh> peeked_;        // the first mesh that can be read, in mm, read beforehand to tell its unit
+    TextureFiles textures_;
+    std::optional<TexturedMesh> peeked_;  // the first mesh that can be read, in mm, read beforehand to tell its unit
     std::size_t peeked_at_ = 0;         // its place
     std::size_t next_ = 0, taken_ = 0;  // place of the next frame; frames that next() gave or failed at
     std::optional<std::size_t> at_;     // place of the last one
     std::int64_t timestamp_us_ = 0, before_us_ = 0;  // of the last one and of the one before
     std::size_t missing_ = 0;
+    std::shared_ptr<const TexturedMesh> textured_;
 };
 
 }  // namespace htvm::app

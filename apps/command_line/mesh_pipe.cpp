@@ -61,7 +61,7 @@ struct MeshPipe::State {
         if (interruption() != 0) return std::optional<PipedMesh>();  // in the middle of a mesh, perhaps
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) return std::optional<PipedMesh>();
-        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp()});
+        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.texture()});
     }
 
     void read_on() {

@@ -15,6 +15,7 @@ struct PipedMesh {
     Mesh mesh;
     std::size_t place = 0;  // among all that came, dropped ones too
     std::string timestamp;  // as its header says; empty: it does not
+    std::string texture;    // likewise: the image's name
 };
 
 class MeshPipe {

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "command_line/capture.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/thread.h"
@@ -455,7 +456,8 @@ struct Options {
     std::vector<std::string> only;
     CompareOptions compare;
     unsigned threads = 0;
-    DecoderOptions limits;  // for streams
+    DecoderOptions limits;   // for streams
+    TextureOptions texture;  // of the originals
     ShadingOptions shading;
     bool flicker = true, follow_sequence = false, json = false;
     double peak_mm = 0;
@@ -504,21 +506,21 @@ bool guess_fits_better(MeshSource original, MeshSource decoded) {
     if (!first || original.millimetres_per_unit == decoded.millimetres_per_unit) return false;
     const auto second = decoded.mesh_at(decoded, 0);
     if (!second) return false;
-    const double guessed = diagonal(bounding_box(*first)), right = diagonal(bounding_box(*second));
+    const double guessed = diagonal(bounding_box(first->mesh)), right = diagonal(bounding_box(second->mesh));
     const double by_stream = guessed / original.millimetres_per_unit * decoded.millimetres_per_unit;
     if (!(guessed > 0) || !(right > 0)) return false;
     return std::abs(std::log(guessed / right)) < std::abs(std::log(by_stream / right));
 }
 
 Result<Sources> open_sources(const Options& options) {
-    auto original = open_meshes(options.originals, {options.unit, options.timestamps, options.limits});
+    auto original = open_meshes(options.originals, {options.unit, options.timestamps, options.limits, options.texture});
     if (!original) return tl::unexpected(original.error());
-    auto decoded = open_meshes({options.decoded}, {options.unit, "", options.limits});
+    auto decoded = open_meshes({options.decoded}, {options.unit, "", options.limits, {}});
     if (!decoded) return tl::unexpected(decoded.error());
     // A stream knows what its capture's files are in, however --scale or --height made millimetres of them; but it may
     // have been encoded from others.
     if (decoded->is_stream && original->guesses_unit) {
-        auto stream = open_meshes({options.decoded}, {options.unit, "", options.limits});
+        auto stream = open_meshes({options.decoded}, {options.unit, "", options.limits, {}});
         if (!stream) return tl::unexpected(stream.error());
         if (guess_fits_better(*original, std::move(*stream))) return Sources{std::move(*original), std::move(*decoded)};
         original->guesses_unit = false;
@@ -578,19 +580,21 @@ Result<Box> sequence_box(const Options& options, const std::vector<FramePair>& p
     for (const auto& pair : pairs) {
         const auto mesh = sources->original.mesh_at(sources->original, pair.original);
         if (!mesh) return tl::unexpected(mesh.error());
-        if (const auto ok = check_measurable(*mesh, "original"); !ok) return tl::unexpected(ok.error());
-        extend(box, bounding_box(*mesh));
+        if (const auto ok = check_measurable(mesh->mesh, "original"); !ok) return tl::unexpected(ok.error());
+        extend(box, bounding_box(mesh->mesh));
         progress.step();
     }
     return box;
 }
 
-Result<void> write_pictures(const Options& options, const Mesh& original, const Mesh& decoded, std::size_t frame) {
+Result<void> write_pictures(const Options& options, const TexturedMesh& original, const TexturedMesh& decoded,
+                            std::size_t frame) {
     const CompareOptions& c = options.compare;
-    const auto cameras = cameras_round(c.view_box.value_or(bounding_box(original)), c.views);
+    const auto cameras = cameras_round(c.view_box.value_or(bounding_box(original.mesh)), c.views);
     if (!cameras) return tl::unexpected(cameras.error());
     RenderOptions render_options = c.render;
-    render_options.colours = render_options.colours && !original.colours.empty() && !decoded.colours.empty();
+    render_options.colours =
+        render_options.colours && ShownMesh(original).has_colours() && ShownMesh(decoded).has_colours();
     const DrawableMesh first = make_drawable(original, render_options), second = make_drawable(decoded, render_options);
     const int count = std::min(options.picture_views, static_cast<int>(cameras->size()));
     Canvas left, right;
@@ -624,7 +628,7 @@ struct Marks {
 };
 
 Result<Marks> open_marks(const Options& options, const MeshSource& original) {
-    auto source = open_meshes({(std::filesystem::path(options.truth) / "marks").string()}, {"mm", "", options.limits});
+    auto source = open_meshes({(std::filesystem::path(options.truth) / "marks").string()}, {"mm", "", options.limits, {}});
     if (!source) return tl::unexpected(source.error());
     Marks marks{std::move(*source), std::vector<std::size_t>(original.frames)};
     const auto& numbers = marks.source.numbers;
@@ -654,7 +658,7 @@ Result<FrameDrift> measure_drift(Marks& marks, DriftMeter& meter, std::size_t or
                     fmt::format("{} has no frame {}; is it the truth of these originals?", marks.source.name, number));
     const auto mesh = marks.source.mesh_at(marks.source, marks.place_of[original]);
     if (!mesh) return tl::unexpected(mesh.error());
-    return meter.add(*mesh, decoded);
+    return meter.add(mesh->mesh, decoded);
 }
 
 Result<Measured> measure(const Options& options, Sources& sources, const std::vector<FramePair>& pairs) {
@@ -674,7 +678,10 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         if (!first) return tl::unexpected(first.error());
         auto second = decoded.mesh_at(decoded, pair.decoded);
         if (!second) return tl::unexpected(second.error());
-        if (out.frames.empty()) warn_of_sizes(sources, *first, *second);
+        // Triangles that keep their texture coordinates show the original's image.
+        if (second->mesh.colours.empty() && !second->texture && !second->mesh.texcoords.empty())
+            second->texture = first->texture;
+        if (out.frames.empty()) warn_of_sizes(sources, first->mesh, second->mesh);
         auto comparison = compare_frame(*first, *second, options.compare);
         if (!comparison)
             return fail(comparison.error().kind,
@@ -685,7 +692,7 @@ Result<Measured> measure(const Options& options, Sources& sources, const std::ve
         out.kinds.push_back(decoded.is_stream ? std::optional(decoded.kinds[pair.decoded]) : std::nullopt);
         if (marks) {
             const auto number = original.numbers.empty() ? pair.original : original.numbers[pair.original];
-            const auto drift = measure_drift(*marks, out.drift, pair.original, number, *second);
+            const auto drift = measure_drift(*marks, out.drift, pair.original, number, second->mesh);
             if (!drift) return tl::unexpected(drift.error());
             out.drifts.push_back(*drift);
         }
@@ -924,6 +931,7 @@ void add_compare(CLI::App& app, Run& run) {
     add_view_options(*command, o);
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
+    add_texture_options(*command, o.texture);
     add_decoder_limits(*command, o.limits);
     command
         ->add_option("--csv", o.csv,

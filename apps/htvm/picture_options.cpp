@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+#include "command_line/capture.h"
 #include "command_line/terminal.h"
 #include "stream_file.h"
 
@@ -90,13 +91,14 @@ void add_picture_options(CLI::App& command, PictureOptions& options) {
         ->capture_default_str();
     command.add_option("--threads", options.threads,
                        "Threads to use (default: one per core); the pictures do not depend on it");
+    add_texture_options(command, options.texture);
     add_decoder_limits(command, options.limits);
 }
 
-RenderOptions render_options(const PictureOptions& options, const Mesh& mesh) {
+RenderOptions render_options(const PictureOptions& options, const TexturedMesh& mesh) {
     RenderOptions out;
     out.colours = !options.shading.grey;
-    const bool coloured = out.colours && !mesh.colours.empty();
+    const bool coloured = out.colours && ShownMesh(mesh).has_colours();
     out.shading = options.shading.shading.value_or(coloured ? Shading::unlit : Shading::smooth);
     return out;
 }

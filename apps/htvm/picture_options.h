@@ -37,6 +37,7 @@ struct PictureOptions {
     std::optional<Colour> background = Colour{255, 255, 255};  // none: transparent
     int samples = 3;                                           // across a pixel
     DecoderOptions limits;
+    TextureOptions texture;
     unsigned threads = 0;
 };
 // The positional argument: what is drawn.
@@ -45,7 +46,7 @@ void add_picture_input(CLI::App& command, PictureOptions& options);
 void add_picture_options(CLI::App& command, PictureOptions& options);
 
 // How this mesh is drawn: coloured ones unlit unless told otherwise, as captured colours contain the light.
-RenderOptions render_options(const PictureOptions& options, const Mesh& mesh);
+RenderOptions render_options(const PictureOptions& options, const TexturedMesh& mesh);
 
 // The views with an axis that is up: the option's, else the source's, else y or z, along which the mesh is longer.
 ViewOptions upright_views(const PictureOptions& options, const MeshSource& source, const Mesh& mesh);

@@ -33,7 +33,7 @@ struct Options {
 constexpr double seconds_of_one_mesh = 6;
 
 Result<MeshSource> open_source(const Options& options) {
-    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits});
+    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits, options.picture.texture});
     if (!source) return source;
     if (options.frames > 0) source->frames = std::min(source->frames, options.frames);
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
@@ -78,8 +78,8 @@ Result<Box> box_of(const Options& options, MeshSource& source) {
         if (interruption() != 0) break;
         const auto mesh = source.mesh_at(source, k);
         if (!mesh) return tl::unexpected(mesh.error());
-        if (const auto ok = check_measurable(*mesh, source.name); !ok) return tl::unexpected(ok.error());
-        extend(box, bounding_box(*mesh));
+        if (const auto ok = check_measurable(mesh->mesh, source.name); !ok) return tl::unexpected(ok.error());
+        extend(box, bounding_box(mesh->mesh));
         progress.step();
     }
     return box;
@@ -89,7 +89,7 @@ Result<Box> box_of(const Options& options, MeshSource& source) {
 class Frames {
 public:
     explicit Frames(const Options& options) : options_(options) {}
-    Result<const Mesh*> at(std::size_t position) {
+    Result<const TexturedMesh*> at(std::size_t position) {
         if (source_ && position == position_) return &mesh_;
         if (!source_ || position < position_) {
             auto opened = open_source(options_);
@@ -98,7 +98,7 @@ public:
         }
         auto mesh = source_->mesh_at(*source_, position);
         if (!mesh) return tl::unexpected(mesh.error());
-        if (const auto ok = check_measurable(*mesh, source_->name); !ok) return tl::unexpected(ok.error());
+        if (const auto ok = check_measurable(mesh->mesh, source_->name); !ok) return tl::unexpected(ok.error());
         mesh_ = std::move(*mesh);
         position_ = position;
         return &mesh_;
@@ -108,7 +108,7 @@ private:
     const Options& options_;
     std::optional<MeshSource> source_;
     std::size_t position_ = 0;
-    Mesh mesh_;
+    TexturedMesh mesh_;
 };
 
 // A camera that looks at the whole box from where it is at each picture.
@@ -137,8 +137,8 @@ Result<double> largest_zoom(Frames& frames, const std::vector<std::size_t>& show
         if (!mesh) return tl::unexpected(mesh.error());
         const auto camera = orbit.at(k, shown.size());
         if (!camera) return tl::unexpected(camera.error());
-        if ((*mesh)->positions.empty()) continue;
-        const double zoom = zoomed_to(**mesh, *camera, orbit.views.margin).scale / camera->scale;
+        if ((*mesh)->mesh.positions.empty()) continue;
+        const double zoom = zoomed_to((*mesh)->mesh, *camera, orbit.views.margin).scale / camera->scale;
         out = std::min(out.value_or(zoom), zoom);
         progress.step();
     }
@@ -185,7 +185,7 @@ Result<void> render(Options options) {
     Frames frames(options);
     const auto first = frames.at(0);
     if (!first) return tl::unexpected(first.error());
-    Orbit orbit{*box, upright_views(options.picture, *source, **first), options.still_camera ? 0 : options.turns, 1};
+    Orbit orbit{*box, upright_views(options.picture, *source, (*first)->mesh), options.still_camera ? 0 : options.turns, 1};
     const auto zoom = largest_zoom(frames, shown, orbit);
     if (!zoom) return tl::unexpected(zoom.error());
     orbit.zoom = *zoom;

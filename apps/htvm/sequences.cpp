@@ -14,6 +14,7 @@
 #include "htvm/frame_numbers.hpp"
 #include "io/mesh_file.h"
 #include "io/sequence.h"
+#include "io/texture_colours.h"
 #include "stream_file.h"
 #include "stream_seek.h"
 
@@ -77,7 +78,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
         bool begun = false;
     };
     source.mesh_at = [reading = std::make_shared<Reading>(Reading{std::move(*input), Decoder(options), options})](
-                         MeshSource& self, std::size_t position) -> Result<Mesh> {
+                         MeshSource& self, std::size_t position) -> Result<TexturedMesh> {
         auto& [stream, decoder, settings, numbers, begun] = *reading;
         const auto number = self.numbers[position];
         if (!std::exchange(begun, true) && position > 0)
@@ -87,7 +88,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             numbers.take(*packet);
             auto frame = decoder.push(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
-            if (*frame && numbers.of((*frame)->info.frame) == number) return std::move((*frame)->mesh);
+            if (*frame && numbers.of((*frame)->info.frame) == number) return TexturedMesh(std::move((*frame)->mesh));
         }
         return fail(ErrorKind::corrupt_stream, self.name + " changed while it was read");
     };
@@ -137,13 +138,18 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     source.millimetres_per_unit = millimetres_per(*chosen);
     source.guesses_unit = guess;
     if (auto found = find_times(source, *files, options.timestamps); !found) return tl::unexpected(found.error());
-    source.mesh_at = [paths = files->paths](MeshSource& self, std::size_t position) -> Result<Mesh> {
-        auto mesh = read_mesh(paths[position]);
-        if (!mesh) return tl::unexpected(mesh.error());
+    auto textures = TextureFiles::open(options.texture, *files);
+    if (!textures) return tl::unexpected(textures.error());
+    source.mesh_at = [paths = files->paths, textures = std::move(*textures)](
+                         MeshSource& self, std::size_t position) mutable -> Result<TexturedMesh> {
+        auto textured = textures.read(position, TextureUse::where_colourless);
+        if (!textured) return textured;
+        auto& [mesh, texture] = *textured;
         if (std::exchange(self.guesses_unit, false))
-            self.millimetres_per_unit = millimetres_per(likely_unit(paths[position], *mesh));
-        if (const auto ok = scale_positions(*mesh, self.millimetres_per_unit); !ok) return tl::unexpected(ok.error());
-        return std::move(*mesh);
+            self.millimetres_per_unit = millimetres_per(likely_unit(paths[position], mesh));
+        if (const auto ok = scale_positions(mesh, self.millimetres_per_unit); !ok) return tl::unexpected(ok.error());
+        if (texture) mesh.colours = colours_from_texture(mesh, *texture);
+        return textured;
     };
     return source;
 }

@@ -11,11 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "core/image.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame.hpp"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "htvm/scene.hpp"
+#include "io/texture_file.h"
 #include "io/timestamps.h"
 
 namespace htvm::app {
@@ -32,14 +34,16 @@ struct MeshSource {
     std::optional<SpaceBounds> bounds;  // mm, of all frames of a stream that says so
     double millimetres_per_unit = 1;    // the unit that files are in, or that a stream's capture was in
     bool guesses_unit = false;          // of files: from the first one that is read
-    // The mesh in mm of the frame at this position of the sequence. Positions must ascend from call to call.
-    std::function<Result<Mesh>(MeshSource&, std::size_t position)> mesh_at;
+    // The mesh in mm of the frame at this position of the sequence, with its texture if it has one, and then with the
+    // texture's colours at its vertices too. Positions must ascend from call to call.
+    std::function<Result<TexturedMesh>(MeshSource&, std::size_t position)> mesh_at;
 };
 
 struct MeshSourceOptions {
     std::string unit = "auto";  // of files: one of length_units, or auto, which guesses from the first one
     std::string timestamps;     // of files: a file of times (io/timestamps.h); empty: as PLY files say
     DecoderOptions limits;      // of streams
+    TextureOptions texture;     // of files
 };
 
 // An .htvm stream, or the files that the names refer to (io/sequence.h).

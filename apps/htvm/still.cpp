@@ -57,20 +57,21 @@ Result<std::size_t> position_of(const Options& options, const MeshSource& source
 Result<void> still(const Options& options) {
     if (options.output != "-" && !options.output.ends_with(".png"))
         return fail(ErrorKind::unsupported, "pictures are written as .png, not as " + options.output);
-    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits});
+    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits, options.picture.texture});
     if (!source) return tl::unexpected(source.error());
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
     const auto position = position_of(options, *source);
     if (!position) return tl::unexpected(position.error());
-    const auto mesh = source->mesh_at(*source, *position);
-    if (!mesh) return tl::unexpected(mesh.error());
+    const auto textured = source->mesh_at(*source, *position);
+    if (!textured) return tl::unexpected(textured.error());
+    const Mesh* mesh = &textured->mesh;
     if (const auto ok = check_measurable(*mesh, source->name); !ok) return ok;
     const auto cameras = cameras_round(bounding_box(*mesh), upright_views(options.picture, *source, *mesh));
     if (!cameras) return tl::unexpected(cameras.error());
     const internal::ThreadPool pool(options.picture.threads);
     Canvas canvas;
     const auto camera = zoomed_to(*mesh, cameras->front(), options.picture.views.margin);
-    const auto picture = draw_smoothly(make_drawable(*mesh, render_options(options.picture, *mesh)), camera,
+    const auto picture = draw_smoothly(make_drawable(*textured, render_options(options.picture, *textured)), camera,
                                        samples_of(options.picture), canvas, pool.threads());
     const auto png = png_of(picture, options.picture.background);
     if (!png) return tl::unexpected(png.error());

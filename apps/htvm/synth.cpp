@@ -20,12 +20,14 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/parallel.h"
+#include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "io/ply.h"
 #include "io/skeleton_file.h"
 #include "io/timestamps.h"
 #include "pacing.h"
+#include "synth/texture.h"
 #include "synth_truth.h"
 
 namespace htvm::app {
@@ -39,6 +41,9 @@ struct Options {
     std::string folder, truth;  // truth: empty for none
     int frames = 60, first_frame = 0, marks = 1000;
     SynthOptions synth;
+    SynthTextureOptions texture;
+    bool is_textured = false;
+    std::string texture_format = "jpg";
     unsigned threads = 0;
     bool json = false, live = false, counted = false;  // counted: the number of frames was given
 };
@@ -51,6 +56,24 @@ struct Written {
 
 std::filesystem::path frame_path(const Options& options, int frame) {
     return std::filesystem::path(options.folder) / fmt::format("frame_{:05}.ply", frame);
+}
+
+// The image beside a mesh.
+Result<void> write_image(const Options& options, std::filesystem::path path, const Image& image) {
+    path.replace_extension("." + options.texture_format);
+    const auto bytes = options.texture_format == "png" ? write_png_image(image) : write_jpeg_image(image);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return write_file(path, *bytes);
+}
+
+// A frame's mesh; its texture beside, if it has one.
+Result<void> write_frame(const Options& options, const std::filesystem::path& path, const SynthFrame& frame,
+                         const std::optional<SynthTexture>& texture) {
+    if (!texture) return write_mesh(path, frame.mesh);
+    MeshFileOptions named;
+    named.texture = path.stem().string() + "." + options.texture_format;
+    if (auto ok = write_image(options, path, texture->image); !ok) return ok;
+    return write_mesh(path, texture->mesh, named);
 }
 
 SkeletonTrack empty_track(double fps) {
@@ -75,25 +98,30 @@ Result<Written> write_frames(const Options& options, SkeletonTrack& noisy, Skele
         const int count = std::min(static_cast<int>(threads.count), options.frames - done);
         std::vector<SynthFrame> made(static_cast<std::size_t>(count));
         std::vector<TrueFrame> known(made.size());
+        std::vector<std::optional<SynthTexture>> textures(made.size());
         const Threads inner = threads.at_most(std::max(1u, threads.count / static_cast<unsigned>(count)));
         parallel_for(made.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
             for (std::size_t i = begin; i < end; ++i) {
                 const int number = options.first_frame + done + static_cast<int>(i);
                 made[i] = synth_frame(options.synth, number, inner);
+                if (options.is_textured)
+                    textures[i] = synth_texture(options.synth, options.texture, made[i], number, inner);
                 if (truth) known[i] = true_frame(options.synth, truth->marks(), number, inner);
             }
         });
         for (std::size_t i = 0; i < made.size(); ++i) {
             SynthFrame& frame = made[i];
             const auto path = frame_path(options, options.first_frame + done++);
-            if (auto ok = write_mesh(path, frame.mesh); !ok) return tl::unexpected(ok.error());
+            if (auto ok = write_frame(options, path, frame, textures[i]); !ok) return tl::unexpected(ok.error());
             written.names.insert(path.filename().string());
-            written.vertices += frame.mesh.positions.size();
+            written.vertices += textures[i] ? textures[i]->mesh.positions.size() : frame.mesh.positions.size();
             written.triangles += frame.mesh.triangles.size();
             add_pose(noisy, std::move(frame.pose));
             add_pose(exact, std::move(frame.true_pose));
             if (truth)
-                if (auto ok = truth->add(path.filename().string(), std::move(frame), std::move(known[i])); !ok)
+                if (auto ok = truth->add(path.filename().string(), std::move(frame), std::move(known[i]),
+                                         textures[i] ? &*textures[i] : nullptr);
+                    !ok)
                     return tl::unexpected(ok.error());
             progress.step();
         }
@@ -139,6 +167,7 @@ void report(const Options& options, const Written& written) {
 
 Result<void> synthesise(const Options& options) {
     if (auto ok = check_synth_options(options.synth); !ok) return ok;
+    if (auto ok = check_texture_options(options.texture); !ok) return ok;
     const auto start = std::chrono::steady_clock::now();
     std::error_code error;
     std::filesystem::create_directories(options.folder, error);
@@ -257,6 +286,24 @@ void add_synth(CLI::App& app, Run& run) {
         ->capture_default_str();
     command->add_flag("--lattice", o.synth.lattice,
                       "Keep the vertices on the edges of one regular grid (by default there is no grid)");
+    auto* texture = command
+                        ->add_option("--texture", o.texture.size,
+                                     "Write a texture of that many pixels along a side beside every mesh, in place of "
+                                     "vertex\ncolours: an atlas whose layout changes every second, with noise and a "
+                                     "drifting exposure;\nwith --truth also without these")
+                        ->option_text("PIXELS");
+    command->add_option("--texture-format", o.texture_format, "Of these images")
+        ->check(CLI::IsMember({"jpg", "png"}))
+        ->option_text("jpg|png=jpg")
+        ->needs(texture);
+    command->add_option("--texture-noise", o.texture.noise, "Their noise, levels RMS; new in every texel and frame")
+        ->capture_default_str()
+        ->needs(texture);
+    command
+        ->add_option("--texture-exposure", o.texture.exposure,
+                     "By how many percent their exposure goes up and down, over seconds")
+        ->capture_default_str()
+        ->needs(texture);
     command->add_flag("--normals", o.synth.normals, "Write vertex normals too");
     command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
     command->add_flag("--json", o.json, "Print what was written as JSON on standard output")->excludes(live);
@@ -271,12 +318,15 @@ void add_synth(CLI::App& app, Run& run) {
         "  htvm compare dance dance.htvm --only m2 --truth truth\n"
         "Example: a live stream without a camera, beside a hub (htvm serve)\n"
         "  htvm synth --live --vertices 10000 --fps 10 | htvm encode - -o ws://localhost:8080/publish/me");
-    command->callback([options, frames, &run] {
+    command->callback([options, frames, texture, &run] {
         if (options->live == !options->folder.empty())
             throw CLI::ValidationError("OUT_DIR",
                                        "or --live: give one of them, a folder to write to or standard output");
         if (options->live && !options->truth.empty())
             throw CLI::ValidationError("--truth", "goes with a folder of frames, not with --live");
+        options->is_textured = texture->count() > 0;
+        if (options->live && options->is_textured)
+            throw CLI::ValidationError("--texture", "writes images beside meshes in a folder, so not with --live");
         options->counted = frames->count() > 0;
         run = [options] { return options->live ? synthesise_live(*options) : synthesise(*options); };
     });

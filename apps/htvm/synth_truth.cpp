@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "io/image_file.h"
 #include "io/mesh_file.h"
 #include "io/output_file.h"
 #include "synth/synth.h"
@@ -51,7 +52,18 @@ Result<TruthFiles> TruthFiles::create(const std::filesystem::path& folder, const
     return files;
 }
 
-Result<void> TruthFiles::add(const std::string& file_name, SynthFrame frame, TrueFrame truth) {
+Result<void> TruthFiles::add(const std::string& file_name, SynthFrame frame, TrueFrame truth,
+                             const SynthTexture* texture) {
+    if (texture) {
+        const auto path = folder_ / "texture" / std::filesystem::path(file_name).replace_extension(".png");
+        std::error_code error;
+        std::filesystem::create_directories(path.parent_path(), error);
+        if (error) return fail(ErrorKind::bad_input, path.parent_path().string() + " cannot be made: " + error.message());
+        const auto bytes = write_png_image(texture->exact);
+        if (!bytes) return tl::unexpected(bytes.error());
+        if (auto ok = write_file(path, *bytes); !ok) return ok;
+        textures_.push_back({texture->layout, texture->gain});
+    }
     Mesh surface = std::move(frame.mesh);
     surface.positions = std::move(frame.true_positions);
     surface.normals.clear();  // they are those of the noisy surface
@@ -71,6 +83,10 @@ Result<void> TruthFiles::finish() const {
     for (const SurfaceMark& mark : marks_) marks.push_back(mark_json(mark));
     auto& events = out["events"] = nlohmann::ordered_json::array();
     for (const LimbEvent& event : limb_events(limbs_, first_frame_, options_.fps)) events.push_back(event_json(event));
+    for (const auto& [layout, gain] : textures_)
+        out["textures"].push_back(
+            {{"layout", layout},
+             {"gain", {std::round(1e4 * gain[0]) / 1e4, std::round(1e4 * gain[1]) / 1e4, std::round(1e4 * gain[2]) / 1e4}}});
     return write_file(folder_ / "truth.json", out.dump(1) + "\n");
 }
 

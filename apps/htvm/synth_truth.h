@@ -1,13 +1,16 @@
 // The files that htvm synth --truth writes beside a capture: DIR/surface/frame_00000.ply, the meshes without noise;
-// DIR/marks/frame_00000.ply, the points that are fixed on the surface; DIR/truth.json, what they are on, and what limbs
-// do. docs/synth.md describes them.
+// DIR/marks/frame_00000.ply, the points that are fixed on the surface; of textured captures DIR/texture/frame_00000.png,
+// the images without noise and exposure; DIR/truth.json, what the marks are on, what limbs do, and the exposure.
+// docs/synth.md describes them.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "htvm/result.hpp"
+#include "synth/texture.h"
 #include "synth/truth.h"
 
 namespace htvm::app {
@@ -19,8 +22,8 @@ public:
                                      int marks);
     const std::vector<SurfaceMark>& marks() const { return marks_; }
 
-    // The frame of that number, which follow each other; `frame`'s mesh is given up.
-    Result<void> add(const std::string& file_name, SynthFrame frame, TrueFrame truth);
+    // The frame of that number, which follow each other; `frame`'s mesh is given up. texture: null if there is none.
+    Result<void> add(const std::string& file_name, SynthFrame frame, TrueFrame truth, const SynthTexture* texture);
     // Writes truth.json.
     Result<void> finish() const;
 
@@ -29,7 +32,12 @@ private:
     SynthOptions options_;
     int first_frame_ = 0;
     std::vector<SurfaceMark> marks_;
+    struct Exposed {
+        int layout;
+        std::array<double, 3> gain;
+    };
     std::vector<std::vector<LimbState>> limbs_;  // of each frame
+    std::vector<Exposed> textures_;              // of each frame, if there are textures
 };
 
 }  // namespace htvm::app

@@ -7,10 +7,12 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/image.h"
 #include "htvm/encoder.hpp"
 #include "htvm/frame.hpp"
 #include "htvm/mesh.hpp"
@@ -26,6 +28,7 @@ struct SourceFrame {
     Mesh mesh;
     std::optional<Pose> pose;  // none if there is no skeleton
     std::int64_t timestamp_us = 0;
+    std::shared_ptr<const TexturedMesh> textured;  // what the colours were made from, for pictures; null: no texture
 };
 
 // What a coder may know about the whole sequence in advance.

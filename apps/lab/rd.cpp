@@ -98,6 +98,9 @@ Result<std::string> common_key(const Options& options) {
     const auto files = find_sequence(options.capture.inputs);
     if (!files) return tl::unexpected(files.error());
     auto inputs = files->paths;
+    auto textures = TextureFiles::open(options.capture.texture, *files);
+    if (!textures) return tl::unexpected(textures.error());
+    for (const auto& image : textures->known_images()) inputs.push_back(image);
     if (!options.capture.skeleton.empty()) inputs.emplace_back(options.capture.skeleton);
     std::string metrics;
     for (const auto& metric : std::set<std::string>(options.metrics.begin(), options.metrics.end()))

@@ -118,6 +118,9 @@ Result<Laboratory> laboratory_of(const Options& options, const SourceFrames& sou
     const auto files = find_sequence(options.capture.inputs);
     if (!files) return tl::unexpected(files.error());
     auto inputs = files->paths;
+    auto textures = TextureFiles::open(options.capture.texture, *files);
+    if (!textures) return tl::unexpected(textures.error());
+    for (const auto& image : textures->known_images()) inputs.push_back(image);
     for (const auto& name : {options.capture.skeleton, true_skeleton_file(options)})
         if (!name.empty()) inputs.emplace_back(name);
     auto measured = options.capture;

@@ -14,7 +14,9 @@
 #include "command_line/terminal.h"
 #include "core/crc32.h"
 #include "core/parallel.h"
+#include "io/image_file.h"
 #include "io/mesh_file.h"
+#include "io/output_file.h"
 
 namespace htvm::lab {
 
@@ -27,7 +29,31 @@ namespace {
 
 std::size_t bytes_of(const Mesh& mesh) {
     return mesh.positions.size() * sizeof(Vector3f) + mesh.triangles.size() * sizeof(Triangle) +
-           mesh.colours.size() * sizeof(Colour);
+           mesh.colours.size() * sizeof(Colour) + mesh.texcoords.size() * sizeof(Vector2f);
+}
+
+std::size_t bytes_of(const SourceFrame& frame) {
+    const std::size_t textured =
+        frame.textured ? bytes_of(frame.textured->mesh) + frame.textured->texture->rgb.size() : 0;
+    return bytes_of(frame.mesh) + textured;
+}
+
+// The image lies beside the mesh.
+std::filesystem::path image_of(std::filesystem::path mesh) { return mesh.replace_extension(".png"); }
+
+Result<void> spill(const TexturedMesh& textured, const std::filesystem::path& file) {
+    const auto image = write_png_image(*textured.texture);
+    if (!image) return tl::unexpected(image.error());
+    if (auto written = write_file(image_of(file), *image); !written) return written;
+    return write_mesh(file, textured.mesh);
+}
+
+Result<std::shared_ptr<const TexturedMesh>> read_spilled(const std::filesystem::path& file) {
+    auto mesh = read_mesh(file);
+    if (!mesh) return tl::unexpected(mesh.error());
+    auto image = read_image_file(image_of(file));
+    if (!image) return tl::unexpected(image.error());
+    return std::make_shared<const TexturedMesh>(std::move(*mesh), std::make_shared<const Image>(std::move(*image)));
 }
 
 }  // namespace
@@ -37,16 +63,22 @@ Result<void> SourceFrames::keep(SourceFrame frame, const SourceOptions& options)
     extend(facts_.box, box);
     const Point3 side = box.high - box.low;
     facts_.frame_side += std::max({side[0], side[1], side[2]});
-    std::filesystem::path file;
-    const std::size_t bytes = bytes_of(frame.mesh);
+    std::filesystem::path file, textured;
+    const std::size_t bytes = bytes_of(frame);
     if (bytes_ + bytes > options.memory_bytes) {
         file = options.spill_folder / fmt::format("source_{:05}.ply", frame.index);
         if (auto written = write_mesh(file, frame.mesh); !written) return written;
+        if (frame.textured) {
+            textured = options.spill_folder / fmt::format("textured_{:05}.ply", frame.index);
+            if (auto written = spill(*frame.textured, textured); !written) return written;
+        }
         frame.mesh = {};
+        frame.textured.reset();
     } else {
         bytes_ += bytes;
     }
     files_.push_back(std::move(file));
+    textured_.push_back(std::move(textured));
     frames_.push_back(std::make_shared<const SourceFrame>(std::move(frame)));
     return {};
 }
@@ -63,7 +95,10 @@ Result<SourceFrames> SourceFrames::load(Capture& capture, const SourceOptions& o
         frame.mesh = std::move(**mesh);
         frame.mesh.normals.clear();
         frame.mesh.texcoords.clear();
-        if (options.geometry_only) frame.mesh.colours.clear();
+        if (options.geometry_only)
+            frame.mesh.colours.clear();
+        else
+            frame.textured = capture.textured();
         if (capture.pose()) frame.pose = *capture.pose();
         frame.timestamp_us = capture.timestamp_us();
         if (auto kept = out.keep(std::move(frame), options); !kept) return tl::unexpected(kept.error());
@@ -83,6 +118,11 @@ Result<std::shared_ptr<const SourceFrame>> SourceFrames::frame(std::size_t index
     if (!mesh) return tl::unexpected(mesh.error());
     auto whole = std::make_shared<SourceFrame>(*frames_[index]);
     whole->mesh = std::move(*mesh);
+    if (!textured_[index].empty()) {
+        auto textured = read_spilled(textured_[index]);
+        if (!textured) return tl::unexpected(textured.error());
+        whole->textured = std::move(*textured);
+    }
     return std::shared_ptr<const SourceFrame>(std::move(whole));
 }
 
@@ -168,7 +208,9 @@ Result<RdFrame> run_frame(const SweepJob& job, const FrameCoder& coder, const So
     out.encode_ms = coded->encode_ms;
     out.decode_ms = coded->decode_ms;
     if (source.index % options.measure_every == 0) {
-        const auto compared = compare_frame(source.mesh, coded->decoded, options.compare);
+        const auto original =
+            source.textured ? ComparedMesh(source.mesh, *source.textured) : ComparedMesh(source.mesh);
+        const auto compared = compare_frame(original, coded->decoded, options.compare);
         if (!compared) return tl::unexpected(compared.error());
         if (options.compare.points) out.m1_mm = m1_geometry(compared->points);
         if (options.compare.surface) out.m2_mm = m2(compared->surface);

@@ -46,7 +46,8 @@ struct SourceOptions {
 
 class SourceFrames {
 public:
-    // Reads the whole capture, in mm, without normals and texture coordinates, which no metric uses.
+    // Reads the whole capture, in mm, without normals and texture coordinates, which no coder is measured by; textures
+    // are kept for pictures.
     static Result<SourceFrames> load(app::Capture& capture, const SourceOptions& options);
     std::size_t size() const { return frames_.size(); }
     const SequenceFacts& facts() const { return facts_; }
@@ -59,6 +60,7 @@ private:
     std::size_t bytes_ = 0;
     std::vector<std::shared_ptr<const SourceFrame>> frames_;  // without its mesh if that is in a file
     std::vector<std::filesystem::path> files_;                // empty if the mesh is in memory
+    std::vector<std::filesystem::path> textured_;             // likewise; empty too if there is no texture
 };
 
 // ---- Results stored between runs ------------------------------------------------------------------------------------

@@ -6,8 +6,9 @@
 //
 // Read: every mesh that the file's scene shows, joined to one, with the transforms of the nodes applied. POSITION,
 // NORMAL, COLOR_0 (times the material's base colour) and TEXCOORD_0, of floats or integers; triangles, strips, fans and
-// points, with indices or without. Lines, materials otherwise, textures, cameras, lights and animations are passed
-// over, and so are nodes that are scaled to nothing, which glTF uses to hide. A vertex that lacks what others have is
+// points, with indices or without. Of materials the base colour and its texture's image, with the coordinates that it
+// uses (KHR_texture_transform applied; the base colour does not multiply the image). Lines, materials otherwise,
+// cameras, lights and animations are passed over, and so are nodes that are scaled to nothing, which glTF uses to hide. A vertex that lacks what others have is
 // white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh that share their vertices go on sharing
 // them.
 //
@@ -27,6 +28,7 @@
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "io/mesh_check.h"
+#include "io/texture_reference.h"
 
 namespace htvm {
 
@@ -34,7 +36,7 @@ namespace htvm {
 // those in it, not through links that lead out of it, and nothing is fetched; with an empty folder, they are errors.
 // Errors: bad_input, unsupported, limit.
 Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesystem::path& folder,
-                       const MeshLimits& limits = {});
+                       const MeshLimits& limits = {}, TextureReference* texture = nullptr);
 
 // A .glb file. Positions, normals, colours and triangles are read back exactly, texture coordinates to within 1e-7 if
 // they are 0..1. Coloured meshes are unlit (KHR_materials_unlit): captured colours contain the light. Fails (bad_input)

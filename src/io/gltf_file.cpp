@@ -148,15 +148,18 @@ Result<fs::path> file_in(const fs::path& folder, const std::string& uri) {
     return path;
 }
 
+// What a data: URI holds.
+Result<std::vector<std::uint8_t>> content_of(const std::string& uri, const char* what) {
+    const auto comma = uri.find(";base64,");
+    auto content = comma == uri.npos ? std::nullopt : decoded_base64(std::string_view(uri).substr(comma + 8));
+    if (!content) return not_readable(std::string(what) + " inside of it is not Base64");
+    return std::move(*content);
+}
+
 Result<std::vector<std::uint8_t>> read_buffer(const GltfFile& file, const std::string& uri) {
     std::uint64_t taken = 0;
     for (const auto& [name, content] : file.buffers) taken += content.size();
-    if (uri.starts_with("data:")) {
-        const auto comma = uri.find(";base64,");
-        auto content = comma == uri.npos ? std::nullopt : decoded_base64(std::string_view(uri).substr(comma + 8));
-        if (!content) return not_readable("a buffer inside of it is not Base64");
-        return std::move(*content);
-    }
+    if (uri.starts_with("data:")) return content_of(uri, "a buffer");
     const auto path = file_in(file.folder, uri);
     if (!path) return tl::unexpected(path.error());
     return read_file(*path, most_buffer_bytes - std::min(taken, most_buffer_bytes));
@@ -224,6 +227,28 @@ T loaded(const std::uint8_t* at) {
     return out;
 }
 
+struct View {
+    std::span<const std::uint8_t> bytes;
+    std::uint64_t stride = 0;  // 0: not given
+};
+
+// Of numbers, or of an image; nothing if it goes beyond its buffer.
+Result<std::optional<View>> open_view(GltfFile& file, std::uint64_t index) {
+    const auto view = gltf_item(file, "bufferViews", index);
+    if (!view) return tl::unexpected(view.error());
+    const auto buffer_index = gltf_number(**view, "buffer", 0);
+    const auto offset = gltf_number(**view, "byteOffset", 0);
+    const auto length = gltf_number(**view, "byteLength", 0);
+    const auto stride = gltf_number(**view, "byteStride", 0);
+    for (const auto* number : {&buffer_index, &offset, &length, &stride})
+        if (!*number) return tl::unexpected(number->error());
+    const auto buffer = open_buffer(file, *buffer_index);
+    if (!buffer) return tl::unexpected(buffer.error());
+    if (*offset > buffer->size() || *length > buffer->size() - *offset) return std::optional<View>();
+    return std::optional(
+        View{buffer->subspan(static_cast<std::size_t>(*offset), static_cast<std::size_t>(*length)), *stride});
+}
+
 }  // namespace
 
 Result<GltfFile> open_gltf(std::span<const std::uint8_t> bytes, const fs::path& folder) {
@@ -281,6 +306,8 @@ Result<std::array<double, N>> gltf_numbers(const json& object, const char* name,
         return not_readable(std::string("a \"") + name + "\" is not a list of " + std::to_string(N) + " numbers");
     return out;
 }
+template Result<std::array<double, 1>> gltf_numbers(const json&, const char*, const std::array<double, 1>&);
+template Result<std::array<double, 2>> gltf_numbers(const json&, const char*, const std::array<double, 2>&);
 template Result<std::array<double, 3>> gltf_numbers(const json&, const char*, const std::array<double, 3>&);
 template Result<std::array<double, 4>> gltf_numbers(const json&, const char*, const std::array<double, 4>&);
 template Result<std::array<double, 16>> gltf_numbers(const json&, const char*, const std::array<double, 16>&);
@@ -311,6 +338,36 @@ std::uint32_t GltfAccessor::whole(std::uint64_t row) const {
     return component == GltfComponent::u16 ? loaded<std::uint16_t>(at) : loaded<std::uint32_t>(at);
 }
 
+Result<TextureReference::Image> gltf_image_at(GltfFile& file, std::uint64_t index) {
+    const auto image = gltf_item(file, "images", index);
+    if (!image) return tl::unexpected(image.error());
+    TextureReference::Image out;
+    out.name = "image " + std::to_string(index) + " of the glTF";
+    if (const auto* uri = find_member(**image, "uri")) {
+        if (!uri->is_string()) return not_readable("the URI of an image is no text");
+        const auto& text = uri->get_ref<const std::string&>();
+        if (text.starts_with("data:")) {
+            auto content = content_of(text, "an image");
+            if (!content) return tl::unexpected(content.error());
+            out.bytes = std::move(*content);
+            return out;
+        }
+        const auto name = decoded_percents(text);
+        if (!name || name->empty() || name->find('\0') != name->npos)
+            return not_readable("its image \"" + text.substr(0, 100) + "\" has no name that can be read");
+        out.name = *name;
+        return out;
+    }
+    const auto view_index = gltf_index(**image, "bufferView");
+    if (!view_index) return tl::unexpected(view_index.error());
+    if (!*view_index) return not_readable(out.name + " has neither a URI nor a place in a buffer");
+    const auto view = open_view(file, **view_index);
+    if (!view) return tl::unexpected(view.error());
+    if (!*view || (*view)->bytes.empty()) return not_readable(out.name + " is empty or goes beyond its buffer");
+    out.bytes.assign((*view)->bytes.begin(), (*view)->bytes.end());
+    return out;
+}
+
 Result<GltfAccessor> open_accessor(GltfFile& file, std::uint64_t index) {
     const auto item = gltf_item(file, "accessors", index);
     if (!item) return tl::unexpected(item.error());
@@ -338,23 +395,16 @@ Result<GltfAccessor> open_accessor(GltfFile& file, std::uint64_t index) {
     const auto* normalised = find_member(json_of, "normalized");
     out.normalised = normalised && normalised->is_boolean() && normalised->get<bool>();
 
-    const auto view = gltf_item(file, "bufferViews", **view_index);
+    const auto view = open_view(file, **view_index);
     if (!view) return tl::unexpected(view.error());
-    const auto buffer_index = gltf_number(**view, "buffer", 0);
-    const auto view_offset = gltf_number(**view, "byteOffset", 0);
-    const auto view_length = gltf_number(**view, "byteLength", 0);
-    const auto stride = gltf_number(**view, "byteStride", row);
-    for (const auto* number : {&buffer_index, &view_offset, &view_length, &stride})
-        if (!*number) return tl::unexpected(number->error());
-    const auto buffer = open_buffer(file, *buffer_index);
-    if (!buffer) return tl::unexpected(buffer.error());
-    if (*view_offset > buffer->size() || *view_length > buffer->size() - *view_offset)
-        return wrong("lies in a view that goes beyond its buffer");
-    if (*stride < row || *stride > 252) return wrong("has rows that overlap or lie too far apart");
-    out.stride = static_cast<std::size_t>(*stride);
-    const auto room = *offset > *view_length ? 0 : *view_length - *offset;
-    if (out.count > 0 && (room < row || (out.count - 1) > (room - row) / *stride)) return wrong("goes beyond its view");
-    out.bytes = buffer->subspan(static_cast<std::size_t>(*view_offset + (room > 0 ? *offset : 0)));
+    if (!*view) return wrong("lies in a view that goes beyond its buffer");
+    const auto& [bytes, given_stride] = **view;
+    const std::uint64_t stride = given_stride > 0 ? given_stride : row;
+    if (stride < row || stride > 252) return wrong("has rows that overlap or lie too far apart");
+    out.stride = static_cast<std::size_t>(stride);
+    const auto room = *offset > bytes.size() ? 0 : bytes.size() - *offset;
+    if (out.count > 0 && (room < row || (out.count - 1) > (room - row) / stride)) return wrong("goes beyond its view");
+    out.bytes = bytes.subspan(static_cast<std::size_t>(room > 0 ? *offset : 0));
     return out;
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "htvm/result.hpp"
+#include "io/texture_reference.h"
 
 namespace htvm::internal {
 
@@ -63,6 +64,10 @@ struct GltfAccessor {
     double number(std::uint64_t row, std::size_t column) const;
     std::uint32_t whole(std::uint64_t row) const;  // the first number of an unsigned accessor, as it is
 };
+
+// The image of that number: inside of the file, or its name from the folder, which is not looked for here. Errors:
+// bad_input, limit.
+Result<TextureReference::Image> gltf_image_at(GltfFile& file, std::uint64_t index);
 
 // Opens an accessor, and reads the buffer that it needs. Errors: bad_input, unsupported (sparse, matrices), limit.
 Result<GltfAccessor> open_accessor(GltfFile& file, std::uint64_t index);

@@ -76,6 +76,7 @@ Result<Transform> transform_of(const json& node) {
 struct VertexSource {
     std::optional<std::uint64_t> positions, normals, colours, texcoords;
     std::array<double, 4> factor{1, 1, 1, 1};
+    std::array<double, 6> placed{1, 0, 0, 0, 1, 0};  // texture coordinates: two rows of x, y and 1
     auto operator<=>(const VertexSource&) const = default;
 };
 
@@ -88,6 +89,8 @@ struct Reading {
     const MeshLimits& limits;
     Mesh mesh = {};  // every attribute as long as the positions until the end
     bool any_colours = false, any_normals = false, any_texcoords = false;
+    bool any_without_image = false;
+    TextureReference texture = {};
     std::map<VertexSource, Vertices> of_node = {};  // vertices of the node at work that primitives may share
 };
 
@@ -142,10 +145,12 @@ void add_colours(Reading& reading, const GltfAccessor* accessor, std::uint64_t c
 }
 
 // glTF's v runs downwards.
-void add_texcoords(Reading& reading, const GltfAccessor& accessor) {
-    for (std::uint64_t row = 0; row < accessor.count; ++row)
-        reading.mesh.texcoords.push_back(
-            {finite_or_zero(accessor.number(row, 0)), finite_or_zero(1 - accessor.number(row, 1))});
+void add_texcoords(Reading& reading, const GltfAccessor& accessor, const std::array<double, 6>& placed) {
+    for (std::uint64_t row = 0; row < accessor.count; ++row) {
+        const double u = accessor.number(row, 0), v = accessor.number(row, 1);
+        reading.mesh.texcoords.push_back({finite_or_zero(placed[0] * u + placed[1] * v + placed[2]),
+                                          finite_or_zero(1 - (placed[3] * u + placed[4] * v + placed[5]))});
+    }
     reading.any_texcoords = true;
 }
 
@@ -175,7 +180,7 @@ Result<Vertices> add_vertices(Reading& reading, const VertexSource& source, cons
     if (source.texcoords) {
         const auto texcoords = open_attribute(reading, *source.texcoords, "TEXCOORD_0", 2, 2, count);
         if (!texcoords) return tl::unexpected(texcoords.error());
-        add_texcoords(reading, *texcoords);
+        add_texcoords(reading, *texcoords, source.placed);
     }
     mesh.normals.resize(mesh.positions.size());
     mesh.texcoords.resize(mesh.positions.size());
@@ -228,15 +233,80 @@ Result<void> add_triangles(Reading& reading, Mode mode, const Vertices& vertices
     return {};
 }
 
-Result<std::array<double, 4>> factor_of(const GltfFile& file, const json& primitive) {
-    constexpr std::array<double, 4> white{1, 1, 1, 1};
+// Which image a texture shows; nothing if it names none that is read here.
+Result<std::optional<std::uint64_t>> image_of_texture(const GltfFile& file, std::uint64_t index) {
+    const auto texture = gltf_item(file, "textures", index);
+    if (!texture) return tl::unexpected(texture.error());
+    if (const auto* extensions = find_member(**texture, "extensions"))
+        if (const auto* webp = find_member(*extensions, "EXT_texture_webp")) return gltf_index(*webp, "source");
+    return gltf_index(**texture, "source");
+}
+
+// KHR_texture_transform: scaled, turned, moved.
+Result<std::array<double, 6>> placed_by(const json& transform) {
+    const auto offset = gltf_numbers<2>(transform, "offset", {0, 0});
+    const auto scale = gltf_numbers<2>(transform, "scale", {1, 1});
+    const auto* turn = find_member(transform, "rotation");
+    const auto angle = turn ? finite_number(*turn) : Result<double>(0);
+    if (!offset) return tl::unexpected(offset.error());
+    if (!scale) return tl::unexpected(scale.error());
+    if (!angle) return not_readable("a \"rotation\" is no number");
+    const double c = std::cos(*angle), s = std::sin(*angle);
+    return std::array<double, 6>{c * (*scale)[0],  s * (*scale)[1], (*offset)[0],
+                                 -s * (*scale)[0], c * (*scale)[1], (*offset)[1]};
+}
+
+// The base colour's image, and which texture coordinates it takes.
+Result<void> add_texture(Reading& reading, const json& texture, const json& attributes, VertexSource& source) {
+    const auto index = gltf_index(texture, "index");
+    const auto set = gltf_number(texture, "texCoord", 0);
+    if (!index) return tl::unexpected(index.error());
+    if (!set) return tl::unexpected(set.error());
+    if (!*index) return {};
+    const auto image = image_of_texture(reading.file, **index);
+    if (!image) return tl::unexpected(image.error());
+    std::uint64_t of_set = *set;
+    if (const auto* extensions = find_member(texture, "extensions"))
+        if (const auto* transform = find_member(*extensions, "KHR_texture_transform")) {
+            const auto placed = placed_by(*transform);
+            if (!placed) return tl::unexpected(placed.error());
+            source.placed = *placed;
+            const auto other = gltf_number(*transform, "texCoord", of_set);
+            if (!other) return tl::unexpected(other.error());
+            of_set = *other;
+        }
+    if (of_set > 0) {
+        const auto name = "TEXCOORD_" + std::to_string(of_set);
+        const auto accessor = gltf_index(attributes, name.c_str());
+        if (!accessor) return tl::unexpected(accessor.error());
+        source.texcoords = *accessor;
+    }
+    if (!*image) return {};
+    auto found = gltf_image_at(reading.file, **image);
+    if (!found) return tl::unexpected(found.error());
+    auto& images = reading.texture.images;
+    const bool is_known = std::any_of(images.begin(), images.end(),
+                                      [&](const auto& other) { return other.name == found->name; });
+    if (!is_known) images.push_back(std::move(*found));
+    return {};
+}
+
+Result<void> add_material(Reading& reading, const json& primitive, const json& attributes, VertexSource& source) {
     const auto index = gltf_index(primitive, "material");
     if (!index) return tl::unexpected(index.error());
-    if (!*index) return white;
-    const auto material = gltf_item(file, "materials", **index);
-    if (!material) return tl::unexpected(material.error());
-    const auto* surface = find_member(**material, "pbrMetallicRoughness");
-    return surface ? gltf_numbers<4>(*surface, "baseColorFactor", white) : white;
+    const json* surface = nullptr;
+    if (*index) {
+        const auto material = gltf_item(reading.file, "materials", **index);
+        if (!material) return tl::unexpected(material.error());
+        surface = find_member(**material, "pbrMetallicRoughness");
+    }
+    const auto* texture = surface ? find_member(*surface, "baseColorTexture") : nullptr;
+    if (!texture) reading.any_without_image = true;
+    if (!surface) return {};
+    const auto factor = gltf_numbers<4>(*surface, "baseColorFactor", source.factor);
+    if (!factor) return tl::unexpected(factor.error());
+    source.factor = *factor;
+    return texture ? add_texture(reading, *texture, attributes, source) : Result<void>();
 }
 
 Result<void> add_primitive(Reading& reading, const json& primitive, const Transform& transform) {
@@ -258,9 +328,7 @@ Result<void> add_primitive(Reading& reading, const json& primitive, const Transf
     }
     const auto indices = gltf_index(primitive, "indices");
     if (!indices) return tl::unexpected(indices.error());
-    const auto factor = factor_of(reading.file, primitive);
-    if (!factor) return tl::unexpected(factor.error());
-    source.factor = *factor;
+    if (auto ok = add_material(reading, primitive, *attributes, source); !ok) return ok;
     const auto vertices = add_vertices(reading, source, transform);
     if (!vertices) return tl::unexpected(vertices.error());
     if (*mode == static_cast<std::uint64_t>(Mode::points)) return {};
@@ -380,7 +448,7 @@ Result<void> add_scene(Reading& reading) {
 }  // namespace
 
 Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesystem::path& folder,
-                       const MeshLimits& limits) {
+                       const MeshLimits& limits, TextureReference* texture) {
     auto file = open_gltf(bytes, folder);
     if (!file) return tl::unexpected(file.error());
     Reading reading{std::move(*file), limits};
@@ -389,6 +457,8 @@ Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesyste
     if (!reading.any_colours) mesh.colours.clear();
     if (!reading.any_normals) mesh.normals.clear();
     if (!reading.any_texcoords) mesh.texcoords.clear();
+    reading.texture.is_partial = reading.any_without_image && !reading.texture.images.empty();
+    if (texture) *texture = std::move(reading.texture);
     return std::move(mesh);
 }
 

@@ -42,15 +42,16 @@ tl::unexpected<Error> fail_at(const std::filesystem::path& path, const Error& er
 }
 
 Result<Mesh> parse(MeshFormat format, const std::vector<std::uint8_t>& bytes, const std::filesystem::path& path,
-                   const MeshLimits& limits) {
+                   const MeshLimits& limits, TextureReference* texture) {
     switch (format) {
         case MeshFormat::ply:
-            return read_ply(bytes, limits);
+            return read_ply(bytes, limits, texture);
         case MeshFormat::obj:
-            return read_obj(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), limits);
+            return read_obj(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), limits,
+                            texture);
         case MeshFormat::glb:
         case MeshFormat::gltf:
-            return read_gltf(bytes, path.has_parent_path() ? path.parent_path() : ".", limits);
+            return read_gltf(bytes, path.has_parent_path() ? path.parent_path() : ".", limits, texture);
         case MeshFormat::drc:
             break;
     }
@@ -113,7 +114,7 @@ std::string timestamp_in_file(const std::filesystem::path& path) {
     return read_ply_timestamp(file).value_or(std::string());
 }
 
-Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options) {
+Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options, TextureReference* texture) {
     const auto format = format_of(path);
     if (!format) {
         return fail_at(path, ErrorKind::unsupported,
@@ -121,7 +122,7 @@ Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions&
     }
     const auto bytes = read_file(path);
     if (!bytes) return tl::unexpected(bytes.error());
-    auto mesh = parse(*format, *bytes, path, options.limits);
+    auto mesh = parse(*format, *bytes, path, options.limits, texture);
     if (!mesh) return fail_at(path, mesh.error());
     if (auto ok = scale_positions(*mesh, options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
     return mesh;
@@ -144,7 +145,7 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         written = &scaled;
     }
     if (*format != MeshFormat::obj) {
-        const auto bytes = *format == MeshFormat::ply ? write_ply(*written, options.timestamp) : write_gltf(*written);
+        const auto bytes = *format == MeshFormat::ply ? write_ply(*written, options.timestamp, options.texture) : write_gltf(*written);
         if (!bytes) return fail_at(path, bytes.error());
         return write_file(path, *bytes);
     }
@@ -179,6 +180,11 @@ std::optional<LengthUnit> unit_of_format(const std::filesystem::path& path) {
     const auto format = format_of(path);
     if (format == MeshFormat::glb || format == MeshFormat::gltf) return LengthUnit::metre;
     return std::nullopt;
+}
+
+bool counts_texture_from_top(const std::filesystem::path& path) {
+    const auto format = format_of(path);
+    return format == MeshFormat::glb || format == MeshFormat::gltf;
 }
 
 LengthUnit likely_unit(const std::filesystem::path& path, const Mesh& mesh) {

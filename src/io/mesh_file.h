@@ -13,6 +13,7 @@
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "io/mesh_check.h"
+#include "io/texture_reference.h"
 
 namespace htvm {
 
@@ -20,13 +21,16 @@ struct MeshFileOptions {
     double millimetres_per_unit = 1;  // for the file's coordinates: 1000 for a file in metres; finite, above 0
     MeshLimits limits;                // the largest mesh to accept
     std::string timestamp;            // for the comment of a PLY file that is written (ply.h); empty: none
+    std::string texture;              // likewise, the name of its image
 };
 
 // When a PLY file says that its frame was captured (ply.h); empty if it does not say, is no PLY or cannot be read.
 std::string timestamp_in_file(const std::filesystem::path& path);
 
-// Reads a mesh and scales its positions to millimetres. Every error message begins with the file's name.
-Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options = {});
+// Reads a mesh and scales its positions to millimetres. Every error message begins with the file's name. texture: takes
+// what the file says of its texture; the image is read by texture_file.h.
+Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options = {},
+                       TextureReference* texture = nullptr);
 
 // Writes a mesh, with positions scaled from millimetres to the file's unit, replacing any file of that name. The folder
 // must exist. Writing .drc and .gltf is unsupported. Every error message begins with the file's name.
@@ -78,5 +82,9 @@ LengthUnit guess_unit(const Mesh& mesh);
 std::optional<LengthUnit> unit_of_format(const std::filesystem::path& path);
 // That unit, or else the one that the file's mesh looks as if it were in.
 LengthUnit likely_unit(const std::filesystem::path& path, const Mesh& mesh);
+
+// Whether the format counts texture coordinates from the top of the image, as glTF does; what is read from all formats
+// is counted from the bottom.
+bool counts_texture_from_top(const std::filesystem::path& path);
 
 }  // namespace htvm

@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "io/number_text.h"
@@ -40,14 +41,16 @@ struct ObjText {
     std::vector<Corner> corners;
     std::vector<Polygon> polygons;
     std::size_t foreign_line = 0;  // the first line that is not an OBJ statement; 0: none
+    TextureReference texture;
+    std::string material_name;      // of the faces that follow
+    bool is_material_used = false;  // by a face so far
 };
 
 // Statements that do not describe a mesh and are skipped.
 bool is_other_statement(std::string_view keyword) {
-    constexpr std::array<std::string_view, 28> others = {
-        "",       "g",      "o",      "s",   "mg",   "l",    "p",     "vp",      "usemtl", "mtllib",
-        "usemap", "maplib", "cstype", "deg", "step", "curv", "curv2", "surf",    "parm",   "trim",
-        "hole",   "scrv",   "sp",     "end", "con",  "lod",  "bevel", "c_interp"};
+    constexpr std::array<std::string_view, 26> others = {
+        "",       "g",   "o",    "s",    "mg",    "l",    "p",    "vp",   "usemap", "maplib", "cstype", "deg",   "step",
+        "curv",   "curv2", "surf", "parm", "trim", "hole", "scrv", "sp",   "end",    "con",    "lod",    "bevel", "c_interp"};
     return std::find(others.begin(), others.end(), keyword) != others.end();
 }
 
@@ -148,7 +151,19 @@ Result<void> read_face(ObjText& obj, std::string_view line, std::size_t line_num
     }
     if (auto ok = check_count(obj.corners.size(), 3 * limits.most_triangles, "corners or more"); !ok) return ok;
     obj.polygons.push_back(polygon);
+    if (!std::exchange(obj.is_material_used, true)) {
+        auto& used = obj.texture.materials;
+        if (std::find(used.begin(), used.end(), obj.material_name) == used.end()) used.push_back(obj.material_name);
+    }
     return {};
+}
+
+// What is left of the line: a name that may hold spaces.
+std::string_view trimmed(std::string_view line) {
+    constexpr const char* blanks = " \t\r\v\f";
+    const std::size_t begin = line.find_first_not_of(blanks);
+    if (begin == line.npos) return {};
+    return line.substr(begin, line.find_last_not_of(blanks) + 1 - begin);
 }
 
 Result<void> read_statement(ObjText& obj, std::string_view line, std::size_t line_number, const MeshLimits& limits) {
@@ -156,6 +171,15 @@ Result<void> read_statement(ObjText& obj, std::string_view line, std::size_t lin
     const std::string_view keyword = take_word(line);
     if (keyword == "v") return read_position(obj, line, line_number, limits);
     if (keyword == "f") return read_face(obj, line, line_number, limits);
+    if (keyword == "mtllib") {
+        obj.texture.material_files.emplace_back(trimmed(line));
+        return {};
+    }
+    if (keyword == "usemtl") {
+        obj.material_name = trimmed(line);
+        obj.is_material_used = false;
+        return {};
+    }
     if (keyword != "vt" && keyword != "vn") {
         if (obj.foreign_line == 0 && !is_other_statement(keyword)) obj.foreign_line = line_number;
         return {};
@@ -331,7 +355,7 @@ void append_statement(std::string& text, const char* keyword, const std::array<f
 
 }  // namespace
 
-Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits) {
+Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits, TextureReference* texture) {
     ObjText obj;
     std::string joined;
     std::size_t line_number = 0;
@@ -344,7 +368,43 @@ Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits) {
         return bad_line(obj.foreign_line,
                         "it is not an OBJ statement, and there is no vertex: this is another kind of file");
     if (auto ok = check_corners(obj); !ok) return tl::unexpected(ok.error());
+    if (texture) *texture = std::move(obj.texture);
     return mesh_of(obj);
+}
+
+std::vector<ObjMaterial> read_obj_materials(std::string_view text) {
+    // How many words follow an option of a map, of which numbers may be left out.
+    const auto words_of_option = [](std::string_view option) {
+        if (option == "-s" || option == "-o" || option == "-t") return 3;
+        return option == "-mm" ? 2 : 1;
+    };
+    std::vector<ObjMaterial> out;
+    std::string joined;
+    std::size_t line_number = 0;
+    while (!text.empty()) {
+        std::string_view line = take_line(text, line_number, joined);
+        const std::string_view keyword = take_word(line);
+        if (keyword == "newmtl") out.push_back({std::string(trimmed(line)), {}});
+        if (keyword != "map_Kd" || out.empty()) continue;
+        for (;;) {
+            std::string_view rest = line;
+            const std::string_view option = take_word(rest);
+            if (!option.starts_with('-')) break;
+            for (int left = words_of_option(option); left > 0; --left) {
+                std::string_view behind = rest;
+                const std::string_view word = take_word(behind);
+                const bool is_text = option.starts_with("-blend") || option == "-clamp" || option == "-cc" ||
+                                     option == "-imfchan" || option == "-type";
+                if (!is_text && !parse_number(word)) break;
+                rest = behind;
+            }
+            line = rest;
+        }
+        auto& image = out.back().image;
+        image = trimmed(line);
+        std::replace(image.begin(), image.end(), '\\', '/');
+    }
+    return out;
 }
 
 Result<std::string> write_obj(const Mesh& mesh) {

@@ -3,8 +3,8 @@
 // ones.
 //
 // Read: v x y z, v x y z r g b (0..1, or 0..255 if any component in the file is above 1), vn, vt, f with v, v/vt, v//vn
-// and v/vt/vn, negative (relative) indices, comments, lines continued with a backslash. Every other statement (groups,
-// objects, materials, lines, points) is skipped. Polygons are cut into fans around their first corner, keeping their
+// and v/vt/vn, negative (relative) indices, comments, lines continued with a backslash; mtllib and usemtl, which say
+// where the texture is. Every other statement (groups, objects, lines, points) is skipped. Polygons are cut into fans around their first corner, keeping their
 // orientation; faces with fewer than three corners are left out; isolated vertices and degenerate triangles are kept.
 //
 // Vertices keep their number and order. A position whose corners have several values of vt or vn becomes several
@@ -20,16 +20,26 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "io/mesh_check.h"
+#include "io/texture_reference.h"
 
 namespace htvm {
 
 // Errors: bad_input, naming the line, if a number cannot be read, a position is not finite or an index refers to
 // nothing; limit.
-Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits = {});
+Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits = {}, TextureReference* texture = nullptr);
+
+// The image of a material in a file that mtllib names: what map_Kd says, without its options. Names are as in the file
+// but for backslashes, which become slashes. Nothing is an error: what is not understood is passed over.
+struct ObjMaterial {
+    std::string name;
+    std::string image;  // empty: it has none
+};
+std::vector<ObjMaterial> read_obj_materials(std::string_view text);
 
 // Writes lines v x y z or v x y z r g b, vt, vn, f. Positions, normals and texture coordinates are read back exactly,
 // colours to the same 8 bits. Fails (bad_input) if check_mesh does.

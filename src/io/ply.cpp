@@ -375,10 +375,9 @@ Result<PlyHeader> read_header(PlySource& source) {
     return header;
 }
 
-Result<Mesh> read_one(PlySource& source, const MeshLimits& limits, std::string* timestamp = nullptr) {
+Result<PlyAtStart> read_one(PlySource& source, const MeshLimits& limits) {
     const auto header = read_header(source);
     if (!header) return tl::unexpected(header.error());
-    if (timestamp) *timestamp = header->timestamp;
     Body body{source, header->format, limits};
     bool has_vertices = false;
     for (const PlyElement& element : header->elements) {
@@ -414,7 +413,7 @@ Result<Mesh> read_one(PlySource& source, const MeshLimits& limits, std::string* 
             if (c == '\n') break;
         }
     }
-    return mesh;
+    return PlyAtStart{std::move(mesh), header->timestamp, header->texture, static_cast<std::size_t>(source.consumed())};
 }
 
 }  // namespace
@@ -422,12 +421,10 @@ Result<Mesh> read_one(PlySource& source, const MeshLimits& limits, std::string* 
 Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
     PlySource source(bytes);
     take_white_space(source);
-    auto mesh = read_one(source, limits);
-    if (!mesh) return tl::unexpected(mesh.error());
-    return PlyAtStart{std::move(*mesh), static_cast<std::size_t>(source.consumed())};
+    return read_one(source, limits);
 }
 
-Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
+Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits, TextureReference* texture) {
     auto read = read_ply_at_start(bytes, limits);
     if (!read) return tl::unexpected(read.error());
     PlySource rest(bytes.subspan(read->bytes_consumed));
@@ -436,6 +433,7 @@ Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& lim
     if (const auto next = take_line(rest, line, 16); next && *next == "ply") {
         return fail(ErrorKind::bad_input, "the file holds more than one PLY; give such a file on standard input");
     }
+    if (texture && !read->texture.empty()) add_image(*texture, read->texture);
     return std::move(read->mesh);
 }
 
@@ -452,14 +450,15 @@ Result<std::optional<Mesh>> PlyStreamReader::next() {
     if (error_) return tl::unexpected(*error_);
     PlySource source(*stream_.rdbuf());
     if (!take_white_space(source)) return std::optional<Mesh>();
-    auto mesh = read_one(source, limits_, &timestamp_);
-    if (!mesh) {
-        error_ = Error{mesh.error().kind,
-                       "mesh " + std::to_string(meshes_read_) + " of the stream: " + mesh.error().message};
+    auto read = read_one(source, limits_);
+    if (!read) {
+        error_ = Error{read.error().kind,
+                       "mesh " + std::to_string(meshes_read_) + " of the stream: " + read.error().message};
         return tl::unexpected(*error_);
     }
     ++meshes_read_;
-    return std::optional<Mesh>(std::move(*mesh));
+    header_ = {std::move(read->timestamp), std::move(read->texture)};
+    return std::optional<Mesh>(std::move(read->mesh));
 }
 
 }  // namespace htvm

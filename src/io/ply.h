@@ -7,7 +7,7 @@
 // are not finite become 0; normals are not normalised. Triangle strips are refused (unsupported).
 //
 // A comment in the header may say when the frame was captured: "comment timestamp 1.25", in any form that parse_time()
-// reads (timestamps.h).
+// reads (timestamps.h), and which image is the texture: "comment TextureFile NAME".
 //
 // Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
 //
@@ -27,11 +27,13 @@
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "io/mesh_check.h"
+#include "io/texture_reference.h"
 
 namespace htvm {
 
 struct PlyAtStart {
     Mesh mesh;
+    std::string timestamp, texture;  // what the header's comments say; empty: nothing
     std::size_t bytes_consumed = 0;  // the position at which the next PLY may begin
 };
 
@@ -40,14 +42,17 @@ Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const 
 
 // Reads the bytes of a file. Trailing bytes are ignored, but a second PLY is an error, so that no mesh is dropped
 // silently.
-Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
+Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {},
+                      TextureReference* texture = nullptr);
 
 // The text after "comment timestamp" in the header of the PLY at the start of the stream; empty if there is none.
 Result<std::string> read_ply_timestamp(std::istream& stream);
 
 // Binary little-endian: float x y z, then, if the mesh has them, float nx ny nz, float s t, uchar red green blue; faces
-// as uchar, uint vertex_indices. timestamp: for the comment; empty: none. Fails (bad_input) if check_mesh does.
-Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view timestamp = {});
+// as uchar, uint vertex_indices. timestamp and texture: for the comments; empty: none. Fails (bad_input) if check_mesh
+// does.
+Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view timestamp = {},
+                                            std::string_view texture = {});
 
 // Reads PLYs that follow one another in a stream. One mesh is held at a time, and the stream is not read past the end
 // of the mesh returned, so the meshes of a live stream are available as soon as they are complete.
@@ -59,12 +64,16 @@ public:
     // same error (which names the mesh, counted from 0) is returned again.
     Result<std::optional<Mesh>> next();
     // For the mesh that next() returned, as from read_ply_timestamp().
-    const std::string& timestamp() const { return timestamp_; }
+    const std::string& timestamp() const { return header_.timestamp; }
+    // Likewise, what its header says of the texture; empty: nothing.
+    const std::string& texture() const { return header_.texture; }
 
 private:
     std::istream& stream_;
     MeshLimits limits_;
-    std::string timestamp_;
+    struct {
+        std::string timestamp, texture;
+    } header_;
     std::size_t meshes_read_ = 0;
     std::optional<Error> error_;
 };

@@ -32,6 +32,7 @@ struct PlyHeader {
     PlyFormat format = PlyFormat::ascii;
     std::vector<PlyElement> elements;
     std::string timestamp;  // what stands behind "comment timestamp"; empty: nothing does
+    std::string texture;    // what stands behind "comment TextureFile", likewise
 };
 
 // The longest header, from "ply" to "end_header", that a reader accepts, in bytes.

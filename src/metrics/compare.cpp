@@ -14,12 +14,12 @@ void compare_vertices(const Mesh& original, const Mesh& decoded, const CompareOp
         out.cloud = {sum_cloud_errors(original, decoded, forward), sum_cloud_errors(decoded, original, backward)};
 }
 
-Result<void> compare_pictures(const Mesh& original, const Mesh& decoded, const CompareOptions& options,
+Result<void> compare_pictures(const ShownMesh& original, const ShownMesh& decoded, const CompareOptions& options,
                               FrameComparison& out) {
     const auto cameras = cameras_round(options.view_box.value_or(out.original_box), options.views);
     if (!cameras) return tl::unexpected(cameras.error());
     RenderOptions render = options.render;
-    render.colours = render.colours && !original.colours.empty() && !decoded.colours.empty();
+    render.colours = render.colours && original.has_colours() && decoded.has_colours();
     out.pictures =
         compare_views(make_drawable(original, render), make_drawable(decoded, render), *cameras, options.threads);
     if (!render.colours) return {};
@@ -52,7 +52,9 @@ Topology& operator+=(Topology& sums, const Topology& t) {
 
 }  // namespace
 
-Result<FrameComparison> compare_frame(const Mesh& original, const Mesh& decoded, const CompareOptions& options) {
+Result<FrameComparison> compare_frame(const ComparedMesh& first, const ComparedMesh& second,
+                                      const CompareOptions& options) {
+    const Mesh &original = *first.mesh, &decoded = *second.mesh;
     if (const auto ok = check_measurable(original, "original"); !ok) return tl::unexpected(ok.error());
     if (const auto ok = check_measurable(decoded, "decoded mesh"); !ok) return tl::unexpected(ok.error());
     FrameComparison out;
@@ -82,15 +84,15 @@ Result<FrameComparison> compare_frame(const Mesh& original, const Mesh& decoded,
         out.texcoords = *error;
     }
     if (options.pictures)
-        if (const auto done = compare_pictures(original, decoded, options, out); !done)
+        if (const auto done = compare_pictures(first.shown, second.shown, options, out); !done)
             return tl::unexpected(done.error());
     if (options.topology) {
-        const auto first = topology(original, options.topology_options, options.threads);
-        if (!first) return tl::unexpected(first.error());
-        const auto second = topology(decoded, options.topology_options, options.threads);
-        if (!second) return tl::unexpected(second.error());
-        out.original_topology = *first;
-        out.decoded_topology = *second;
+        const auto of_original = topology(original, options.topology_options, options.threads);
+        if (!of_original) return tl::unexpected(of_original.error());
+        const auto of_decoded = topology(decoded, options.topology_options, options.threads);
+        if (!of_decoded) return tl::unexpected(of_decoded.error());
+        out.original_topology = *of_original;
+        out.decoded_topology = *of_decoded;
     }
     return out;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/image.h"
 #include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
@@ -30,7 +31,7 @@ struct CompareOptions {
     SurfaceErrorOptions surface_options;
     TopologyMeasureOptions topology_options;
     ViewOptions views;
-    RenderOptions render;            // colours are drawn only if both meshes have some
+    RenderOptions render;            // colours and textures are drawn only if both meshes have some
     std::optional<Box> view_box;     // what the cameras look at in every frame; empty: the bounding box of each
                                      // original
     internal::Threads threads = {};  // the number of threads does not change the results (overrides surface_options')
@@ -47,13 +48,24 @@ struct FrameComparison {
     TexcoordError texcoords;
     CloudError cloud;
     PictureErrorSums pictures;        // as CompareOptions::render says
-    PictureErrorSums unlit_pictures;  // the same without shading; zero without colours
+    PictureErrorSums unlit_pictures;  // the same without shading; zero without colours or textures
     Topology original_topology, decoded_topology;
+};
+
+// A mesh to compare, and what pictures show of it: the mesh itself, with its texture if it has one, or the textured mesh
+// that its vertex colours were made from. All is lent.
+struct ComparedMesh {
+    const Mesh* mesh;
+    ShownMesh shown;
+    ComparedMesh(const Mesh& own) : mesh(&own), shown(own) {}
+    ComparedMesh(const TexturedMesh& own) : mesh(&own.mesh), shown(own) {}
+    ComparedMesh(const Mesh& own, const TexturedMesh& pictured) : mesh(&own), shown(pictured) {}
 };
 
 // Fails (bad_input) if a mesh cannot be measured (check_measurable) or an option is out of range, (limit) if memory
 // runs out.
-Result<FrameComparison> compare_frame(const Mesh& original, const Mesh& decoded, const CompareOptions& options = {});
+Result<FrameComparison> compare_frame(const ComparedMesh& original, const ComparedMesh& decoded,
+                                      const CompareOptions& options = {});
 
 // The sums over the frames so far.
 struct SequenceComparison {

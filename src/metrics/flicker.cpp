@@ -42,7 +42,7 @@ ChangeSums change_between(const TwoFrames& original, const TwoFrames& decoded) {
 }
 
 // meshes: the original before, the original now, the decoded before, the decoded now.
-ChangeSums change_in_views(const std::array<const Mesh*, 4>& meshes, const std::vector<Camera>& cameras,
+ChangeSums change_in_views(const std::array<const TexturedMesh*, 4>& meshes, const std::vector<Camera>& cameras,
                            const RenderOptions& render, Threads threads) {
     std::array<DrawableMesh, 4> drawables;
     for (std::size_t i = 0; i < meshes.size(); ++i) drawables[i] = make_drawable(*meshes[i], render);
@@ -84,18 +84,18 @@ double flicker_ratio(const ChangeSums& sums) {
     return std::sqrt(static_cast<double>(sums.decoded) / static_cast<double>(sums.original));
 }
 
-Result<std::optional<FrameFlicker>> FlickerMeter::add(Mesh original, Mesh decoded) {
-    if (const auto ok = check_measurable(original, "original"); !ok) return tl::unexpected(ok.error());
-    if (const auto ok = check_measurable(decoded, "decoded mesh"); !ok) return tl::unexpected(ok.error());
+Result<std::optional<FrameFlicker>> FlickerMeter::add(TexturedMesh original, TexturedMesh decoded) {
+    if (const auto ok = check_measurable(original.mesh, "original"); !ok) return tl::unexpected(ok.error());
+    if (const auto ok = check_measurable(decoded.mesh, "decoded mesh"); !ok) return tl::unexpected(ok.error());
     const auto before = std::exchange(before_, std::make_unique<Pair>(Pair{std::move(original), std::move(decoded)}));
     if (!before) return std::optional<FrameFlicker>{};
     const std::array meshes{&before->original, &before_->original, &before->decoded, &before_->decoded};
-    Box box = bounding_box(*meshes[0]);
-    extend(box, bounding_box(*meshes[1]));
+    Box box = bounding_box(meshes[0]->mesh);
+    extend(box, bounding_box(meshes[1]->mesh));
     const auto cameras = cameras_round(options_.view_box.value_or(box), options_.views);
     if (!cameras) return tl::unexpected(cameras.error());
     RenderOptions render = options_.render;
-    render.colours = render.colours && std::ranges::none_of(meshes, [](const Mesh* m) { return m->colours.empty(); });
+    render.colours = render.colours && std::ranges::all_of(meshes, [](const TexturedMesh* m) { return ShownMesh(*m).has_colours(); });
     FrameFlicker out;
     out.lit = change_in_views(meshes, *cameras, render, options_.threads);
     if (render.colours) {

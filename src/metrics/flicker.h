@@ -53,7 +53,7 @@ struct FlickerOptions {
     // Half the size of M3's pictures in each direction: a pixel is a sample of what its centre sees, so fewer of them
     // give the same mean.
     ViewOptions views{.width = 640, .height = 512};
-    RenderOptions render;            // colours are drawn only if all four meshes have some
+    RenderOptions render;            // colours and textures are drawn only if all four meshes have some
     std::optional<Box> view_box;     // what the cameras look at; empty: the box around both frames of the original
     internal::Threads threads = {};  // their number does not change the results
 };
@@ -64,13 +64,13 @@ public:
 
     // The next frame; nothing for the first. Fails (bad_input) if a mesh cannot be measured (check_measurable) or an
     // option is out of range.
-    Result<std::optional<FrameFlicker>> add(Mesh original, Mesh decoded);
+    Result<std::optional<FrameFlicker>> add(TexturedMesh original, TexturedMesh decoded);
     // The next frame does not follow the one before.
     void begin_anew() { before_.reset(); }
 
 private:
     struct Pair {
-        Mesh original, decoded;
+        TexturedMesh original, decoded;
     };
     FlickerOptions options_;
     std::unique_ptr<const Pair> before_;

@@ -67,16 +67,37 @@ struct TrianglePaint {
     std::array<Shade, 3> shades;
     std::array<Point3, 3> normals;  // used for smooth shading
     bool smooth = false;
+    const ImagePyramid* texture = nullptr;  // its colours are multiplied by the shades
+    std::array<Vector2f, 3> texcoords;
+    std::size_t level = 0;  // of the texture
 };
 
-TrianglePaint paint_of(const DrawableMesh& drawable, const Triangle& t, bool front_facing, const Light& light) {
+// Texels along the side of a pixel, on average over the triangle.
+double texels_in_pixel(const ImagePyramid& texture, const std::array<Vector2f, 3>& texcoords, double pixels) {
+    const auto& [a, b, c] = texcoords;
+    const double area = std::abs(static_cast<double>(b[0] - a[0]) * static_cast<double>(c[1] - a[1]) -
+                                 static_cast<double>(c[0] - a[0]) * static_cast<double>(b[1] - a[1]));
+    return std::sqrt(area * texture.image().width * texture.image().height / pixels);
+}
+
+// pixels: twice the triangle's area in the picture.
+TrianglePaint paint_of(const DrawableMesh& drawable, const Triangle& t, bool front_facing, const Light& light,
+                       double pixels) {
     const Mesh& mesh = *drawable.mesh;
     const RenderOptions& options = drawable.options;
-    const bool coloured = options.colours && !mesh.colours.empty();
+    const bool coloured = options.colours && !mesh.colours.empty() && !drawable.texture;
     TrianglePaint paint;
+    if (drawable.texture) {
+        paint.texture = &*drawable.texture;
+        paint.texcoords = {mesh.texcoords[t[0]], mesh.texcoords[t[1]], mesh.texcoords[t[2]]};
+        paint.level = paint.texture->level_for(texels_in_pixel(*paint.texture, paint.texcoords, pixels));
+    }
     for (std::size_t i = 0; i < 3; ++i) {
         const Colour& c = coloured ? mesh.colours[t[i]] : options.material;
-        paint.shades[i] = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+        if (drawable.texture)
+            paint.shades[i] = {1, 1, 1};
+        else
+            paint.shades[i] = {static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
     }
     const double side = front_facing ? 1 : -1;
     if (options.shading == Shading::smooth) {
@@ -101,10 +122,19 @@ void paint_pixel(const TrianglePaint& paint, const std::array<double, 3>& weight
         const Point3 n = paint.normals[0] * weights[0] + paint.normals[1] * weights[1] + paint.normals[2] * weights[2];
         lit = light.intensity(normalised(n));
     }
+    Shade texel{1, 1, 1};
+    if (paint.texture) {
+        const auto place = [&](std::size_t axis) {
+            double sum = 0;
+            for (std::size_t i = 0; i < 3; ++i) sum += weights[i] * static_cast<double>(paint.texcoords[i][axis]);
+            return static_cast<float>(sum);
+        };
+        texel = paint.texture->at(place(0), place(1), paint.level);
+    }
     for (std::size_t c = 0; c < 3; ++c) {
         float value = 0;
         for (std::size_t i = 0; i < 3; ++i) value += static_cast<float>(weights[i]) * paint.shades[i][c];
-        rgb[c] = level(value * lit);
+        rgb[c] = level(value * lit * texel[c]);
     }
 }
 
@@ -167,7 +197,9 @@ void draw_triangle(const DrawableMesh& drawable, const Triangle& t, const Camera
                 nearness = part[0] * v[0]->nearness + part[1] * v[1]->nearness + part[2] * v[2]->nearness;
             if (!(static_cast<float>(nearness) > canvas.nearness[pixel])) continue;
             canvas.nearness[pixel] = static_cast<float>(nearness);
-            if (!painted) paint = paint_of(drawable, t, front_facing, light);
+            if (!painted)
+                paint = paint_of(drawable, t, front_facing, light,
+                                 static_cast<double>(area) / (double{subpixels} * subpixels));
             painted = true;
             std::array<double, 3> weights;
             for (std::size_t i = 0; i < 3; ++i) weights[order[i]] = part[i] * normalise;
@@ -194,9 +226,10 @@ void clear(const Camera& camera, const Colour& background, Canvas& canvas) {
 
 }  // namespace
 
-DrawableMesh make_drawable(const Mesh& mesh, const RenderOptions& options) {
-    DrawableMesh drawable{&mesh, options, {}};
-    if (options.shading == Shading::smooth) drawable.normals = welded_normals(mesh);
+DrawableMesh make_drawable(const ShownMesh& shown, const RenderOptions& options) {
+    DrawableMesh drawable{shown.mesh, options, {}, {}};
+    if (options.shading == Shading::smooth) drawable.normals = welded_normals(*shown.mesh);
+    if (options.colours && shown.texture && !shown.mesh->texcoords.empty()) drawable.texture.emplace(*shown.texture);
     return drawable;
 }
 
@@ -215,9 +248,9 @@ void draw(const DrawableMesh& drawable, const Camera& camera, Canvas& canvas, Th
     });
 }
 
-Picture render(const Mesh& mesh, const Camera& camera, const RenderOptions& options, Threads threads) {
+Picture render(const ShownMesh& shown, const Camera& camera, const RenderOptions& options, Threads threads) {
     Canvas canvas;
-    draw(make_drawable(mesh, options), camera, canvas, threads);
+    draw(make_drawable(shown, options), camera, canvas, threads);
     return std::move(canvas.picture);
 }
 

@@ -8,9 +8,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/image.h"
 #include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
@@ -51,7 +53,7 @@ enum class Shading {
 
 struct RenderOptions {
     Shading shading = Shading::smooth;
-    bool colours = true;             // draw the mesh's colours if it has some; false: draw the material
+    bool colours = true;  // draw the mesh's texture, else its colours, if it has one; false: draw the material
     Colour material{200, 200, 200};  // for meshes drawn without colours
     Colour background{255, 255, 255};
 };
@@ -62,13 +64,27 @@ struct Picture {
     std::vector<std::uint8_t> covered;  // one byte per pixel: 1 if the mesh was drawn there (the foreground), else 0
 };
 
-// A mesh prepared for drawing from several cameras. The mesh must outlive it.
+// A mesh to draw, with its texture if it has one; both are lent.
+struct ShownMesh {
+    const Mesh* mesh;
+    const Image* texture = nullptr;
+    ShownMesh(const Mesh& shown) : mesh(&shown) {}
+    ShownMesh(const TexturedMesh& shown) : mesh(&shown.mesh), texture(shown.texture.get()) {}
+    bool has_colours() const { return texture || !mesh->colours.empty(); }
+};
+
+// A mesh prepared for drawing from several cameras. The mesh and its texture must outlive it.
+//
+// A texture is sampled at the place that each pixel's centre sees, linearly between texels. Where a pixel sees several,
+// a smaller image stands in whose texels are nearest to a pixel's size, by triangle: else a picture would show
+// whichever texel it meets, and neighbouring pictures others.
 struct DrawableMesh {
     const Mesh* mesh = nullptr;
     RenderOptions options;
     std::vector<Vector3f> normals;  // one per vertex, if smooth shading needs them
+    std::optional<internal::ImagePyramid> texture;  // if it is drawn
 };
-DrawableMesh make_drawable(const Mesh& mesh, const RenderOptions& options = {});
+DrawableMesh make_drawable(const ShownMesh& shown, const RenderOptions& options = {});
 
 // Everything that drawing needs besides the picture, kept so that the next picture of the same size needs no
 // allocation.
@@ -87,7 +103,7 @@ struct Canvas {
 void draw(const DrawableMesh& drawable, const Camera& camera, Canvas& canvas, internal::Threads threads = {});
 
 // One picture of a mesh.
-Picture render(const Mesh& mesh, const Camera& camera, const RenderOptions& options = {},
+Picture render(const ShownMesh& shown, const Camera& camera, const RenderOptions& options = {},
                internal::Threads threads = {});
 
 // Puts pictures side by side, from the left; rows below a lower picture stay white.

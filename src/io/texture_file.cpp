@@ -1,0 +1,238 @@
+#include "io/texture_file.h"
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "io/image_file.h"
+#include "io/obj.h"
+
+namespace htvm {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* other_ways = "; --texture gives its place, or none to go on without";
+
+tl::unexpected<Error> fail_at(const fs::path& mesh, ErrorKind kind, const std::string& message) {
+    return fail(kind, mesh.empty() ? message : mesh.string() + ": " + message);
+}
+
+fs::path folder_of(const fs::path& mesh) { return mesh.has_parent_path() ? mesh.parent_path() : fs::path("."); }
+
+// The file of that name in the folder or below it; the last part of the name alone if it leads elsewhere, as where a
+// program wrote its own folders into it.
+std::optional<fs::path> file_within(const fs::path& folder, const std::string& name) {
+    if (name.empty() || name.find('\0') != name.npos) return std::nullopt;
+    std::error_code error;
+    const auto inside = fs::canonical(folder, error);
+    if (error) return std::nullopt;
+    const auto last_part = name.substr(name.find_last_of("/\\") + 1);
+    for (const auto& tried : {name, last_part}) {
+        if (tried.empty() || !fs::is_regular_file(folder / tried, error)) continue;
+        const auto path = fs::canonical(folder / tried, error);
+        if (error) continue;
+        if (std::mismatch(inside.begin(), inside.end(), path.begin(), path.end()).first == inside.end())
+            return folder / tried;
+    }
+    return std::nullopt;
+}
+
+// The images of an OBJ's materials. A material file that is not there says nothing: many an OBJ names one that was
+// never sent along.
+Result<TextureReference> with_materials(const fs::path& mesh, const TextureReference& said) {
+    TextureReference out = said;
+    if (said.material_files.empty() || said.materials.empty()) return out;
+    std::vector<ObjMaterial> known;
+    for (const auto& name : said.material_files) {
+        const auto path = file_within(folder_of(mesh), name);
+        if (!path) continue;
+        constexpr std::uint64_t most_bytes = std::uint64_t{1} << 26;
+        const auto bytes = read_file(*path, most_bytes);
+        if (!bytes) return tl::unexpected(bytes.error());
+        const auto more = read_obj_materials({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
+        known.insert(known.end(), more.begin(), more.end());
+    }
+    bool any_without = false;
+    for (const auto& name : said.materials) {
+        const auto material =
+            std::find_if(known.begin(), known.end(), [&](const auto& candidate) { return candidate.name == name; });
+        const bool has_image = material != known.end() && !material->image.empty();
+        if (has_image) add_image(out, material->image);
+        any_without = any_without || !has_image;
+    }
+    out.is_partial = any_without && !out.images.empty();
+    return out;
+}
+
+// An image beside the mesh that is called like it.
+std::optional<fs::path> image_beside(const fs::path& mesh) {
+    std::error_code error;
+    for (const char* extension : image_extensions) {
+        std::string upper = extension;
+        std::transform(upper.begin(), upper.end(), upper.begin(),
+                       [](char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; });
+        for (const std::string& tried : {std::string(extension), upper}) {
+            fs::path path = mesh;
+            path.replace_extension(tried);
+            if (fs::is_regular_file(path, error)) return path;
+        }
+    }
+    return std::nullopt;
+}
+
+// The images of a pattern, one for each mesh: by number where every mesh's has one, else in order.
+Result<std::vector<fs::path>> images_of_pattern(const std::string& pattern, const SequenceFiles& images,
+                                                const SequenceFiles& meshes) {
+    std::vector<fs::path> out;
+    std::optional<std::uint64_t> missing;
+    for (const auto number : meshes.numbers) {
+        const auto at = std::lower_bound(images.numbers.begin(), images.numbers.end(), number);
+        if (at != images.numbers.end() && *at == number)
+            out.push_back(images.paths[static_cast<std::size_t>(at - images.numbers.begin())]);
+        else if (!missing)
+            missing = number;
+    }
+    if (!meshes.numbers.empty() && !missing) return out;
+    if (images.paths.size() == meshes.paths.size()) return images.paths;
+    return fail(ErrorKind::bad_input,
+                "--texture " + pattern + " gives " + std::to_string(images.paths.size()) + " images for " +
+                    std::to_string(meshes.paths.size()) + " meshes" +
+                    (missing ? ", and none has the number " + std::to_string(*missing) : "") +
+                    "; give an image for each, or one for all");
+}
+
+void turn_over(Mesh& mesh) {
+    for (auto& texcoord : mesh.texcoords) texcoord[1] = 1 - texcoord[1];
+}
+
+}  // namespace
+
+Result<TextureFiles> TextureFiles::open(const TextureOptions& options, const SequenceFiles& meshes) {
+    TextureFiles out;
+    out.options_ = options;
+    out.meshes_ = meshes;
+    const auto& what = options.files;
+    if (what.empty() || what == "none") return out;
+    std::error_code error;
+    if (fs::is_directory(what, error) || (!fs::exists(what, error) && what.find_first_of("*?") != what.npos))
+        return fail(ErrorKind::bad_input, "--texture " + what + " is no image; give one for all frames, or a pattern " +
+                                              "such as tex_%05d.jpg");
+    const auto images = find_sequence(what);
+    if (!images) return fail(images.error().kind, "--texture: " + images.error().message);
+    const bool is_pattern = images->paths != std::vector<fs::path>{what};
+    if (!is_pattern) {
+        out.images_ = images->paths;
+        return out;
+    }
+    if (meshes.paths.empty())
+        return fail(ErrorKind::bad_input, "--texture " + what + ": meshes from standard input take one image for all");
+    auto each = images_of_pattern(what, *images, meshes);
+    if (!each) return tl::unexpected(each.error());
+    out.images_ = std::move(*each);
+    return out;
+}
+
+std::vector<std::filesystem::path> TextureFiles::known_images() const {
+    if (options_.files == "none" || !images_.empty()) return images_;
+    std::vector<fs::path> out;
+    for (const auto& mesh : meshes_.paths)
+        if (const auto beside = image_beside(mesh)) out.push_back(*beside);
+    return out;
+}
+
+Result<TextureFiles::Found> TextureFiles::find(const fs::path& mesh, std::size_t place,
+                                               const TextureReference& said) const {
+    Found out;
+    if (options_.files == "none") return out;
+    if (!images_.empty()) {
+        out.path = images_.size() == 1 ? images_[0] : images_[place];
+        out.name = out.path.string();
+        return out;
+    }
+    const auto texture = with_materials(mesh, said);
+    if (!texture) return tl::unexpected(texture.error());
+    if (texture->images.size() > 1 || texture->is_partial)
+        return fail_at(mesh, ErrorKind::unsupported,
+                       texture->is_partial
+                           ? "a part of the mesh has an image and another has none; one image for all of it is read" +
+                                 std::string(other_ways)
+                           : "its parts have " + std::to_string(texture->images.size()) +
+                                 " images; one image for all of it is read: bake them into one" + other_ways);
+    if (!texture->images.empty()) {
+        out.name = texture->images[0].name;
+        if (!texture->images[0].bytes.empty()) {
+            out.bytes = &said.images[0].bytes;
+            return out;
+        }
+        const auto path = file_within(folder_of(mesh), out.name);
+        if (!path)
+            return fail_at(mesh, ErrorKind::bad_input,
+                           "its image \"" + out.name.substr(0, 200) + "\" is not in its folder" + other_ways);
+        out.path = *path;
+        out.name = path->string();
+        return out;
+    }
+    if (const auto beside = mesh.empty() ? std::nullopt : image_beside(mesh)) {
+        out.path = *beside;
+        out.name = beside->string();
+    }
+    return out;
+}
+
+Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, std::size_t place,
+                                             const TextureReference& said, TextureUse use) {
+    image_name_.clear();
+    const bool from_top = !path.empty() && counts_texture_from_top(path);
+    if ((options_.origin == TextureOrigin::top && !from_top) || (options_.origin == TextureOrigin::bottom && from_top))
+        turn_over(mesh);
+    if (mesh.positions.empty()) return TexturedMesh(std::move(mesh));
+    const bool is_named = !images_.empty();
+    if (mesh.texcoords.empty()) {
+        if (is_named || use == TextureUse::always)
+            return fail_at(path, ErrorKind::bad_input,
+                           "the mesh has no texture coordinates, which its image needs; leave --texture out, or write "
+                           "the mesh with them");
+        return TexturedMesh(std::move(mesh));
+    }
+    const bool is_wanted = use == TextureUse::always ||
+                           (use == TextureUse::where_colourless && (is_named || mesh.colours.empty()));
+    const auto found = find(path, place, said);
+    if (!found) {
+        if (!is_wanted) return TexturedMesh(std::move(mesh));
+        return tl::unexpected(found.error());
+    }
+    image_name_ = found->name;
+    if (!is_wanted) return TexturedMesh(std::move(mesh));
+    if (found->name.empty()) {
+        if (use != TextureUse::always) return TexturedMesh(std::move(mesh));
+        return fail_at(path, ErrorKind::bad_input, "no image was found for it; --texture gives its place");
+    }
+    if (found->bytes) {
+        auto image = read_image(*found->bytes);
+        if (!image) return fail_at(path, image.error().kind, found->name + ": " + image.error().message);
+        return TexturedMesh(std::move(mesh), std::make_shared<const Image>(std::move(*image)));
+    }
+    if (!kept_ || kept_path_ != found->path) {
+        auto image = read_image_file(found->path);
+        if (!image) return tl::unexpected(image.error());
+        kept_ = std::make_shared<const Image>(std::move(*image));
+        kept_path_ = found->path;
+    }
+    return TexturedMesh(std::move(mesh), kept_);
+}
+
+Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const MeshFileOptions& options) {
+    const auto& path = meshes_.paths[place];
+    TextureReference said;
+    auto mesh = read_mesh(path, options, &said);
+    if (!mesh) return tl::unexpected(mesh.error());
+    return completed(std::move(*mesh), path, place, said, use);
+}
+
+Result<TexturedMesh> TextureFiles::with_image(Mesh mesh, const TextureReference& said, TextureUse use) {
+    return completed(std::move(mesh), {}, 0, said, use);
+}
+
+}  // namespace htvm

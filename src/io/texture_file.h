@@ -1,0 +1,75 @@
+// Which image belongs to a mesh, and meshes with their images: one for all frames, or one each.
+//
+// In this order: the image that the user names; the one that the mesh's file names (map_Kd of an OBJ's material,
+// "comment TextureFile" of a PLY, the base colour's texture of a glTF, which may be inside of it); the one beside the
+// mesh that is called like it. What a file names is looked for in the mesh's folder and those in it, nowhere else.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/image.h"
+#include "htvm/result.hpp"
+#include "io/mesh_file.h"
+#include "io/sequence.h"
+#include "io/texture_reference.h"
+
+namespace htvm {
+
+// From which edge of the image texture coordinates are counted in the files.
+enum class TextureOrigin { by_format, bottom, top };
+
+struct TextureOptions {
+    // An image for all frames; a pattern with a %d, of an image for each; "none": no image is read; empty: those that
+    // the meshes name, or that lie beside them.
+    std::string files;
+    TextureOrigin origin = TextureOrigin::by_format;
+};
+
+// Which meshes need their image.
+enum class TextureUse {
+    none,              // no mesh
+    where_colourless,  // those with texture coordinates and without vertex colours, or all if the user named the image
+    always,            // all; it is an error if there is no image
+};
+
+class TextureFiles {
+public:
+    // For meshes of one capture. Fails (bad_input) if the images that the options name are not there, or not for all
+    // of the meshes. Without meshes (standard input) there is one image for all.
+    static Result<TextureFiles> open(const TextureOptions& options, const SequenceFiles& meshes = {});
+
+    // Reads the mesh at that place of the capture, with its image where `use` says so and there is one.
+    Result<TexturedMesh> read(std::size_t place, TextureUse use, const MeshFileOptions& options = {});
+
+    // The same for a mesh that was read already, from standard input.
+    Result<TexturedMesh> with_image(Mesh mesh, const TextureReference& said, TextureUse use);
+
+    // Of the mesh that was read last: whether there is an image for it, read or not, and what it is called.
+    const std::string& image_name() const { return image_name_; }  // empty: there is none
+
+    // The images of all meshes as far as they are known before these are read.
+    std::vector<std::filesystem::path> known_images() const;
+
+private:
+    struct Found {
+        std::string name;                            // empty: there is no image
+        std::filesystem::path path;                  // empty: the bytes are inside of the mesh's file
+        const std::vector<std::uint8_t>* bytes = nullptr;
+    };
+    Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place,
+                                   const TextureReference& said, TextureUse use);
+    Result<Found> find(const std::filesystem::path& mesh, std::size_t place, const TextureReference& said) const;
+
+    TextureOptions options_;
+    SequenceFiles meshes_;
+    std::vector<std::filesystem::path> images_;  // that the user named: one for all, or one for each mesh
+    std::string image_name_;
+    std::filesystem::path kept_path_;  // of the image that was read last, which frames may share
+    std::shared_ptr<const Image> kept_;
+};
+
+}  // namespace htvm
