@@ -1,7 +1,7 @@
 // Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
 // tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 and NAME_3 of versions
-// 2 and 3, and no encoder writes them any more; NAME_4 are of version 4. HTVM_WRITE_CONFORMANCE=1 in the environment
-// rewrites all of version 4 that are there; NAME_4 writes that one, whether it is there or not.
+// 2 and 3, and no encoder writes them any more; NAME_4 are of version 4, NAME_5 of 5. HTVM_WRITE_CONFORMANCE=1 in the
+// environment rewrites all of versions 4 and 5 that are there; NAME_4 writes that one, whether it is there or not.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -90,7 +90,7 @@ std::string asked_for() {
 }
 
 void write_packets(const std::string& unnumbered, const std::vector<Packet>& packets) {
-    const std::string name = unnumbered + "_" + std::to_string(stream_version);
+    const std::string name = unnumbered + "_" + std::to_string(read_sequence_header(packets[0].payload)->version);
     if (asked_for() != name && !(asked_for() == "1" && fs::exists(folder / (name + ".htvm")))) return;
     std::vector<std::uint8_t> bytes;
     for (const auto& packet : packets) {
@@ -190,6 +190,19 @@ void write_patched() {
     ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
     ASSERT_GE(frames_of(coded, FrameType::patched), 1u);
     write_packets("patched", coded.packets);
+}
+
+// What version 5 brought: T-frames in groups of several lengths, after an I-frame, after a place to start, after an
+// I-frame of the tracked mesh.
+void write_grouped() {
+    auto person = walking(14, 200, 20);
+    for (auto& frame : person.frames) frame.mesh.texcoords.clear();  // another layout in each would make I-frames
+    auto options = default_options(Profile::tracked);
+    options.tracked.group = 5;
+    options.tracked.access_interval = 6;
+    options.key_interval = 11;
+    options.geometry_step = 4;
+    write_stream("grouped", person, options);
 }
 
 // TP-frames with any patches on every awkward connectivity.
@@ -314,6 +327,7 @@ void write_all() {
     write_tracked_by_chance();
     write_patched();
     write_patched_by_chance();
+    write_grouped();
     write_sequences();
 
     TestSequence spokes{"awkward, moving", {}, {}};

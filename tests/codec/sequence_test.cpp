@@ -189,12 +189,12 @@ TEST(SequenceHeader, BytesBehindTheLastFieldAreIgnored) {
 
 TEST(SequenceHeader, AnotherVersionIsUnsupported) {
     auto bytes = write_sequence_header(full_header());
-    bytes[4] = static_cast<std::uint8_t>(stream_version + 1);
+    bytes[4] = static_cast<std::uint8_t>(newest_version + 1);
     const auto read = read_sequence_header(bytes);
     ASSERT_FALSE(read.has_value());
     EXPECT_EQ(read.error().kind, ErrorKind::unsupported);
-    EXPECT_NE(read.error().message.find("version 5"), std::string::npos) << read.error().message;
-    EXPECT_NE(read.error().message.find("versions 1 to 4; a newer htvm"), std::string::npos) << read.error().message;
+    EXPECT_NE(read.error().message.find("version 6"), std::string::npos) << read.error().message;
+    EXPECT_NE(read.error().message.find("versions 1 to 5; a newer htvm"), std::string::npos) << read.error().message;
     bytes[4] = 0;
     EXPECT_EQ(read_sequence_header(bytes).error().kind, ErrorKind::unsupported);
     bytes[0] = 'x';

@@ -99,6 +99,13 @@ for name in fast fast_normals; do
     same $name "$work/$name" --profile tracked
     contains patched
 done
+# Groups, also of odd lengths, and ended by TP-frames.
+"$htvm" synth "$work/calm" --vertices 300 --frames 14 --motion calm >/dev/null 2>&1
+for group in 2 5 8; do
+    same calm "$work/calm" --profile tracked --group $group --access-interval 9
+    same fast_normals "$work/fast_normals" --profile tracked --group $group -q 60
+done
+contains tracked
 for stream in "$here"/../data/conformance/*.htvm; do
     stored "$stream"
 done
