@@ -152,6 +152,27 @@ TEST(RegisterDeformation, TurnsATwistedArm) {
     EXPECT_NEAR(tip.angle(), 0.9, 0.15);
 }
 
+// RMS distance of the target's vertices from the deformed reference's triangles.
+double rms_from_triangles(const DeformableMesh& mesh, const SurfaceIndex& target,
+                          std::span<const RigidMotion> motions) {
+    const auto now = deform(mesh, motions, {});
+    const SurfaceIndex reference(now, mesh.triangles);
+    double squares = 0;
+    for (const auto& p : target.positions) squares += static_cast<double>(reference.closest(p).squared_distance);
+    return std::sqrt(squares / static_cast<double>(target.positions.size()));
+}
+
+TEST(RegisterDeformation, LaysTheTrianglesOfACoarseReferenceOnTheSurface) {
+    DeformationOptions options;
+    const auto reference = sweep(25, 8, arm);  // sides up to 50 mm long, on a tube 80 by 50 mm thick
+    const auto target = target_of(moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); }), options);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
+    const auto to_triangles = register_deformation(mesh, target, {}, options);
+    options.surface_rounds = 0;
+    const auto to_vertices = register_deformation(mesh, target, {}, options);
+    EXPECT_LT(rms_from_triangles(mesh, target, to_triangles), 0.97 * rms_from_triangles(mesh, target, to_vertices));
+}
+
 TEST(RegisterDeformation, MovesNothingWhereNothingMoved) {
     const DeformationOptions options;
     const auto surface = sweep(121, 40, arm);
