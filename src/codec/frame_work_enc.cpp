@@ -43,6 +43,8 @@ std::size_t Candidate::bytes() const {
     return sum;
 }
 
+double region_side(const Configuration& configuration) { return 100 * configuration.adult_millimetre; }
+
 DeformationOptions deformation_options(const Configuration& configuration) {
     DeformationOptions out;
     out.millimetre = configuration.adult_millimetre;
@@ -74,7 +76,7 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         in_use->patches = before.reference->patches + 1;
         in_use->patch_bytes = before.reference->patch_bytes + static_cast<double>(sent.bytes());
     }
-    if (patched || sent.renewal) out.nodes.best_fit = before.nodes.best_fit;
+    out.nodes.best_fit = sent.best_fit;
     out.nodes.targets = patched ? std::move(sent.targets) : on_new_reference(before.nodes.targets, {}, 0, {});
     if (in_use->decoded.tracked)
         in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
@@ -171,13 +173,13 @@ SurfaceErrors FrameWork::errors_of(const LatticeMesh& decoded) {
 
 TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_edge,
                                   std::span<const double> intra_squared) {
-    constexpr double stray_in_edges = 2, reach = 25, region = 100;  // in mean edges; mm on an adult
+    constexpr double stray_in_edges = 2, reach = 25;  // in mean edges; mm on an adult
     const auto& captured = surface();
     StageClock clock(stages);
     TrackedFitOptions options;
     options.stray = std::max(stray_in_edges * reference_edge, 1.0);
     options.reach = std::max(reach * configuration.adult_millimetre, options.stray);
-    options.region = region * configuration.adult_millimetre;
+    options.region = region_side(configuration);
     options.threads = configuration.threads;
     auto out = measure_tracked_fit(captured, decoded, intra_squared, options);
     clock.done("fit of the tracking");

@@ -108,13 +108,14 @@ struct Candidate {
     double quality = 50;          // the quality setting used, under rate or error control
     bool stands_in = false;       // a P- or T-frame of motion alone, because nothing better fits the buffer
     // What it leaves for the sequence; one of the first three is set.
-    std::optional<IntraFacts> intra;                   // I, TP; used only if it is referred to
-    std::optional<BoneHistory> bones;                  // P, EP
-    std::optional<NodeHistory> nodes;                  // T; TP: what its T-frame would have left
-    std::optional<EnhancedTrial> trial;                // set if EP- and I-frame were compared
-    CodedPose pose;                                    // I, TP
-    KeptNodes kept;                                    // TP: what the reference that it becomes takes over
-    TargetHistory targets;                             // TP: on the reference that it becomes
+    std::optional<IntraFacts> intra;     // I, TP; used only if it is referred to
+    std::optional<BoneHistory> bones;    // P, EP
+    std::optional<NodeHistory> nodes;    // T; TP: what its T-frame would have left
+    std::optional<EnhancedTrial> trial;  // set if EP- and I-frame were compared
+    CodedPose pose;                      // I, TP
+    KeptNodes kept;                      // TP: what the reference that it becomes takes over
+    TargetHistory targets;               // TP: on the reference that it becomes
+    double best_fit = 0;  // I, TP: NodeHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
     std::vector<std::uint32_t> distance_order_counts;  // EP
     std::size_t bytes() const;
 };
@@ -186,6 +187,9 @@ private:
     bool looked_for_limbs_ = false;
     std::optional<AnimationFit> animation_fit_;
 };
+
+// Side of the cubes of space by which it is judged whether a region is lost, lattice units.
+double region_side(const Configuration& configuration);
 
 // The registration's options, scaled to this subject.
 DeformationOptions deformation_options(const Configuration& configuration);

@@ -230,8 +230,8 @@ SampleBlend over_groups(const SampleBlend& fine, const std::vector<SampleBlend>&
 }
 
 // The colours around a vertex, and how well they fit a slope; zero slope and trust if they do not. normal: unit length.
-SampleTexture texture_at(const DeformableMesh& mesh, std::span<const Colour> colours, const TrianglesAround& around,
-                         std::uint32_t vertex, const Vector3d& normal) {
+SampleTexture texture_at(const DeformableMesh& mesh, std::span<const Colour> colours, std::uint32_t vertex,
+                         const Vector3d& normal) {
     // Of colours by chance at six neighbours a slope explains a third; trust begins where it explains two thirds.
     constexpr double chance = 3, least_moment = 0.02;
     const auto place_of = [&](std::uint32_t v) {
@@ -241,7 +241,7 @@ SampleTexture texture_at(const DeformableMesh& mesh, std::span<const Colour> col
     SampleTexture out;
     out.colour = colour_of(vertex).cast<float>();
     const auto visit_neighbours = [&](auto&& use) {
-        for (const auto t : around.of(vertex))
+        for (const auto t : mesh.around.of(vertex))
             for (const auto other : mesh.triangles[t]) {
                 if (other == vertex) continue;
                 const Vector3d apart = place_of(other) - place_of(vertex);
@@ -277,10 +277,9 @@ SampleTexture texture_at(const DeformableMesh& mesh, std::span<const Colour> col
 std::vector<SampleTexture> textures_of_samples(const DeformableMesh& mesh, std::span<const Colour> colours) {
     std::vector<SampleTexture> out;
     if (colours.empty()) return out;
-    const auto around = triangles_around(mesh.positions.size(), mesh.triangles);
     for (std::size_t i = 0; i < mesh.samples.size(); ++i) {
         const auto& n = mesh.sample_normals[i];
-        out.push_back(texture_at(mesh, colours, around, mesh.samples[i], {n[0], n[1], n[2]}));
+        out.push_back(texture_at(mesh, colours, mesh.samples[i], {n[0], n[1], n[2]}));
     }
     if (std::none_of(out.begin(), out.end(), [](const auto& texture) { return texture.trust > 0; })) out.clear();
     return out;
@@ -304,6 +303,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
     DeformableMesh mesh;
     mesh.positions.assign(positions.begin(), positions.end());
     mesh.triangles.assign(triangles.begin(), triangles.end());
+    mesh.around = triangles_around(positions.size(), triangles);
     mesh.weights = std::move(weights);
     mesh.handles.assign(handles.begin(), handles.end());
     if (handles.empty()) return mesh;
@@ -339,6 +339,7 @@ Point3f point_of(const Vector3d& v) {
 
 // The handles of one level, and the samples that they move away from their rest positions.
 struct Stage {
+    const DeformableMesh& mesh;
     const DeformationLevel& level;
     std::vector<Vector3d> rest, rest_normals;  // of the samples at rest
     std::vector<Vector3d> centre;              // of the handles, at rest
@@ -348,7 +349,8 @@ struct Stage {
 };
 
 struct Moved {
-    std::vector<Point3f> points, normals;
+    std::vector<Point3f> points, normals;  // of the samples
+    std::vector<Point3f> vertices;         // of the mesh; only for rounds that match to its triangles
 };
 
 Vector3d blended(const SampleBlend& blend, const std::vector<RigidMotion>& motion, const Vector3d& x) {
@@ -367,7 +369,7 @@ Vector3d blended_turn(const SampleBlend& blend, const std::vector<RigidMotion>& 
 }
 
 Moved move_samples(const Stage& stage, Threads threads) {
-    Moved out{std::vector<Point3f>(stage.rest.size()), std::vector<Point3f>(stage.rest.size())};
+    Moved out{std::vector<Point3f>(stage.rest.size()), std::vector<Point3f>(stage.rest.size()), {}};
     parallel_for(stage.rest.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
             out.points[i] = point_of(blended(stage.level.blends[i], stage.motion, stage.rest[i]));
@@ -380,10 +382,25 @@ Moved move_samples(const Stage& stage, Threads threads) {
 // A sample, and the plane of the target that it should lie in.
 struct Match {
     std::uint32_t sample = 0;
-    std::uint32_t vertex = 0;  // in the target
-    float weight = 0;          // 0: no match
-    float gap = 0;             // spacing of the points that were searched
+    std::uint32_t vertex = 0;            // in the target
+    float weight = 0;                    // 0: no match
+    float gap = 0;                       // spacing of the points that were searched
+    Vector3d normal = Vector3d::Zero();  // the mean of the two normals, or zero: measured along it, points of the same
+                                         // round surface are not apart
+    double across = 0;                   // how far the target lies from the reference along the normal,
+    Vector3d along = Vector3d::Zero();   // and how far the vertex lies from the sample along the surface
 };
+
+Match match_of(const Moved& moved, std::uint32_t sample, const SurfaceIndex& target, std::uint32_t vertex, float gap) {
+    Match out{sample, vertex, 0, gap};
+    const Vector3d apart = vector_of(target.positions[vertex]) - vector_of(moved.points[sample]);
+    const Vector3d sum = vector_of(target.normals[vertex]) + vector_of(moved.normals[sample]);
+    const double length = sum.norm();
+    if (length > 0) out.normal = sum / length;
+    out.across = out.normal.dot(apart);
+    out.along = apart - out.across * out.normal;
+    return out;
+}
 
 // The results of the last round's searches, from which the next round's begin.
 struct Guesses {
@@ -398,21 +415,45 @@ struct Round {
     bool far = false;       // search among the target's samples; distant matches still count
     std::size_t every = 1;  // use only every n-th sample
     bool colours = false;   // match colours, too; both sides must have them
+    bool surfaces = false;  // match the target's samples to the reference's triangles; not with `far`
 };
 
 // Near matches have full weight, which fades to zero at the reach; distant ones all have the same small pull.
-float match_weight(const OrientedMatch& match, const Round& round) {
-    if (!match.found) return 0;
-    const double d = std::sqrt(static_cast<double>(match.squared_distance));
+float match_weight(double squared_distance, const Round& round) {
+    const double d = std::sqrt(squared_distance);
     if (round.far) return static_cast<float>(1 / std::max(1.0, d / (0.1 * round.reach)));
     const double fade = std::max(0.0, 1 - d * d / (round.reach * round.reach));
     return static_cast<float>(fade * fade);
 }
 
+// The point nearest to `query` on the moved triangles around a vertex.
+struct NearOnReference {
+    Vector3d point = Vector3d::Zero();
+    double squared_distance = std::numeric_limits<double>::infinity();
+};
+
+NearOnReference nearest_around(const DeformableMesh& mesh, std::span<const Point3f> vertices, std::uint32_t vertex,
+                               const Vector3d& query) {
+    NearOnReference out;
+    for (const auto triangle : mesh.around.of(vertex)) {
+        const auto& t = mesh.triangles[triangle];
+        const Vector3d a = vector_of(vertices[t[0]]), b = vector_of(vertices[t[1]]), c = vector_of(vertices[t[2]]);
+        // The triangle is skipped if even its plane is farther away than the best so far.
+        const Vector3d across = (b - a).cross(c - a);
+        const double height = across.dot(query - a);
+        if (height * height > out.squared_distance * across.squaredNorm()) continue;
+        const auto found = closest_on_triangle(to_vector(point_of(query)), to_vector(vertices[t[0]]),
+                                               to_vector(vertices[t[1]]), to_vector(vertices[t[2]]));
+        if (found.squared_distance >= out.squared_distance) continue;
+        out = {found.shares[0] * a + found.shares[1] * b + found.shares[2] * c, found.squared_distance};
+    }
+    return out;
+}
+
 // Matches in both directions: from each sample to the target, and from each of the target's samples to the nearest
-// moved sample.
-std::vector<Match> find_matches(const Moved& moved, const SurfaceIndex& target, const Round& round, float cell,
-                                const DeformationOptions& options, Guesses& guesses) {
+// moved sample, or to the triangles around that.
+std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, const SurfaceIndex& target,
+                                const Round& round, float cell, const DeformationOptions& options, Guesses& guesses) {
     const std::size_t skip = round.every * (round.far ? 2 : 1);
     const std::size_t forward = moved.points.size() / round.every, back = target.samples.size() / skip;
     const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
@@ -427,9 +468,11 @@ std::vector<Match> find_matches(const Moved& moved, const SurfaceIndex& target, 
         std::uint32_t& guess = guesses.forward[i];
         const auto match = search.nearest(moved.points[sample], moved.normals[sample], reach, agreement,
                                           guess == OrientedPoints::no_point ? last : guess);
-        if (match.found) guess = match.index;
-        const auto vertex = round.far && match.found ? target.samples[match.index] : match.index;
-        out[i] = {static_cast<std::uint32_t>(sample), vertex, match_weight(match, round), gap};
+        if (!match.found) return guess;
+        guess = match.index;
+        const auto vertex = round.far ? target.samples[match.index] : match.index;
+        out[i] = match_of(moved, static_cast<std::uint32_t>(sample), target, vertex, gap);
+        out[i].weight = match_weight(match.squared_distance, round);
         return guess;
     };
     const auto go_back = [&](std::size_t i, std::uint32_t last) {
@@ -437,8 +480,20 @@ std::vector<Match> find_matches(const Moved& moved, const SurfaceIndex& target, 
         std::uint32_t& guess = guesses.back[i];
         const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], reach, agreement,
                                              guess == OrientedPoints::no_point ? last : guess);
-        if (match.found) guess = match.index;
-        out[forward + i] = {match.index, vertex, match_weight(match, round), round.gap};
+        if (!match.found) return guess;
+        guess = match.index;
+        Match& there = out[forward + i];
+        there = match_of(moved, match.index, target, vertex, round.gap);
+        auto squared_distance = static_cast<double>(match.squared_distance);
+        if (round.surfaces) {
+            const Vector3d point = vector_of(target.positions[vertex]);
+            const auto near = nearest_around(mesh, moved.vertices, mesh.samples[match.index], point);
+            if (near.squared_distance < squared_distance) {
+                squared_distance = near.squared_distance;
+                there.across = there.normal.dot(point - near.point);
+            }
+        }
+        there.weight = match_weight(squared_distance, round);
         return guess;
     };
     // Both directions are cut into slices, so that the threads have equal work.
@@ -468,26 +523,20 @@ struct Pull {
 };
 
 // For the samples in [begin, end).
-std::vector<Pull> sum_pulls(const std::vector<Match>& matches, const Moved& moved, const SurfaceIndex& target,
-                            double point_share, std::size_t begin, std::size_t end) {
+std::vector<Pull> sum_pulls(const std::vector<Match>& matches, double point_share, std::size_t begin, std::size_t end) {
     std::vector<Pull> pulls(end - begin);
     for (const Match& match : matches) {
         if (match.sample < begin || match.sample >= end) continue;
-        const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
-        // The mean of the two normals: measured along it, points of the same round surface are not apart.
-        const Vector3d sum = vector_of(target.normals[match.vertex]) + vector_of(moved.normals[match.sample]);
-        const double length = sum.norm();
-        const Vector3d normal = length > 0 ? Vector3d(sum / length) : Vector3d::Zero();
+        const Vector3d& normal = match.normal;
         // Samples have gaps between them, so only a distance along the surface beyond the gap counts as an error.
-        const double across = normal.dot(apart);
-        const Vector3d along = apart - across * normal;
+        const Vector3d& along = match.along;
         const double weight = static_cast<double>(match.weight);
         const double slide = along.norm();
         const double share = slide > match.gap ? weight * point_share * (1 - match.gap / slide) : 0;
         Pull& pull = pulls[match.sample - begin];
         pull.metric.noalias() += (weight - share) * normal * normal.transpose();
         pull.metric.diagonal().array() += share;
-        pull.force += weight * across * normal + share * along;
+        pull.force += weight * match.across * normal + share * along;
     }
     return pulls;
 }
@@ -691,8 +740,9 @@ struct RoundResult {
 
 RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell,
                       BlockSystem (&systems)[2], Guesses& guesses, const DeformationOptions& options) {
-    const Moved moved = move_samples(stage, options.threads);
-    const auto matches = find_matches(moved, target, round, cell, options, guesses);
+    Moved moved = move_samples(stage, options.threads);
+    if (round.surfaces) moved.vertices = deform(stage.mesh, stage.motion, options.threads);
+    const auto matches = find_matches(stage.mesh, moved, target, round, cell, options, guesses);
     std::vector<Pull> of_colours;
     if (round.colours) of_colours = colour_pulls(stage, matches, moved, target, options);
     std::vector<Vector3d> centres(stage.centre.size());
@@ -701,7 +751,7 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
     auto add_half = [&](std::size_t half) {
         systems[half].clear();
         const std::size_t begin = half * stage.rest.size() / 2, end = (half + 1) * stage.rest.size() / 2;
-        auto pulls = sum_pulls(matches, moved, target, round.point_share, begin, end);
+        auto pulls = sum_pulls(matches, round.point_share, begin, end);
         for (std::size_t i = begin; i < end && !of_colours.empty(); ++i) {
             pulls[i - begin].metric += of_colours[i].metric;
             pulls[i - begin].force += of_colours[i].force;
@@ -752,7 +802,7 @@ DeformationForm form_of(const BlockPattern& pattern, BlockSystem system, double 
 }
 
 Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
-    Stage stage{mesh.fine, {}, {}, mesh.handles, mesh.fine.pairs, std::move(motion), mesh.sample_textures};
+    Stage stage{mesh, mesh.fine, {}, {}, mesh.handles, mesh.fine.pairs, std::move(motion), mesh.sample_textures};
     for (std::size_t i = 0; i < mesh.samples.size(); ++i) {
         stage.rest.push_back(vector_of(mesh.positions[mesh.samples[i]]));
         stage.rest_normals.push_back(vector_of(mesh.sample_normals[i]));
@@ -762,7 +812,8 @@ Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
 
 // Groups of handles start from where `fine` has their handles.
 Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, Threads threads) {
-    Stage stage{mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size()), {}};
+    Stage stage{mesh, mesh.coarse, {}, {}, {}, mesh.coarse.pairs, std::vector<RigidMotion>(mesh.coarse.centre.size()),
+                {}};
     const Moved moved = move_samples(fine, threads);
     for (const std::uint32_t i : mesh.coarse.samples) {
         stage.rest.push_back(vector_of(moved.points[i]));
@@ -832,6 +883,7 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
                        value(options.first_point_share, options.last_point_share), 0.5f * mesh.sample_gap, false};
         round.colours = i + options.colour_rounds >= options.fine_rounds && !target.colours.empty() &&
                         !mesh.sample_textures.empty();
+        round.surfaces = i + options.surface_rounds >= options.fine_rounds;
         weight = run_round(fine, target, round, cell, systems, guesses, options).weight;
     }
     if (form && options.fine_rounds > 0) *form = form_of(mesh.fine.pattern, std::move(systems[0]), weight);
@@ -882,9 +934,67 @@ void settle(const DeformableMesh& mesh, const SurfaceIndex& target, const Deform
 
 }  // namespace
 
+namespace {
+
+// What two motions that differ in one limb are compared by: its samples, and those of the target that lie near it where
+// either of the two takes it. Elsewhere both are the same.
+struct LimbSamples {
+    std::vector<std::uint32_t> forward, back;  // indices of the mesh's samples, and of the target's vertices
+};
+
+LimbSamples samples_around(const DeformableMesh& mesh, const SurfaceIndex& target, const std::vector<bool>& in_limb,
+                           std::span<const Moved* const> moved, double reach) {
+    LimbSamples out;
+    for (std::uint32_t i = 0; i < mesh.samples.size(); ++i) {
+        const SampleBlend& blend = mesh.fine.blends[i];
+        for (std::size_t k = 0; k < blend.count; ++k)
+            if (in_limb[blend.handle[k]]) {
+                out.forward.push_back(i);
+                break;
+            }
+    }
+    std::vector<Point3f> places;
+    for (const Moved* m : moved)
+        for (const auto i : out.forward) places.push_back(m->points[i]);
+    if (places.empty()) return out;
+    const std::vector<Point3f> any_way(places.size(), Point3f{});
+    const OrientedPoints near(places, any_way, static_cast<float>(reach / 2));
+    for (const auto vertex : target.samples)
+        if (near.nearest(target.positions[vertex], {}, static_cast<float>(reach), 0).found) out.back.push_back(vertex);
+    return out;
+}
+
+// The sum of their distances to the planes of what they match, each limited to `reach`.
+double error_of(const LimbSamples& samples, const Moved& moved, const SurfaceIndex& target, double reach,
+                double agreement) {
+    const OrientedPoints reference(moved.points, moved.normals, static_cast<float>(reach / 2));
+    const auto far = static_cast<float>(reach), facing = static_cast<float>(agreement);
+    const auto distance = [&](std::uint32_t sample, std::uint32_t vertex) {
+        const Vector3d apart = vector_of(target.positions[vertex]) - vector_of(moved.points[sample]);
+        return std::min(reach, std::abs(apart.dot(vector_of(target.normals[vertex]))));
+    };
+    double sum = 0;
+    std::uint32_t guess = OrientedPoints::no_point;
+    for (const auto i : samples.forward) {
+        const auto match = target.fine.nearest(moved.points[i], moved.normals[i], far, facing, guess);
+        if (match.found) guess = match.index;
+        sum += match.found ? distance(i, match.index) : reach;
+    }
+    guess = OrientedPoints::no_point;
+    for (const auto vertex : samples.back) {
+        const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], far, facing, guess);
+        if (match.found) guess = match.index;
+        sum += match.found ? distance(match.index, vertex) : reach;
+    }
+    return sum;
+}
+
+}  // namespace
+
 bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
                        const DeformationOptions& options, std::vector<RigidMotion>& motions, DeformationForm* form) {
     constexpr double elsewhere = 15;  // mm
+    const double reach = options.near_reach * options.millimetre;
     std::vector<bool> differs(motions.size());
     for (std::size_t h = 0; h < motions.size(); ++h)
         differs[h] = (motions[h](mesh.handles[h]) - other[h](mesh.handles[h])).norm() > elsewhere * options.millimetre;
@@ -893,25 +1003,34 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
         tied[pair.first].push_back(pair.second);
         tied[pair.second].push_back(pair.first);
     }
-    double least = deformation_error(mesh, target, motions, options);
+    Stage stage = fine_stage(mesh, motions);
+    Moved moved = move_samples(stage, options.threads);
     bool taken = false;
     for (std::size_t seed = 0; seed < motions.size(); ++seed) {
         if (!differs[seed]) continue;
         std::vector<std::size_t> limb = {seed};
+        std::vector<bool> in_limb(motions.size(), false);
         differs[seed] = false;
+        in_limb[seed] = true;
         for (std::size_t i = 0; i < limb.size(); ++i)
             for (const auto next : tied[limb[i]])
-                if (differs[next]) differs[next] = false, limb.push_back(next);
-        auto trial = motions;
-        for (const auto h : limb) trial[h] = other[h];
-        const double error = deformation_error(mesh, target, trial, options);
-        if (error >= least) continue;
-        least = error;
-        motions = std::move(trial);
-        taken = true;
+                if (differs[next]) differs[next] = false, in_limb[next] = true, limb.push_back(next);
+        for (const auto h : limb) stage.motion[h] = other[h];
+        Moved trial = move_samples(stage, options.threads);
+        const std::array<const Moved*, 2> both = {&moved, &trial};
+        const auto samples = samples_around(mesh, target, in_limb, both, reach);
+        if (error_of(samples, trial, target, reach, options.agreement) <
+            error_of(samples, moved, target, reach, options.agreement)) {
+            moved = std::move(trial);
+            taken = true;
+        } else {
+            for (const auto h : limb) stage.motion[h] = motions[h];
+        }
     }
-    if (taken) settle(mesh, target, options, motions, form);
-    return taken;
+    if (!taken) return false;
+    motions = std::move(stage.motion);
+    settle(mesh, target, options, motions, form);
+    return true;
 }
 
 double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
@@ -923,7 +1042,7 @@ double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target,
     const std::size_t every = mesh.samples.size() + target.samples.size() < 2000 ? 1 : 4;
     const Round round{.reach = reach, .stiffness = 0, .point_share = 0, .gap = 0, .far = false, .every = every};
     Guesses guesses;
-    const auto matches = find_matches(moved, target, round, static_cast<float>(reach / 2), options, guesses);
+    const auto matches = find_matches(mesh, moved, target, round, static_cast<float>(reach / 2), options, guesses);
     double near = 0;
     for (const Match& match : matches) {
         const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/geometry.h"
 #include "core/thread.h"
 #include "core/vertex_weights.h"
 #include "htvm/mesh.hpp"
@@ -82,6 +83,8 @@ struct DeformationOptions {
     int solver_iterations = 40;  // at most, of conjugate gradients, per round
     int colour_rounds = 3;       // last fine rounds in which colours are matched as well, where both sides have them
     double colour_weight = 5;    // mm^2: variance of a distance that counts as much as the noise of a colour does
+    int surface_rounds = 3;      // last fine rounds in which the target is matched to the reference's triangles, not to
+                                 // its vertices alone
     Threads threads = {};
 };
 
@@ -118,6 +121,7 @@ struct SampleTexture {
 struct DeformableMesh {
     std::vector<Point3f> positions;
     std::vector<Triangle> triangles;
+    TrianglesAround around;  // each vertex
     HandleWeights weights;
     std::vector<Eigen::Vector3d> handles;  // positions of the handles
     std::vector<std::uint32_t> samples;    // indices of vertices

@@ -8,6 +8,8 @@
 #include <functional>
 #include <numbers>
 
+#include "surface/limb_starts.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -150,6 +152,27 @@ TEST(RegisterDeformation, TurnsATwistedArm) {
     EXPECT_LT(rest_after(mesh, target, motions).rms, 0.8);
     const Eigen::AngleAxisd tip(motions.back().rotation);
     EXPECT_NEAR(tip.angle(), 0.9, 0.15);
+}
+
+// RMS distance of the target's vertices from the deformed reference's triangles.
+double rms_from_triangles(const DeformableMesh& mesh, const SurfaceIndex& target,
+                          std::span<const RigidMotion> motions) {
+    const auto now = deform(mesh, motions, {});
+    const SurfaceIndex reference(now, mesh.triangles);
+    double squares = 0;
+    for (const auto& p : target.positions) squares += static_cast<double>(reference.closest(p).squared_distance);
+    return std::sqrt(squares / static_cast<double>(target.positions.size()));
+}
+
+TEST(RegisterDeformation, LaysTheTrianglesOfACoarseReferenceOnTheSurface) {
+    DeformationOptions options;
+    const auto reference = sweep(25, 8, arm);  // sides up to 50 mm long, on a tube 80 by 50 mm thick
+    const auto target = target_of(moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); }), options);
+    const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
+    const auto to_triangles = register_deformation(mesh, target, {}, options);
+    options.surface_rounds = 0;
+    const auto to_vertices = register_deformation(mesh, target, {}, options);
+    EXPECT_LT(rms_from_triangles(mesh, target, to_triangles), 0.97 * rms_from_triangles(mesh, target, to_vertices));
 }
 
 TEST(RegisterDeformation, MovesNothingWhereNothingMoved) {
@@ -331,6 +354,45 @@ TEST(TakeNearerLimbs, TakesThePartThatLiesNearerAndLeavesTheRest) {
     const auto settled = motions;
     EXPECT_FALSE(take_nearer_limbs(mesh, target, other, options, motions));
     EXPECT_EQ(motions[0].shift, settled[0].shift);
+}
+
+// A tube along x, 1.2 m long.
+Vector3d long_arm(double u, double v) {
+    const Vector3d p = arm(u, v);
+    return {2 * p.x(), p.y(), p.z()};
+}
+
+// Turns what lies beyond x = 800 about there to +y, within a bend of a hand's breadth.
+Vector3d folded(const Vector3d& p, double angle) {
+    const double share = std::clamp((p.x() - 750) / 100, 0.0, 1.0);
+    const Vector3d joint(800, 0, 0);
+    return joint + Eigen::AngleAxisd(angle * share, Vector3d::UnitZ()) * (p - joint);
+}
+
+TEST(ReachedForExtremities, FindsALimbThatClosestPointsLose) {
+    const DeformationOptions options;
+    const auto reference = sweep(121, 40, long_arm);
+    const auto mesh = with_handles_along_x(reference, 0, 1200, 17, options);
+    const auto fold = [](const Vector3d& p) { return folded(p, 1.9); };
+    const auto target = target_of(moved(sweep(141, 36, long_arm), fold), options);
+    auto motions = register_deformation(mesh, target, {}, options);
+    EXPECT_GT(rms_from_triangles(mesh, target, motions), 30);
+    const auto reached = reached_for_extremities(mesh, target, motions, {}, {});
+    ASSERT_EQ(reached.size(), mesh.handles.size());
+    EXPECT_LT((reached[16](mesh.handles[16]) - fold(mesh.handles[16])).norm(), 60);
+    auto near = options;
+    near.coarse_rounds = 0;
+    const auto other = register_deformation(mesh, target, reached, near);
+    EXPECT_TRUE(take_nearer_limbs(mesh, target, other, options, motions));
+    EXPECT_LT(rms_from_triangles(mesh, target, motions), 6);
+}
+
+TEST(ReachedForExtremities, IsNothingWhereEveryLimbEndsAtOne) {
+    const DeformationOptions options;
+    const auto mesh = with_handles_along_x(sweep(121, 40, long_arm), 0, 1200, 17, options);
+    const auto bow = [](const Vector3d& p) { return Vector3d(p + Vector3d(0, 60 * std::sin(p.x() / 400), 0)); };
+    const auto target = target_of(moved(sweep(141, 36, long_arm), bow), options);
+    EXPECT_TRUE(reached_for_extremities(mesh, target, std::vector<RigidMotion>(17), {}, {}).empty());
 }
 
 TEST(DeformationError, IsSmallerForTheBetterMotion) {

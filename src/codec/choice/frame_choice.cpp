@@ -243,12 +243,20 @@ Result<Candidate> choose_by_cost(FrameWork& work, const FrameSteps& steps) {
 
 // ---- Profile::tracked -----------------------------------------------------------------------------------------------
 
+// How far off a region of 10 cm may be, lattice units. best: RMS of the best T-frame.
+double allowed_in_region(const FrameWork& work, double best) {
+    constexpr double region_to_best = 5, region_to_intra = 1.5;
+    constexpr double visible = 3.5, visible_in_edges = 0.5;  // mm on an adult; in mean edges of the capture
+    const auto& intra = work.reference().intra;
+    return std::max({region_to_best * best, region_to_intra * intra.fit.worst_region,
+                     visible * work.configuration.adult_millimetre, visible_in_edges * intra.edge});
+}
+
 // Whether a T-frame fits visibly worse than the T-frames of its I-frame can: over the whole surface, or in one region,
 // such as a hand.
 bool lost_track(const FrameWork& work, const TrackedFit& fit) {
-    constexpr double more_strays = 0.004, worst_to_best = 2.2, region_to_best = 7, region_to_intra = 1.5;
-    constexpr double quantised = 0.5;                      // steps
-    constexpr double visible = 6, visible_in_edges = 0.5;  // mm on an adult; in mean edges of the capture
+    constexpr double more_strays = 0.004, worst_to_best = 2.2;
+    constexpr double quantised = 0.5;  // steps
     const auto& reference = work.reference();
     const double best_fit = work.sequence.nodes.best_fit;
     const double best = best_fit > 0 ? best_fit : fit.rms;
@@ -256,9 +264,7 @@ bool lost_track(const FrameWork& work, const TrackedFit& fit) {
     const double too_far =
         std::max(worst_to_best * best, quantised * static_cast<double>(reference.intra.steps.geometry));
     return fit.stray_share > reference.intra.fit.stray_share + more_strays || fit.rms > too_far ||
-           fit.worst_region >
-               std::max({region_to_best * best, region_to_intra * reference.intra.fit.worst_region,
-                         visible * work.configuration.adult_millimetre, visible_in_edges * reference.intra.edge});
+           fit.worst_region > allowed_in_region(work, best);
 }
 
 // Whether the capture's texture atlas is laid out anew since the I-frame, whose texture coordinates a T-frame shows.
@@ -277,6 +283,7 @@ SurfacePatchOptions patch_options(const FrameWork& work, const FrameSteps& steps
     const double millimetre = configuration.adult_millimetre;
     SurfacePatchOptions out;
     out.lost = std::max(6 * millimetre, 0.5 * work.reference().intra.edge);
+    out.region = region_side(configuration);
     out.reach = 30 * millimetre;
     out.speck = 20 * millimetre;
     out.most_share = configuration.options.tracked.patch_share;
@@ -286,23 +293,28 @@ SurfacePatchOptions patch_options(const FrameWork& work, const FrameSteps& steps
 }
 
 // The T-frame with the lost regions replaced; nothing if that is not possible, does not help, or costs about as much as
-// an I-frame.
+// an I-frame. Where regions alone do not help, as where much is a little off, all that is lost is replaced.
 Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
     using Patched = std::optional<Candidate>;
     constexpr double most_bytes = 0.8;  // of the I-frame's
     if (work.configuration.options.tracked.patch_share <= 0 || !tracked.texcoords.empty()) return Patched();
-    StageClock clock(work.stages);
-    const auto found = find_surface_patch(tracked, work.reference().decoded.tracked->mesh.positions, work.mesh,
-                                          work.surface(), patch_options(work, steps));
-    clock.done("patch");
-    if (!found) return Patched();
-    auto out = code_patched(work, steps, *found);
-    if (!out) return tl::unexpected(out.error());
-    auto& fit = out->intra->fit;
-    if (static_cast<double>(out->bytes()) > most_bytes * work.reference().bytes || lost_track(work, fit))
-        return Patched();
-    fit = least_of(std::move(fit), work.reference().intra.fit);
-    return Patched(std::move(*out));
+    auto options = patch_options(work, steps);
+    for (const double region_lost : {allowed_in_region(work, work.sequence.nodes.best_fit), 0.0}) {
+        options.region_lost = region_lost;
+        StageClock clock(work.stages);
+        const auto found = find_surface_patch(tracked, work.reference().decoded.tracked->mesh.positions, work.mesh,
+                                              work.surface(), options);
+        clock.done("patch");
+        if (!found) continue;
+        auto out = code_patched(work, steps, *found);
+        if (!out) return tl::unexpected(out.error());
+        auto& fit = out->intra->fit;
+        if (static_cast<double>(out->bytes()) > most_bytes * work.reference().bytes || lost_track(work, fit)) continue;
+        fit = least_of(std::move(fit), work.reference().intra.fit);
+        out->best_fit = work.sequence.nodes.best_fit;
+        return Patched(std::move(*out));
+    }
+    return Patched();
 }
 
 // Whoever joins late needs all patches since the I-frame.
@@ -349,13 +361,14 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) return std::move(**patched);
     }
-    if (anew || lost) return code_frame(FrameType::intra, work, steps);
-    if (due || patches_have_grown(work))
-        return may_be_renewed(work, steps, tracked->decoded) ? code_renewed_intra(work, steps, tracked->decoded)
-                                                             : code_frame(FrameType::intra, work, steps);
     auto& best = tracked->nodes->best_fit;
-    if (best == 0 || fit.rms < best) best = fit.rms;
-    return tracked;
+    if (!lost && (best == 0 || fit.rms < best)) best = fit.rms;
+    if (!anew && !lost && !due && !patches_have_grown(work)) return tracked;
+    const bool renewed = !anew && !lost && may_be_renewed(work, steps, tracked->decoded);
+    auto intra =
+        renewed ? code_renewed_intra(work, steps, tracked->decoded) : code_frame(FrameType::intra, work, steps);
+    if (intra && !lost) intra->best_fit = best;
+    return intra;
 }
 
 // ---- one attempt at given steps -------------------------------------------------------------------------------------

@@ -242,28 +242,48 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
 
 namespace {
 
-// The cube of space that a sample lies in, and its squared distance from the other surface.
-struct SampledDistance {
-    std::array<std::int32_t, 3> cube{};
-    double squared = 0;
-};
+CubeErrors::Cube cube_of(const Point3f& point, double side) {
+    CubeErrors::Cube out{};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        out[axis] = static_cast<std::int32_t>(std::floor(static_cast<double>(point[axis]) / side));
+    return out;
+}
 
-// The two farthest samples of each cube are left out: one sample that found the wrong sheet does not mean that a region
-// is lost.
-double worst_of(std::vector<SampledDistance> samples) {
+}  // namespace
+
+double CubeErrors::worst() const {
+    double out = 0;
+    for (const auto& region : rms) out = std::max(out, region.second);
+    return out;
+}
+
+double CubeErrors::at(const Point3f& point) const {
+    const auto cube = cube_of(point, side);
+    const auto found = std::lower_bound(rms.begin(), rms.end(), cube,
+                                        [](const auto& region, const Cube& other) { return region.first < other; });
+    return found != rms.end() && found->first == cube ? found->second : 0;
+}
+
+CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side) {
     constexpr std::ptrdiff_t fewest = 10, left_out = 2;
-    std::sort(samples.begin(), samples.end(),
-              [](const auto& a, const auto& b) { return a.cube != b.cube ? a.cube < b.cube : a.squared < b.squared; });
-    double worst = 0;
-    for (auto i = samples.begin(), j = i; i != samples.end(); i = j) {
-        j = std::find_if(i, samples.end(), [&](const auto& sample) { return sample.cube != i->cube; });
+    std::vector<std::pair<CubeErrors::Cube, double>> sorted;
+    sorted.reserve(samples.size());
+    for (std::size_t i = 0; i < samples.size(); ++i) sorted.emplace_back(cube_of(samples[i], side), squared[i]);
+    std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
+        return a.first != b.first ? a.first < b.first : a.second < b.second;
+    });
+    CubeErrors out{side};
+    for (auto i = sorted.begin(), j = i; i != sorted.end(); i = j) {
+        j = std::find_if(i, sorted.end(), [&](const auto& sample) { return sample.first != i->first; });
         if (j - i < fewest) continue;
         const double sum = std::accumulate(i, j - left_out, 0.0,
-                                           [](double total, const auto& sample) { return total + sample.squared; });
-        worst = std::max(worst, sum / static_cast<double>(j - i - left_out));
+                                           [](double total, const auto& sample) { return total + sample.second; });
+        out.rms.emplace_back(i->first, std::sqrt(sum / static_cast<double>(j - i - left_out)));
     }
-    return std::sqrt(worst);
+    return out;
 }
+
+namespace {
 
 // Every n-th vertex, and the centre of every n-th triangle.
 SurfaceSamples sparse_samples_of(std::span<const Point3f> points, std::span<const Point3f> normals,
@@ -282,18 +302,17 @@ SurfaceSamples sparse_samples_of(std::span<const Point3f> points, std::span<cons
 TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<double>& squared,
                      const TrackedFitOptions& options) {
     if (points.empty()) return {};
-    std::vector<SampledDistance> samples(points.size());
     double squares = 0;
     std::size_t strays = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        for (std::size_t axis = 0; axis < 3; ++axis)
-            samples[i].cube[axis] = static_cast<std::int32_t>(std::floor(points[i][axis] / options.region));
-        samples[i].squared = squared[i];
-        squares += squared[i];
-        if (squared[i] > options.stray * options.stray) ++strays;
+    for (const double distance : squared) {
+        squares += distance;
+        if (distance > options.stray * options.stray) ++strays;
     }
     const auto count = static_cast<double>(points.size());
-    return {std::sqrt(squares / count), static_cast<double>(strays) / count, worst_of(std::move(samples)), {}};
+    return {std::sqrt(squares / count),
+            static_cast<double>(strays) / count,
+            cube_errors(points, squared, options.region).worst(),
+            {}};
 }
 
 // The captured surface is so fine that searching the triangles around the nearest vertex suffices; its normals tell the

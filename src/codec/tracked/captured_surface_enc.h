@@ -2,8 +2,10 @@
 // the targets for a reference that was moved to the surface, and whether the decoded frame still fits the surface.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "codec/tracked/tracked_frame.h"
@@ -35,6 +37,18 @@ struct TrackedTargets {
 // limb, the vertices of a coarse reference must lie outside, so that its triangles lie half outside and half inside.
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
                                     const SurfaceIndex& surface, double reach, Threads threads);
+
+// The RMS distance of samples of a surface from another one, in each cube of space.
+struct CubeErrors {
+    using Cube = std::array<std::int32_t, 3>;
+    double side = 1;
+    std::vector<std::pair<Cube, double>> rms{};  // ascending by cube; cubes with few samples are left out
+    double worst() const;
+    double at(const Point3f& point) const;  // 0 if its cube is left out
+};
+// squared: the samples' squared distances. The two farthest of each cube are left out: one that found the wrong sheet
+// does not mean that a region is lost.
+CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side);
 
 // Measured with a few thousand samples in each direction; the worse of the two directions. Lattice units.
 struct TrackedFit {

@@ -258,7 +258,25 @@ void grow(std::vector<bool>& marked, std::span<const Triangle> triangles) {
             for (const auto v : t) marked[v] = true;
 }
 
-// A region is lost as far as the error is over half the limit, if enough of it is over the limit.
+// How far the surfaces are apart around each vertex of the tracked mesh: the RMS distance in its cube of space, of
+// either surface's vertices from the other.
+std::vector<double> errors_around(std::span<const Point3f> points, std::span<const double> error,
+                                  const Capture& capture, const SurfacePatchOptions& options) {
+    std::vector<double> squared, of_capture;
+    for (const double distance : error) squared.push_back(distance * distance);
+    for (const auto& found : capture.on_decoded) {
+        const double distance = distance_to(found, options.reach);
+        of_capture.push_back(distance * distance);
+    }
+    const auto back = cube_errors(points, squared, options.region),
+               forth = cube_errors(capture.points, of_capture, options.region);
+    std::vector<double> out;
+    for (const auto& point : points) out.push_back(std::max(back.at(point), forth.at(point)));
+    return out;
+}
+
+// A region is lost as far as the error is over half the limit, if enough of it is over the limit. Where any cube of
+// space is lost, only regions that reach into lost cubes are.
 std::vector<bool> find_lost(const LatticeMesh& decoded, std::span<const LatticePoint> rest, const Sides& sides,
                             std::span<const double> error, const Capture& capture, const SurfacePatchOptions& options) {
     constexpr double hardly_seen = 0.25;  // how much a triangle of bad shape counts that lies on the surface
@@ -282,8 +300,19 @@ std::vector<bool> find_lost(const LatticeMesh& decoded, std::span<const LatticeP
     const double enough = options.speck * options.speck;
     for (std::uint32_t v = 0; v < vertices; ++v)
         if (rims[v]) area[regions.of(v)] += enough;
+    std::vector<bool> reaches(vertices, true);
+    const auto around = errors_around(points_of(decoded.positions), error, capture, options);
+    const auto in_lost_cube = [&](std::uint32_t v) { return around[v] > options.region_lost; };
+    if (std::any_of(around.begin(), around.end(), [&](double rms) { return rms > options.region_lost; })) {
+        reaches.assign(vertices, false);
+        for (std::uint32_t v = 0; v < vertices; ++v)
+            if (in_lost_cube(v)) reaches[regions.of(v)] = true;
+    }
     std::vector<bool> lost(vertices);
-    for (std::uint32_t v = 0; v < vertices; ++v) lost[v] = doubtful(v) && area[regions.of(v)] >= enough;
+    for (std::uint32_t v = 0; v < vertices; ++v) {
+        const auto region = regions.of(v);
+        lost[v] = doubtful(v) && area[region] >= enough && reaches[region];
+    }
     if (std::find(lost.begin(), lost.end(), true) == lost.end()) return lost;
     for (int ring = 0; ring < options.margin; ++ring) grow(lost, decoded.triangles);
     return lost;

@@ -20,6 +20,8 @@ struct SurfacePatchOptions {
                               // apart by half of it
     double reach = 480;       // how far to search for the other surface
     double speck = 320;       // side of a square: lost regions of a smaller area are left alone
+    double region = 1600;     // side of the cubes of space by which a frame is judged: see TrackedFitOptions
+    double region_lost = 0;   // RMS distance from which on a cube is lost; 0: regions are lost by themselves
     int margin = 1;           // rings of triangles around a lost region that go as well, >= 0
     double stretch = 3;       // a triangle is lost, too, where a side is longer than at rest by this factor
     double gap = 0.5;         // between what stays and the piece, before they are joined: in mean edges there

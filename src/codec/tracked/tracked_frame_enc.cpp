@@ -7,6 +7,7 @@
 #include "codec/stage_clock_enc.h"
 #include "codec/tracked/captured_surface_enc.h"
 #include "codec/tracked/node_motion_enc.h"
+#include "surface/limb_starts.h"
 
 namespace htvm::internal {
 namespace {
@@ -138,7 +139,13 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
         const auto other = register_deformation(deformable, surface, from[i], options);
         if (take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form)) any = true;
     }
-    return any;
+    const auto reached = reached_for_extremities(deformable, surface, registered.motion, starts.last,
+                                                 {.millimetre = options.millimetre});
+    if (reached.empty()) return any;
+    auto near = options;  // the body is where it should be already
+    near.coarse_rounds = 0;
+    const auto other = register_deformation(deformable, surface, reached, near);
+    return take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form) || any;
 }
 
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,

@@ -53,8 +53,9 @@ struct NodeRegistration {
 // From the start that lies nearest to the surface.
 NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
                                 const DeformationOptions& options);
-// Registers from the other starts, too, and takes each limb from where it lies nearest to the surface: a start that is
-// best for the whole may lose a hand. registered: by register_nodes(). Gives whether any limb was taken from elsewhere.
+// Registers from the other starts, too, and with limbs that end nowhere turned towards the capture's extremities; takes
+// each limb from where it lies nearest to the surface: a start that is best for the whole may lose a hand. registered:
+// by register_nodes(). Gives whether any limb was taken from elsewhere.
 bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
                        const DeformationOptions& options, NodeRegistration& registered);
 
