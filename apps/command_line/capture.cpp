@@ -114,24 +114,27 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
                        "Seconds to add to the skeleton's clock, if it is early or late");
     add_texture_options(command, options.texture);
     command
-        .add_option("--texture-as", options.texture_as,
-                    "What becomes of a texture: colours at the vertices, or coordinates, which are kept as they are while\n"
-                    "the image is left out (default: colours, unless the meshes have vertex colours of their own)")
+        .add_option(
+            "--texture-as", options.texture_as,
+            "What becomes of a texture: colours at the vertices, or coordinates, which are kept as they are while\n"
+            "the image is left out (default: colours, unless the meshes have vertex colours of their own)")
         ->check(CLI::IsMember({"colours", "coordinates"}));
 }
 
 void add_texture_options(CLI::App& command, TextureOptions& options) {
     command
-        .add_option("--texture", options.files,
-                    "The texture, PNG, JPEG or WebP: an image for all meshes, a pattern such as tex_%05d.jpg for one each,\n"
-                    "or none (default: the image that the meshes' files name, else the one beside a mesh that is called\n"
-                    "like it)")
+        .add_option(
+            "--texture", options.files,
+            "The texture, PNG, JPEG or WebP: an image for all meshes, a pattern such as tex_%05d.jpg for one each,\n"
+            "or none (default: the image that the meshes' files name, else the one beside a mesh that is called\n"
+            "like it)")
         ->type_name("FILE");
     const std::map<std::string, TextureOrigin> origins{{"bottom", TextureOrigin::bottom}, {"top", TextureOrigin::top}};
     command
-        .add_option("--texture-origin", options.origin,
-                    "From which edge of the image the files count texture coordinates (default: top for glTF, bottom for\n"
-                    "the other formats)")
+        .add_option(
+            "--texture-origin", options.origin,
+            "From which edge of the image the files count texture coordinates (default: top for glTF, bottom for\n"
+            "the other formats)")
         ->transform(CLI::CheckedTransformer(origins))
         ->option_text("bottom|top");
 }
@@ -311,7 +314,8 @@ Result<void> Capture::find_unit() {
         return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
     const bool guessed = options_.unit == "auto" && options_.height == 0 && options_.scale == 1;
     const auto of_format = pipe_ ? std::nullopt : unit_of_format(files_.paths[peeked_at_]);
-    const auto unit = options_.unit == "auto" ? of_format.value_or(guess_unit(peeked_->mesh)) : *length_unit(options_.unit);
+    const auto unit =
+        options_.unit == "auto" ? of_format.value_or(guess_unit(peeked_->mesh)) : *length_unit(options_.unit);
     millimetres_per_unit_ = options_.scale * millimetres_per(unit);
     const double tall = height_of(peeked_->mesh, options_.up);
     if (options_.height > 0) {
@@ -363,9 +367,10 @@ void Capture::tell_of_texture() const {
     const auto& image = textures_.image_name();
     const auto& [mesh, texture] = *peeked_;
     if (texture) {
-        note(fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
-                         "coordinates keeps its coordinates instead",
-                         image, texture->width, texture->height));
+        note(
+            fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
+                        "coordinates keeps its coordinates instead",
+                        image, texture->width, texture->height));
     } else if (mesh.texcoords.empty() || options_.texture.files == "none") {
         return;
     } else if (image.empty()) {
@@ -373,9 +378,10 @@ void Capture::tell_of_texture() const {
     } else if (options_.texture_as == "coordinates") {
         note(fmt::format("the texture coordinates are encoded, their image ({}) is not", image));
     } else {
-        note(fmt::format("the meshes have vertex colours, so their texture ({}) is not used; --texture-as colours takes "
-                         "its colours",
-                         image));
+        note(
+            fmt::format("the meshes have vertex colours, so their texture ({}) is not used; --texture-as colours takes "
+                        "its colours",
+                        image));
     }
 }
 

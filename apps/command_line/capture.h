@@ -61,7 +61,8 @@ class Capture {
 public:
     // Opens the input, reads the skeleton and says on the terminal what it found and assumed.
     static Result<Capture> open(const CaptureOptions& options);
-    // The next frame's mesh in mm, as it is to be encoded, or nothing at the end. After an error of a file the next call gives the next file.
+    // The next frame's mesh in mm, as it is to be encoded, or nothing at the end. After an error of a file the next
+    // call gives the next file.
     Result<std::optional<Mesh>> next();
     // Whether there can be a next frame after an error: standard input is lost with its place.
     bool survives_errors() const { return !pipe_; }
@@ -77,7 +78,7 @@ public:
     // Of the frame that next() gave, or failed at, last:
     const Pose* pose() const { return pose_at(*at_); }  // null where there is no skeleton
     std::int64_t timestamp_us() const { return timestamp_us_; }
-    std::string name() const;                                // its file, or its place on standard input
+    std::string name() const;  // its file, or its place on standard input
     // With its texture, before that became colours at vertices; null if it has none.
     std::shared_ptr<const TexturedMesh> textured() const { return textured_; }
     std::size_t missing_before() const { return missing_; }  // frames of the numbers between it and the one before
@@ -128,9 +129,9 @@ private:
 
     TextureFiles textures_;
     std::optional<TexturedMesh> peeked_;  // the first mesh that can be read, in mm, read beforehand to tell its unit
-    std::size_t peeked_at_ = 0;         // its place
-    std::size_t next_ = 0, taken_ = 0;  // place of the next frame; frames that next() gave or failed at
-    std::optional<std::size_t> at_;     // place of the last one
+    std::size_t peeked_at_ = 0;           // its place
+    std::size_t next_ = 0, taken_ = 0;    // place of the next frame; frames that next() gave or failed at
+    std::optional<std::size_t> at_;       // place of the last one
     std::int64_t timestamp_us_ = 0, before_us_ = 0;  // of the last one and of the one before
     std::size_t missing_ = 0;
     std::shared_ptr<const TexturedMesh> textured_;

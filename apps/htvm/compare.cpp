@@ -628,7 +628,8 @@ struct Marks {
 };
 
 Result<Marks> open_marks(const Options& options, const MeshSource& original) {
-    auto source = open_meshes({(std::filesystem::path(options.truth) / "marks").string()}, {"mm", "", options.limits, {}});
+    auto source =
+        open_meshes({(std::filesystem::path(options.truth) / "marks").string()}, {"mm", "", options.limits, {}});
     if (!source) return tl::unexpected(source.error());
     Marks marks{std::move(*source), std::vector<std::size_t>(original.frames)};
     const auto& numbers = marks.source.numbers;

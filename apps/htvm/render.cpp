@@ -185,7 +185,8 @@ Result<void> render(Options options) {
     Frames frames(options);
     const auto first = frames.at(0);
     if (!first) return tl::unexpected(first.error());
-    Orbit orbit{*box, upright_views(options.picture, *source, (*first)->mesh), options.still_camera ? 0 : options.turns, 1};
+    Orbit orbit{*box, upright_views(options.picture, *source, (*first)->mesh), options.still_camera ? 0 : options.turns,
+                1};
     const auto zoom = largest_zoom(frames, shown, orbit);
     if (!zoom) return tl::unexpected(zoom.error());
     orbit.zoom = *zoom;

@@ -58,7 +58,8 @@ Result<void> TruthFiles::add(const std::string& file_name, SynthFrame frame, Tru
         const auto path = folder_ / "texture" / std::filesystem::path(file_name).replace_extension(".png");
         std::error_code error;
         std::filesystem::create_directories(path.parent_path(), error);
-        if (error) return fail(ErrorKind::bad_input, path.parent_path().string() + " cannot be made: " + error.message());
+        if (error)
+            return fail(ErrorKind::bad_input, path.parent_path().string() + " cannot be made: " + error.message());
         const auto bytes = write_png_image(texture->exact);
         if (!bytes) return tl::unexpected(bytes.error());
         if (auto ok = write_file(path, *bytes); !ok) return ok;
@@ -86,7 +87,8 @@ Result<void> TruthFiles::finish() const {
     for (const auto& [layout, gain] : textures_)
         out["textures"].push_back(
             {{"layout", layout},
-             {"gain", {std::round(1e4 * gain[0]) / 1e4, std::round(1e4 * gain[1]) / 1e4, std::round(1e4 * gain[2]) / 1e4}}});
+             {"gain",
+              {std::round(1e4 * gain[0]) / 1e4, std::round(1e4 * gain[1]) / 1e4, std::round(1e4 * gain[2]) / 1e4}}});
     return write_file(folder_ / "truth.json", out.dump(1) + "\n");
 }
 

@@ -1,7 +1,7 @@
 // The files that htvm synth --truth writes beside a capture: DIR/surface/frame_00000.ply, the meshes without noise;
-// DIR/marks/frame_00000.ply, the points that are fixed on the surface; of textured captures DIR/texture/frame_00000.png,
-// the images without noise and exposure; DIR/truth.json, what the marks are on, what limbs do, and the exposure.
-// docs/synth.md describes them.
+// DIR/marks/frame_00000.ply, the points that are fixed on the surface; of textured captures
+// DIR/texture/frame_00000.png, the images without noise and exposure; DIR/truth.json, what the marks are on, what limbs
+// do, and the exposure. docs/synth.md describes them.
 #pragma once
 
 #include <array>

@@ -208,8 +208,7 @@ Result<RdFrame> run_frame(const SweepJob& job, const FrameCoder& coder, const So
     out.encode_ms = coded->encode_ms;
     out.decode_ms = coded->decode_ms;
     if (source.index % options.measure_every == 0) {
-        const auto original =
-            source.textured ? ComparedMesh(source.mesh, *source.textured) : ComparedMesh(source.mesh);
+        const auto original = source.textured ? ComparedMesh(source.mesh, *source.textured) : ComparedMesh(source.mesh);
         const auto compared = compare_frame(original, coded->decoded, options.compare);
         if (!compared) return tl::unexpected(compared.error());
         if (options.compare.points) out.m1_mm = m1_geometry(compared->points);

@@ -8,9 +8,9 @@
 // NORMAL, COLOR_0 (times the material's base colour) and TEXCOORD_0, of floats or integers; triangles, strips, fans and
 // points, with indices or without. Of materials the base colour and its texture's image, with the coordinates that it
 // uses (KHR_texture_transform applied; the base colour does not multiply the image). Lines, materials otherwise,
-// cameras, lights and animations are passed over, and so are nodes that are scaled to nothing, which glTF uses to hide. A vertex that lacks what others have is
-// white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh that share their vertices go on sharing
-// them.
+// cameras, lights and animations are passed over, and so are nodes that are scaled to nothing, which glTF uses to hide.
+// A vertex that lacks what others have is white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh
+// that share their vertices go on sharing them.
 //
 // Not read, with an error that says so: sparse accessors, skins and weighted morph targets (the vertices of a frame are
 // what counts), and required extensions about geometry other than KHR_mesh_quantization, such as Draco.

@@ -285,8 +285,8 @@ Result<void> add_texture(Reading& reading, const json& texture, const json& attr
     auto found = gltf_image_at(reading.file, **image);
     if (!found) return tl::unexpected(found.error());
     auto& images = reading.texture.images;
-    const bool is_known = std::any_of(images.begin(), images.end(),
-                                      [&](const auto& other) { return other.name == found->name; });
+    const bool is_known =
+        std::any_of(images.begin(), images.end(), [&](const auto& other) { return other.name == found->name; });
     if (!is_known) images.push_back(std::move(*found));
     return {};
 }

@@ -16,13 +16,14 @@ namespace htvm {
 namespace {
 
 tl::unexpected<Error> damaged(const char* format, const std::string& why) {
-    return fail(ErrorKind::bad_input, std::string("the ") + format + " image is damaged or cut off (" + why +
-                                          "); save it or copy it again");
+    return fail(ErrorKind::bad_input,
+                std::string("the ") + format + " image is damaged or cut off (" + why + "); save it or copy it again");
 }
 
 tl::unexpected<Error> not_read(const std::string& what) {
-    return fail(ErrorKind::unsupported, "the image " + what + ", which is not read; save it with 8 bits a channel, as "
-                                                              "red, green and blue");
+    return fail(ErrorKind::unsupported, "the image " + what +
+                                            ", which is not read; save it with 8 bits a channel, as "
+                                            "red, green and blue");
 }
 
 std::size_t bytes_of(int width, int height, std::size_t channels) {

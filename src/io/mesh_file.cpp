@@ -145,7 +145,8 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         written = &scaled;
     }
     if (*format != MeshFormat::obj) {
-        const auto bytes = *format == MeshFormat::ply ? write_ply(*written, options.timestamp, options.texture) : write_gltf(*written);
+        const auto bytes =
+            *format == MeshFormat::ply ? write_ply(*written, options.timestamp, options.texture) : write_gltf(*written);
         if (!bytes) return fail_at(path, bytes.error());
         return write_file(path, *bytes);
     }

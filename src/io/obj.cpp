@@ -49,8 +49,9 @@ struct ObjText {
 // Statements that do not describe a mesh and are skipped.
 bool is_other_statement(std::string_view keyword) {
     constexpr std::array<std::string_view, 26> others = {
-        "",       "g",   "o",    "s",    "mg",    "l",    "p",    "vp",   "usemap", "maplib", "cstype", "deg",   "step",
-        "curv",   "curv2", "surf", "parm", "trim", "hole", "scrv", "sp",   "end",    "con",    "lod",    "bevel", "c_interp"};
+        "",       "g",      "o",   "s",    "mg",   "l",     "p",     "vp",      "usemap",
+        "maplib", "cstype", "deg", "step", "curv", "curv2", "surf",  "parm",    "trim",
+        "hole",   "scrv",   "sp",  "end",  "con",  "lod",   "bevel", "c_interp"};
     return std::find(others.begin(), others.end(), keyword) != others.end();
 }
 

@@ -4,8 +4,9 @@
 //
 // Read: v x y z, v x y z r g b (0..1, or 0..255 if any component in the file is above 1), vn, vt, f with v, v/vt, v//vn
 // and v/vt/vn, negative (relative) indices, comments, lines continued with a backslash; mtllib and usemtl, which say
-// where the texture is. Every other statement (groups, objects, lines, points) is skipped. Polygons are cut into fans around their first corner, keeping their
-// orientation; faces with fewer than three corners are left out; isolated vertices and degenerate triangles are kept.
+// where the texture is. Every other statement (groups, objects, lines, points) is skipped. Polygons are cut into fans
+// around their first corner, keeping their orientation; faces with fewer than three corners are left out; isolated
+// vertices and degenerate triangles are kept.
 //
 // Vertices keep their number and order. A position whose corners have several values of vt or vn becomes several
 // vertices: the first combination keeps the position's index, the others are appended at the end, in the order in which

@@ -96,11 +96,10 @@ Result<std::vector<fs::path>> images_of_pattern(const std::string& pattern, cons
     }
     if (!meshes.numbers.empty() && !missing) return out;
     if (images.paths.size() == meshes.paths.size()) return images.paths;
-    return fail(ErrorKind::bad_input,
-                "--texture " + pattern + " gives " + std::to_string(images.paths.size()) + " images for " +
-                    std::to_string(meshes.paths.size()) + " meshes" +
-                    (missing ? ", and none has the number " + std::to_string(*missing) : "") +
-                    "; give an image for each, or one for all");
+    return fail(ErrorKind::bad_input, "--texture " + pattern + " gives " + std::to_string(images.paths.size()) +
+                                          " images for " + std::to_string(meshes.paths.size()) + " meshes" +
+                                          (missing ? ", and none has the number " + std::to_string(*missing) : "") +
+                                          "; give an image for each, or one for all");
 }
 
 void turn_over(Mesh& mesh) {
@@ -196,8 +195,8 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
                            "the mesh with them");
         return TexturedMesh(std::move(mesh));
     }
-    const bool is_wanted = use == TextureUse::always ||
-                           (use == TextureUse::where_colourless && (is_named || mesh.colours.empty()));
+    const bool is_wanted =
+        use == TextureUse::always || (use == TextureUse::where_colourless && (is_named || mesh.colours.empty()));
     const auto found = find(path, place, said);
     if (!found) {
         if (!is_wanted) return TexturedMesh(std::move(mesh));

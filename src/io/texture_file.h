@@ -56,8 +56,8 @@ public:
 
 private:
     struct Found {
-        std::string name;                            // empty: there is no image
-        std::filesystem::path path;                  // empty: the bytes are inside of the mesh's file
+        std::string name;            // empty: there is no image
+        std::filesystem::path path;  // empty: the bytes are inside of the mesh's file
         const std::vector<std::uint8_t>* bytes = nullptr;
     };
     Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place,

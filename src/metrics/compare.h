@@ -52,8 +52,8 @@ struct FrameComparison {
     Topology original_topology, decoded_topology;
 };
 
-// A mesh to compare, and what pictures show of it: the mesh itself, with its texture if it has one, or the textured mesh
-// that its vertex colours were made from. All is lent.
+// A mesh to compare, and what pictures show of it: the mesh itself, with its texture if it has one, or the textured
+// mesh that its vertex colours were made from. All is lent.
 struct ComparedMesh {
     const Mesh* mesh;
     ShownMesh shown;

@@ -95,7 +95,8 @@ Result<std::optional<FrameFlicker>> FlickerMeter::add(TexturedMesh original, Tex
     const auto cameras = cameras_round(options_.view_box.value_or(box), options_.views);
     if (!cameras) return tl::unexpected(cameras.error());
     RenderOptions render = options_.render;
-    render.colours = render.colours && std::ranges::all_of(meshes, [](const TexturedMesh* m) { return ShownMesh(*m).has_colours(); });
+    render.colours = render.colours &&
+                     std::ranges::all_of(meshes, [](const TexturedMesh* m) { return ShownMesh(*m).has_colours(); });
     FrameFlicker out;
     out.lit = change_in_views(meshes, *cameras, render, options_.threads);
     if (render.colours) {

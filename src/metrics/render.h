@@ -81,7 +81,7 @@ struct ShownMesh {
 struct DrawableMesh {
     const Mesh* mesh = nullptr;
     RenderOptions options;
-    std::vector<Vector3f> normals;  // one per vertex, if smooth shading needs them
+    std::vector<Vector3f> normals;                  // one per vertex, if smooth shading needs them
     std::optional<internal::ImagePyramid> texture;  // if it is drawn
 };
 DrawableMesh make_drawable(const ShownMesh& shown, const RenderOptions& options = {});

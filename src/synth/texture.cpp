@@ -98,8 +98,8 @@ bool pack(std::vector<Chart*>& order, double scale, int size) {
 }
 
 Layout make_layout(const SynthOptions& options, int size, int number) {
-    const RandomKey key = derive_key(derive_key(RandomKey{mix_bits(options.seed)}, layout_stream),
-                                     static_cast<std::uint64_t>(number));
+    const RandomKey key =
+        derive_key(derive_key(RandomKey{mix_bits(options.seed)}, layout_stream), static_cast<std::uint64_t>(number));
     const RandomKey axes_key = derive_key(key, axes_stream), order_key = derive_key(key, order_stream);
     Layout out;
     // Not far from the axes of the T-pose, along which most of its parts lie.
@@ -197,9 +197,10 @@ Unfolded unfold(const SynthFrame& made, const PosedScene& scene, const Layout& l
                 const SurfacePoint& point = points[triangles[t][c]];
                 // Where parts merely touch, a corner may belong to the other one.
                 const bool hangs_together = (joined_parts(part) & part_bit(point.part)) != 0;
-                patch.rest[c] = hangs_together ? point.rest
-                                               : Vector3d(frame.rotation.transpose() * (corners[c] - frame.pivot) +
-                                                          frame.rest_pivot);
+                patch.rest[c] =
+                    hangs_together
+                        ? point.rest
+                        : Vector3d(frame.rotation.transpose() * (corners[c] - frame.pivot) + frame.rest_pivot);
             }
             const Vector3d normal = (patch.rest[1] - patch.rest[0]).cross(patch.rest[2] - patch.rest[0]);
             const Vector3d along = layout.axes.transpose() * normal;
@@ -234,7 +235,8 @@ void give_texcoords(const SynthFrame& made, const Unfolded& unfolded, int size, 
                 mesh.texcoords[v] = texcoord;
             }
             if (chart_of[v] == chart) continue;
-            const auto [at, is_new] = others.emplace(std::pair(v, chart), static_cast<std::uint32_t>(out.vertices.size()));
+            const auto [at, is_new] =
+                others.emplace(std::pair(v, chart), static_cast<std::uint32_t>(out.vertices.size()));
             triangle[c] = at->second;
             if (!is_new) continue;
             out.vertices.push_back(v);
@@ -293,7 +295,8 @@ void draw(const std::vector<Patch>& patches, Image& image, std::vector<std::uint
             const auto from = [](double x) { return static_cast<std::size_t>(std::max(0.0, std::ceil(x - 0.5))); };
             const Shares shares(patch);
             if (shares.is_flat) continue;
-            for (std::size_t y = std::max(begin, from(low.y())); y < end && static_cast<double>(y) + 0.5 <= high.y(); ++y)
+            for (std::size_t y = std::max(begin, from(low.y())); y < end && static_cast<double>(y) + 0.5 <= high.y();
+                 ++y)
                 for (std::size_t x = from(low.x()); x < size && static_cast<double>(x) + 0.5 <= high.x(); ++x) {
                     const Vector2d middle(static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
                     const auto inside = shares.at(middle);
@@ -315,7 +318,8 @@ void fill_gutters(Image& image, std::vector<std::uint8_t>& drawn) {
         const auto before = drawn;
         for (int y = 0; y < size; ++y)
             for (int x = 0; x < size; ++x) {
-                const auto at = static_cast<std::size_t>(y) * static_cast<std::size_t>(size) + static_cast<std::size_t>(x);
+                const auto at =
+                    static_cast<std::size_t>(y) * static_cast<std::size_t>(size) + static_cast<std::size_t>(x);
                 if (before[at]) continue;
                 std::array<int, 3> sum{};
                 int count = 0;

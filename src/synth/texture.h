@@ -15,9 +15,9 @@
 namespace htvm {
 
 struct SynthTextureOptions {
-    int size = 1024;       // pixels along each side, 64..4096
-    double noise = 2;      // levels, RMS, new in every texel and frame
-    double exposure = 5;   // percent by which the exposure goes up and down
+    int size = 1024;      // pixels along each side, 64..4096
+    double noise = 2;     // levels, RMS, new in every texel and frame
+    double exposure = 5;  // percent by which the exposure goes up and down
 };
 
 struct SynthTexture {

@@ -128,6 +128,7 @@ TEST(CEncoder, OptionsGiveTheBytesOfTheCppEncoder) {
                              {"topology.predicted_below", "30"},
                              {"topology.merge_duplicates", "off"}}},
                            {Profile::tracked, {{"tracked.references", "intra"}, {"tracked.simplify", "0.2"}}},
+                           {Profile::tracked, {{"tracked.group", "3"}}},
                            {Profile::tracked, {{"rate.bits_per_second", "4e6"}, {"rate.buffer_seconds", "0.5"}}}}) {
         const auto options = make_options(static_cast<std::uint32_t>(profile));
         auto cpp = default_options(profile);

@@ -86,6 +86,25 @@ TEST(Compare, WithoutColoursOfBothThereAreNoUnlitPictures) {
     EXPECT_FALSE(summarise(as_sequence(*compare_frame(coloured, coloured, grey))).has_unlit);
 }
 
+TEST(Compare, ATextureIsWhatPicturesShow) {
+    TexturedMesh captured(shapes::plane(100, 4, 0));
+    for (const auto& p : captured.mesh.positions) captured.mesh.texcoords.push_back({p[0] / 100, p[1] / 100});
+    captured.texture = std::make_shared<const Image>(Image{2, 2, std::vector<std::uint8_t>(12, 90)});
+    Mesh decoded = captured.mesh;
+    decoded.texcoords.clear();
+    EXPECT_FALSE(summarise(as_sequence(*compare_frame(captured, decoded, small_pictures()))).has_unlit);
+    decoded.colours.assign(decoded.positions.size(), {90, 90, 90});
+    const ComparisonSummary same = summarise(as_sequence(*compare_frame(captured, decoded, small_pictures())));
+    ASSERT_TRUE(same.has_unlit);
+    EXPECT_TRUE(std::isinf(same.m3_unlit_full_db));
+    // The colours that were made of it are measured at vertices, and the texture by pictures.
+    Mesh coloured = decoded;
+    coloured.colours.assign(decoded.positions.size(), {100, 100, 100});
+    const auto both = summarise(as_sequence(*compare_frame({coloured, captured}, coloured, small_pictures())));
+    EXPECT_EQ(both.m1_colour, 0);
+    EXPECT_NEAR(both.m3_unlit_foreground_db, 20 * std::log10(255.0 / 10), 1e-9);
+}
+
 TEST(Compare, OnlyWhatIsAskedForIsMeasured) {
     const Mesh flat = shapes::plane(100, 4, 0);
     CompareOptions options = small_pictures();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <numeric>
 #include <random>
 
@@ -257,6 +258,58 @@ TEST(Png, IsWrittenAndAFolderThatDoesNotExistIsAnError) {
     EXPECT_EQ(std::string(signature + 1, 3), "PNG");
     std::filesystem::remove(path);
     EXPECT_FALSE(write_png(picture, "/nonexistent/folder/a.png").has_value());
+}
+
+// ---- Textures -------------------------------------------------------------------------------------------------------
+
+// size x size mm around the origin, facing the camera, with an image spread over it.
+TexturedMesh textured_square(float size, Image image) {
+    Mesh mesh;
+    const float half = size / 2;
+    mesh.positions = {{-half, -half, 0}, {half, -half, 0}, {half, half, 0}, {-half, half, 0}};
+    mesh.texcoords = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+    return {std::move(mesh), std::make_shared<const Image>(std::move(image))};
+}
+
+TEST(Render, ATextureAsLargeAsThePictureIsThePicture) {
+    Image image{8, 8, {}};
+    for (int i = 0; i < 3 * 64; ++i) image.rgb.push_back(static_cast<std::uint8_t>(i));
+    const TexturedMesh square = textured_square(8, image);
+    EXPECT_EQ(render(square, pixel_camera(8, 8), unlit()).rgb, image.rgb);
+}
+
+TEST(Render, ATextureComesBeforeVertexColoursAndGreyBeforeBoth) {
+    TexturedMesh square = textured_square(8, {1, 1, {10, 20, 30}});
+    square.mesh.colours.assign(4, {200, 0, 0});
+    EXPECT_EQ(pixel_at(render(square, pixel_camera(8, 8), unlit()), 3, 3), (Colour{10, 20, 30}));
+    EXPECT_EQ(pixel_at(render(square.mesh, pixel_camera(8, 8), unlit()), 3, 3), (Colour{200, 0, 0}));
+    RenderOptions grey = unlit();
+    grey.colours = false;
+    EXPECT_EQ(pixel_at(render(square, pixel_camera(8, 8), grey), 3, 3), grey.material);
+}
+
+TEST(Render, ATextureIsShadedAsVertexColoursAre) {
+    const TexturedMesh square = textured_square(8, {1, 1, {200, 100, 50}});
+    Mesh coloured = square.mesh;
+    coloured.colours.assign(4, {200, 100, 50});
+    for (const Shading shading : {Shading::flat, Shading::smooth}) {
+        RenderOptions options;
+        options.shading = shading;
+        const Colour first = pixel_at(render(square, pixel_camera(8, 8), options), 2, 5);
+        const Colour second = pixel_at(render(coloured, pixel_camera(8, 8), options), 2, 5);
+        for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(first[c], second[c], 1);
+    }
+}
+
+TEST(Render, PixelsThatSeeManyTexelsShowTheirMean) {
+    Image checks{64, 64, {}};
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x)
+            checks.rgb.insert(checks.rgb.end(), 3, static_cast<std::uint8_t>((x + y) % 2 ? 200 : 0));
+    const Picture picture = render(textured_square(16, checks), pixel_camera(16, 16), unlit());
+    EXPECT_EQ(covered_pixels(picture), 256u);
+    for (const auto level : picture.rgb) EXPECT_EQ(level, 100);
 }
 
 }  // namespace
