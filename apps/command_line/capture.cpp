@@ -393,6 +393,12 @@ Mesh Capture::as_encoded(TexturedMesh captured) {
     return with_vertex_colours(*textured_);
 }
 
+MeshFileOptions Capture::mesh_options() const {
+    MeshFileOptions out;
+    out.millimetres_per_unit = millimetres_per_unit_;
+    return out;
+}
+
 Result<std::optional<TexturedMesh>> Capture::read_file() {
     if (next_ == begin_ + frames_) return std::optional<TexturedMesh>{};
     const std::size_t place = next_++;
@@ -401,12 +407,24 @@ Result<std::optional<TexturedMesh>> Capture::read_file() {
     at_ = place;
     timestamp_us_ = file_times_.empty() ? regular_time(places_[place]) : file_times_[place];
     before_us_ = before;
-    if (peeked_ && place == peeked_at_) return std::exchange(peeked_, std::nullopt);
-    MeshFileOptions options;
-    options.millimetres_per_unit = millimetres_per_unit_;
-    auto mesh = textures_.read(place, texture_use(), options);
+    const bool begun = ahead_ && ahead_->place == place;
+    auto mesh = peeked_ && place == peeked_at_ ? Result<TexturedMesh>(*std::exchange(peeked_, std::nullopt))
+                : begun                        ? ahead_->mesh.get()
+                                               : textures_.read(place, texture_use(), mesh_options());
+    // Who takes a second frame will take a third.
+    if (taken_ > 0) begin_to_read_next();
     if (!mesh) return tl::unexpected(mesh.error());
     return std::optional<TexturedMesh>{std::move(*mesh)};
+}
+
+void Capture::begin_to_read_next() {
+    const bool last = next_ == begin_ + frames_ || (options_.frames > 0 && taken_ + 1 >= options_.frames);
+    if (last || (peeked_ && next_ == peeked_at_)) return;
+    if (!ahead_) ahead_ = std::make_shared<Ahead>(Ahead{textures_, 0, {}});
+    ahead_->place = next_;
+    ahead_->mesh =
+        std::async(std::launch::async, [&files = ahead_->files, place = next_, use = texture_use(),
+                                        options = mesh_options()] { return files.read(place, use, options); });
 }
 
 Result<std::optional<TexturedMesh>> Capture::read_pipe() {
@@ -457,6 +475,7 @@ Result<std::optional<Mesh>> Capture::next() {
 }
 
 void Capture::rewind() {
+    ahead_.reset();
     at_.reset();
     next_ = begin_;
     taken_ = 0;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -106,6 +107,8 @@ private:
     void tell_of_texture() const;
     TextureUse texture_use() const;
     Result<std::optional<TexturedMesh>> read_file();
+    void begin_to_read_next();
+    MeshFileOptions mesh_options() const;
     Result<std::optional<TexturedMesh>> read_pipe();
     Mesh as_encoded(TexturedMesh captured);
     Result<void> find_piped_time(std::size_t place, const std::string& timestamp);
@@ -135,6 +138,15 @@ private:
     std::int64_t timestamp_us_ = 0, before_us_ = 0;  // of the last one and of the one before
     std::size_t missing_ = 0;
     std::shared_ptr<const TexturedMesh> textured_;
+
+    // The next file, which is read while the caller has the one before: of Draco that takes a fifth as long as to
+    // encode it. The thread that reads has `files` to itself.
+    struct Ahead {
+        TextureFiles files;
+        std::size_t place = 0;
+        std::future<Result<TexturedMesh>> mesh;
+    };
+    std::shared_ptr<Ahead> ahead_;  // a copy of a capture goes elsewhere, by restrict_to(), before it reads
 };
 
 }  // namespace htvm::app
