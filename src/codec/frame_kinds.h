@@ -21,7 +21,8 @@ struct DecoderState;
 enum class RefersTo : std::uint8_t {
     nothing,
     reference,            // the current reference: an I-frame, or a frame that patched it
-    reference_or_before,  // the current reference, or the last frame of the same kind since then
+    reference_or_before,  // the current reference, or the last frame of the same kind since then; in a group of them
+                          // also one of those
 };
 
 // Kinds whose sizes rate control models together.

@@ -200,6 +200,32 @@ TEST(SurfacePatch, takes_nothing_from_a_sheet_that_faces_the_other_way) {
     EXPECT_LT(farthest(out, above), 48);
 }
 
+TEST(SurfacePatch, replaces_only_what_reaches_into_lost_cubes) {
+    // Two hills, one twice as high as the other, in different cubes of space.
+    const auto hills = [](double x, double y) { return hill(x + 1200, y + 1200) / 2 + hill(x - 1200, y - 1200); };
+    const auto decoded = height_field(40, 100, flat), captured = height_field(80, 50, hills);
+    const auto goes_at = [&](const std::optional<SurfacePatch>& patch, double x, double y) {
+        bool any = false;
+        for (std::size_t v = 0; v < decoded.positions.size(); ++v)
+            any =
+                any || (patch->removed[v] && std::hypot(decoded.positions[v].x - x, decoded.positions[v].y - y) < 400);
+        return any;
+    };
+    SurfacePatchOptions options;
+    options.region = 2000;
+    const auto both = patch_of(decoded, captured, options);
+    ASSERT_TRUE(both.has_value());
+    EXPECT_TRUE(goes_at(both, 1200, 1200));
+    EXPECT_TRUE(goes_at(both, -1200, -1200));
+    options.region_lost = 180;  // RMS of the higher hill in its cube; of the other half as much
+    const auto higher = patch_of(decoded, captured, options);
+    ASSERT_TRUE(higher.has_value());
+    EXPECT_TRUE(goes_at(higher, 1200, 1200));
+    EXPECT_FALSE(goes_at(higher, -1200, -1200));
+    options.region_lost = 4000;  // no cube is: what is lost by itself goes
+    EXPECT_EQ(patch_of(decoded, captured, options)->removed, both->removed);
+}
+
 TEST(SurfacePatch, is_none_if_too_much_is_lost) {
     const auto decoded = ball(coarse, round_radius), captured = ball(fine, radius_with_cap);
     SurfacePatchOptions options;

@@ -299,7 +299,11 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
     constexpr double most_bytes = 0.8;  // of the I-frame's
     if (work.configuration.options.tracked.patch_share <= 0 || !tracked.texcoords.empty()) return Patched();
     auto options = patch_options(work, steps);
-    for (const double region_lost : {allowed_in_region(work, work.sequence.nodes.best_fit), 0.0}) {
+    // At fine steps a bit brings more where less is wrong.
+    constexpr double lost_in_steps = 1.75;
+    const double lost = std::min(allowed_in_region(work, work.sequence.nodes.best_fit),
+                                 lost_in_steps * static_cast<double>(steps.geometry));
+    for (const double region_lost : {lost, 0.0}) {
         options.region_lost = region_lost;
         StageClock clock(work.stages);
         const auto found = find_surface_patch(tracked, work.reference().decoded.tracked->mesh.positions, work.mesh,
@@ -319,8 +323,8 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
 
 // Whoever joins late needs all patches since the I-frame.
 bool patches_have_grown(const FrameWork& work) {
-    constexpr int most_patches = 16;
-    constexpr double most_bytes = 3;  // times the I-frame's
+    constexpr int most_patches = 24;
+    constexpr double most_bytes = 4;  // times the I-frame's
     const auto& reference = work.reference();
     return reference.patches >= most_patches || reference.patch_bytes > most_bytes * reference.bytes;
 }

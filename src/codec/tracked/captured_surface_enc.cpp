@@ -264,8 +264,8 @@ double CubeErrors::at(const Point3f& point) const {
     return found != rms.end() && found->first == cube ? found->second : 0;
 }
 
-CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side) {
-    constexpr std::ptrdiff_t fewest = 10, left_out = 2;
+CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side,
+                       std::ptrdiff_t fewest, std::ptrdiff_t left_out) {
     std::vector<std::pair<CubeErrors::Cube, double>> sorted;
     sorted.reserve(samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) sorted.emplace_back(cube_of(samples[i], side), squared[i]);
@@ -301,6 +301,8 @@ SurfaceSamples sparse_samples_of(std::span<const Point3f> points, std::span<cons
 
 TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<double>& squared,
                      const TrackedFitOptions& options) {
+    // One sample that found the wrong sheet does not mean that a region is lost.
+    constexpr std::ptrdiff_t fewest = 10, left_out = 2;
     if (points.empty()) return {};
     double squares = 0;
     std::size_t strays = 0;
@@ -311,7 +313,7 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
     const auto count = static_cast<double>(points.size());
     return {std::sqrt(squares / count),
             static_cast<double>(strays) / count,
-            cube_errors(points, squared, options.region).worst(),
+            cube_errors(points, squared, options.region, fewest, left_out).worst(),
             {}};
 }
 

@@ -46,9 +46,10 @@ struct CubeErrors {
     double worst() const;
     double at(const Point3f& point) const;  // 0 if its cube is left out
 };
-// squared: the samples' squared distances. The two farthest of each cube are left out: one that found the wrong sheet
-// does not mean that a region is lost.
-CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side);
+// squared: the samples' squared distances. left_out: how many of the farthest of each cube do not count; fewest: of
+// samples that a cube must have, > left_out.
+CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side,
+                       std::ptrdiff_t fewest, std::ptrdiff_t left_out = 0);
 
 // Measured with a few thousand samples in each direction; the worse of the two directions. Lattice units.
 struct TrackedFit {

@@ -262,14 +262,15 @@ void grow(std::vector<bool>& marked, std::span<const Triangle> triangles) {
 // either surface's vertices from the other.
 std::vector<double> errors_around(std::span<const Point3f> points, std::span<const double> error,
                                   const Capture& capture, const SurfacePatchOptions& options) {
+    constexpr std::ptrdiff_t fewest = 4;
     std::vector<double> squared, of_capture;
     for (const double distance : error) squared.push_back(distance * distance);
     for (const auto& found : capture.on_decoded) {
         const double distance = distance_to(found, options.reach);
         of_capture.push_back(distance * distance);
     }
-    const auto back = cube_errors(points, squared, options.region),
-               forth = cube_errors(capture.points, of_capture, options.region);
+    const auto back = cube_errors(points, squared, options.region, fewest),
+               forth = cube_errors(capture.points, of_capture, options.region, fewest);
     std::vector<double> out;
     for (const auto& point : points) out.push_back(std::max(back.at(point), forth.at(point)));
     return out;
