@@ -133,8 +133,8 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
     command
         .add_option(
             "--texture-origin", options.origin,
-            "From which edge of the image the files count texture coordinates (default: top for glTF, bottom for\n"
-            "the other formats)")
+            "From which edge of the image the files count texture coordinates (default: top for glTF; bottom for OBJ\n"
+            "and PLY; for Draco as both sides of the texture's seams agree)")
         ->transform(CLI::CheckedTransformer(origins))
         ->option_text("bottom|top");
 }
@@ -371,6 +371,10 @@ void Capture::tell_of_texture() const {
             fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
                         "coordinates keeps its coordinates instead",
                         image, texture->width, texture->height));
+        if (textures_.is_from_top_by_seams())
+            note(
+                "its coordinates are taken for counted from the image's top, since so both sides of its seams agree "
+                "(see --texture-origin)");
     } else if (mesh.texcoords.empty() || options_.texture.files == "none") {
         return;
     } else if (image.empty()) {

@@ -1,6 +1,8 @@
 #include "io/texture_file.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <system_error>
 #include <utility>
 
@@ -8,6 +10,8 @@
 #include "io/obj.h"
 
 namespace htvm {
+
+using namespace internal;
 
 namespace {
 
@@ -100,6 +104,37 @@ Result<std::vector<fs::path>> images_of_pattern(const std::string& pattern, cons
                                           " images for " + std::to_string(meshes.paths.size()) + " meshes" +
                                           (missing ? ", and none has the number " + std::to_string(*missing) : "") +
                                           "; give an image for each, or one for all");
+}
+
+// Draco files alone: the others' formats say it.
+bool says_no_origin(const fs::path& mesh) {
+    const auto extension = mesh.extension();
+    return extension == ".drc" || extension == ".DRC";
+}
+
+// How much the colours of the two sides of seams differ, from the bottom and from the top of the image; nothing if the
+// mesh has no seam.
+struct SeamDifference {
+    double from_bottom = 0, from_top = 0;
+};
+std::optional<SeamDifference> difference_at_seams(const Mesh& mesh, const Image& image) {
+    const ImagePyramid texture(image);
+    std::map<Vector3f, std::size_t> first_at;
+    SeamDifference out;
+    bool any = false;
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+        const auto first = first_at.emplace(mesh.positions[v], v).first->second;
+        const Vector2f &a = mesh.texcoords[first], &b = mesh.texcoords[v];
+        if (a == b) continue;
+        any = true;
+        const auto add = [&](double& sum, float av, float bv) {
+            const auto one = texture.at(a[0], av), other = texture.at(b[0], bv);
+            for (std::size_t c = 0; c < 3; ++c) sum += std::abs(static_cast<double>(one[c] - other[c]));
+        };
+        add(out.from_bottom, a[1], b[1]);
+        add(out.from_top, 1 - a[1], 1 - b[1]);
+    }
+    return any ? std::optional(out) : std::nullopt;
 }
 
 void turn_over(Mesh& mesh) {
@@ -208,18 +243,30 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
         if (use != TextureUse::always) return TexturedMesh(std::move(mesh));
         return fail_at(path, ErrorKind::bad_input, "no image was found for it; --texture gives its place");
     }
-    if (found->bytes) {
-        auto image = read_image(*found->bytes);
-        if (!image) return fail_at(path, image.error().kind, found->name + ": " + image.error().message);
-        return TexturedMesh(std::move(mesh), std::make_shared<const Image>(std::move(*image)));
+    auto image = read_image_of(*found, path);
+    if (!image) return tl::unexpected(image.error());
+    if (options_.origin == TextureOrigin::by_format && says_no_origin(path)) {
+        if (!from_top_by_seams_)
+            if (const auto difference = difference_at_seams(mesh, **image))
+                from_top_by_seams_ = difference->from_top < difference->from_bottom;
+        if (is_from_top_by_seams()) turn_over(mesh);
     }
-    if (!kept_ || kept_path_ != found->path) {
-        auto image = read_image_file(found->path);
+    return TexturedMesh(std::move(mesh), std::move(*image));
+}
+
+Result<std::shared_ptr<const Image>> TextureFiles::read_image_of(const Found& found, const fs::path& mesh) {
+    if (found.bytes) {
+        auto image = read_image(*found.bytes);
+        if (!image) return fail_at(mesh, image.error().kind, found.name + ": " + image.error().message);
+        return std::make_shared<const Image>(std::move(*image));
+    }
+    if (!kept_ || kept_path_ != found.path) {
+        auto image = read_image_file(found.path);
         if (!image) return tl::unexpected(image.error());
         kept_ = std::make_shared<const Image>(std::move(*image));
-        kept_path_ = found->path;
+        kept_path_ = found.path;
     }
-    return TexturedMesh(std::move(mesh), kept_);
+    return kept_;
 }
 
 Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const MeshFileOptions& options) {

@@ -19,7 +19,9 @@
 
 namespace htvm {
 
-// From which edge of the image texture coordinates are counted in the files.
+// From which edge of the image texture coordinates are counted in the files. By format: from the top in glTF, from the
+// bottom in OBJ and PLY. Draco says nothing, and its files come in both ways: as both sides of the atlas's seams, which
+// are one place of the surface, agree better in the image.
 enum class TextureOrigin { by_format, bottom, top };
 
 struct TextureOptions {
@@ -51,6 +53,9 @@ public:
     // Of the mesh that was read last: whether there is an image for it, read or not, and what it is called.
     const std::string& image_name() const { return image_name_; }  // empty: there is none
 
+    // Whether coordinates were taken for counted from the top because of the seams.
+    bool is_from_top_by_seams() const { return from_top_by_seams_.value_or(false); }
+
     // The images of all meshes as far as they are known before these are read.
     std::vector<std::filesystem::path> known_images() const;
 
@@ -62,13 +67,15 @@ private:
     };
     Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place,
                                    const TextureReference& said, TextureUse use);
+    Result<std::shared_ptr<const Image>> read_image_of(const Found& found, const std::filesystem::path& mesh);
     Result<Found> find(const std::filesystem::path& mesh, std::size_t place, const TextureReference& said) const;
 
     TextureOptions options_;
     SequenceFiles meshes_;
     std::vector<std::filesystem::path> images_;  // that the user named: one for all, or one for each mesh
     std::string image_name_;
-    std::filesystem::path kept_path_;  // of the image that was read last, which frames may share
+    std::optional<bool> from_top_by_seams_;  // decided by the first mesh that has seams
+    std::filesystem::path kept_path_;        // of the image that was read last, which frames may share
     std::shared_ptr<const Image> kept_;
 };
 

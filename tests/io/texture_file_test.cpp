@@ -1,9 +1,12 @@
 #include "io/texture_file.h"
 
+#include <draco/compression/encode.h>
+#include <draco/mesh/triangle_soup_mesh_builder.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -27,9 +30,9 @@ const char* const obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 0.75\nf
 class TextureFile : public testing::Test {
 protected:
     void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "htvm_texture_XXXXXX").string();
-        ASSERT_NE(mkdtemp(name.data()), nullptr);
-        folder = name;
+        std::string made = (fs::temp_directory_path() / "htvm_texture_XXXXXX").string();
+        ASSERT_NE(mkdtemp(made.data()), nullptr);
+        folder = made;
     }
     void TearDown() override { fs::remove_all(folder); }
 
@@ -188,6 +191,48 @@ TEST_F(TextureFile, TheOriginTurnsCoordinatesOver) {
     EXPECT_EQ(read("a.glb")->mesh.texcoords[2], (Vector2f{0, 0.75f}));
     EXPECT_EQ(read("a.glb", 0, {"", TextureOrigin::top})->mesh.texcoords[2], (Vector2f{0, 0.75f}));
     EXPECT_EQ(read("a.glb", 0, {"", TextureOrigin::bottom})->mesh.texcoords[2], (Vector2f{0, 0.25f}));
+}
+
+// Two triangles beside each other, which share an edge in space and lie in different corners of the image.
+void write_draco(const fs::path& path, bool from_top) {
+    constexpr std::array<Vector3f, 6> positions{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}};
+    constexpr std::array<Vector2f, 6> texcoords{
+        {{0.1f, 0.1f}, {0.4f, 0.1f}, {0.1f, 0.4f}, {0.9f, 0.1f}, {0.9f, 0.4f}, {0.6f, 0.4f}}};
+    draco::TriangleSoupMeshBuilder builder;
+    builder.Start(2);
+    const int place = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
+    const int texture = builder.AddAttribute(draco::GeometryAttribute::TEX_COORD, 2, draco::DT_FLOAT32);
+    for (std::uint32_t f = 0; f < 2; ++f) {
+        std::array<Vector2f, 3> own;
+        for (std::size_t c = 0; c < 3; ++c) {
+            own[c] = texcoords[3 * f + c];
+            if (from_top) own[c][1] = 1 - own[c][1];
+        }
+        builder.SetAttributeValuesForFace(place, draco::FaceIndex(f), &positions[3 * f], &positions[3 * f + 1],
+                                          &positions[3 * f + 2]);
+        builder.SetAttributeValuesForFace(texture, draco::FaceIndex(f), &own[0], &own[1], &own[2]);
+    }
+    const auto mesh = builder.Finalize();
+    draco::Encoder encoder;
+    draco::EncoderBuffer buffer;
+    ASSERT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+    write_bytes(path, {buffer.data(), buffer.data() + buffer.size()});
+}
+
+TEST_F(TextureFile, OfDracoFilesTheSeamsTellTheOrigin) {
+    // The lower half, where the triangles are, is of one colour; the upper half is not.
+    Image image = plain(16, 16, green);
+    for (std::size_t i = 0; i < image.rgb.size() / 2; i += 3)
+        if (i / 3 % 16 < 8) image.rgb[i] = 255;
+    write_bytes(folder / "a.png", *write_png_image(image));
+    for (const bool from_top : {false, true}) {
+        write_draco(folder / "a.drc", from_top);
+        const auto as_found = read("a.drc");
+        ASSERT_TRUE(as_found.has_value()) << error_of(as_found);
+        for (const auto& texcoord : as_found->mesh.texcoords) EXPECT_LT(texcoord[1], 0.5f) << from_top;
+        const auto as_told = read("a.drc", 0, {"", from_top ? TextureOrigin::bottom : TextureOrigin::top});
+        for (const auto& texcoord : as_told->mesh.texcoords) EXPECT_GT(texcoord[1], 0.5f) << from_top;
+    }
 }
 
 TEST_F(TextureFile, MistakesAreToldInOneSentence) {
