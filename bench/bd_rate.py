@@ -10,7 +10,7 @@ against the first.
   --frames N           of the capture (default 60)
   --with OPTIONS       for all of them (default "--denoise off", since errors are measured against the capture)
   --only LIST          metrics: m2, or m2,m3 (default m2)
-  --samples N          of M2, in each direction (default 20000)
+  --compare OPTIONS    of htvm compare (default "--samples 20000"; for pictures of fewer sides "--views 3")
 """
 import argparse
 import bisect
@@ -85,7 +85,7 @@ def measure(arguments, options, quality, folder):
     encoded = json.loads(run(arguments.htvm, "encode", arguments.capture, "--frames", arguments.frames, "-q", quality,
                              *getattr(arguments, "with").split(), *options.split(), "--json", "-o", stream))
     compared = json.loads(run(arguments.htvm, "compare", arguments.capture, stream, "--frames", arguments.frames,
-                              "--only", arguments.only, "--samples", arguments.samples, "--json"))
+                              "--only", arguments.only, *arguments.compare.split(), "--json"))["sequence"]
     out = {}
     if "m2" in arguments.only.split(","):
         out["M2"] = ("%.4f mm" % compared["m2"]["rms_mm"], -math.log(compared["m2"]["rms_mm"]))
@@ -103,7 +103,7 @@ def main():
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--with", default="--denoise off")
     parser.add_argument("--only", default="m2")
-    parser.add_argument("--samples", type=int, default=20000)
+    parser.add_argument("--compare", default="--samples 20000")
     arguments = parser.parse_args()
     curves = []
     for options in arguments.options:

@@ -259,13 +259,6 @@ void check_jobs(const EncodeOptions& options, bool random_session) {
                                    "all the same number");
 }
 
-// A group's packets come once its last frame is captured.
-void check_groups(const EncodeOptions& options) {
-    if (is_given(options.encoding, "tracked.group") && live::looks_like_hub_address(options.output))
-        throw CLI::ValidationError("--group",
-                                   "holds frames back, which who watches live would wait for; it is for files");
-}
-
 }  // namespace
 
 Result<void> encode(const EncodeOptions& options) {
@@ -274,6 +267,10 @@ Result<void> encode(const EncodeOptions& options) {
     if (!capture) return tl::unexpected(capture.error());
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
+    // A group's packets come once its last frame is captured.
+    if (settings->tracked.group > 1 && live::looks_like_hub_address(options.output))
+        return fail(ErrorKind::bad_input,
+                    "--group holds frames back, which who watches live would wait for: it is for files, not for a hub");
     const bool drawn = !is_given(options.encoding, "session") && options.job.of == 0 && may_be_live(options.output);
     if (drawn) settings->session = random_session();
     const auto audio = AudioTrack::open(options.audio);
@@ -361,7 +358,6 @@ void add_encode(CLI::App& app, Run& run) {
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();
-        check_groups(*options);
         check_jobs(*options, !sessions.empty() && sessions[0] == "random");
         if (live::looks_like_hub_address(options->output) && options->in_groups())
             throw CLI::ValidationError("--jobs", "encodes groups of frames at once: for files, not for what is live");
