@@ -93,8 +93,8 @@ contains tracked
 same moving "$work/moving" --profile tracked --simplify 0 --tracked-from intra
 contains tracked
 # TP-frames: dances in which tracking is lost in places.
-"$htvm" synth "$work/fast" --vertices 700 --frames 13 --motion fast >/dev/null 2>&1
-"$htvm" synth "$work/fast_normals" --vertices 700 --frames 8 --motion fast --normals >/dev/null 2>&1
+"$htvm" synth "$work/fast" --vertices 1000 --frames 13 --motion fast --seed 2 >/dev/null 2>&1
+"$htvm" synth "$work/fast_normals" --vertices 1000 --frames 13 --motion fast --seed 2 --normals >/dev/null 2>&1
 for name in fast fast_normals; do
     same $name "$work/$name" --profile tracked
     contains patched
