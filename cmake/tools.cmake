@@ -17,7 +17,13 @@ add_library(htvm_libdraco INTERFACE)
 target_include_directories(htvm_libdraco SYSTEM INTERFACE ${DRACO_INCLUDE})
 target_link_libraries(htvm_libdraco INTERFACE ${DRACO_LIBRARY})
 
-htvm_floor(io DIRECTORY src/io LINKS htvm_core htvm_libdraco htvm_image_formats nlohmann_json::nlohmann_json)
+# Images and textures are apart, so that the Python library, which reads meshes alone, needs none of their libraries.
+file(GLOB io_sources CONFIGURE_DEPENDS src/io/*.cpp)
+set(image_sources ${io_sources})
+list(FILTER image_sources INCLUDE REGEX "/(image|texture)_[a-z]*\\.cpp$")
+list(FILTER io_sources EXCLUDE REGEX "/(image|texture)_[a-z]*\\.cpp$")
+htvm_floor(io SOURCES ${io_sources} LINKS htvm_core htvm_libdraco nlohmann_json::nlohmann_json)
+htvm_floor(images SOURCES ${image_sources} LINKS htvm_io htvm_image_formats)
 htvm_floor(synth DIRECTORY src/synth LINKS htvm_core Eigen3::Eigen)
 # It reads no input, and makes what other tests need: with sanitizers it would take half of their time.
 if(HTVM_SANITIZE MATCHES "address")
@@ -42,7 +48,7 @@ function(htvm_program_library name folder)
   # The work is in the libraries; optimising the options and tables would take a quarter of the whole build.
   target_compile_options(htvm_${name} PRIVATE $<IF:$<CONFIG:Debug>,-O0,-O1>)
 endfunction()
-htvm_program_library(command_line command_line htvm_core htvm_io CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
+htvm_program_library(command_line command_line htvm_core htvm_io htvm_images CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 include(cmake/live.cmake)
 htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_synth htvm_metrics htvm_live)

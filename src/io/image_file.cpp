@@ -33,7 +33,6 @@ std::size_t bytes_of(int width, int height, std::size_t channels) {
 // Nothing is allocated before.
 Result<void> check_size(std::uint64_t width, std::uint64_t height, int largest_side) {
     const auto most = static_cast<std::uint64_t>(largest_side);
-    if (width == 0 || height == 0) return fail(ErrorKind::bad_input, "the image has no pixels");
     if (width <= most && height <= most) return {};
     return fail(ErrorKind::limit, "the image has " + std::to_string(width) + " x " + std::to_string(height) +
                                       " pixels, more than " + std::to_string(most) + " x " + std::to_string(most) +
@@ -90,6 +89,7 @@ Result<Image> read_jpeg(std::span<const std::uint8_t> bytes, int largest_side) {
     int width = 0, height = 0, subsampling = 0, colours = 0;
     if (tjDecompressHeader3(jpeg.get(), bytes.data(), size, &width, &height, &subsampling, &colours) != 0)
         return damaged("JPEG", tjGetErrorStr2(jpeg.get()));
+    if (width < 1 || height < 1) return damaged("JPEG", "it ends within its header");
     if (auto ok = check_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height), largest_side); !ok)
         return tl::unexpected(ok.error());
     if (colours == TJCS_CMYK || colours == TJCS_YCCK) return not_read("has the colours of printing (CMYK)");

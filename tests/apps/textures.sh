@@ -1,0 +1,75 @@
+#!/usr/bin/env bash
+# Textured captures: images beside meshes, colours from them, pictures and metrics with them, and what is wrong with them.
+. "$(dirname "$0")/expect.sh"
+
+"$htvm" synth capture --frames 3 --vertices 3000 --texture 256 --truth truth --quiet
+for k in 0 1 2; do
+    [ -f capture/frame_0000$k.jpg ] || fail "frame $k has no image"
+    grep -qa "^comment TextureFile frame_0000$k.jpg" capture/frame_0000$k.ply || fail "frame $k does not name its image"
+    [ -f truth/texture/frame_0000$k.png ] || fail "frame $k has no true image"
+done
+grep -q '"gain"' truth/truth.json || fail "the truth does not tell the exposure"
+expect 2 "--texture writes images beside meshes in a folder" "$htvm" synth --live --texture 256
+expect 1 "64 to 4096 pixels" "$htvm" synth x --frames 1 --texture 5000
+
+# Colours at vertices by default; the stream has no texture coordinates.
+expect 0 "the colours are those of the texture (capture/frame_00000.jpg, 256 x 256 pixels) at the vertices" \
+    "$htvm" encode capture -o colours.htvm
+"$htvm" decode colours.htvm -o decoded/ --quiet
+head -c 400 decoded/00000.ply | grep -qa "property uchar red" || fail "the decoded mesh has no colours"
+head -c 400 decoded/00000.ply | grep -qa "property float s" && fail "the decoded mesh has texture coordinates"
+# As good as vertex colours of the same person, in which there is no camera's noise.
+unlit() { "$htvm" compare "$@" --only m3 --views 2 --width 320 --height 256 --json 2>/dev/null | sed -n '/"sequence"/,$p' | awk -F'[:,]' '/"m3_unlit"/ { seen = 1 } seen && /foreground_db/ { print int($2); exit }'; }
+textured=$(unlit capture colours.htvm)
+[ "${textured:-0}" -ge 16 ] || fail "the colours are ${textured:-?} dB from the texture"
+# Against it coordinates alone, which the capture's own image is laid on.
+expect 0 "the texture coordinates are encoded, their image (capture/frame_00000.jpg) is not" \
+    "$htvm" encode capture --texture-as coordinates -o coordinates.htvm
+[ "$(unlit capture coordinates.htvm)" -gt "$textured" ] || fail "kept coordinates do not show the image"
+
+# Two processes give the same stream.
+"$htvm" encode capture --keyint 1 --jobs 2 -o jobs.htvm --quiet
+"$htvm" encode capture --keyint 1 --jobs 1 -o job.htvm --quiet
+cmp -s jobs.htvm job.htvm || fail "jobs make another stream"
+
+# Standard input: an image by its comment, and one for all.
+(cd capture && cat frame_0000*.ply | "$htvm" encode - -o ../piped.htvm --quiet)
+"$htvm" decode piped.htvm -o piped/ --quiet
+head -c 400 piped/00000.ply | grep -qa "property uchar red" || fail "meshes from standard input have no colours"
+expect 1 "take one image for all" bash -c "cat capture/*.ply | '$htvm' encode - --texture 'capture/frame_%05d.jpg' -o x.htvm"
+
+# Pictures: a square metre whose upper half is white, the lower black, as its material says; and turned over.
+python3 - <<'PYTHON'
+import struct, zlib
+
+def chunk(kind, data):
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+rows = b"".join(b"\0" + (b"\xff" if y < 4 else b"\0") * 24 for y in range(8))
+open("skin.png", "wb").write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 8, 8, 8, 2, 0, 0, 0))
+                             + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+PYTHON
+printf 'mtllib square.mtl\nusemtl skin\nv -0.5 -0.5 0\nv 0.5 -0.5 0\nv 0.5 0.5 0\nv -0.5 0.5 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n' >square.obj
+printf 'newmtl skin\nmap_Kd skin.png\n' >square.mtl
+shows() { [ "$(python3 "$project/tests/apps/png.py" "$1" 30,10 30,30 | tail -n 2 | paste -sd,)" = "$2" ] || fail "$1 does not show $2"; }
+small=(--width 60 --height 40 --elevation 0 --up y --quiet)
+"$htvm" still square.obj -o square.png "${small[@]}" && shows square.png "255 255 255,0 0 0"
+"$htvm" still square.obj --texture-origin top -o square.png "${small[@]}" && shows square.png "0 0 0,255 255 255"
+"$htvm" still square.obj --texture none -o square.png "${small[@]}" --shading unlit && shows square.png "200 200 200,200 200 200"
+
+# What is wrong, and where.
+head -c 100 skin.png >cut.png
+expect 1 "cut.png: the PNG image is damaged or cut off" "$htvm" still square.obj --texture cut.png -o x.png
+expect 1 "--texture: there is no file or folder gone.png" "$htvm" still square.obj --texture gone.png -o x.png
+expect 1 "square.obj: this is no PNG, JPEG or WebP image; save it as one of them" "$htvm" still square.obj --texture square.obj -o x.png
+rm skin.png
+expect 1 'square.obj: its image "skin.png" is not in its folder; --texture gives its place, or none to go on without' \
+    "$htvm" encode square.obj -o x.htvm
+expect 0 "" "$htvm" encode square.obj --texture none -o x.htvm
+expect 2 "--texture-as" "$htvm" encode capture --texture-as picture -o x.htvm
+# A bad image makes its frame a bad one.
+echo nonsense >capture/frame_00001.jpg
+expect 1 "capture/frame_00001.jpg: this is no PNG, JPEG or WebP image" "$htvm" encode capture -o x.htvm
+expect 0 "1 bad frame left out" "$htvm" encode capture --on-bad-frame skip -o x.htvm
+
+done_with "textured captures"
