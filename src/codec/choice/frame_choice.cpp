@@ -246,7 +246,7 @@ Result<Candidate> choose_by_cost(FrameWork& work, const FrameSteps& steps) {
 // How far off a region of 10 cm may be, lattice units. best: RMS of the best T-frame.
 double allowed_in_region(const FrameWork& work, double best) {
     constexpr double region_to_best = 5, region_to_intra = 1.5;
-    constexpr double visible = 3.5, visible_in_edges = 0.35;  // mm on an adult; in mean edges of the capture
+    constexpr double visible = 3.5, visible_in_edges = 0.42;  // mm on an adult; in mean edges of the capture
     const auto& intra = work.reference().intra;
     return std::max({region_to_best * best, region_to_intra * intra.fit.worst_region,
                      visible * work.configuration.adult_millimetre, visible_in_edges * intra.edge});
@@ -282,7 +282,7 @@ SurfacePatchOptions patch_options(const FrameWork& work, const FrameSteps& steps
     const auto& configuration = work.configuration;
     const double millimetre = configuration.adult_millimetre;
     SurfacePatchOptions out;
-    out.lost = std::max(6 * millimetre, 0.35 * work.reference().intra.edge);
+    out.lost = std::max(6 * millimetre, 0.42 * work.reference().intra.edge);
     out.region = region_side(configuration);
     out.reach = 30 * millimetre;
     out.speck = 20 * millimetre;
