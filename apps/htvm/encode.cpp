@@ -352,9 +352,9 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  htvm encode capture/ --jobs 8 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 --drop-late -o wss://hub.example/publish/person");
-    show_first(*command,
-               {"--skeleton", "--output", "--fps", "--unit", "--height", "--frames", "--first", "--quality",
-                "--profile", "--bitrate", "--buffer", "--keyint", "--on-bad-frame", "--threads", "--jobs", "--json"});
+    show_first(*command, {"--skeleton", "--output", "--fps", "--unit", "--height", "--texture", "--frames", "--first",
+                          "--quality", "--profile", "--bitrate", "--buffer", "--keyint", "--on-bad-frame", "--threads",
+                          "--jobs", "--json"});
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();

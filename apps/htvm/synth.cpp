@@ -292,7 +292,7 @@ void add_synth(CLI::App& app, Run& run) {
                                      "vertex\ncolours: an atlas whose layout changes every second, with noise and a "
                                      "drifting exposure;\nwith --truth also without these")
                         ->option_text("PIXELS");
-    command->add_option("--texture-format", o.texture_format, "Of these images")
+    command->add_option("--texture-format", o.texture_format, "The format of these images")
         ->check(CLI::IsMember({"jpg", "png"}))
         ->option_text("jpg|png=jpg")
         ->needs(texture);

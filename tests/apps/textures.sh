@@ -9,7 +9,7 @@ for k in 0 1 2; do
     [ -f truth/texture/frame_0000$k.png ] || fail "frame $k has no true image"
 done
 grep -q '"gain"' truth/truth.json || fail "the truth does not tell the exposure"
-expect 2 "--texture writes images beside meshes in a folder" "$htvm" synth --live --texture 256
+expect 2 "writes images beside meshes in a folder, so not with --live" "$htvm" synth --live --texture 256
 expect 1 "64 to 4096 pixels" "$htvm" synth x --frames 1 --texture 5000
 
 # Colours at vertices by default; the stream has no texture coordinates.
@@ -58,7 +58,7 @@ small=(--width 60 --height 40 --elevation 0 --up y --quiet)
 "$htvm" still square.obj --texture none -o square.png "${small[@]}" --shading unlit && shows square.png "200 200 200,200 200 200"
 
 # What is wrong, and where.
-head -c 100 skin.png >cut.png
+head -c 60 skin.png >cut.png
 expect 1 "cut.png: the PNG image is damaged or cut off" "$htvm" still square.obj --texture cut.png -o x.png
 expect 1 "--texture: there is no file or folder gone.png" "$htvm" still square.obj --texture gone.png -o x.png
 expect 1 "square.obj: this is no PNG, JPEG or WebP image; save it as one of them" "$htvm" still square.obj --texture square.obj -o x.png
