@@ -137,6 +137,14 @@ std::optional<SeamDifference> difference_at_seams(const Mesh& mesh, const Image&
     return any ? std::optional(out) : std::nullopt;
 }
 
+Image turned_over(const Image& image) {
+    Image out{image.width, image.height, {}};
+    const auto row = 3 * static_cast<std::ptrdiff_t>(image.width);
+    for (auto end = image.rgb.end(); end != image.rgb.begin(); end -= row)
+        out.rgb.insert(out.rgb.end(), end - row, end);
+    return out;
+}
+
 void turn_over(Mesh& mesh) {
     for (auto& texcoord : mesh.texcoords) texcoord[1] = 1 - texcoord[1];
 }
@@ -249,7 +257,9 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
         if (!from_top_by_seams_)
             if (const auto difference = difference_at_seams(mesh, **image))
                 from_top_by_seams_ = difference->from_top < difference->from_bottom;
-        if (is_from_top_by_seams()) turn_over(mesh);
+        // The image, as the coordinates are to stay what the file says wherever they are coded or compared.
+        if (is_from_top_by_seams())
+            return TexturedMesh(std::move(mesh), std::make_shared<const Image>(turned_over(**image)));
     }
     return TexturedMesh(std::move(mesh), std::move(*image));
 }

@@ -21,7 +21,7 @@ namespace htvm {
 
 // From which edge of the image texture coordinates are counted in the files. By format: from the top in glTF, from the
 // bottom in OBJ and PLY. Draco says nothing, and its files come in both ways: as both sides of the atlas's seams, which
-// are one place of the surface, agree better in the image.
+// are one place of the surface, agree better in the image, which is turned over where that is from the top.
 enum class TextureOrigin { by_format, bottom, top };
 
 struct TextureOptions {
