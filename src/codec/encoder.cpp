@@ -365,7 +365,7 @@ RateControlOptions rate_options(const EncoderOptions& options) {
     out.buffer_seconds = options.rate.buffer_seconds;
     // An I-frame's bits are made up for within a second, not over ten.
     out.key_interval = std::min(options.key_interval, 30);
-    if (options.profile == Profile::tracked) out.intra_extra = 3;
+    if (options.profile == Profile::tracked) out.intra_extra = 4;
     return out;
 }
 

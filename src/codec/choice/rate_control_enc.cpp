@@ -158,18 +158,17 @@ double RateController::quality(FrameType type) const {
     return std::clamp(q, options_.lowest_quality, options_.highest_quality);
 }
 
-// The bits the line carries, plus what brings the buffer to the level wanted just before an I-frame: the bits lost
-// while the line was idle, so that the total meets the target. That level is at least a little, so that the line does
-// not idle, and at most half the buffer.
+// The bits the line carries, plus what makes up for those that frames so far took too much, or too little. Of an
+// I-frame only the part counts that should have been made up for by now, since quality is chosen for the usual mixture
+// of types.
 double RateController::wanted_bits() const {
-    const double frames = capacity_ / per_frame_, horizon = std::clamp(1.5 * frames, 4.0, 60.0);
+    const double frames = capacity_ / per_frame_, horizon = std::clamp(frames, 4.0, 15.0);
     const double phase = 1 - static_cast<double>(since_intra_) / options_.key_interval;
     const double of_intra = std::max(0.0, expected_bits(model_, RateClass::intra, level_) - per_frame_);
-    const double before_intra = buffer_ - (since_intra_ > 0 ? of_intra * std::max(0.0, phase) : 0);
-    const double least = std::min(capacity_ / 5, 4 * per_frame_);
-    const double most = std::max(least, std::min(capacity_ / 2, 0.85 * capacity_ - of_intra));
-    const double wanted = std::clamp(idle_bits_, least, most);
-    return std::clamp(per_frame_ + (wanted - before_intra) / horizon, per_frame_ / 4, per_frame_ * 1.06);
+    const double excused = since_intra_ > 0 ? of_intra * std::max(0.0, phase) : 0;
+    // More than half a buffer below the target is not made up for: that would be a burst.
+    const double behind = std::max(buffer_ - idle_bits_ - excused, -capacity_ / 2);
+    return std::clamp(per_frame_ - behind / horizon, per_frame_ / 4, per_frame_ * 1.5);
 }
 
 double RateController::live_quality(FrameType type) const {
