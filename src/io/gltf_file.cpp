@@ -229,7 +229,7 @@ T loaded(const std::uint8_t* at) {
 
 struct View {
     std::span<const std::uint8_t> bytes;
-    std::uint64_t stride = 0;  // 0: not given
+    std::optional<std::uint64_t> stride = {};
 };
 
 // Of numbers, or of an image; nothing if it goes beyond its buffer.
@@ -239,9 +239,10 @@ Result<std::optional<View>> open_view(GltfFile& file, std::uint64_t index) {
     const auto buffer_index = gltf_number(**view, "buffer", 0);
     const auto offset = gltf_number(**view, "byteOffset", 0);
     const auto length = gltf_number(**view, "byteLength", 0);
-    const auto stride = gltf_number(**view, "byteStride", 0);
-    for (const auto* number : {&buffer_index, &offset, &length, &stride})
+    const auto stride = gltf_index(**view, "byteStride");
+    for (const auto* number : {&buffer_index, &offset, &length})
         if (!*number) return tl::unexpected(number->error());
+    if (!stride) return tl::unexpected(stride.error());
     const auto buffer = open_buffer(file, *buffer_index);
     if (!buffer) return tl::unexpected(buffer.error());
     if (*offset > buffer->size() || *length > buffer->size() - *offset) return std::optional<View>();
@@ -399,7 +400,7 @@ Result<GltfAccessor> open_accessor(GltfFile& file, std::uint64_t index) {
     if (!view) return tl::unexpected(view.error());
     if (!*view) return wrong("lies in a view that goes beyond its buffer");
     const auto& [bytes, given_stride] = **view;
-    const std::uint64_t stride = given_stride > 0 ? given_stride : row;
+    const std::uint64_t stride = given_stride.value_or(row);
     if (stride < row || stride > 252) return wrong("has rows that overlap or lie too far apart");
     out.stride = static_cast<std::size_t>(stride);
     const auto room = *offset > bytes.size() ? 0 : bytes.size() - *offset;
