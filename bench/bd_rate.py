@@ -6,6 +6,7 @@ usage: bd_rate.py [options] HTVM CAPTURE OPTIONS OPTIONS...
 
 OPTIONS are those of htvm encode, in one word: bd_rate.py htvm ../shared/data/liam "" "--group 4" "--group 8". All are held
 against the first.
+  --before PROGRAM     another build, which encodes what the first OPTIONS say; all are compared by HTVM
   -q A,B,...           qualities (default 20,35,50,65)
   --frames N           of the capture (default 60)
   --with OPTIONS       for all of them (default "--denoise off", since errors are measured against the capture)
@@ -79,10 +80,10 @@ def rate_difference(reference, tested):
     return math.exp((b.integral(low, high) - a.integral(low, high)) / (high - low)) - 1
 
 
-def measure(arguments, options, quality, folder):
+def measure(arguments, program, options, quality, folder):
     """Bytes, frames/s, and each metric as (what is shown, quality: the more the better)."""
     stream = os.path.join(folder, "stream.htvm")
-    encoded = json.loads(run(arguments.htvm, "encode", arguments.capture, "--frames", arguments.frames, "-q", quality,
+    encoded = json.loads(run(program, "encode", arguments.capture, "--frames", arguments.frames, "-q", quality,
                              *getattr(arguments, "with").split(), *options.split(), "--json", "-o", stream))
     compared = json.loads(run(arguments.htvm, "compare", arguments.capture, stream, "--frames", arguments.frames,
                               "--only", arguments.only, *arguments.compare.split(), "--json"))["sequence"]
@@ -99,6 +100,7 @@ def main():
     parser.add_argument("htvm")
     parser.add_argument("capture")
     parser.add_argument("options", nargs="+")
+    parser.add_argument("--before")
     parser.add_argument("-q", default="20,35,50,65")
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--with", default="--denoise off")
@@ -106,11 +108,12 @@ def main():
     parser.add_argument("--compare", default="--samples 20000")
     arguments = parser.parse_args()
     curves = []
-    for options in arguments.options:
+    for number, options in enumerate(arguments.options):
+        program = arguments.before if arguments.before and number == 0 else arguments.htvm
         curve = {}
         with tempfile.TemporaryDirectory() as folder:
             for quality in arguments.q.split(","):
-                size, speed, metrics = measure(arguments, options, quality, folder)
+                size, speed, metrics = measure(arguments, program, options, quality, folder)
                 for name, (_, value) in metrics.items():
                     curve.setdefault(name, []).append((size, value))
                 print("%-20s -q %-4s %9d bytes  %s  encoded at %.1f frames/s" % (
