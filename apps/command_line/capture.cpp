@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "command_line/terminal.h"
@@ -129,14 +128,15 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
             "or none (default: the image that the meshes' files name, else the one beside a mesh that is called\n"
             "like it)")
         ->type_name("FILE");
-    const std::map<std::string, TextureOrigin> origins{{"bottom", TextureOrigin::bottom}, {"top", TextureOrigin::top}};
     command
-        .add_option(
-            "--texture-origin", options.origin,
+        .add_option_function<std::string>(
+            "--texture-origin",
+            [&options](const std::string& edge) {
+                options.origin = edge == "top" ? TextureOrigin::top : TextureOrigin::bottom;
+            },
             "From which edge of the image the files count texture coordinates (default: top for glTF; bottom for OBJ\n"
             "and PLY; for Draco as both sides of the texture's seams agree)")
-        ->transform(CLI::CheckedTransformer(origins))
-        ->option_text("bottom|top");
+        ->check(CLI::IsMember({"bottom", "top"}));
 }
 
 bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
@@ -335,6 +335,7 @@ Result<void> Capture::find_unit() {
             note(looks + " (see --unit)");
     }
     if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) return ok;
+    has_texture_ = peeked_->texture != nullptr;
     find_floor();
     // From files all is read again but what is kept.
     if (!pipe_) next_ = begin_;
@@ -475,6 +476,10 @@ Result<std::optional<Mesh>> Capture::next() {
     if (!captured || *captured) ++taken_;
     if (!captured) return tl::unexpected(captured.error());
     if (!*captured) return std::optional<Mesh>{};
+    if (has_texture_ && !(*captured)->texture && (*captured)->mesh.colours.empty())
+        return fail(ErrorKind::bad_input, fmt::format("{}: there is no image for it, as there is for others; --texture "
+                                                      "gives its place, --texture-as coordinates does without images",
+                                                      name()));
     return std::optional<Mesh>{as_encoded(std::move(**captured))};
 }
 

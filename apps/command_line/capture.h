@@ -131,6 +131,7 @@ private:
     std::size_t begin_ = 0, frames_ = 0;  // place of the first frame; their number, 0 where it is not known
 
     TextureFiles textures_;
+    bool has_texture_ = false;            // whether the first mesh's colours are those of its texture
     std::optional<TexturedMesh> peeked_;  // the first mesh that can be read, in mm, read beforehand to tell its unit
     std::size_t peeked_at_ = 0;           // its place
     std::size_t next_ = 0, taken_ = 0;    // place of the next frame; frames that next() gave or failed at

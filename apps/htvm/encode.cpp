@@ -35,10 +35,11 @@ double seconds_of(const Summary& summary, double fps) {
 // ---- What is said of it ---------------------------------------------------------------------------------------------
 
 void report(const EncodeOptions& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes,
-            double fps, std::size_t dropped_late) {
+            double fps, std::size_t dropped_late, const Publishing* hub = nullptr) {
     const auto frames = summary.totals.all().frames;
     const double seconds = seconds_of(summary, fps);
     const double megabits = 8e-6 * static_cast<double>(bytes);
+    const auto not_sent = hub ? hub->state().dropped_frames : 0;
     if (options.json) {
         nlohmann::json out = {{"output", options.output},
                               {"bytes", bytes},
@@ -50,6 +51,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
                               {"late_frames", dropped_late},
                               {"megabits_per_second", megabits / seconds},
                               {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
+        if (hub) out["not_sent_frames"] = not_sent;
         if (rate.controlled()) out["control"] = rate_json(rate, bytes, seconds);
         fmt::print("{}\n", out.dump(2));
     } else {
@@ -63,6 +65,10 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
         warn(fmt::format(
             "{} of {} came faster than they were encoded, and were dropped; a lower -q or --bitrate is faster",
             dropped_late, counted(summary.frames + dropped_late, "frame")));
+    if (not_sent > 0)
+        warn(fmt::format(
+            "the line did not take {} of {} in time, and they were not sent; a lower --bitrate or -q fits it", not_sent,
+            counted(frames, "frame")));
     if (const auto strain = rate_warning(rate); !strain.empty()) warn(strain);
     if (summary.without_triangles > 0)
         warn(fmt::format("{} of {} no triangles; see that the files hold meshes", summary.without_triangles,
@@ -186,6 +192,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         Summary summary;
         RateReport rate(settings);
         const bool writes = number >= fewest;
+        bool line_was_slower = false;
         {
             Progress progress(most == 1 ? "encoding" : fmt::format("pass {}", number), capture.frames());
             FrameWarnings warnings;
@@ -208,6 +215,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
             auto done = encode_frames(pass);
             if (!done) return writes ? ended_early(pass, *output, done.error()) : done;
             if (done = finish(pass); !done) return done;
+            line_was_slower = pass.line_was_slower;
         }
         const double seconds = seconds_of(summary, capture.fps());
         if (!writes || (number < most && is_off(rate, 8.0 * static_cast<double>(output->bytes()), seconds))) {
@@ -220,7 +228,8 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
         if (summary.bounds) output->add_bounds(*summary.bounds);
         if (auto finished = output->finish(); !finished) return finished;
-        report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped());
+        rate.line_was_slower = line_was_slower;
+        report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped(), hub);
         if (rate.dropped.empty()) return {};
         return fail(
             ErrorKind::limit,
@@ -361,6 +370,9 @@ void add_encode(CLI::App& app, Run& run) {
         check_jobs(*options, !sessions.empty() && sessions[0] == "random");
         if (live::looks_like_hub_address(options->output) && options->in_groups())
             throw CLI::ValidationError("--jobs", "encodes groups of frames at once: for files, not for what is live");
+        if (options->publishing.fixed_bitrate &&
+            !(live::looks_like_hub_address(options->output) && is_given(options->encoding, "rate.bits_per_second")))
+            throw CLI::ValidationError("--fixed-bitrate", "does nothing without a --bitrate and a hub to publish to");
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
         if (options->capture.drop_late && !is_piped(options->capture))

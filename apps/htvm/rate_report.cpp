@@ -98,7 +98,7 @@ RateStrain rate_strain(const RateReport& report) {
 
 std::string rate_warning(const RateReport& report) {
     const auto strain = rate_strain(report);
-    if (!strain.any()) return {};
+    if (!strain.any() || report.line_was_slower) return {};
     std::string what;
     const auto add = [&](std::size_t frames, const char* how) {
         if (frames > 0) what += fmt::format("{}{} {}", what.empty() ? "" : ", ", frames, how);
@@ -122,6 +122,7 @@ std::string rate_summary(const RateReport& report, std::uint64_t bytes, double s
                                   report.bits_per_second / 1e6, error_percent(report, bytes, seconds),
                                   report.buffer_seconds, report.buffer.peak_percent(), qualities);
     if (quality.lowest >= 100) out += ", the highest there is";
+    if (report.line_was_slower) out += "; less than asked for, since the line did not carry it";
     if (!report.dropped.empty())
         out += fmt::format("; {} of {} frames dropped", report.dropped.size(), report.costs.size());
     return out;
@@ -141,6 +142,7 @@ nlohmann::json rate_json(const RateReport& report, std::uint64_t bytes, double s
     out["buffer_seconds"] = report.buffer_seconds;
     out["buffer_peak_percent"] = report.buffer.peak_percent();
     const auto strain = rate_strain(report);
+    out["line_was_slower"] = report.line_was_slower;
     out["lowest_quality_frames"] = strain.lowest_quality;
     out["moved_alone_frames"] = strain.moved_alone;
     out["dropped_frames"] = report.dropped;

@@ -56,6 +56,7 @@ struct RateReport {
     BufferModel buffer;
     std::vector<FrameCost> costs;      // one per frame of the capture, with 0 bits if it was dropped
     std::vector<std::size_t> dropped;  // indices of frames of the capture
+    bool line_was_slower = false;      // so that less was made than asked for
     bool moved_by_choice = false;      // P-frames are chosen where they fit, not only where nothing else does
 };
 

@@ -125,7 +125,12 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     const auto& name = names.front();
     if (name == "-")
         return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
-    if (names.size() == 1 && name.ends_with(".htvm")) return open_stream(name, options.limits);
+    if (names.size() == 1 && name.ends_with(".htvm")) {
+        if (!options.texture.files.empty() || options.texture.origin != TextureOrigin::by_format)
+            return fail(ErrorKind::bad_input,
+                        name + " is a stream, which has no texture; --texture and --texture-origin are for mesh files");
+        return open_stream(name, options.limits);
+    }
     const bool guess = options.unit == "auto";
     const auto chosen = guess ? LengthUnit::millimetre : length_unit(options.unit);
     if (!chosen) return tl::unexpected(chosen.error());

@@ -226,7 +226,11 @@ class Encoder:
         For an encoder that was made with a bitrate; else BadInput.
         """
         self._check_open()
-        self._check(c.library.htvm_encoder_set_bitrate(self._handle, bits_per_second))
+        try:
+            rate = float(bits_per_second)
+        except (TypeError, ValueError):
+            raise BadInput(f"a bitrate is a number of bits per second, not {bits_per_second!r}") from None
+        self._check(c.library.htvm_encoder_set_bitrate(self._handle, rate))
 
     def finish(self) -> List[bytes]:
         """Ends the stream, and returns its last packets. A file is complete then, and in its place."""

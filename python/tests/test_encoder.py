@@ -109,6 +109,8 @@ def test_a_bitrate_changes_while_frames_are_pushed():
     assert size_of(75, 105) < 0.7 * before
     with pytest.raises(htvm.BadInput, match="rate.bits_per_second"):
         htvm.Encoder(subject_size=1000).set_bitrate(1e6)
+    with pytest.raises(htvm.BadInput, match="not 'fast'"):
+        encoder.set_bitrate("fast")
 
 
 def test_a_mesh_that_cannot_be_coded_is_left_out():

@@ -132,4 +132,5 @@ expect 2 "a folder to write to or standard output" "$htvm" synth
 expect 2 "a folder to write to or standard output" "$htvm" synth walk --live
 # Nobody is there: the publisher looks for a hub until it is told to end.
 expect 5 "127.0.0.1:9" "$htvm" publish walk.htvm ws://127.0.0.1:9/publish/a
+expect 2 "--fixed-bitrate: does nothing without a --bitrate and a hub" "$htvm" encode capture --fixed-bitrate -o x.htvm
 done_with "publish: passed"
