@@ -98,9 +98,10 @@ static class Program
 
     static void PrintDigests(string path)
     {
+        const string kinds = "IEPTT"; // a patched frame is a T-frame here
         using (var frame = new FrameReader(File.OpenRead(path)))
             while (frame.Next())
-                Console.WriteLine("{0} {1} {2} {3} {4:x8}", frame.Info.Frame, "IEPT"[(int)frame.Info.Type], frame.VertexCount,
+                Console.WriteLine("{0} {1} {2} {3} {4:x8}", frame.Info.Frame, kinds[(int)frame.Info.Type], frame.VertexCount,
                                   frame.IndexCount / 3, Digest(frame));
     }
 
