@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <queue>
 #include <utility>
 
 #include "core/disjoint_sets.h"
@@ -15,28 +13,6 @@ namespace htvm::internal {
 namespace {
 
 using Eigen::Vector3d;
-constexpr double unreachable = std::numeric_limits<double>::infinity();
-
-// Distances along the graph.
-std::vector<double> distances_from(const PlaceGraph& graph, std::uint32_t start) {
-    std::vector<double> out(graph.places.size(), unreachable);
-    using Entry = std::pair<double, std::uint32_t>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> heap;
-    out[start] = 0;
-    heap.emplace(0, start);
-    while (!heap.empty()) {
-        const auto [distance, place] = heap.top();
-        heap.pop();
-        if (distance > out[place]) continue;
-        for (const auto other : graph.beside[place]) {
-            const double there = distance + (graph.places[other] - graph.places[place]).norm();
-            if (there >= out[other]) continue;
-            out[other] = there;
-            heap.emplace(there, other);
-        }
-    }
-    return out;
-}
 
 // Mean distance of each place from places spread over the graph, among those that can be reached.
 std::vector<double> mean_distances(const PlaceGraph& graph) {
@@ -82,15 +58,6 @@ std::vector<std::uint32_t> extremities_of(const PlaceGraph& graph, const std::ve
 }
 
 }  // namespace
-
-PlaceGraph graph_of_handles(const DeformableMesh& mesh) {
-    PlaceGraph out{mesh.handles, std::vector<std::vector<std::uint32_t>>(mesh.handles.size())};
-    for (const auto& pair : mesh.fine.pairs) {
-        out.beside[pair.first].push_back(pair.second);
-        out.beside[pair.second].push_back(pair.first);
-    }
-    return out;
-}
 
 PlaceGraph graph_of_surface(const SurfaceIndex& surface, double side) {
     using Cube = std::array<std::int32_t, 3>;

@@ -9,20 +9,13 @@
 #include <span>
 #include <vector>
 
+#include "surface/place_graph.h"
 #include "surface/rigid_registration.h"
 #include "surface/surface_index.h"
 #include "surface/tracked_registration.h"
 
 namespace htvm::internal {
 
-// Places on a surface and which of them are beside each other; distances along it are sums of the straight ones.
-struct PlaceGraph {
-    std::vector<Eigen::Vector3d> places;
-    std::vector<std::vector<std::uint32_t>> beside;  // for each place, both ways
-};
-
-// The handles of a reference, as they lie at rest.
-PlaceGraph graph_of_handles(const DeformableMesh& mesh);
 // A place for each connected part of the surface within a cube of this side: parts that only pass near each other, as a
 // hand beside a hip, are not beside each other.
 PlaceGraph graph_of_surface(const SurfaceIndex& surface, double side);

@@ -4,9 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <queue>
 
 #include "core/parallel.h"
 
@@ -158,43 +156,16 @@ void find_blocks(std::vector<SampleBlend>& blends, const std::vector<HandlePair>
     }
 }
 
-// Distances from one handle along the graph of pairs, no further than `reach`.
-std::vector<double> reach_over_pairs(const std::vector<Vector3d>& handles,
-                                     const std::vector<std::vector<std::uint16_t>>& tied, std::uint32_t start,
-                                     double reach) {
-    std::vector<double> distance(handles.size(), std::numeric_limits<double>::max());
-    using Entry = std::pair<double, std::uint32_t>;
-    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> heap;
-    distance[start] = 0;
-    heap.emplace(0, start);
-    while (!heap.empty()) {
-        const auto [d, h] = heap.top();
-        heap.pop();
-        if (d > distance[h]) continue;
-        for (const std::uint16_t other : tied[h]) {
-            const double there = d + (handles[other] - handles[h]).norm();
-            if (there > reach || there >= distance[other]) continue;
-            distance[other] = there;
-            heap.emplace(there, other);
-        }
-    }
-    return distance;
-}
-
 // Forms groups of handles about `spacing` apart along their pairs, and how each handle follows the groups.
 void group_handles(DeformableMesh& mesh, double spacing) {
-    std::vector<std::vector<std::uint16_t>> tied(mesh.handles.size());
-    for (const auto& pair : mesh.fine.pairs) {
-        tied[pair.first].push_back(pair.second);
-        tied[pair.second].push_back(pair.first);
-    }
+    const PlaceGraph graph = graph_of_handles(mesh);
     std::vector<bool> covered(mesh.handles.size(), false);
     std::vector<std::vector<std::pair<float, std::uint16_t>>> parts(mesh.handles.size());
     for (std::uint32_t h = 0; h < mesh.handles.size(); ++h) {
         if (covered[h]) continue;
         const auto group = static_cast<std::uint16_t>(mesh.coarse.centre.size());
         mesh.coarse.centre.push_back(h);
-        const auto distance = reach_over_pairs(mesh.handles, tied, h, 2 * spacing);
+        const auto distance = distances_from(graph, h, 2 * spacing);
         for (std::size_t other = 0; other < distance.size(); ++other) {
             if (distance[other] > 2 * spacing) continue;
             covered[other] = covered[other] || distance[other] <= spacing;
@@ -286,6 +257,15 @@ std::vector<SampleTexture> textures_of_samples(const DeformableMesh& mesh, std::
 }
 
 }  // namespace
+
+PlaceGraph graph_of_handles(const DeformableMesh& mesh) {
+    PlaceGraph out{mesh.handles, std::vector<std::vector<std::uint32_t>>(mesh.handles.size())};
+    for (const auto& pair : mesh.fine.pairs) {
+        out.beside[pair.first].push_back(pair.second);
+        out.beside[pair.second].push_back(pair.first);
+    }
+    return out;
+}
 
 SampleBlend blend_of(const VertexWeights& weights) {
     SampleBlend out;
@@ -932,10 +912,6 @@ void settle(const DeformableMesh& mesh, const SurfaceIndex& target, const Deform
     motions = register_deformation(mesh, target, motions, near, form);
 }
 
-}  // namespace
-
-namespace {
-
 // What two motions that differ in one limb are compared by: its samples, and those of the target that lie near it where
 // either of the two takes it. Elsewhere both are the same.
 struct LimbSamples {
@@ -998,11 +974,7 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
     std::vector<bool> differs(motions.size());
     for (std::size_t h = 0; h < motions.size(); ++h)
         differs[h] = (motions[h](mesh.handles[h]) - other[h](mesh.handles[h])).norm() > elsewhere * options.millimetre;
-    std::vector<std::vector<std::uint16_t>> tied(motions.size());
-    for (const auto& pair : mesh.fine.pairs) {
-        tied[pair.first].push_back(pair.second);
-        tied[pair.second].push_back(pair.first);
-    }
+    const auto beside = graph_of_handles(mesh).beside;
     Stage stage = fine_stage(mesh, motions);
     Moved moved = move_samples(stage, options.threads);
     bool taken = false;
@@ -1013,7 +985,7 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
         differs[seed] = false;
         in_limb[seed] = true;
         for (std::size_t i = 0; i < limb.size(); ++i)
-            for (const auto next : tied[limb[i]])
+            for (const auto next : beside[limb[i]])
                 if (differs[next]) differs[next] = false, in_limb[next] = true, limb.push_back(next);
         for (const auto h : limb) stage.motion[h] = other[h];
         Moved trial = move_samples(stage, options.threads);

@@ -17,6 +17,7 @@
 #include "core/thread.h"
 #include "core/vertex_weights.h"
 #include "htvm/mesh.hpp"
+#include "surface/place_graph.h"
 #include "surface/rigid_registration.h"
 #include "surface/surface_index.h"
 
@@ -131,6 +132,9 @@ struct DeformableMesh {
     DeformationLevel fine, coarse;
     std::vector<SampleBlend> groups;  // how each handle follows the groups
 };
+
+// The handles, as they lie at rest; those of a pair are beside each other.
+PlaceGraph graph_of_handles(const DeformableMesh& mesh);
 
 // weights: one per vertex, with handles < handles.size(); pairs likewise. Without handles, nothing ever moves. colours:
 // one per vertex, or none.
