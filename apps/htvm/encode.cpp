@@ -192,7 +192,6 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         Summary summary;
         RateReport rate(settings);
         const bool writes = number >= fewest;
-        bool line_was_slower = false;
         {
             Progress progress(most == 1 ? "encoding" : fmt::format("pass {}", number), capture.frames());
             FrameWarnings warnings;
@@ -215,7 +214,6 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
             auto done = encode_frames(pass);
             if (!done) return writes ? ended_early(pass, *output, done.error()) : done;
             if (done = finish(pass); !done) return done;
-            line_was_slower = pass.line_was_slower;
         }
         const double seconds = seconds_of(summary, capture.fps());
         if (!writes || (number < most && is_off(rate, 8.0 * static_cast<double>(output->bytes()), seconds))) {
@@ -228,7 +226,6 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
         if (summary.bounds) output->add_bounds(*summary.bounds);
         if (auto finished = output->finish(); !finished) return finished;
-        rate.line_was_slower = line_was_slower;
         report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped(), hub);
         if (rate.dropped.empty()) return {};
         return fail(

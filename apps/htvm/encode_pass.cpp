@@ -56,7 +56,7 @@ Result<void> follow_line(Pass& pass) {
                       fmt::format("the line does not carry {:.2f} Mbit/s; less is sent until it does",
                                   pass.rate.bits_per_second / 1e6));
     pass.slower_line = slower ? *bits_per_second : 0;
-    pass.line_was_slower = pass.line_was_slower || slower;
+    pass.rate.line_was_slower = pass.rate.line_was_slower || slower;
     return pass.encoder.set_bitrate(*bits_per_second);
 }
 

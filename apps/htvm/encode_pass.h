@@ -56,7 +56,6 @@ struct Pass {
     RateReport& rate;
     std::function<bool()> wants_key_frame = {};           // asked before each frame: whether it should be an I-frame
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
-    bool line_was_slower = false;                         // at any time
     double slower_line = 0;      // the bitrate that the line carries at present, where it is below the one asked for
     bool saw_triangles = false;  // in a frame so far, or of those before
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
