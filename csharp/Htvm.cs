@@ -221,6 +221,7 @@ namespace Htvm
         [DllImport(Library)] public static extern IntPtr htvm_encoder_last_error(IntPtr encoder);
         [DllImport(Library)] public static extern Status htvm_encoder_send_mesh(IntPtr encoder, ref Mesh mesh, IntPtr pose, long timestamp_us, int force_intra);
         [DllImport(Library)] public static extern Status htvm_encoder_set_bitrate(IntPtr encoder, double bits_per_second);
+        [DllImport(Library)] public static extern Status htvm_encoder_set_effort(IntPtr encoder, uint effort);
         [DllImport(Library)] public static extern Status htvm_encoder_finish(IntPtr encoder);
         [DllImport(Library)] public static extern Status htvm_encoder_receive_packet(IntPtr encoder, byte[] buffer, UIntPtr capacity, out UIntPtr size);
         [DllImport(Library)] public static extern Status htvm_encoder_front_index(IntPtr encoder, byte[] buffer, UIntPtr capacity, out UIntPtr size);
@@ -672,6 +673,13 @@ namespace Htvm
         public void SetBitrate(double bitsPerSecond)
         {
             Check(Native.htvm_encoder_set_bitrate(handle, bitsPerSecond));
+        }
+
+        // From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort; 0: its motion alone
+        // is coded, for a frame that would be late otherwise.
+        public void SetEffort(uint effort)
+        {
+            Check(Native.htvm_encoder_set_effort(handle, effort));
         }
 
         // Ends the stream, and returns its last packets.

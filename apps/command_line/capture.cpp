@@ -164,7 +164,7 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
     Capture capture;
     capture.options_ = options;
     if (is_piped(options)) {
-        capture.pipe_ = std::make_shared<MeshPipe>(options.drop_late);
+        capture.pipe_ = std::make_shared<MeshPipe>(options.while_busy);
     } else if (auto found = capture.find_files(); !found) {
         return tl::unexpected(found.error());
     }
@@ -441,9 +441,10 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
         auto piped = pipe_->next();
         if (!piped) return tl::unexpected(piped.error());
         if (!*piped) return std::optional<TexturedMesh>{};
-        auto& [mesh, place, timestamp, image] = **piped;
+        auto& [mesh, place, timestamp, image, came] = **piped;
         if (place < options_.first) continue;
         at_ = place;
+        came_ = came;
         if (auto ok = find_piped_time(place, timestamp); !ok) return tl::unexpected(ok.error());
         if (auto ok = scale_positions(mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
         TextureReference said;
@@ -472,6 +473,7 @@ Result<void> Capture::find_piped_time(std::size_t place, const std::string& time
 
 Result<std::optional<Mesh>> Capture::next() {
     if (options_.frames > 0 && taken_ >= options_.frames) return std::optional<Mesh>{};
+    if (!pipe_) came_ = std::chrono::steady_clock::now();
     auto captured = pipe_ ? read_pipe() : read_file();
     if (!captured || *captured) ++taken_;
     if (!captured) return tl::unexpected(captured.error());

@@ -2,6 +2,7 @@
 // time.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <future>
 #include <memory>
@@ -40,7 +41,8 @@ struct CaptureOptions {
     TextureOptions texture;      // where images are
     std::string texture_as;      // colours: at the vertices; coordinates: the image is left out; empty: colours of what
                                  // has no vertex colours of its own
-    bool drop_late = false;      // of standard input: drops frames that come faster than they are taken
+    WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
+                                             // taken
 };
 
 // Adds the options above to a command.
@@ -79,6 +81,8 @@ public:
     // Of the frame that next() gave, or failed at, last:
     const Pose* pose() const { return pose_at(*at_); }  // null where there is no skeleton
     std::int64_t timestamp_us() const { return timestamp_us_; }
+    // When it was there: of standard input, when its last byte came; of files, when the caller asked for it.
+    std::chrono::steady_clock::time_point came() const { return came_; }
     std::string name() const;  // its file, or its place on standard input
     // With its texture, before that became colours at vertices; null if it has none.
     std::shared_ptr<const TexturedMesh> textured() const { return textured_; }
@@ -137,6 +141,7 @@ private:
     std::size_t next_ = 0, taken_ = 0;    // place of the next frame; frames that next() gave or failed at
     std::optional<std::size_t> at_;       // place of the last one
     std::int64_t timestamp_us_ = 0, before_us_ = 0;  // of the last one and of the one before
+    std::chrono::steady_clock::time_point came_{};
     std::size_t missing_ = 0;
     std::shared_ptr<const TexturedMesh> textured_;
 

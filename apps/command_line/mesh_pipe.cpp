@@ -50,9 +50,13 @@ private:
 struct MeshPipe::State {
     using Next = Result<std::optional<PipedMesh>>;
 
-    State() : input(unwanted), stream(&input), reader(stream) {}
+    explicit State(WhileBusy busy) : while_busy(busy), input(unwanted), stream(&input), reader(stream) {}
     ~State() {
-        unwanted = true;
+        {
+            const std::lock_guard lock(mutex);
+            unwanted = true;
+        }
+        changed.notify_all();
         if (thread.joinable()) thread.join();
     }
 
@@ -61,30 +65,34 @@ struct MeshPipe::State {
         if (interruption() != 0) return std::optional<PipedMesh>();  // in the middle of a mesh, perhaps
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) return std::optional<PipedMesh>();
-        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.texture()});
+        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.texture(),
+                                       std::chrono::steady_clock::now()});
     }
 
     void read_on() {
         for (;;) {
             auto next = read();
             const bool last = !next || !*next;
-            const std::lock_guard lock(mutex);
-            if (!last && waiting.size() == most_waiting) {
+            std::unique_lock lock(mutex);
+            if (while_busy == WhileBusy::read_on)
+                changed.wait(lock, [&] { return last || unwanted || waiting.size() < most_waiting; });
+            if (!last && waiting.size() >= most_waiting) {
                 waiting.pop_front();
                 ++dropped;
             }
             waiting.push_back(std::move(next));
-            changed.notify_one();
-            if (last) return;
+            changed.notify_all();
+            if (last || unwanted) return;
         }
     }
 
+    const WhileBusy while_busy;
     std::atomic<bool> unwanted = false;
     InterruptibleInput input;
     std::istream stream;
     PlyStreamReader reader;
     std::size_t came = 0;
-    // drop_late alone; those below the mutex are guarded by it.
+    // Unless the sender waits; those below the mutex are guarded by it.
     std::thread thread;
     std::condition_variable changed;
     mutable std::mutex mutex;
@@ -92,8 +100,8 @@ struct MeshPipe::State {
     std::size_t dropped = 0;
 };
 
-MeshPipe::MeshPipe(bool drop_late) : state_(std::make_unique<State>()) {
-    if (drop_late) state_->thread = std::thread([state = state_.get()] { state->read_on(); });
+MeshPipe::MeshPipe(WhileBusy while_busy) : state_(std::make_unique<State>(while_busy)) {
+    if (while_busy != WhileBusy::wait) state_->thread = std::thread([state = state_.get()] { state->read_on(); });
 }
 MeshPipe::MeshPipe(MeshPipe&&) noexcept = default;
 MeshPipe::~MeshPipe() = default;
@@ -107,6 +115,7 @@ Result<std::optional<PipedMesh>> MeshPipe::next() {
     if (!front || !*front) return front;
     auto next = std::move(front);
     state.waiting.pop_front();
+    state.changed.notify_all();
     return next;
 }
 

@@ -1,7 +1,9 @@
 // Meshes from standard input, PLY after PLY, as a rig sends them.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,16 +15,22 @@ namespace htvm::app {
 
 struct PipedMesh {
     Mesh mesh;
-    std::size_t place = 0;  // among all that came, dropped ones too
-    std::string timestamp;  // as its header says; empty: it does not
-    std::string texture;    // likewise: the image's name
+    std::size_t place = 0;                         // among all that came, dropped ones too
+    std::string timestamp;                         // as its header says; empty: it does not
+    std::string texture;                           // likewise: the image's name
+    std::chrono::steady_clock::time_point came{};  // when it was there in whole
+};
+
+// What becomes of meshes that come while the caller is at work.
+enum class WhileBusy : std::uint8_t {
+    wait,     // the sender waits: nothing is read before it is asked for
+    read_on,  // a few are read, each at the time it comes; then the sender waits
+    drop,     // a few are read, and of more the oldest are dropped
 };
 
 class MeshPipe {
 public:
-    // drop_late: reads on while the caller is at work, and of more than a few meshes that wait drops the oldest. Else
-    // the sender waits.
-    explicit MeshPipe(bool drop_late);
+    explicit MeshPipe(WhileBusy while_busy);
     MeshPipe(MeshPipe&&) noexcept;
     ~MeshPipe();
     // The next mesh; nothing at the end, and where the program was interrupted. After an error there is no next one.

@@ -35,7 +35,7 @@ double seconds_of(const Summary& summary, double fps) {
 // ---- What is said of it ---------------------------------------------------------------------------------------------
 
 void report(const EncodeOptions& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes,
-            double fps, std::size_t dropped_late, const Publishing* hub = nullptr) {
+            double fps, std::size_t dropped_late, const Publishing* hub = nullptr, const Deadline* deadline = nullptr) {
     const auto frames = summary.totals.all().frames;
     const double seconds = seconds_of(summary, fps);
     const double megabits = 8e-6 * static_cast<double>(bytes);
@@ -53,6 +53,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
                               {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
         if (hub) out["not_sent_frames"] = not_sent;
         if (rate.controlled()) out["control"] = rate_json(rate, bytes, seconds);
+        if (deadline) out["pace"] = deadline_json(*deadline);
         fmt::print("{}\n", out.dump(2));
     } else {
         tell(layer_table(summary.totals));
@@ -60,6 +61,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
                          shown_place(options.output), counted(frames, "frame"), bytes, megabits / seconds, fps,
                          static_cast<double>(frames) / summary.encode_seconds));
         if (rate.controlled()) note(rate_summary(rate, bytes, seconds));
+        if (deadline) note(deadline_summary(*deadline));
     }
     if (dropped_late > 0)
         warn(fmt::format(
@@ -108,7 +110,7 @@ bool may_be_live(const std::string& output) {
 // ---- The passes -----------------------------------------------------------------------------------------------------
 
 int fewest_passes(const EncodeOptions& options, const EncoderOptions& settings) {
-    if (!(settings.rate.bits_per_second > 0)) return 1;
+    if (!(settings.rate.bits_per_second > 0) || options.deadline > 0) return 1;
     if (options.encoding.passes > 0) return options.encoding.passes;
     return is_piped(options.capture) ? 1 : 2;
 }
@@ -179,6 +181,12 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
     // What went to a pipe cannot be taken back.
     const int most = options.encoding.passes == 0 && fewest == 2 && !may_be_live(options.output) ? most_passes : fewest;
     std::optional<RatePasses> passes;
+    std::vector<int> efforts;
+    if (!options.repeat_efforts.empty()) {
+        auto read = read_effort_log(options.repeat_efforts);
+        if (!read) return tl::unexpected(read.error());
+        efforts = std::move(*read);
+    }
     for (int number = 1;; ++number) {
         // Before the first pass, so that a place that cannot be written to does not cost one.
         auto output = StreamOutput::open(options.output, options.publishing);
@@ -191,6 +199,9 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (number == 1) note_bones(options, settings);
         Summary summary;
         RateReport rate(settings);
+        Deadline deadline(options.deadline, settings.tracked.effort);
+        const bool timed = options.deadline > 0 || !options.effort_log.empty() || !efforts.empty() ||
+                           (is_piped(options.capture) && settings.profile == Profile::tracked);
         const bool writes = number >= fewest;
         {
             Progress progress(most == 1 ? "encoding" : fmt::format("pass {}", number), capture.frames());
@@ -205,6 +216,8 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
                 .warnings = number == fewest ? &warnings : nullptr,
                 .summary = summary,
                 .rate = rate};
+            if (timed) pass.deadline = &deadline;
+            pass.efforts = efforts;
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
             if (hub) pass.wants_key_frame = [hub] { return hub->wants_key_frame(); };
             if (hub && rate.rate_controlled() && !options.publishing.fixed_bitrate)
@@ -226,7 +239,10 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (summary.totals.all().frames == 0) return fail(ErrorKind::bad_input, "there was no mesh to encode");
         if (summary.bounds) output->add_bounds(*summary.bounds);
         if (auto finished = output->finish(); !finished) return finished;
-        report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped(), hub);
+        report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped(), hub,
+               timed ? &deadline : nullptr);
+        if (!options.effort_log.empty())
+            if (auto written = write_effort_log(options.effort_log, deadline.frames()); !written) return written;
         if (rate.dropped.empty()) return {};
         return fail(
             ErrorKind::limit,
@@ -265,6 +281,20 @@ void check_jobs(const EncodeOptions& options, bool random_session) {
                                    "all the same number");
 }
 
+// What goes with the clock, frame after frame.
+void check_pace(const EncodeOptions& options) {
+    const char* flag = options.deadline > 0              ? "--deadline"
+                       : !options.effort_log.empty()     ? "--effort-log"
+                       : !options.repeat_efforts.empty() ? "--repeat-efforts"
+                                                         : nullptr;
+    if (!flag) return;
+    if (options.encoding.profile != "tracked")
+        throw CLI::ValidationError(flag, "is for --profile tracked: the others have no efforts");
+    if (options.in_groups()) throw CLI::ValidationError(flag, "goes frame by frame, not with --jobs or --job");
+    if (options.encoding.passes == 2)
+        throw CLI::ValidationError(flag, "goes with one pass over the frames, not with --passes 2");
+}
+
 }  // namespace
 
 Result<void> encode(const EncodeOptions& options) {
@@ -274,9 +304,11 @@ Result<void> encode(const EncodeOptions& options) {
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
     // A group's packets come once its last frame is captured.
-    if (settings->tracked.group > 1 && live::looks_like_hub_address(options.output))
+    const bool live = live::looks_like_hub_address(options.output) || options.deadline > 0;
+    if (settings->tracked.group > 1 && live)
         return fail(ErrorKind::bad_input,
                     "--group holds frames back, which who watches live would wait for: it is for files, not for a hub");
+    if (settings->tracked.group == 0 && live) settings->tracked.group = 1;
     const bool drawn = !is_given(options.encoding, "session") && options.job.of == 0 && may_be_live(options.output);
     if (drawn) settings->session = random_session();
     const auto audio = AudioTrack::open(options.audio);
@@ -320,9 +352,29 @@ void add_encode(CLI::App& app, Run& run) {
     command->add_flag(
         "--fill", options->fill,
         "Where the numbers of the files leave some out, repeat the frame before (default: a gap in time)");
-    command->add_flag("--drop-late", options->capture.drop_late,
+    command->add_flag("--drop-late", options->drop_late,
                       "Of meshes on standard input that come faster than they are encoded, drop the oldest that wait,\n"
                       "so that a camera never has to (default: the sender waits)");
+    constexpr const char* pace = "A camera's pace";
+    command
+        ->add_option("--deadline", options->deadline,
+                     "Milliseconds from when a mesh is there to when its packet is: where a frame would be late, less\n"
+                     "is searched for it (see --effort), at last its motion alone is coded; no frame is left out.\n"
+                     "How many were late or got less is said at the end")
+        ->check(CLI::Range(1.0, 60000.0))
+        ->type_name("MS")
+        ->group(pace);
+    command
+        ->add_option("--effort-log", options->effort_log,
+                     "Write what was decided of each frame, and how long it took, as lines of CSV")
+        ->type_name("FILE")
+        ->group(pace);
+    command
+        ->add_option("--repeat-efforts", options->repeat_efforts,
+                     "Take the effort of each frame from such a log, not from the clock: the same bytes again")
+        ->type_name("FILE")
+        ->group(pace)
+        ->excludes("--deadline");
     constexpr const char* jobs = "Many processors, many machines";
     command
         ->add_option(
@@ -372,8 +424,12 @@ void add_encode(CLI::App& app, Run& run) {
             throw CLI::ValidationError("--fixed-bitrate", "does nothing without a --bitrate and a hub to publish to");
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the stream; choose one");
-        if (options->capture.drop_late && !is_piped(options->capture))
+        if (options->drop_late && !is_piped(options->capture))
             throw CLI::ValidationError("--drop-late", "is for meshes on standard input: files can wait");
+        options->capture.while_busy = options->drop_late      ? WhileBusy::drop
+                                      : options->deadline > 0 ? WhileBusy::read_on
+                                                              : WhileBusy::wait;
+        check_pace(*options);
         if (options->encoding.passes == 2 && is_piped(options->capture))
             throw CLI::ValidationError(
                 "--passes",

@@ -23,6 +23,10 @@ struct EncodeOptions {
     std::string output;
     PublishingOptions publishing;  // where the output is a hub
     AudioOptions audio;
+    bool drop_late = false;      // of standard input: drops the oldest of frames that come faster than they are encoded
+    double deadline = 0;         // milliseconds from a mesh's arrival to its packet; 0: none
+    std::string effort_log;      // file: writes what was decided of each frame; empty: nowhere
+    std::string repeat_efforts;  // file: takes the efforts of frames from there; empty: they are decided
     std::string on_bad_frame = "stop";  // or skip, repeat
     bool fill = false;                  // repeats the frame before in the place of missing ones
     bool json = false;

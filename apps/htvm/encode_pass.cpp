@@ -60,6 +60,18 @@ Result<void> follow_line(Pass& pass) {
     return pass.encoder.set_bitrate(*bits_per_second);
 }
 
+double milliseconds_since(std::chrono::steady_clock::time_point then) {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - then).count();
+}
+
+// How much is searched for the next frame, which has waited for so long.
+Result<int> choose_effort(Pass& pass, double waited) {
+    const auto place = pass.deadline->frames().size();
+    const int effort = place < pass.efforts.size() ? pass.efforts[place] : pass.deadline->effort(waited);
+    if (auto set = pass.encoder.set_effort(effort); !set) return tl::unexpected(set.error());
+    return effort;
+}
+
 // What became of a mesh.
 enum class Coded { yes, dropped };
 
@@ -68,6 +80,13 @@ enum class Coded { yes, dropped };
 Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us) {
     auto& summary = pass.summary;
     const auto start = std::chrono::steady_clock::now();
+    TimedFrame timed;
+    if (pass.deadline) {
+        timed.waited = milliseconds_since(pass.capture.came());
+        const auto effort = choose_effort(pass, timed.waited);
+        if (!effort) return tl::unexpected(effort.error());
+        timed.effort = *effort;
+    }
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
     const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
     summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -85,6 +104,10 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         return Coded::dropped;
     }
     if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
+    if (pass.deadline) {
+        timed.took = milliseconds_since(start);
+        pass.deadline->took(timed);
+    }
     if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());
     pass.step(progress_text(pass));
     return Coded::yes;

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "command_line/layer_table.h"
+#include "deadline.h"
 #include "encode.h"
 #include "htvm/encoder.hpp"
 #include "rate_report.h"
@@ -56,8 +57,10 @@ struct Pass {
     RateReport& rate;
     std::function<bool()> wants_key_frame = {};           // asked before each frame: whether it should be an I-frame
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
-    double slower_line = 0;      // the bitrate that the line carries at present, where it is below the one asked for
-    bool saw_triangles = false;  // in a frame so far, or of those before
+    Deadline* deadline = nullptr;   // how much is searched for each frame, and how long that takes; null: not counted
+    std::vector<int> efforts = {};  // of the first frames, in place of what the deadline says
+    double slower_line = 0;         // the bitrate that the line carries at present, where it is below the one asked for
+    bool saw_triangles = false;     // in a frame so far, or of those before
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
     std::optional<Mesh> last = {};
     std::optional<Pose> last_pose = {};

@@ -68,6 +68,11 @@ public:
     // of rate.buffer_seconds then holds as much of the new rate. bad_input unless the options gave a rate, or if this
     // is not a rate that they could have given.
     Result<void> set_bitrate(double bits_per_second);
+    // From the next frame on so much is searched for each: 1 to 9, as TrackedOptions::effort; groups stay as long as
+    // they were. With 0 a frame's motion alone is coded, and what tracking loses there is mended by a later one: for a
+    // frame that would be late otherwise. The same efforts for the same frames give the same bytes. bad_input if it is
+    // out of range, or with another profile than tracked.
+    Result<void> set_effort(int effort);
     // Ends the sequence: codes what is held, and queues the index of I-frames. After an error nothing has ended.
     Result<void> finish();
     // The next packet in stream order; nothing if more must be pushed first.

@@ -52,13 +52,16 @@ enum class Denoising : std::uint8_t {
 
 // For Profile::tracked only; with other profiles, anything but the defaults is refused.
 struct TrackedOptions {
+    int effort = 5;  // how much is searched for a frame, 1 to 9: 1 takes the least time, 9 the fewest bits; up to 5
+                     // keeps up with a camera (docs/performance.md)
     TrackedReferences references = TrackedReferences::previous;
     int access_interval = 30;  // with `previous`: largest distance, in frames, between places where decoding can start
                                // for whoever has the I-frame and its patches: T-frames that refer to nothing else
-    int group = 1;          // T-frames coded in groups of up to so many, 1 to 8: the last first, the others between two
-                            // each: fewer bits, but packets come up to so many frames late. 1: each behind the last
-    double simplify = 0.4;  // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
-                            // its surface in geometry steps; 0: it keeps all vertices and its connectivity
+    int group = 0;  // T-frames coded in groups of up to so many, 1 to 8: the last first, the others between two each:
+                    // fewer bits, but packets come up to so many frames late. 1: each behind the last. 0: by the
+                    // effort, from 6 on more than 1, where groups may be
+    double simplify = 0.4;     // how far the mesh of an I-frame, which T-frames take over, may be simplified: error of
+                               // its surface in geometry steps; 0: it keeps all vertices and its connectivity
     double patch_share = 0.3;  // where tracking is lost, the largest share of the mesh that a patch may replace; where
                                // more is lost, an I-frame is sent; 0: always
     Denoising denoise = Denoising::automatic;  // with a target error always off: that is measured against the capture
@@ -131,6 +134,10 @@ struct EncoderOptions {
 // The default options of a profile: those of EncoderOptions for Profile::tracked. The others have an I-frame every 30
 // frames, and Profile::paper the paper's choices where they differ.
 EncoderOptions default_options(Profile profile);
+
+// How many T-frames an encoder with these options codes as a group: TrackedOptions::group, or where that is 0, what
+// goes with the effort.
+int frames_in_group(const EncoderOptions& options);
 
 // The two steps for a quality from 0 to 100 that means about the same error for every capture, with T-frames or without
 // (T-frames and their I-frames use finer positions and coarser colours than this to have that error). Position steps

@@ -503,6 +503,10 @@ htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh,
  * HTVM_BAD_INPUT: the options gave no rate.bits_per_second, or this is not one that they could have given. */
 htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_second);
 
+/* From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort; 0: its motion alone is
+ * coded, for a frame that would be late otherwise. HTVM_BAD_INPUT: above 9, or another profile than the tracked one. */
+htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort);
+
 /* Ends the sequence: codes what is held. No mesh may be sent afterwards. HTVM_OUT_OF_MEMORY: nothing has ended. */
 htvm_status htvm_encoder_finish(htvm_encoder* encoder);
 

@@ -247,6 +247,7 @@ functions: dict[str, tuple[Any, list[Any]]] = {
     "htvm_encoder_send_mesh": (
         htvm_status, [htvm_encoder, POINTER(htvm_mesh), POINTER(htvm_pose), c_int64, ctypes.c_int]),
     "htvm_encoder_set_bitrate": (htvm_status, [htvm_encoder, c_double]),
+    "htvm_encoder_set_effort": (htvm_status, [htvm_encoder, c_uint32]),
     "htvm_encoder_finish": (htvm_status, [htvm_encoder]),
     "htvm_encoder_receive_packet": (htvm_status, [htvm_encoder, POINTER(c_uint8), c_size_t, POINTER(c_size_t)]),
     "htvm_encoder_front_index": (htvm_status, [htvm_encoder, POINTER(c_uint8), c_size_t, POINTER(c_size_t)]),

@@ -232,6 +232,16 @@ class Encoder:
             raise BadInput(f"a bitrate is a number of bits per second, not {bits_per_second!r}") from None
         self._check(c.library.htvm_encoder_set_bitrate(self._handle, rate))
 
+    def set_effort(self, effort: int) -> None:
+        """From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort.
+
+        With 0 a frame's motion alone is coded, for one that would be late otherwise.
+        """
+        self._check_open()
+        if not isinstance(effort, int) or not 0 <= effort <= 9:
+            raise BadInput(f"an effort is a whole number from 0 to 9, not {effort!r}")
+        self._check(c.library.htvm_encoder_set_effort(self._handle, effort))
+
     def finish(self) -> List[bytes]:
         """Ends the stream, and returns its last packets. A file is complete then, and in its place."""
         if self._finished:

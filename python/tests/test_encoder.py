@@ -113,6 +113,15 @@ def test_a_bitrate_changes_while_frames_are_pushed():
         encoder.set_bitrate("fast")
 
 
+def test_the_effort_is_a_whole_number_up_to_nine():
+    encoder = htvm.Encoder(subject_size=1000)
+    for effort in (0, 9, 5):
+        encoder.set_effort(effort)
+    for wrong in (-1, 10, 2.5, "fast"):
+        with pytest.raises(htvm.BadInput, match="whole number from 0 to 9"):
+            encoder.set_effort(wrong)
+
+
 def test_a_mesh_that_cannot_be_coded_is_left_out():
     encoder = htvm.Encoder(subject_size=1000)
     packets = encoder.push(sheet(0))

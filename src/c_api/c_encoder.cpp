@@ -330,6 +330,14 @@ htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_seco
     });
 }
 
+htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort) {
+    if (!encoder) return HTVM_BAD_INPUT;
+    return guarded(encoder->error, [&] {
+        const auto set = encoder->encoder.set_effort(effort > 9 ? 10 : static_cast<int>(effort));
+        return set ? htvm_status{HTVM_OK} : encoder->error.set(set.error());
+    });
+}
+
 htvm_status htvm_encoder_finish(htvm_encoder* encoder) {
     if (!encoder) return HTVM_BAD_INPUT;
     return guarded(encoder->error, [&] {

@@ -44,6 +44,7 @@ struct Encoder::State {
     PoseTracker poses;
     Sequence sequence;
     QualityControl control;
+    int effort = usual_effort;  // for the next frame
     Output output;
     std::optional<std::int64_t> last_timestamp;
     std::vector<HeldFrame> held;        // T-frames of the group that is not whole yet
@@ -306,7 +307,8 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     auto coded_pose = state.poses.next(mesh, pose, state.configuration.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");
-    FrameWork work(state.configuration, state.sequence, std::move(*on_lattice), std::move(*coded_pose), state.stages);
+    FrameWork work(state.configuration, state.sequence, state.effort, std::move(*on_lattice), std::move(*coded_pose),
+                   state.stages);
     auto chosen = choose_frame(
         work, state.control, [&](const Candidate& candidate) { return bits_of(state, candidate); }, force_intra);
     if (!chosen) return tl::unexpected(chosen.error());
@@ -371,6 +373,14 @@ RateControlOptions rate_options(const EncoderOptions& options) {
 
 }  // namespace
 
+int frames_in_group(const EncoderOptions& options) {
+    if (options.tracked.group > 0) return options.tracked.group;
+    const bool may_be = options.profile == Profile::tracked && options.key_interval > 1 &&
+                        options.tracked.references == TrackedReferences::previous &&
+                        !(options.rate.bits_per_second > 0) && !(options.rate.target_error > 0);
+    return may_be ? tracking_effort(options.tracked.effort).group : 1;
+}
+
 QualitySteps quality_steps(double quality) {
     const double q = std::clamp(quality, 0.0, 100.0) / 100;
     return {16 * std::exp2(-6 * q), 32 * std::exp2(-5 * q)};
@@ -380,6 +390,8 @@ Result<Encoder> Encoder::create(const EncoderOptions& options) try {
     if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
     auto state = std::make_unique<State>();
     state->configuration.options = options;
+    state->configuration.options.tracked.group = frames_in_group(options);
+    state->effort = options.tracked.effort;
     state->pool = ThreadPool(options.threads, options.runner);
     state->configuration.threads = state->pool.threads();
     if (options.rate.bits_per_second > 0) state->control.rate.emplace(rate_options(options), options.rate.first_pass);
@@ -435,6 +447,15 @@ Result<void> Encoder::set_bitrate(double bits_per_second) {
     if (!(bits_per_second > 0)) return fail(ErrorKind::bad_input, "a bitrate is above 0");
     if (auto ok = check(options); !ok) return ok;
     rate->change_rate(bits_per_second);
+    return {};
+}
+
+Result<void> Encoder::set_effort(int effort) {
+    if (state_->configuration.options.profile != Profile::tracked)
+        return fail(ErrorKind::bad_input, "an effort is for the tracked profile: others have none");
+    if (effort < 0 || effort > most_effort)
+        return fail(ErrorKind::bad_input, "an effort is 0 to 9, not " + std::to_string(effort));
+    state_->effort = effort;
     return {};
 }
 

@@ -207,12 +207,23 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return o.tracked.access_interval; },
      .set = [](EncoderOptions& o, double value) { o.tracked.access_interval = static_cast<int>(value); },
      .flag = "--access-interval"},
+    {.name = "tracked.effort",
+     .group = OptionGroup::tracked,
+     .kind = OptionKind::whole_number,
+     .least = 1,
+     .most = 9,
+     .meaning =
+         "how much is searched for a frame: 1 takes the least time, 9 the fewest bits; up to 5 is for what is live",
+     .get = [](const EncoderOptions& o) -> double { return o.tracked.effort; },
+     .set = [](EncoderOptions& o, double value) { o.tracked.effort = static_cast<int>(value); },
+     .flag = "--effort"},
     {.name = "tracked.group",
      .group = OptionGroup::tracked,
      .kind = OptionKind::whole_number,
      .unit = "frames",
      .least = 1,
      .most = 8,
+     .zero = "by the effort: up to 5 each frame alone, at 6, 7, 8 and above groups of 2, 4 and 8, where groups may be",
      .meaning =
          "T-frames that are coded as a group, the last one first, the others from two around them each: fewer bits "
          "for files; packets come up to so many frames late, and encoding takes longer",

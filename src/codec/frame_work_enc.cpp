@@ -45,11 +45,14 @@ std::size_t Candidate::bytes() const {
 
 double region_side(const Configuration& configuration) { return 100 * configuration.adult_millimetre; }
 
-DeformationOptions deformation_options(const Configuration& configuration) {
+DeformationOptions deformation_options(const Configuration& configuration, const TrackingEffort& effort) {
     DeformationOptions out;
     out.millimetre = configuration.adult_millimetre;
     out.threads = configuration.threads;
-    return out;
+    return with_effort(out, effort);
+}
+DeformationOptions deformation_options(const Configuration& configuration) {
+    return deformation_options(configuration, tracking_effort(configuration.options.tracked.effort));
 }
 
 Result<Sequence> advance(const Configuration& configuration, const Sequence& before, Candidate& sent) {
@@ -127,7 +130,7 @@ const NodeRegistration& FrameWork::registered_nodes() {
         const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
         registered_nodes_ =
             register_nodes(reference().deformable, target, {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
-                           deformation_options(configuration));
+                           deformation_options(configuration, effort));
         clock.done("registration");
     }
     return *registered_nodes_;
@@ -141,7 +144,7 @@ bool FrameWork::follow_lost_limbs() {
     const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
     const bool any = internal::follow_lost_limbs(reference().deformable, surface(),
                                                  {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
-                                                 deformation_options(configuration), registered);
+                                                 deformation_options(configuration, effort), registered);
     registered_nodes_ = std::move(registered);
     clock.done("registration");
     return any;

@@ -16,6 +16,7 @@
 #include "codec/stream/sequence.h"
 #include "codec/tracked/captured_surface_enc.h"
 #include "codec/tracked/tracked_frame_enc.h"
+#include "codec/tracked/tracking_effort_enc.h"
 #include "core/thread.h"
 #include "htvm/encoder.hpp"
 #include "surface/surface_distance.h"
@@ -143,17 +144,19 @@ struct TrackedWork {
 // What is derived from one frame, computed on first use and kept. Lengths are in lattice units.
 class FrameWork {
 public:
-    FrameWork(const Configuration& settled, const Sequence& before, LatticeMesh captured, CodedPose captured_pose,
-              std::vector<StageTime>& times)
+    FrameWork(const Configuration& settled, const Sequence& before, int effort_of_frame, LatticeMesh captured,
+              CodedPose captured_pose, std::vector<StageTime>& times)
         : configuration(settled),
           sequence(before),
+          effort(tracking_effort(effort_of_frame)),
           mesh(std::move(captured)),
           pose(std::move(captured_pose)),
           stages(times) {}
 
     const Configuration& configuration;
     const Sequence& sequence;
-    const LatticeMesh mesh;  // as captured
+    const TrackingEffort effort;  // for this frame
+    const LatticeMesh mesh;       // as captured
     const CodedPose pose;
     std::vector<StageTime>& stages;
 
@@ -191,7 +194,10 @@ private:
 // Side of the cubes of space by which it is judged whether a region is lost, lattice units.
 double region_side(const Configuration& configuration);
 
-// The registration's options, scaled to this subject.
+// The registration's options, scaled to this subject, with the effort that the encoder was asked for.
 DeformationOptions deformation_options(const Configuration& configuration);
+// The same with a frame's effort. The reference's samples are as many as were chosen with it, whatever the effort
+// since.
+DeformationOptions deformation_options(const Configuration& configuration, const TrackingEffort& effort);
 
 }  // namespace htvm::internal

@@ -155,6 +155,22 @@ late=$(awk -F'[:,]' '/"late_frames"/ { print $2 }' burst.json)
 [ "$(times burst.htvm | awk '{ print $NF }')" = 1967 ] || fail "late frames change the times of others"
 expect 2 "--drop-late" "$htvm" encode capture --drop-late -o x.htvm
 
+# A deadline costs effort, not frames, and what was decided can be repeated.
+"$htvm" encode - --deadline 1 --effort-log efforts.csv --json -o hurried.htvm <burst.ply >hurried.json 2>said ||
+    fail "--deadline: $(tail -1 said)"
+[ "$(times hurried.htvm | wc -w)" -eq 60 ] || fail "a deadline leaves frames out"
+grep -q '"lowered_frames": [1-9]' hurried.json || fail "a deadline of a millisecond costs no effort"
+[ "$(wc -l <efforts.csv)" -eq 61 ] || fail "the log has not a line per frame"
+expect 0 "deadline 5000 ms: 0 frames late, 0 frames with less effort" "$htvm" encode capture --deadline 5000 -o x.htvm
+sed -i 's/^7,[0-9]*,/7,1,/' efforts.csv
+"$htvm" encode capture --repeat-efforts efforts.csv -o again_1.htvm --quiet
+"$htvm" encode capture --repeat-efforts efforts.csv -o again_2.htvm --quiet
+cmp again_1.htvm again_2.htvm || fail "the same efforts give other bytes"
+expect 1 "this is no effort log" "$htvm" encode capture --repeat-efforts times.csv -o x.htvm
+expect 2 "is for --profile tracked" "$htvm" encode capture --profile topology --deadline 50 -o x.htvm
+expect 2 "--deadline" "$htvm" encode capture --jobs 2 --deadline 50 -o x.htvm
+expect 2 "--deadline" "$htvm" encode capture --repeat-efforts efforts.csv --deadline 50 -o x.htvm
+
 # Points without a surface.
 mkdir points
 for k in 0 1; do

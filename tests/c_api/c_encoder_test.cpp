@@ -393,6 +393,16 @@ TEST(CEncoder, ABitrateIsChangedWhereOneWasGiven) {
     EXPECT_EQ(htvm_encoder_set_bitrate(encoder.get(), -1), HTVM_BAD_INPUT);
 }
 
+TEST(CEncoder, AnEffortIsSetFromZeroToNine) {
+    const auto encoder = make_encoder();
+    EXPECT_EQ(htvm_encoder_set_effort(encoder.get(), 0), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_set_effort(encoder.get(), 9), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_set_effort(encoder.get(), 10), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_set_effort(encoder.get(), 0xffffffffu), HTVM_BAD_INPUT);
+    EXPECT_EQ(std::string(htvm_encoder_last_error(encoder.get())), "an effort is 0 to 9, not 10");
+    EXPECT_EQ(htvm_encoder_set_effort(nullptr, 5), HTVM_BAD_INPUT);
+}
+
 TEST(CEncoder, TheMeshWithoutVerticesIsAFrame) {
     const auto encoder = make_encoder();
     htvm_mesh mesh;

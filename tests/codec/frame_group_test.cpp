@@ -394,11 +394,11 @@ TEST(GroupedStream, APacketThatIsNotOfTheGroupInForceIsAnError) {
 
 TEST(GroupOption, IsKnownByName) {
     EncoderOptions options;
-    EXPECT_EQ(options.tracked.group, 1);
+    EXPECT_EQ(options.tracked.group, 0);
     ASSERT_TRUE(set_option(options, "tracked.group", "8"));
     EXPECT_EQ(options.tracked.group, 8);
     EXPECT_FALSE(set_option(options, "tracked.group", "9"));
-    EXPECT_FALSE(set_option(options, "tracked.group", "0"));
+    EXPECT_TRUE(set_option(options, "tracked.group", "0"));
 }
 
 TEST(GroupOption, IsRefusedWhereItDoesNotGoTogether) {

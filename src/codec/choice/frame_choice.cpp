@@ -303,8 +303,9 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
     constexpr double lost_in_steps = 1.75;
     const double lost = std::min(allowed_in_region(work, work.sequence.nodes.best_fit),
                                  lost_in_steps * static_cast<double>(steps.geometry));
-    for (const double region_lost : {lost, 0.0}) {
-        options.region_lost = region_lost;
+    const std::array<double, 2> ways = {lost, 0.0};
+    for (int way = 0; way < std::min<int>(work.effort.patches, ways.size()); ++way) {
+        options.region_lost = ways[static_cast<std::size_t>(way)];
         StageClock clock(work.stages);
         const auto found = find_surface_patch(tracked, work.reference().decoded.tracked->mesh.positions, work.mesh,
                                               work.surface(), options);
@@ -345,6 +346,8 @@ bool may_be_renewed(const FrameWork& work, const FrameSteps& steps, const Lattic
 // more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
 // late, it is made of the tracked mesh, so that nothing jumps. due: an I-frame is wanted.
 Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool due) {
+    if (work.effort.motion_alone && !due) return code_motion_alone(work, steps);
+    if (work.effort.always_other_starts) work.follow_lost_limbs();
     auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
@@ -352,7 +355,7 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
         return work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
     };
     auto fit = fit_of();
-    if (lost_track(work, fit) && work.follow_lost_limbs()) {
+    if (work.effort.follows_limbs && lost_track(work, fit) && work.follow_lost_limbs()) {
         tracked = code_frame(FrameType::tracked, work, steps);
         if (!tracked) return tracked;
         fit = fit_of();

@@ -1,0 +1,136 @@
+#include "deadline.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "io/mesh_file.h"
+#include "io/number_text.h"
+#include "io/output_file.h"
+#include "metrics/percentile.h"
+
+namespace htvm::app {
+namespace {
+
+// How long a frame takes at each effort, against the usual one: docs/performance.md. Roughly is enough, since what is
+// learned of each frame corrects it.
+constexpr std::array<double, 10> shares = {0.45, 0.7, 0.75, 0.9, 0.95, 1, 1.3, 1.8, 2.2, 5};
+
+double share_of(int effort) { return shares[static_cast<std::size_t>(std::clamp(effort, 0, 9))]; }
+
+std::string frames_text(std::size_t count) { return fmt::format("{} {}", count, count == 1 ? "frame" : "frames"); }
+
+}  // namespace
+
+int Deadline::effort(double waited) const {
+    constexpr double room = 0.9;  // of the deadline, as forecasts are off
+    if (!(milliseconds_ > 0)) return most_;
+    for (int effort = most_; effort > 0; --effort)
+        if (waited + usual_ * share_of(effort) <= room * milliseconds_) return effort;
+    // Motion alone loses track sooner or later, which nobody mends. Where the machine never has time for more, a few
+    // late frames are better than a picture that falls apart.
+    const auto alone = [](const TimedFrame& frame) { return frame.effort == 0; };
+    const bool for_long = frames_.size() >= most_alone &&
+                          std::all_of(frames_.end() - static_cast<std::ptrdiff_t>(most_alone), frames_.end(), alone);
+    return for_long ? std::min(1, most_) : 0;
+}
+
+void Deadline::took(const TimedFrame& frame) {
+    // Of the first frame, an I-frame, nothing follows for others. A frame that took unusually long, as one with a patch
+    // does, says little of the next; what frames commonly take is followed within a few.
+    constexpr double newest = 0.25, unusual = 2;
+    const bool first = frames_.empty();
+    frames_.push_back(frame);
+    if (first) return;
+    const double usual = frame.took / share_of(frame.effort);
+    usual_ = usual_ == 0 ? usual : usual_ + newest * (std::min(usual, unusual * usual_) - usual_);
+}
+
+std::size_t Deadline::late() const {
+    if (!(milliseconds_ > 0)) return 0;
+    return static_cast<std::size_t>(std::count_if(
+        frames_.begin(), frames_.end(), [&](const TimedFrame& frame) { return frame.latency() > milliseconds_; }));
+}
+
+std::size_t Deadline::lowered() const {
+    return static_cast<std::size_t>(
+        std::count_if(frames_.begin(), frames_.end(), [&](const TimedFrame& frame) { return frame.effort < most_; }));
+}
+
+Latency latency_of(const std::vector<TimedFrame>& frames) {
+    std::vector<double> all;
+    for (const auto& frame : frames) all.push_back(frame.latency());
+    if (all.empty()) return {};
+    std::sort(all.begin(), all.end());
+    return {percentile(all, 50), percentile(all, 99), all.back()};
+}
+
+std::string deadline_summary(const Deadline& deadline) {
+    const auto latency = latency_of(deadline.frames());
+    auto out =
+        fmt::format("latency of a frame {:.1f} ms in the median, {:.1f} ms in the 99th percentile, {:.1f} ms at most",
+                    latency.median, latency.p99, latency.longest);
+    if (!(deadline.milliseconds() > 0)) return out;
+    std::size_t alone = 0;
+    for (const auto& frame : deadline.frames()) alone += frame.effort == 0 ? 1 : 0;
+    return out + fmt::format("; deadline {:g} ms: {} late, {} with less effort, {} of them as motion alone",
+                             deadline.milliseconds(), frames_text(deadline.late()), frames_text(deadline.lowered()),
+                             alone);
+}
+
+nlohmann::json deadline_json(const Deadline& deadline) {
+    const auto latency = latency_of(deadline.frames());
+    nlohmann::json out = {{"latency_ms", {{"p50", latency.median}, {"p99", latency.p99}, {"max", latency.longest}}}};
+    if (!(deadline.milliseconds() > 0)) return out;
+    std::array<std::size_t, 10> by_effort{};
+    for (const auto& frame : deadline.frames()) ++by_effort[static_cast<std::size_t>(frame.effort)];
+    out["deadline_ms"] = deadline.milliseconds();
+    out["late_frames"] = deadline.late();
+    out["lowered_frames"] = deadline.lowered();
+    out["frames_by_effort"] = by_effort;
+    return out;
+}
+
+Result<void> write_effort_log(const std::filesystem::path& path, const std::vector<TimedFrame>& frames) {
+    std::string text = "frame,effort,waited_ms,took_ms\n";
+    for (std::size_t i = 0; i < frames.size(); ++i)
+        text += fmt::format("{},{},{:.3f},{:.3f}\n", i, frames[i].effort, frames[i].waited, frames[i].took);
+    return write_file(path, text);
+}
+
+Result<std::vector<int>> read_effort_log(const std::filesystem::path& path) {
+    const auto bytes = read_file(path);
+    if (!bytes) return tl::unexpected(bytes.error());
+    const std::string text(bytes->begin(), bytes->end());
+    std::vector<int> out;
+    const auto wrong = [&](std::size_t line, const char* what) {
+        return fail(ErrorKind::bad_input,
+                    fmt::format("{}, line {}: {} (an effort log, as --effort-log writes it, has a "
+                                "line \"frame,effort,...\", then one per frame)",
+                                path.string(), line, what));
+    };
+    std::size_t line = 0;
+    for (std::size_t at = 0; at < text.size();) {
+        const auto end = std::min(text.find('\n', at), text.size());
+        const auto row = text.substr(at, end - at);
+        at = end + 1;
+        if (++line == 1) {
+            if (row.rfind("frame,effort", 0) != 0) return wrong(line, "this is no effort log");
+            continue;
+        }
+        if (row.empty()) continue;
+        const auto comma = row.find(',');
+        const auto second = comma == std::string::npos ? comma : row.find(',', comma + 1);
+        if (comma == std::string::npos) return wrong(line, "there is no effort");
+        const double frame = parse_number(row.substr(0, comma)).value_or(-1);
+        const double effort = parse_number(row.substr(comma + 1, second - comma - 1)).value_or(-1);
+        if (frame != static_cast<double>(out.size())) return wrong(line, "frames are not numbered from 0 on");
+        if (!(effort >= 0 && effort <= 9) || effort != static_cast<int>(effort))
+            return wrong(line, "an effort is 0 to 9");
+        out.push_back(static_cast<int>(effort));
+    }
+    return out;
+}
+
+}  // namespace htvm::app

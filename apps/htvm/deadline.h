@@ -1,0 +1,63 @@
+// How much may be searched for each frame of a live capture, so that none is late; and what was decided, to be
+// repeated.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "htvm/result.hpp"
+
+namespace htvm::app {
+
+// One frame, as decided and as it went.
+struct TimedFrame {
+    int effort = 5;     // see Encoder::set_effort()
+    double waited = 0;  // milliseconds from when the mesh was there to when it was taken
+    double took = 0;    // milliseconds that it then took
+    double latency() const { return waited + took; }
+};
+
+// Takes the highest effort with which a frame will probably be out in time. Times are forecast from the last frames':
+// how long each effort takes against the others is known, how fast the machine is and how hard the capture is not.
+class Deadline {
+public:
+    // milliseconds: from when a mesh is there; 0: there is no deadline. most: the effort that was asked for.
+    Deadline(double milliseconds, int most) : milliseconds_(milliseconds), most_(most) {}
+    // For a frame that has waited for so long. 0, motion alone, at most so many times in a row.
+    static constexpr std::size_t most_alone = 10;
+    int effort(double waited) const;
+    void took(const TimedFrame& frame);
+
+    double milliseconds() const { return milliseconds_; }
+    int most() const { return most_; }
+    const std::vector<TimedFrame>& frames() const { return frames_; }
+    std::size_t late() const;     // frames that were
+    std::size_t lowered() const;  // frames that got less than was asked for
+
+private:
+    double milliseconds_;
+    int most_;
+    double usual_ = 0;  // milliseconds that a frame takes at the usual effort, of the last ones; 0: not known yet
+    std::vector<TimedFrame> frames_;
+};
+
+// Median, 99th percentile and longest of the latencies, milliseconds; 0 without frames.
+struct Latency {
+    double median = 0, p99 = 0, longest = 0;
+};
+Latency latency_of(const std::vector<TimedFrame>& frames);
+
+// "latency 21 ms in the median, ...", and where there is a deadline, how many frames were late or got less effort.
+std::string deadline_summary(const Deadline& deadline);
+nlohmann::json deadline_json(const Deadline& deadline);
+
+// A line per frame: its number, effort, waiting and time. Read back, the efforts alone count.
+Result<void> write_effort_log(const std::filesystem::path& path, const std::vector<TimedFrame>& frames);
+Result<std::vector<int>> read_effort_log(const std::filesystem::path& path);
+
+}  // namespace htvm::app

@@ -1,0 +1,114 @@
+// How much is searched for frames that have a deadline, and the log by which a run is repeated.
+#include "deadline.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace htvm::app {
+namespace {
+
+// A machine on which a frame takes `usual` milliseconds at effort 5, half of that as motion alone, and every effort in
+// between accordingly; meshes come every 33 ms.
+double took(int effort, double usual) { return effort == 0 ? 0.5 * usual : usual * (0.7 + 0.06 * effort); }
+
+Deadline after(std::size_t frames, double usual, double milliseconds, int most = 5) {
+    Deadline deadline(milliseconds, most);
+    double waited = 0;
+    for (std::size_t i = 0; i < frames; ++i) {
+        TimedFrame frame{deadline.effort(waited), waited, 0};
+        frame.took = took(frame.effort, usual);
+        deadline.took(frame);
+        waited = std::max(0.0, waited + frame.took - 33);
+    }
+    return deadline;
+}
+
+TEST(Deadline, WithTimeToSpareEveryFrameGetsWhatWasAskedFor) {
+    const auto deadline = after(100, 20, 100, 7);
+    EXPECT_EQ(deadline.lowered(), 0u);
+    EXPECT_EQ(deadline.late(), 0u);
+}
+
+TEST(Deadline, WithoutOneNothingIsLateOrLowered) {
+    const auto deadline = after(100, 200, 0);
+    EXPECT_EQ(deadline.lowered(), 0u);
+    EXPECT_EQ(deadline.late(), 0u);
+}
+
+TEST(Deadline, AFrameThatWouldBeLateGetsLess) {
+    auto deadline = after(20, 30, 60);
+    EXPECT_EQ(deadline.effort(0), 5);
+    const int hurried = deadline.effort(28);
+    EXPECT_LT(hurried, 5);
+    EXPECT_GT(hurried, 0);
+    EXPECT_EQ(deadline.effort(58), 0);
+}
+
+TEST(Deadline, AMachineThatIsTooSlowKeepsUpWithLess) {
+    const auto deadline = after(300, 38, 66);
+    EXPECT_EQ(deadline.late(), 0u);
+    EXPECT_GT(deadline.lowered(), 0u);
+    EXPECT_LT(deadline.lowered(), deadline.frames().size());
+}
+
+TEST(Deadline, AFrameThatTookUnusuallyLongHardlyCountsForTheNext) {
+    auto deadline = after(20, 20, 66);
+    deadline.took({5, 0, 200});
+    EXPECT_EQ(deadline.effort(0), 5);
+}
+
+TEST(Deadline, MotionAloneIsNotCodedForever) {
+    const auto deadline = after(100, 400, 50);
+    std::size_t row = 0;
+    for (const auto& frame : deadline.frames()) {
+        row = frame.effort == 0 ? row + 1 : 0;
+        EXPECT_LE(row, Deadline::most_alone);
+    }
+    EXPECT_GT(deadline.late(), 0u);
+}
+
+TEST(Deadline, TellsTheMedianTheNinetyNinthPercentileAndTheLongest) {
+    std::vector<TimedFrame> frames;
+    for (int i = 1; i <= 100; ++i) frames.push_back({5, 1.0 * i, 1.0 * i});
+    const auto latency = latency_of(frames);
+    EXPECT_NEAR(latency.median, 101, 1.01);
+    EXPECT_NEAR(latency.p99, 199, 1.01);
+    EXPECT_EQ(latency.longest, 200);
+    EXPECT_EQ(latency_of({}).longest, 0);
+}
+
+class EffortLog : public testing::Test {
+protected:
+    std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "efforts.csv";
+    void write(const std::string& text) { std::ofstream(path) << text; }
+    std::string error() {
+        const auto read = read_effort_log(path);
+        return read ? "" : read.error().message.substr(path.string().size());
+    }
+};
+
+TEST_F(EffortLog, GivesTheEffortsBack) {
+    ASSERT_TRUE(write_effort_log(path, {{5, 0, 40}, {0, 12.5, 20}, {9, 1, 2}}));
+    EXPECT_EQ(*read_effort_log(path), (std::vector<int>{5, 0, 9}));
+}
+
+TEST_F(EffortLog, ThatIsNoneIsRefusedWithItsLine) {
+    const std::string what =
+        " (an effort log, as --effort-log writes it, has a line \"frame,effort,...\", then one per "
+        "frame)";
+    write("time,effort\n0,5\n");
+    EXPECT_EQ(error(), ", line 1: this is no effort log" + what);
+    write("frame,effort\n0,5\n2,5\n");
+    EXPECT_EQ(error(), ", line 3: frames are not numbered from 0 on" + what);
+    for (const char* row : {"0,10", "0,-1", "0,4.5", "0,", "0,x"}) {
+        write(std::string("frame,effort\n") + row + "\n");
+        EXPECT_EQ(error(), ", line 2: an effort is 0 to 9" + what) << row;
+    }
+    write("frame,effort\n0\n");
+    EXPECT_EQ(error(), ", line 2: there is no effort" + what);
+}
+
+}  // namespace
+}  // namespace htvm::app
