@@ -15,18 +15,13 @@
 #include <utility>
 #include <vector>
 
+#include "captures.h"
 #include "htvm/decoder.hpp"
 #include "htvm/encoder.hpp"
-#include "synth/synth.h"
 
 namespace {
 
-constexpr int first_frame = 40, frames = 6;
-
-struct Sequence {
-    std::vector<htvm::SynthFrame> frames;
-    std::vector<htvm::Packet> packets;
-};
+const std::vector<htvm::SynthFrame>& capture() { return htvm::bench::synthetic_frames(); }
 
 htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
     htvm::EncoderOptions options = htvm::default_options(htvm::Profile::topology);
@@ -62,17 +57,6 @@ void choose(htvm::EncoderOptions& options, Kind kind) {
     }
 }
 
-const std::vector<htvm::SynthFrame>& capture() {
-    static const auto made = [] {
-        htvm::SynthOptions options;
-        if (const char* vertices = std::getenv("HTVM_BENCH_VERTICES")) options.vertices = std::atoi(vertices);
-        std::vector<htvm::SynthFrame> out;
-        for (int i = 0; i < frames; ++i) out.push_back(htvm::synth_frame(options, first_frame + i));
-        return out;
-    }();
-    return made;
-}
-
 // An encoder that has coded its first frame, so that the next ones can refer to it.
 htvm::Encoder primed(Kind kind, double quality, unsigned threads) {
     auto options = encoder_options(quality, threads);
@@ -102,7 +86,7 @@ bool is_kind(benchmark::State& state, htvm::FrameType type, Kind kind) {
 // Runs forwards and backwards, so that the person never jumps, but not to the frame that the others refer to: there
 // nothing has moved.
 const htvm::SynthFrame& input_of(std::int64_t frame) {
-    const auto step = static_cast<std::size_t>(frame % (2 * (frames - 2)));
+    const std::size_t frames = capture().size(), step = static_cast<std::size_t>(frame) % (2 * (frames - 2));
     return capture()[1 + (step < frames - 1 ? step : 2 * (frames - 2) - step)];
 }
 
@@ -123,6 +107,8 @@ void encode(benchmark::State& state, Kind kind) {
         bits += 8.0 * static_cast<double>(info.bytes.total()) / info.source_vertices;
     }
     report(state, stages);
+    state.counters["captured vertices"] = static_cast<double>(capture()[1].mesh.positions.size());
+    state.counters["decoded vertices"] = encoder.last_frame().vertices;
     state.counters["bpv"] = bits / static_cast<double>(state.iterations());
 }
 
@@ -213,6 +199,8 @@ void decode(benchmark::State& state, Kind kind) {
     if (!is_kind(state, *htvm::frame_type(measured.kind), kind)) return;
     for (auto _ : state) decode_frame(decoder, measured);
     report(state, std::map<std::string, double>{});
+    state.counters["captured vertices"] = static_cast<double>(capture()[2].mesh.positions.size());
+    state.counters["decoded vertices"] = static_cast<double>(decoder.push(measured)->value().mesh.positions.size());
 }
 
 void decode_two_threads(benchmark::State& state, Kind kind) {

@@ -2,7 +2,9 @@ find_package(benchmark REQUIRED)
 file(GLOB benchmark_sources CONFIGURE_DEPENDS bench/*.cpp)
 if(benchmark_sources)
   add_executable(htvm_bench ${benchmark_sources})
-  target_link_libraries(htvm_bench PRIVATE htvm_encoder htvm_decoder htvm_draco htvm_synth benchmark::benchmark_main)
+  target_include_directories(htvm_bench PRIVATE ${PROJECT_SOURCE_DIR}/apps)
+  target_link_libraries(htvm_bench PRIVATE htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_synth htvm_libdraco
+                                           benchmark::benchmark_main)
 endif()
 # Viewers for ./dev live-load and lossy-line.
 add_executable(live_watch bench/live/watch.cpp)
