@@ -19,7 +19,7 @@ void check_places(const std::vector<std::uint64_t>& places, std::uint64_t pushed
 
 Packet any_packet(fuzz::FuzzInput& input) {
     Packet packet;
-    packet.kind = static_cast<PacketKind>(input.below(10));
+    packet.kind = static_cast<PacketKind>(input.below(13));
     packet.flags = input.u8();
     packet.frame = input.below(16);
     packet.reference = input.below(16);

@@ -1,7 +1,7 @@
 // What a frame needs to be decoded, determined from packet headers alone: for programs that handle loss, seek, cut,
 // join late, forward or record a stream without decoding it. The rule is docs/bitstream.md, section 2.2: a frame needs
 // the sequence header, the packet that `reference` in its header names, what that one needs, and, for an EP-frame, the
-// codebooks in force.
+// codebooks in force. Pictures of textures (texture.hpp) need pictures alone, and no frame needs one.
 //
 //   htvm::Dependencies dependencies;
 //   for each packet of a live stream:
@@ -44,8 +44,11 @@ public:
     // The places of exactly the packets that the newest frame needs, in the order in which to decode them: the sequence
     // header first, the frame last. Empty if it cannot be decoded from what was pushed, and before any frame.
     std::vector<std::uint64_t> closure() const;
-    // The places of the packets that later frames may need, in the same order; all others can be forgotten. A viewer
-    // that joins late must be sent these.
+    // The same for the newest picture: the header, and the pictures from the last key picture on. Empty if there is
+    // none since the sequence began, or one that it needs did not come.
+    std::vector<std::uint64_t> picture_closure() const;
+    // The places of the packets that later frames and pictures may need, in the same order; all others can be
+    // forgotten. A viewer that joins late must be sent these.
     std::vector<std::uint64_t> kept() const;
 
 private:
@@ -69,6 +72,7 @@ private:
     void take_header(const PacketHeader& header, std::uint64_t place);
     void take_codebook(const PacketHeader& header, std::uint64_t place);
     void take_frame(const PacketHeader& header, std::uint64_t place);
+    void take_picture(const PacketHeader& header, std::uint64_t place);
     void forget_reference();
     std::size_t chained_up_to(std::uint32_t number) const;
     std::vector<std::uint64_t> places(std::size_t references, const Codebooks& codebooks, std::size_t chained) const;
@@ -90,10 +94,16 @@ private:
     Codebooks codebooks_;                          // since the I-frame
     std::vector<std::uint64_t> untold_codebooks_;  // of either purpose, all since the I-frame
     Newest newest_;
+    std::vector<Frame> pictures_;  // that later ones may need: a key picture, then each referring to the one before
+    struct NewestPicture {
+        std::uint64_t place;
+        std::size_t before;  // how many of pictures_ it needs besides itself
+    };
+    std::optional<NewestPicture> newest_picture_;
 };
 
-// The same for a list: the places in `packets` of exactly what packets[frame] needs, itself last. Empty if it cannot be
-// decoded from these, or is not a frame.
+// The same for a list: the places in `packets` of exactly what packets[frame] needs, a frame or a picture, itself last.
+// Empty if it cannot be decoded from these, or is neither.
 std::vector<std::size_t> closure(std::span<const PacketHeader> packets, std::size_t frame);
 
 }  // namespace htvm

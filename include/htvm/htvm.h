@@ -284,9 +284,10 @@ const char* htvm_layer_name(uint32_t layer);
 
 /* flags of a packet: bits */
 enum {
-    HTVM_PACKET_REFERRED = 1,  /* of a frame: later frames may refer to it */
-    HTVM_PACKET_ACCESS = 2,    /* of a frame: it needs no frame but the one it refers to, which needs none */
-    HTVM_PACKET_DROPPABLE = 4, /* of a frame: it may be left out without affecting any other */
+    HTVM_PACKET_REFERRED = 1,  /* of a frame or picture: later ones may refer to it */
+    HTVM_PACKET_ACCESS = 2,    /* of a frame: it needs no frame but the one it refers to, which needs none; of a
+                                * picture: it needs no other */
+    HTVM_PACKET_DROPPABLE = 4, /* of a frame or picture: it may be left out without affecting any other */
     HTVM_PACKET_COLOUR = 8,    /* of a codebook: of the colours, not of the geometry */
     HTVM_PACKET_SESSION = 16,  /* of a sequence header: its session is not 0 */
     HTVM_PACKET_TOLD = 128     /* the other bits are valid */
@@ -294,7 +295,7 @@ enum {
 
 typedef struct htvm_packet_info {
     uint32_t struct_size; /* bytes of this struct that were filled */
-    uint32_t kind;        /* of packet: docs/bitstream.md, section 2 */
+    uint32_t kind;        /* of packet: docs/bitstream.md, section 2; HTVM_PACKET_PICTURE, ... */
     uint32_t flags;       /* HTVM_PACKET_...; for streams of version 1 they are derived */
     uint32_t frame;       /* number of the frame that it is, or came with */
     uint32_t reference;   /* number of the frame that it refers to */
@@ -313,6 +314,42 @@ htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_inf
 enum { HTVM_PACKET_HEADER = 32 };
 htvm_status htvm_packet_header_read(const uint8_t* bytes, size_t size, htvm_packet_info* info, size_t info_size);
 
+/* kinds of packets that players look for; all others go to the decoder, and these may */
+enum { HTVM_PACKET_AUDIO = 10, HTVM_PACKET_PICTURE = 12 };
+
+/* what coded a picture */
+enum {
+    HTVM_PICTURE_AV1 = 1,   /* one temporal unit of low-overhead OBUs */
+    HTVM_PICTURE_VP9 = 2,   /* one frame */
+    HTVM_PICTURE_PNG = 16,  /* an image file; and so */
+    HTVM_PICTURE_JPEG = 17, /**/
+    HTVM_PICTURE_WEBP = 18  /**/
+};
+
+/* The picture of a frame of a textured stream, to be given to the platform's decoder of video or images. */
+typedef struct htvm_texture_picture {
+    uint32_t struct_size;          /* number of bytes of this struct that were filled in */
+    uint32_t coder;                /* HTVM_PICTURE_... */
+    uint32_t matrix;               /* of video: 1 BT.709, 6 BT.601; 0 of image files */
+    uint32_t full_range;           /* of video: 1 where its planes take the whole range of 0..255 */
+    uint32_t width, height;        /* pixels, 1..4096 */
+    uint32_t frame;                /* number of the frame that it is the picture of */
+    uint32_t reference;            /* number of the frame of the picture before, which it needs; its own frame's for a
+                                    * key picture, which needs none */
+    int64_t timestamp_us;          /* of its frame */
+    uint32_t gain_red, gain_green; /* the decoded values, 0..255, are multiplied by these / 4096 */
+    uint32_t gain_blue;
+    uint32_t reserved;    /* 0 */
+    const uint8_t* coded; /* the coder's bytes, on loan: within the packet */
+    uint64_t coded_bytes; /* at least 1 */
+} htvm_texture_picture;
+
+/* Reads a whole packet of kind HTVM_PACKET_PICTURE (header and checksums included). HTVM_CORRUPT_STREAM: it is not one
+ * whole, undamaged packet of this kind. HTVM_UNSUPPORTED: the coder or the matrix is not known. HTVM_BAD_INPUT also if
+ * picture_size is not sizeof(htvm_texture_picture). */
+htvm_status htvm_texture_picture_read(const uint8_t* packet, size_t size, htvm_texture_picture* picture,
+                                      size_t picture_size);
+
 /* Determines what frames need, for programs that forward, record or cut a stream without decoding it. */
 typedef struct htvm_dependencies htvm_dependencies;
 
@@ -324,11 +361,12 @@ void htvm_dependencies_destroy(htvm_dependencies* dependencies);
  * first packet, and so on. */
 htvm_status htvm_dependencies_push(htvm_dependencies* dependencies, const htvm_packet_info* info, uint64_t* place);
 
-/* The places of exactly the packets that the newest frame needs, in the order to decode them, itself last; none if
- * it cannot be decoded. *count is set to how many; HTVM_BUFFER_TOO_SMALL if capacity is less. */
+/* The places of exactly the packets that the newest frame needs (no picture is), in the order to decode them, itself
+ * last; none if it cannot be decoded. *count is set to how many; HTVM_BUFFER_TOO_SMALL if capacity is less. */
 htvm_status htvm_dependencies_closure(htvm_dependencies* dependencies, uint64_t* places, size_t capacity,
                                       size_t* count);
-/* Likewise what later frames may need. All other packets can be forgotten; a viewer that joins late is sent these. */
+/* Likewise what later frames may need, and later pictures of a textured stream. All other packets can be forgotten; a
+ * viewer that joins late is sent these. */
 htvm_status htvm_dependencies_kept(htvm_dependencies* dependencies, uint64_t* places, size_t capacity, size_t* count);
 
 /* The number in the whole stream of the frame that the packet pushed last is. Where the frame numbers of a sequence

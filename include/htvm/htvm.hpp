@@ -17,4 +17,5 @@
 #include "htvm/result.hpp"           // IWYU pragma: export
 #include "htvm/scene.hpp"            // IWYU pragma: export
 #include "htvm/skeleton.hpp"         // IWYU pragma: export
+#include "htvm/texture.hpp"          // IWYU pragma: export
 #include "htvm/threads.hpp"          // IWYU pragma: export

@@ -23,13 +23,15 @@ enum class PacketKind : std::uint8_t {
     front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
     audio = 10,       // (9 is not used) sound of the time from a frame to the next (audio.hpp); optional
     patched = 11,     // TP-frame: a T-frame of which a part is replaced; a reference itself
+    texture = 12,     // the picture of a frame (texture.hpp); optional
 };
 
 // Bits of PacketHeader::flags (docs/bitstream.md, section 2.1), for programs that do not decode the packet.
 namespace packet_flag {
-inline constexpr std::uint8_t referred = 1;   // frames: later frames may refer to it
-inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but the reference and what that needs
-inline constexpr std::uint8_t droppable = 4;  // frames, audio: it may be left out without affecting any frame
+inline constexpr std::uint8_t referred = 1;   // frames, pictures: later ones may refer to it
+inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but the reference and what that needs;
+                                              // pictures: it needs no other
+inline constexpr std::uint8_t droppable = 4;  // frames, audio, pictures: it may be left out without affecting others
 inline constexpr std::uint8_t colour = 8;     // codebooks: it is for colours, not for geometry
 inline constexpr std::uint8_t session = 16;   // sequence headers: the session is not 0
 inline constexpr std::uint8_t settled = 32;   // I-frames: of a tracked mesh, which is not smoothed once more

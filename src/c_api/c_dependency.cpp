@@ -1,4 +1,4 @@
-// Packet headers and what frames need in the C interface, over htvm::FrameNumbers.
+// Packet headers, pictures, and what frames need in the C interface, over htvm::FrameNumbers.
 #include <algorithm>
 #include <optional>
 #include <vector>
@@ -6,6 +6,7 @@
 #include "c_api/c_status.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
+#include "htvm/texture.hpp"
 
 using htvm::c_api::guarded;
 using htvm::c_api::LastError;
@@ -23,6 +24,13 @@ static_assert(HTVM_PACKET_REFERRED == htvm::packet_flag::referred && HTVM_PACKET
               HTVM_PACKET_COLOUR == htvm::packet_flag::colour && HTVM_PACKET_SESSION == htvm::packet_flag::session &&
               HTVM_PACKET_TOLD == htvm::packet_flag::told);
 static_assert(HTVM_PACKET_HEADER == htvm::packet_header_bytes);
+static_assert(HTVM_PACKET_AUDIO == static_cast<int>(htvm::PacketKind::audio) &&
+              HTVM_PACKET_PICTURE == static_cast<int>(htvm::PacketKind::texture));
+static_assert(HTVM_PICTURE_AV1 == static_cast<int>(htvm::PictureCoder::av1) &&
+              HTVM_PICTURE_VP9 == static_cast<int>(htvm::PictureCoder::vp9) &&
+              HTVM_PICTURE_PNG == static_cast<int>(htvm::PictureCoder::png) &&
+              HTVM_PICTURE_JPEG == static_cast<int>(htvm::PictureCoder::jpeg) &&
+              HTVM_PICTURE_WEBP == static_cast<int>(htvm::PictureCoder::webp));
 
 namespace {
 
@@ -70,6 +78,37 @@ htvm_status htvm_packet_header_read(const uint8_t* bytes, size_t size, htvm_pack
     const auto header = htvm::read_packet_header({bytes, size}, payload_bytes);
     if (!header) return HTVM_CORRUPT_STREAM;
     return describe(*header, std::uint64_t{payload_bytes} + htvm::packet_overhead, info, info_size);
+}
+
+htvm_status htvm_texture_picture_read(const uint8_t* packet, size_t size, htvm_texture_picture* picture,
+                                      size_t picture_size) {
+    if (!packet || !picture || picture_size != sizeof *picture) return HTVM_BAD_INPUT;
+    LastError unused;
+    return guarded(unused, [&] {
+        htvm::PacketReader one(size);
+        one.push({packet, size});
+        const auto whole = one.pull();
+        if (!whole || one.damaged_bytes() > 0 || one.pending_bytes() > 0) return htvm_status{HTVM_CORRUPT_STREAM};
+        // On loan from the caller's bytes, not from the copy that was checked.
+        const auto read =
+            htvm::read_texture_picture(*whole, {packet + htvm::packet_header_bytes, whole->payload.size()});
+        if (!read) return htvm::c_api::status_of(read.error().kind);
+        htvm_texture_picture out{};
+        out.coder = static_cast<std::uint32_t>(read->coder);
+        out.matrix = static_cast<std::uint32_t>(read->matrix);
+        out.full_range = read->full_range ? 1 : 0;
+        out.width = read->width;
+        out.height = read->height;
+        out.frame = whole->frame;
+        out.reference = whole->reference;
+        out.timestamp_us = whole->timestamp_us;
+        out.gain_red = read->gains[0];
+        out.gain_green = read->gains[1];
+        out.gain_blue = read->gains[2];
+        out.coded = read->coded.data();
+        out.coded_bytes = read->coded.size();
+        return htvm::c_api::write_struct(out, picture, picture_size);
+    });
 }
 
 htvm_status htvm_dependencies_create(const htvm_allocator* allocator, htvm_dependencies** dependencies) {

@@ -7,6 +7,7 @@
 #include "codec/stream/sequence.h"
 #include "codec/tracked/frame_group.h"
 #include "core/crc32.h"
+#include "htvm/texture.hpp"
 
 namespace htvm {
 
@@ -32,6 +33,7 @@ std::uint64_t Dependencies::push(const PacketHeader& header) {
     const auto place = pushed_++;
     if (header.kind == PacketKind::sequence) take_header(header, place);
     if (header.kind == PacketKind::codebook) take_codebook(header, place);
+    if (header.kind == PacketKind::texture) take_picture(header, place);
     if (frame_type(header.kind)) take_frame(header, place);
     return place;
 }
@@ -41,6 +43,8 @@ void Dependencies::begin_sequence() {
     highest_frame_.reset();
     forget_reference();
     newest_ = {};
+    pictures_.clear();
+    newest_picture_.reset();
 }
 
 void Dependencies::forget_reference() {
@@ -100,6 +104,23 @@ void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
     newest_ = {};
 }
 
+void Dependencies::take_picture(const PacketHeader& header, std::uint64_t place) {
+    newest_picture_.reset();
+    if (!header_) return;
+    const bool key = is_key_picture(header);
+    const auto named = std::find_if(pictures_.begin(), pictures_.end(),
+                                    [&](const Frame& picture) { return picture.number == header.reference; });
+    if (!key && named == pictures_.end()) return;
+    const auto before = key ? std::size_t{0} : static_cast<std::size_t>(named - pictures_.begin()) + 1;
+    newest_picture_ = {place, before};
+    if (header.has(packet_flag::told) && !header.has(packet_flag::referred)) return;
+    pictures_.resize(before);
+    pictures_.push_back({header.frame, place});
+    if (pictures_.size() <= most_) return;
+    pictures_.clear();
+    newest_picture_.reset();
+}
+
 // How many frames of chain_ one needs that refers to this one; 0 if it is none of them. Only within a group of T-frames
 // may it be another than the last.
 std::size_t Dependencies::chained_up_to(std::uint32_t number) const {
@@ -128,13 +149,29 @@ std::vector<std::uint64_t> Dependencies::closure() const {
     return out;
 }
 
-std::vector<std::uint64_t> Dependencies::kept() const { return places(references_.size(), codebooks_, chain_.size()); }
+std::vector<std::uint64_t> Dependencies::picture_closure() const {
+    if (!newest_picture_ || !header_) return {};
+    std::vector<std::uint64_t> out = {header_->place};
+    for (std::size_t i = 0; i < newest_picture_->before; ++i) out.push_back(pictures_[i].place);
+    out.push_back(newest_picture_->place);
+    return out;
+}
+
+std::vector<std::uint64_t> Dependencies::kept() const {
+    auto out = places(references_.size(), codebooks_, chain_.size());
+    const auto frames = static_cast<std::ptrdiff_t>(out.size());
+    for (const auto& picture : pictures_) out.push_back(picture.place);
+    if (header_) std::inplace_merge(out.begin() + 1, out.begin() + frames, out.end());
+    return out;
+}
 
 std::vector<std::size_t> closure(std::span<const PacketHeader> packets, std::size_t frame) {
-    if (frame >= packets.size() || !frame_type(packets[frame].kind)) return {};
+    if (frame >= packets.size()) return {};
+    const bool picture = packets[frame].kind == PacketKind::texture;
+    if (!picture && !frame_type(packets[frame].kind)) return {};
     Dependencies dependencies;
     for (const auto& packet : packets.first(frame + 1)) dependencies.push(packet);
-    const auto places = dependencies.closure();
+    const auto places = picture ? dependencies.picture_closure() : dependencies.closure();
     return {places.begin(), places.end()};
 }
 

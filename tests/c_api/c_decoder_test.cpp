@@ -1,6 +1,7 @@
 // The C interface's decoder gives the same as the C++ one, and survives callers who misuse it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <memory>
@@ -10,6 +11,7 @@
 #include "codec/enhanced_options.h"
 #include "htvm/dependency.hpp"
 #include "htvm/stream_index.hpp"
+#include "htvm/texture.hpp"
 
 namespace htvm {
 namespace {
@@ -502,6 +504,40 @@ TEST(CInterface, TellsWhatFramesNeedAsTheCppOneDoes) {
     EXPECT_EQ(htvm_dependencies_kept(nullptr, places.data(), places.size(), &count), HTVM_BAD_INPUT);
     htvm_dependencies_destroy(dependencies);
     htvm_dependencies_destroy(nullptr);
+}
+
+TEST(CInterface, ReadsAPictureOnLoanFromItsPacket) {
+    const std::vector<std::uint8_t> coded = {1, 2, 3};
+    const TexturePicture given = {PictureCoder::vp9, ColourMatrix::bt601, true, 640, 480, {4096, 1, 65535}, coded};
+    auto bytes = write_packet(write_texture_picture(given, {7, 6, 5, true}));
+    htvm_texture_picture picture;
+    ASSERT_EQ(htvm_texture_picture_read(bytes.data(), bytes.size(), &picture, sizeof picture), HTVM_OK);
+    EXPECT_EQ(picture.struct_size, sizeof picture);
+    EXPECT_EQ(picture.coder, static_cast<std::uint32_t>(HTVM_PICTURE_VP9));
+    EXPECT_EQ(picture.matrix, 6u);
+    EXPECT_EQ(picture.full_range, 1u);
+    EXPECT_EQ(picture.width, 640u);
+    EXPECT_EQ(picture.height, 480u);
+    EXPECT_EQ(picture.frame, 7u);
+    EXPECT_EQ(picture.reference, 6u);
+    EXPECT_EQ(picture.timestamp_us, 5);
+    EXPECT_EQ(picture.gain_red, 4096u);
+    EXPECT_EQ(picture.gain_green, 1u);
+    EXPECT_EQ(picture.gain_blue, 65535u);
+    ASSERT_EQ(picture.coded_bytes, coded.size());
+    EXPECT_EQ(picture.coded, bytes.data() + bytes.size() - 4 - coded.size());
+    EXPECT_TRUE(std::equal(coded.begin(), coded.end(), picture.coded));
+    EXPECT_EQ(htvm_texture_picture_read(bytes.data(), bytes.size() - 1, &picture, sizeof picture), HTVM_CORRUPT_STREAM);
+    EXPECT_EQ(htvm_texture_picture_read(nullptr, 0, &picture, sizeof picture), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_texture_picture_read(bytes.data(), bytes.size(), nullptr, 0), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_texture_picture_read(bytes.data(), bytes.size(), &picture, 8), HTVM_BAD_INPUT);
+    auto unknown = write_texture_picture(given, {7, 6, 5, true});
+    unknown.payload[0] = 9;
+    bytes = write_packet(unknown);
+    EXPECT_EQ(htvm_texture_picture_read(bytes.data(), bytes.size(), &picture, sizeof picture), HTVM_UNSUPPORTED);
+    unknown.kind = PacketKind::audio;
+    bytes = write_packet(unknown);
+    EXPECT_EQ(htvm_texture_picture_read(bytes.data(), bytes.size(), &picture, sizeof picture), HTVM_CORRUPT_STREAM);
 }
 
 TEST(CInterface, CarriesSessionSceneAndMetadata) {

@@ -20,7 +20,8 @@ from intra import decode_intra_mesh
 from nodes import Kept, smoothed
 from reference import Reference, decode_pose
 from patched import decode_patched_mesh
-from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, PATCHED, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
+from picture import Pictures
+from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, PATCHED, PICTURE, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
                     read_coded_frame, read_frame_payload, read_sequence_header)
 from tracked import TrackedReference, decode_tracked_mesh
 
@@ -92,15 +93,18 @@ def decode_stream(data):
     header = reference = group = None
     books = [None, None]
     highest = -1  # number of a frame since the sequence began
+    pictures = Pictures()
     for packet in packets(data):
         if packet.kind in (INTRA, ENHANCED, PREDICTED, TRACKED, PATCHED):
             highest = max(highest, packet.frame)
+            pictures.frame = packet.frame
         try:
             if packet.kind == SEQUENCE:
                 new = read_sequence_header(packet.payload)
                 repeated = header is not None and packet.payload == header.bytes
                 if not repeated or (new.session == 0 and packet.frame <= highest):
                     reference, group, books, highest = None, None, [None, None], -1
+                    pictures = Pictures()
                 header = new
             elif packet.kind == CODEBOOK:
                 book = read_codebook(packet.payload)
@@ -108,6 +112,8 @@ def decode_stream(data):
                     books[book.purpose] = book
             elif packet.kind == AUDIO:
                 read_audio(packet.payload)
+            elif packet.kind == PICTURE:
+                pictures.take(packet)
             elif packet.kind == INTRA:
                 check(header, "a frame came before any sequence header")
                 frame = read_coded_frame(packet)

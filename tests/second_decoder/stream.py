@@ -8,7 +8,7 @@ from conventions import Bytes, L, Unsupported, check
 
 # ---------------------------------------------------------------------------------------------- 2. packets
 
-SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED, AUDIO, PATCHED = 1, 2, 3, 4, 5, 6, 7, 10, 11
+SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED, AUDIO, PATCHED, PICTURE = 1, 2, 3, 4, 5, 6, 7, 10, 11, 12
 REFERRED, SETTLED, TOLD = 1, 32, 128  # flags
 
 
