@@ -5,8 +5,11 @@
 #include <cmath>
 #include <filesystem>
 
+#include "command_line/interruption.h"
+#include "command_line/terminal.h"
 #include "core/opus_packet.h"
 #include "htvm/decoder.hpp"
+#include "sound/opus_track.h"
 
 namespace htvm::app {
 namespace {
@@ -24,7 +27,8 @@ std::uint32_t clamped(std::int64_t samples, std::uint64_t most) {
 void add_audio_options(CLI::App& command, AudioOptions& options) {
     auto* file = command.add_option(
         "--audio", options.file,
-        "Sound, which begins with the first frame: an .opus file (ffmpeg -i SOUND -c:a libopus sound.opus)");
+        "Sound, which begins with the first frame, mono or stereo: WAV, FLAC, MP3, Ogg, AIFF and others, coded as\n"
+        "Opus; Opus files are taken as they are");
     file->type_name("FILE");
     command
         .add_option(
@@ -34,11 +38,25 @@ void add_audio_options(CLI::App& command, AudioOptions& options) {
         ->type_name("SECONDS")
         ->check(CLI::Range(-1e6, 1e6))
         ->needs(file);
+    command
+        .add_option("--audio-bitrate", options.kilobits,
+                    "--audio: kbit/s of the sound, 6 to 510 (default: 48 mono, 96 stereo); Opus files are coded again")
+        ->type_name("KBIT/S")
+        ->check(CLI::Range(6.0, 510.0))
+        ->needs(file);
 }
 
 Result<std::optional<AudioTrack>> AudioTrack::open(const AudioOptions& options) {
     if (options.file.empty()) return std::nullopt;
-    auto track = read_ogg_opus(std::filesystem::path(options.file));
+    OpusFileOptions coding;
+    if (options.kilobits > 0) coding.bits_per_second = static_cast<std::uint32_t>(std::lround(1000 * options.kilobits));
+    std::optional<Progress> progress;  // in steps of a second
+    coding.step = [&](double, double of) {
+        if (!progress) progress.emplace("coding the sound, seconds", static_cast<std::size_t>(of));
+        progress->step();
+        return interruption() == 0;
+    };
+    auto track = read_opus_track(options.file, coding);
     if (!track) return tl::unexpected(track.error());
     return AudioTrack(std::move(*track), options.delay);
 }

@@ -17,17 +17,18 @@ class App;
 namespace htvm::app {
 
 struct AudioOptions {
-    std::string file;  // Ogg Opus; empty: no sound
-    double delay = 0;  // seconds from the first frame to the beginning of the sound; below 0, so much is left out
+    std::string file;     // any sound file; empty: no sound
+    double delay = 0;     // seconds from the first frame to the beginning of the sound; below 0, so much is left out
+    double kilobits = 0;  // a second, for Opus; 0: the usual rate, and Opus files are taken as they are
 };
 
-// Adds --audio and --audio-delay to a command.
+// Adds --audio, --audio-delay and --audio-bitrate to a command.
 void add_audio_options(CLI::App& command, AudioOptions& options);
 
 // Gives out the sound behind the frame in whose time it begins, and cuts it where the frames end.
 class AudioTrack {
 public:
-    // Nothing if no file is given.
+    // Nothing if no file is given. Sound that is not Opus yet is coded now, with progress on the terminal.
     static Result<std::optional<AudioTrack>> open(const AudioOptions& options);
 
     // The sound that lies before a packet of the stream. Takes every packet, in order.

@@ -1,4 +1,4 @@
-// htvm decode: a stream in, meshes out.
+// htvm decode: a stream in, meshes and sound out.
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
@@ -27,6 +27,7 @@
 #include "io/ply.h"
 #include "io/sequence.h"
 #include "io/timestamps.h"
+#include "sound_output.h"
 #include "stream_file.h"
 #include "stream_seek.h"
 
@@ -34,7 +35,7 @@ namespace htvm::app {
 namespace {
 
 struct Options {
-    std::string input, output, timestamps, format = "ply", unit = "capture", conceal = "gap";
+    std::string input, output, audio, timestamps, format = "ply", unit = "capture", conceal = "gap";
     std::uint64_t first = 0;
     std::size_t frames = 0;
     unsigned threads = 0;
@@ -170,6 +171,7 @@ struct Decoding {
     LostFrames lost = {};
     std::uint32_t begins_with = 0;  // number of the first frame of a stream that begins in the middle, until told
     std::uint64_t promised = 0;     // frames of the stream, by indices in front
+    SoundOutput* sound = nullptr;   // takes what is read, if sound is asked for
     std::uint32_t next_number = 0;  // of the frame after the last
 };
 
@@ -294,6 +296,8 @@ Result<bool> decode_next(Decoding& d) {
             return tl::unexpected(ok.error());
         return false;
     }
+    if (d.sound)
+        if (auto ok = d.sound->take(*packet); !ok) return tl::unexpected(ok.error());
     const bool is_frame = frame_type(packet->kind).has_value();
     d.numbers.take(*packet);
     if (d.numbers.begins_sequence()) d.summary.timestamp_us.reset();  // frames before its first one never existed
@@ -385,7 +389,36 @@ void begin_at_first(Decoding& d) {
     d.promised = start->promised;
 }
 
+tl::unexpected<Error> not_a_stream(const Options& options) {
+    return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
+}
+
+// The sound alone: no frame is decoded.
+Result<void> extract_sound(const Options& options) {
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes, options.trust);
+    if (!input) return tl::unexpected(input.error());
+    SoundOutput sound(options.audio, {options.first, options.frames});
+    Decoder headers(options.limits);  // only checks the sequence headers
+    while (auto packet = input->next()) {
+        if (packet->kind == PacketKind::sequence)
+            if (auto ok = headers.push(*packet); !ok) return tl::unexpected(ok.error());
+        if (auto ok = sound.take(*packet); !ok) return fail(ok.error().kind, options.input + ": " + ok.error().message);
+        if (sound.is_enough()) break;
+    }
+    if (input->refusal()) return tl::unexpected(*input->refusal());
+    if (!headers.sequence() && input->oversized_packets() == 0) return not_a_stream(options);
+    if (auto ok = sound.finish(options.input); !ok) return ok;
+    return sound.is_enough() ? Result<void>() : check_whole(*input, options.input);
+}
+
 Result<void> decode(const Options& options) {
+    // A file is read once more for its sound, since the frames asked for may need only some of it.
+    std::error_code no_file;
+    const bool apart = options.output.empty() || std::filesystem::is_regular_file(options.input, no_file);
+    if (!options.audio.empty() && apart) {
+        auto extracted = extract_sound(options);
+        if (!extracted || options.output.empty()) return extracted;
+    }
     auto input = StreamInput::open(options.input, options.limits.max_packet_bytes, options.trust);
     if (!input) return tl::unexpected(input.error());
     auto output = MeshOutput::open(options);
@@ -396,9 +429,12 @@ Result<void> decode(const Options& options) {
     Decoder decoder(settings);
     Summary summary;
     summary.due = static_cast<std::uint32_t>(options.first);
+    SoundOutput sound(options.audio, {options.first, options.frames});
+    const bool sound_beside = !options.audio.empty() && !apart;
     {
         Progress progress("decoding", options.frames);
         Decoding decoding{options, *input, *output, decoder, summary, progress};
+        if (sound_beside) decoding.sound = &sound;
         if (options.first > 0) begin_at_first(decoding);
         for (;;) {
             const auto more = decode_next(decoding);
@@ -412,11 +448,12 @@ Result<void> decode(const Options& options) {
         if (auto ok = write_file(options.timestamps, frame_times_csv(summary.times)); !ok) return ok;
     if (options.json) print_json(summary, *input);
     if (input->refusal()) return tl::unexpected(*input->refusal());
-    if (!decoder.sequence() && input->oversized_packets() == 0)
-        return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
+    if (!decoder.sequence() && input->oversized_packets() == 0) return not_a_stream(options);
     if (summary.written() == 0 && options.first > 0 && summary.undecodable + summary.missing == 0)
         return fail(ErrorKind::bad_input, fmt::format("{} has no frame {}", options.input, options.first));
     tell_what_was_written(options, *output, summary);
+    if (sound_beside)
+        if (auto ok = sound.finish(options.input); !ok) return ok;
     return judge(options, *output, *input, summary);
 }
 
@@ -424,7 +461,7 @@ Result<void> decode(const Options& options) {
 
 void add_decode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command = app.add_subcommand("decode", "Turn an .htvm stream back into meshes");
+    auto* command = app.add_subcommand("decode", "Turn an .htvm stream back into meshes and sound");
     command
         ->add_option("input", options->input,
                      "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
@@ -436,8 +473,12 @@ void add_decode(CLI::App& app, Run& run) {
                      "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one .glb (all\n"
                      "frames, as an animation), of one .ply or .obj (the first frame only), or - for concatenated PLY\n"
                      "on standard output")
-        ->type_name("FILE")
-        ->required();
+        ->type_name("FILE");
+    command
+        ->add_option("--audio", options->audio,
+                     "Where the sound goes: an .opus or .ogg file, with the packets as they are in the stream, or a\n"
+                     ".wav. It begins with the first frame asked for. Without -o, only the sound is written")
+        ->type_name("FILE");
     command
         ->add_option(
             "--timestamps", options->timestamps,
@@ -475,11 +516,17 @@ void add_decode(CLI::App& app, Run& run) {
         "  htvm decode person.htvm -o meshes/\n"
         "  htvm decode person.htvm -o 'out/%04d.obj'\n"
         "  htvm decode person.htvm -o person.glb\n"
+        "  htvm decode person.htvm --audio voice.wav\n"
         "  htvm decode - -o - < person.htvm | viewer --ply\n"
         "  htvm decode ws://localhost:8080/watch/person -o - | viewer --ply");
     command->callback([options, &run] {
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the meshes; choose one");
+        if (options->output.empty() && options->audio.empty())
+            throw CLI::ValidationError("-o", "is required, or --audio for the sound alone");
+        if (!options->audio.empty() && !is_written_sound_name(options->audio))
+            throw CLI::ValidationError(
+                "--audio", fmt::format("'{}' does not end in one of {}", options->audio, written_sound_extensions));
         run = [options] { return decode(*options); };
     });
 }

@@ -79,7 +79,7 @@ void add_join(CLI::App& app, Run& run) {
         "last. With --audio, sound that the streams have is left out.\n"
         "Examples:\n"
         "  htvm join part1.htvm part2.htvm -o whole.htvm\n"
-        "  htvm join silent.htvm --audio sound.opus -o person.htvm");
+        "  htvm join silent.htvm --audio sound.wav -o person.htvm");
     command->callback([options, &run] { run = [options] { return run_join(*options); }; });
 }
 

@@ -34,6 +34,10 @@ void check_file(std::span<const std::uint8_t> bytes) {
         size += packet.size();
     }
     require(samples >= track->pre_skip + track->samples && size <= bytes.size(), "no more sound than the file has");
+    const auto again = read_ogg_opus(write_ogg_opus(*track));
+    require(
+        again && again->samples == track->samples && again->pre_skip == track->pre_skip && again->gain == track->gain,
+        "a file that is written is read again");
 }
 
 }  // namespace

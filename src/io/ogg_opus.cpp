@@ -37,6 +37,15 @@ std::uint32_t ogg_crc(std::span<const std::uint8_t> bytes, std::uint32_t crc) {
     return crc;
 }
 
+constexpr std::size_t sum_at = 22;  // of a page: where its sum is
+
+// The sum of a page is that with zeros in its place.
+std::uint32_t page_sum(std::span<const std::uint8_t> page) {
+    auto sum = ogg_crc(page.first(sum_at), 0);
+    sum = ogg_crc(std::array<std::uint8_t, 4>{}, sum);
+    return ogg_crc(page.subspan(sum_at + 4), sum);
+}
+
 struct Page {
     bool continues = false, first = false, last = false;
     std::int64_t granule = -1;  // samples up to the end of the last packet that ends in it, pre-skip included
@@ -64,11 +73,7 @@ std::optional<Page> read_page(std::span<const std::uint8_t> bytes, std::size_t& 
     page.body = in.bytes(body);
     if (!in.ok()) return std::nullopt;
     size = in.position();
-    // The sum is that of the page with zeros in place of the sum.
-    constexpr std::size_t sum_at = 22;
-    auto sum = ogg_crc(bytes.first(sum_at), 0);
-    sum = ogg_crc(std::array<std::uint8_t, 4>{}, sum);
-    if (ogg_crc(bytes.first(size).subspan(sum_at + 4), sum) != stored) return std::nullopt;
+    if (page_sum(bytes.first(size)) != stored) return std::nullopt;
     return page;
 }
 
@@ -95,7 +100,92 @@ Result<OpusTrack> read_head(std::span<const std::uint8_t> packet) {
     return out;
 }
 
+// Packets one behind the other, on pages of about a second.
+class PageWriter {
+public:
+    // granule: samples up to the packet's end, pre-skip included.
+    void add(std::span<const std::uint8_t> packet, std::int64_t granule) {
+        for (;;) {
+            if (lacing_.size() == 255) close();
+            const auto piece = packet.first(std::min<std::size_t>(packet.size(), 255));
+            lacing_.push_back(static_cast<std::uint8_t>(piece.size()));
+            body_.insert(body_.end(), piece.begin(), piece.end());
+            packet = packet.subspan(piece.size());
+            open_ = piece.size() == 255;
+            if (!open_) break;
+        }
+        granule_ = granule;
+    }
+    // The page ends here; last: and with it the file.
+    void close(bool last = false) {
+        ByteWriter page;
+        for (const char c : {'O', 'g', 'g', 'S', '\0'}) page.u8(static_cast<std::uint8_t>(c));
+        page.u8(static_cast<std::uint8_t>((continues_ ? 1 : 0) | (number_ == 0 ? 2 : 0) | (last ? 4 : 0)));
+        page.u64(static_cast<std::uint64_t>(granule_));
+        page.u32(0x6874766d);  // the number of the only stream in the file
+        page.u32(number_++);
+        page.u32(0);
+        page.u8(static_cast<std::uint8_t>(lacing_.size()));
+        page.bytes(lacing_);
+        page.bytes(body_);
+        auto bytes = page.take();
+        const auto sum = page_sum(bytes);
+        for (int n = 0; n < 4; ++n)
+            bytes[sum_at + static_cast<std::size_t>(n)] = static_cast<std::uint8_t>(sum >> (8 * n));
+        file_.insert(file_.end(), bytes.begin(), bytes.end());
+        continues_ = open_;
+        granule_ = -1;
+        lacing_.clear();
+        body_.clear();
+    }
+    std::vector<std::uint8_t> take() { return std::move(file_); }
+
+private:
+    std::vector<std::uint8_t> file_, lacing_, body_;
+    std::int64_t granule_ = -1;  // of the last packet that ends on the page
+    std::uint32_t number_ = 0;
+    bool open_ = false, continues_ = false;
+};
+
+void put_text(ByteWriter& out, std::string_view text) {
+    for (const char c : text) out.u8(static_cast<std::uint8_t>(c));
+}
+
 }  // namespace
+
+std::vector<std::uint8_t> write_ogg_opus(const OpusTrack& track) {
+    PageWriter pages;
+    ByteWriter head;
+    put_text(head, "OpusHead");
+    head.u8(1);
+    head.u8(track.channels);
+    head.u16(static_cast<std::uint16_t>(track.pre_skip));
+    head.u32(48000);
+    head.u16(static_cast<std::uint16_t>(track.gain));
+    head.u8(0);
+    pages.add(head.data(), 0);
+    pages.close();
+    ByteWriter tags;
+    put_text(tags, "OpusTags");
+    tags.u32(4);
+    put_text(tags, "htvm");
+    tags.u32(0);
+    pages.add(tags.data(), 0);
+    pages.close();
+    const std::uint64_t end = track.pre_skip + track.samples;
+    std::uint64_t decoded = 0, page_begin = 0;
+    for (const auto& packet : track.packets) {
+        if (decoded >= end) break;
+        if (decoded >= page_begin + 48000) {
+            pages.close();
+            page_begin = decoded;
+        }
+        decoded += opus_samples(packet).value_or(0);
+        pages.add(packet, static_cast<std::int64_t>(std::min(decoded, end)));
+    }
+    pages.close(true);
+    return pages.take();
+}
 
 Result<OpusTrack> read_ogg_opus(std::span<const std::uint8_t> file) {
     std::optional<OpusTrack> track;

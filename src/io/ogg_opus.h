@@ -1,4 +1,4 @@
-// Sound files: Ogg Opus (RFC 7845), taken apart into packets of Opus. Nothing is decoded.
+// Sound files: Ogg Opus (RFC 7845), taken apart into packets of Opus, and put together from them. Nothing is decoded.
 #pragma once
 
 #include <cstdint>
@@ -21,5 +21,8 @@ struct OpusTrack {
 // bad_input if it is no such file, is damaged, or has more than two channels: the message says how to make one.
 Result<OpusTrack> read_ogg_opus(std::span<const std::uint8_t> file);
 Result<OpusTrack> read_ogg_opus(const std::filesystem::path& path);
+
+// The file. Packets behind the last sample that is heard are left out.
+std::vector<std::uint8_t> write_ogg_opus(const OpusTrack& track);
 
 }  // namespace htvm

@@ -63,7 +63,89 @@ cp piped.htvm indexed.htvm
 expect 0 "12 frames" "$htvm" index indexed.htvm
 expect 0 "with an index, with audio" "$htvm" verify indexed.htvm
 
-# Only Opus is taken.
+# Any sound file: WAV at 44.1 kHz, stereo, with a burst of 1 kHz around 0.1 s and 0.3 s; and out again, in step with the
+# frames, as WAV and as Opus, which comes in again as WAV.
+python3 - <<'PYTHON'
+import math, struct, wave
+with wave.open("bursts.wav", "wb") as out:
+    out.setnchannels(2), out.setsampwidth(2), out.setframerate(44100)
+    for n in range(44100 * 4 // 10):
+        t = n / 44100
+        x = sum(0.25 * (1 + math.cos(math.pi * (t - at) / 0.025)) * math.sin(2000 * math.pi * (t - at))
+                for at in (0.1, 0.3) if abs(t - at) < 0.025)
+        out.writeframes(struct.pack("<hh", round(32000 * x), round(16000 * x)))
+PYTHON
+# bursts FILE.wav: when there are bursts, milliseconds.
+bursts() {
+    python3 - "$1" <<'PYTHON'
+import struct, sys, wave
+with wave.open(sys.argv[1]) as sound:
+    assert (sound.getframerate(), sound.getsampwidth()) == (48000, 2)
+    channels, bytes = sound.getnchannels(), sound.readframes(10 ** 9)
+values = struct.unpack(f"<{len(bytes) // 2}h", bytes)[::channels]
+found, energy, moment, quiet = [], 0, 0, 0
+for n, x in enumerate(list(values) + [0] * 4800):
+    quiet = 0 if abs(x) > 500 else quiet + 1
+    energy, moment = energy + x * x, moment + x * x * n
+    if quiet > 2400 and energy:
+        if energy > 1e8: found.append(moment / energy / 48)
+        energy = moment = 0
+print(*(round(at) for at in found), channels)
+PYTHON
+}
+encode --audio bursts.wav -o wav.htvm
+expect 0 "audio: Opus, stereo, 0.40 s" "$htvm" info wav.htvm
+encode --audio bursts.wav --audio-bitrate 24 -o less.htvm
+[ "$(stat -c %s less.htvm)" -lt "$(stat -c %s wav.htvm)" ] || fail "a lower rate does not take fewer bytes"
+# heard EXPECTED STREAM OPTIONS...: bursts in what decode --audio writes, as either kind of file.
+heard() {
+    local expected=$1 got
+    shift
+    "$htvm" decode "$@" --audio out.wav 2>/dev/null || fail "decode $* --audio out.wav"
+    got=$(bursts out.wav)
+    near "$got" "$expected" || fail "decode $* --audio out.wav: bursts at $got, not $expected"
+    "$htvm" decode "$@" --audio out.opus 2>/dev/null || fail "decode $* --audio out.opus"
+    "$htvm" join silent.htvm silent.htvm --audio out.opus -o again.htvm 2>/dev/null
+    "$htvm" decode again.htvm --audio again.wav 2>/dev/null
+    got=$(bursts again.wav)
+    near "$got" "$expected" || fail "decode $* --audio out.opus: bursts at $got, not $expected"
+}
+# Within 2 ms.
+near() {
+    python3 - "$1" "$2" <<'PYTHON'
+import sys
+got, expected = ([int(x) for x in text.split()] for text in sys.argv[1:])
+sys.exit(len(got) != len(expected) or any(abs(g - e) > 2 for g, e in zip(got, expected)))
+PYTHON
+}
+heard "100 300 2" wav.htvm
+heard "33 2" wav.htvm --first 8 --frames 3
+"$htvm" cut wav.htvm --first 8 -o cut.htvm 2>/dev/null
+heard "33 2" cut.htvm
+encode --audio bursts.wav --audio-delay 0.0351 -o delayed.htvm
+heard "135 335 2" delayed.htvm
+encode --audio bursts.wav --audio-delay -0.15 -o early.htvm
+heard "150 2" early.htvm
+"$htvm" cut wav.htvm --frames 4 -o cut0.htvm 2>/dev/null
+"$htvm" join cut.htvm cut0.htvm wav.htvm -o mixed.htvm 2>/dev/null
+heard "33 233 367 567 2" mixed.htvm
+cat cut.htvm wav.htvm >two.htvm
+heard "33 233 433 2" two.htvm
+"$htvm" decode - --audio piped.wav -o meshes <wav.htvm 2>/dev/null
+near "$(bursts piped.wav)" "100 300 2" || fail "from standard input: $(bursts piped.wav)"
+[ "$(ls meshes | wc -l)" = 12 ] || fail "meshes beside the sound: $(ls meshes)"
+# What comes out as Opus are the packets that went in.
+encode --audio "$clicks" -o sound.htvm
+"$htvm" decode sound.htvm --audio same.opus 2>/dev/null
+encode --audio same.opus -o same.htvm
+cmp -s same.htvm sound.htvm || fail "sound that was taken out and laid in again is another"
+expect 1 "has no sound" "$htvm" decode silent.htvm --audio none.wav
+expect 1 "has no frame 99" "$htvm" decode sound.htvm --first 99 --audio none.wav
+expect 2 "does not end in one of .opus" "$htvm" decode sound.htvm --audio none.mp3
+expect 2 "-o" "$htvm" decode sound.htvm
+[ -e none.wav ] && fail "no sound leaves a file"
+
+# What is no sound, or damaged, is refused.
 head -c 2000 "$clicks" >short.opus
 expect 1 "ffmpeg" "$htvm" encode walk --audio walk/skeleton.json -o x.htvm
 expect 1 "damaged" "$htvm" encode walk --audio short.opus -o x.htvm
@@ -71,4 +153,5 @@ expect 1 "no such file" "$htvm" encode walk --audio nowhere.opus -o x.htvm
 expect 2 "--audio" "$htvm" encode walk --audio-delay 1 -o x.htvm
 [ -e x.htvm ] && fail "sound that cannot be read leaves a stream"
 
+expect 2 "--audio-bitrate" "$htvm" encode walk --audio "$clicks" --audio-bitrate 5 -o x.htvm
 done_with "sound is kept in step with the frames"

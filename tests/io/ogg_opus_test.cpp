@@ -59,6 +59,30 @@ TEST(OggOpus, DamageAndMissingPagesAreErrors) {
     EXPECT_FALSE(read_ogg_opus(std::span(whole).first(pages[2])));
 }
 
+TEST(OggOpus, WhatIsWrittenIsReadAgain) {
+    auto track = *read_ogg_opus(clicks());
+    track.channels = 2;
+    track.gain = -300;
+    track.packets[7].resize(255);     // whose lacing has a zero behind it
+    track.packets[8].resize(200000);  // over several pages
+    for (const std::uint32_t cut : {0u, 1u, 311u}) {
+        auto cut_off = track;
+        cut_off.samples -= cut;
+        const auto again = read_ogg_opus(write_ogg_opus(cut_off));
+        ASSERT_TRUE(again) << again.error().message;
+        EXPECT_TRUE(again->packets == track.packets);
+        EXPECT_EQ(again->samples, cut_off.samples);
+        EXPECT_EQ(again->pre_skip, track.pre_skip);
+        EXPECT_EQ(again->gain, track.gain);
+        EXPECT_EQ(again->channels, track.channels);
+    }
+    track.samples = 48000;  // what is behind them is left out
+    const auto part = read_ogg_opus(write_ogg_opus(track));
+    ASSERT_TRUE(part) << part.error().message;
+    EXPECT_EQ(part->packets.size(), 51u);
+    EXPECT_EQ(part->samples, 48000u);
+}
+
 TEST(OpusPacket, ItsFirstBytesTellItsLength) {
     using Bytes = std::vector<std::uint8_t>;
     const auto samples = [](const Bytes& bytes) { return internal::opus_samples(bytes); };
