@@ -309,6 +309,14 @@ Result<void> encode(const EncodeOptions& options) {
         return fail(ErrorKind::bad_input,
                     "--group holds frames back, which who watches live would wait for: it is for files, not for a hub");
     if (settings->tracked.group == 0 && live) settings->tracked.group = 1;
+    if (settings->latency_frames > 0 && options.deadline > 0)
+        return fail(ErrorKind::bad_input,
+                    "--deadline counts the time until a frame is coded, and --latency-frames lets it "
+                    "wait for the next one: give one of them");
+    // Nobody waits for the frames of a file.
+    if (!is_given(options.encoding, "latency_frames") && !is_piped(options.capture) && !may_be_live(options.output) &&
+        options.deadline == 0 && options.effort_log.empty())
+        settings->latency_frames = 1;
     const bool drawn = !is_given(options.encoding, "session") && options.job.of == 0 && may_be_live(options.output);
     if (drawn) settings->session = random_session();
     const auto audio = AudioTrack::open(options.audio);

@@ -230,7 +230,15 @@ Result<void> encode_frames(Pass& pass) {
 
 Result<void> finish(Pass& pass) {
     const auto start = std::chrono::steady_clock::now();
-    const auto finished = pass.encoder.finish();
+    auto finished = pass.encoder.finish();
+    // The frame that waited may not fit.
+    if (!finished && finished.error().kind == ErrorKind::limit && pass.rate.rate_controlled() &&
+        !pass.rate.costs.empty()) {
+        add_dropped(pass.rate);
+        warn_of_frame(pass, FrameWarnings::dropped,
+                      fmt::format("the last frame is dropped: {}", finished.error().message));
+        finished = pass.encoder.finish();
+    }
     pass.summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!finished) return finished;
     return pass.encoder.coded_frames().empty() ? drain(pass) : take_coded(pass);

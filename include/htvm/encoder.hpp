@@ -5,8 +5,9 @@
 //   while (auto packet = encoder->pull()) send(htvm::write_packet(*packet));
 //   encoder->finish();                                    // then pull the rest
 //
-// Where T-frames are coded in groups (TrackedOptions::group), frames are held until their group is whole: a push may
-// queue the packets of none, or of several. Memory is bounded by a few frames, whatever the length of the sequence.
+// With EncoderOptions::latency_frames a push queues the packets of the frame before. Where T-frames are coded in groups
+// (TrackedOptions::group), frames are held until their group is whole: a push may queue the packets of none, or of
+// several. Memory is bounded by a few frames, whatever the length of the sequence.
 #pragma once
 
 #include <cstdint>
@@ -60,9 +61,10 @@ public:
     // pushed, such as the lattice's origin, the subject's size and the bones' radii. So encoders of different parts of
     // a capture write the same sequence header, and their streams can be joined to one sequence. Errors as of push().
     Result<void> begin(const Mesh& first, const Pose* pose);
-    // Codes one frame. pose: for the skeleton of the options; null if the tracker lost it, and then the last one is
-    // kept. Timestamps must ascend. After an error the frame is not part of the stream, and the next may be pushed.
-    // Under rate control, a frame that does not fit the buffer even at the lowest quality is a limit error.
+    // Codes one frame; with EncoderOptions::latency_frames the one before, of which any error is then. pose: for the
+    // skeleton of the options; null if the tracker lost it, and then the last one is kept. Timestamps must ascend.
+    // After an error the frame is not part of the stream, and the next may be pushed. Under rate control, a frame that
+    // does not fit the buffer even at the lowest quality is a limit error.
     Result<void> push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra = false);
     // From the next frame on the line carries so many bits a second; the quality follows within half a second. A buffer
     // of rate.buffer_seconds then holds as much of the new rate. bad_input unless the options gave a rate, or if this

@@ -34,12 +34,22 @@ struct Output {
     std::uint32_t header_sent = 0;  // number of the frame with which the sequence header was last sent
 };
 
+// A frame on the lattice, that is coded now or waits for the next one, with what was found of it meanwhile.
+struct PushedFrame {
+    LatticeMesh mesh;
+    CodedPose pose;
+    std::int64_t timestamp_us = 0;
+    bool force_intra = false;
+    int effort = usual_effort;
+    AheadWork ahead = {};
+};
+
 }  // namespace
 
 struct Encoder::State {
     ThreadPool pool;
     Configuration configuration;
-    bool configured = false;  // by Encoder::begin()
+    bool configured = false;  // by Encoder::begin(), or a frame that waits
     bool begun = false, finished = false;
     PoseTracker poses;
     Sequence sequence;
@@ -47,8 +57,9 @@ struct Encoder::State {
     int effort = usual_effort;  // for the next frame
     Output output;
     std::optional<std::int64_t> last_timestamp;
-    std::vector<HeldFrame> held;        // T-frames of the group that is not whole yet
-    std::optional<GroupAnchor> anchor;  // what the next group may refer to; none: the reference alone
+    std::optional<PushedFrame> waiting;  // the last one, with EncoderOptions::latency_frames
+    std::vector<HeldFrame> held;         // T-frames of the group that is not whole yet
+    std::optional<GroupAnchor> anchor;   // what the next group may refer to; none: the reference alone
     // Of the frames whose packets the last call queued; if it queued none, of the last one before.
     std::vector<EncodedFrame> coded;
     std::vector<LatticeMesh> decoded;
@@ -300,17 +311,49 @@ Result<void> hold(State& state, FrameWork& work, Candidate& chosen, std::int64_t
     return {};
 }
 
-Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
+Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* pose) {
     StageClock clock(state.stages);
     auto on_lattice = to_lattice(mesh, state.configuration.header.lattice);
     if (!on_lattice) return tl::unexpected(on_lattice.error());
     auto coded_pose = state.poses.next(mesh, pose, state.configuration.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");
-    FrameWork work(state.configuration, state.sequence, state.effort, std::move(*on_lattice), std::move(*coded_pose),
+    PushedFrame out;
+    out.mesh = std::move(*on_lattice);
+    out.pose = std::move(*coded_pose);
+    out.effort = state.effort;
+    return out;
+}
+
+// Chooses the frame; beside that, does what can be done of the next one, if there is one. What was found under another
+// assumption than what became of this frame is not kept: the bytes are those of one frame after the other.
+Result<Candidate> choose_beside(State& state, FrameWork& work, bool force_intra, PushedFrame* next) {
+    const auto bits = [&](const Candidate& candidate) { return bits_of(state, candidate); };
+    if (!next) return choose_frame(work, state.control, bits, force_intra);
+    const bool may_be_tracked = work.can_be_tracked();
+    std::optional<NodeRegistration> registered;
+    if (may_be_tracked) registered = work.registered_nodes();
+    std::optional<Result<Candidate>> chosen;
+    std::vector<StageTime> stages;
+    parallel_invoke(
+        state.configuration.threads, [&] { chosen = choose_frame(work, state.control, bits, force_intra); },
+        [&] {
+            next->ahead = work_ahead(state.configuration, state.sequence, registered ? &*registered : nullptr,
+                                     next->mesh, next->pose, next->effort, stages);
+        });
+    state.stages.insert(state.stages.end(), stages.begin(), stages.end());
+    const bool as_assumed = *chosen && (*chosen)->type == FrameType::tracked && work.is_as_first_registered();
+    if (!as_assumed) next->ahead.registered.reset();
+    return std::move(*chosen);
+}
+
+// next: pushed behind it, or null.
+Result<void> code_frame_of(State& state, PushedFrame frame, PushedFrame* next) {
+    const auto timestamp_us = frame.timestamp_us;
+    FrameWork work(state.configuration, state.sequence, frame.effort, std::move(frame.mesh), std::move(frame.pose),
                    state.stages);
-    auto chosen = choose_frame(
-        work, state.control, [&](const Candidate& candidate) { return bits_of(state, candidate); }, force_intra);
+    work.take(std::move(frame.ahead));
+    auto chosen = choose_beside(state, work, frame.force_intra, next);
     if (!chosen) return tl::unexpected(chosen.error());
     const FrameCost cost{rate_type(*chosen), chosen->quality, bits_of(state, *chosen), chosen->renewed};
     StageClock derivation(state.stages);
@@ -332,9 +375,24 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     }
     state.sequence = std::move(*sequence);
     state.begun = true;
-    state.last_timestamp = timestamp_us;
+    state.last_timestamp = std::max(timestamp_us, state.last_timestamp.value_or(timestamp_us));
     if (state.control.rate) state.control.rate->coded(cost);
     return {};
+}
+
+Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
+    auto frame = put_on_lattice(state, mesh, pose);
+    if (!frame) return tl::unexpected(frame.error());
+    frame->timestamp_us = timestamp_us;
+    frame->force_intra = force_intra;
+    if (state.configuration.options.latency_frames == 0) return code_frame_of(state, std::move(*frame), nullptr);
+    state.configured = true;
+    state.last_timestamp = timestamp_us;
+    auto before = std::exchange(state.waiting, std::nullopt);
+    if (!before) state.coded_none = true;
+    auto coded = before ? code_frame_of(state, std::move(*before), &*frame) : Result<void>();
+    state.waiting = std::move(*frame);
+    return coded;
 }
 
 // Marks where a frame's packets begin in the queue. If the frame fails, packets queued since are removed and the
@@ -410,7 +468,7 @@ Encoder::~Encoder() = default;
 
 Result<void> Encoder::begin(const Mesh& first, const Pose* pose) try {
     auto& state = *state_;
-    if (state.begun) return fail(ErrorKind::bad_input, "the first frame was pushed already");
+    if (state.begun || state.waiting) return fail(ErrorKind::bad_input, "the first frame was pushed already");
     auto done = configure(state, first, pose);
     state.configured = done.has_value();
     return done;
@@ -461,11 +519,16 @@ Result<void> Encoder::set_effort(int effort) {
 
 Result<void> Encoder::finish() {
     auto& state = *state_;
-    if (state.finished || !state.begun) return {};
+    if (state.finished || (!state.begun && !state.waiting)) return {};
     state.stages.clear();
     const auto before = queued(state);
     const auto code_the_rest = [&]() -> Result<void> {
         Outcome outcome;
+        if (auto last = std::exchange(state.waiting, std::nullopt)) {
+            if (auto coded = code_frame_of(state, std::move(*last), nullptr); !coded) return coded;
+            if (state.held.empty()) return {};
+            if (!state.coded_none) outcome = {std::move(state.coded), std::move(state.decoded), std::nullopt};
+        }
         if (auto sent = send_held(state, state.held, outcome); !sent) return sent;
         state.held.clear();
         commit(state, std::move(outcome));
@@ -476,6 +539,7 @@ Result<void> Encoder::finish() {
         take_back(state, before);
         return done;
     }
+    if (!state.begun) return {};
     state.finished = true;
     try {
         Packet packet;
@@ -502,7 +566,7 @@ std::optional<Packet> Encoder::pull() {
 std::span<const EncodedFrame> Encoder::coded_frames() const {
     return state_->coded_none ? std::span<const EncodedFrame>() : state_->coded;
 }
-std::size_t Encoder::held_frames() const { return state_->held.size(); }
+std::size_t Encoder::held_frames() const { return state_->held.size() + (state_->waiting ? 1 : 0); }
 
 const FrameInfo& Encoder::last_frame() const {
     static const FrameInfo none;

@@ -82,6 +82,18 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return o.threads; },
      .set = [](EncoderOptions& o, double value) { o.threads = static_cast<unsigned>(value); },
      .flag = "--threads"},
+    {.name = "latency_frames",
+     .group = OptionGroup::common,
+     .kind = OptionKind::whole_number,
+     .unit = "frames",
+     .least = 0,
+     .most = 1,
+     .meaning =
+         "frames that wait, 0 or 1: with 1 a frame is coded once the next one is there, and work of both goes side by "
+         "side on several threads; the bytes do not depend on it",
+     .get = [](const EncoderOptions& o) -> double { return o.latency_frames; },
+     .set = [](EncoderOptions& o, double value) { o.latency_frames = static_cast<int>(value); },
+     .flag = "--latency-frames"},
     {.name = "subject_size",
      .group = OptionGroup::common,
      .kind = OptionKind::number,

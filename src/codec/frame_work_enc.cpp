@@ -35,6 +35,26 @@ std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration
     return out;
 }
 
+SurfaceIndex surface_of(const Configuration& configuration, const LatticeMesh& mesh, std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    auto out = configuration.tracked() ? captured_surface(mesh, deformation_options(configuration))
+                                       : SurfaceIndex(points_of(mesh.positions), mesh.triangles);
+    clock.done("search structures");
+    return out;
+}
+
+// starts: but for the skeleton's.
+NodeRegistration register_frame(const Configuration& configuration, const ReferenceInUse& reference,
+                                const SurfaceIndex& surface, const CodedPose& pose, NodeStarts starts,
+                                const TrackingEffort& effort, std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    const auto skeletal = skeletal_node_motion(configuration, reference.decoded, pose);
+    starts.skeletal = skeletal;
+    auto out = register_nodes(reference.deformable, surface, starts, deformation_options(configuration, effort));
+    clock.done("registration");
+    return out;
+}
+
 }  // namespace
 
 std::size_t Candidate::bytes() const {
@@ -102,13 +122,18 @@ double FrameWork::edge() {
 }
 
 const SurfaceIndex& FrameWork::surface() {
-    if (!surface_) {
-        StageClock clock(stages);
-        surface_ = configuration.tracked() ? captured_surface(mesh, deformation_options(configuration))
-                                           : SurfaceIndex(points_of(mesh.positions), mesh.triangles);
-        clock.done("search structures");
-    }
+    if (!surface_) surface_ = surface_of(configuration, mesh, stages);
     return *surface_;
+}
+
+void FrameWork::take(AheadWork ahead) {
+    surface_ = std::move(ahead.surface);
+    registered_nodes_ = std::move(ahead.registered);
+}
+
+bool FrameWork::can_be_tracked() const {
+    return configuration.tracked() && sequence.reference && reference().decoded.tracked &&
+           !reference().decoded.mesh().positions.empty() && carries_surface();
 }
 
 const FrameMotion& FrameWork::bone_motion() {
@@ -124,14 +149,9 @@ const FrameMotion& FrameWork::bone_motion() {
 
 const NodeRegistration& FrameWork::registered_nodes() {
     if (!registered_nodes_) {
-        const auto& target = surface();
-        StageClock clock(stages);
         const auto& nodes = sequence.nodes;
-        const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
-        registered_nodes_ =
-            register_nodes(reference().deformable, target, {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
-                           deformation_options(configuration, effort));
-        clock.done("registration");
+        registered_nodes_ = register_frame(configuration, reference(), surface(), pose,
+                                           {nodes.last, nodes.before_last, nodes.gone_on, {}}, effort, stages);
     }
     return *registered_nodes_;
 }
@@ -146,6 +166,7 @@ bool FrameWork::follow_lost_limbs() {
                                                  {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
                                                  deformation_options(configuration, effort), registered);
     registered_nodes_ = std::move(registered);
+    followed_limbs_ = followed_limbs_ || any;
     clock.done("registration");
     return any;
 }
@@ -186,6 +207,18 @@ TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_e
     options.threads = configuration.threads;
     auto out = measure_tracked_fit(captured, decoded, intra_squared, options);
     clock.done("fit of the tracking");
+    return out;
+}
+
+AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const NodeRegistration* registered,
+                     const LatticeMesh& next_mesh, const CodedPose& next_pose, int effort,
+                     std::vector<StageTime>& stages) {
+    AheadWork out;
+    out.surface = surface_of(configuration, next_mesh, stages);
+    if (registered && !next_mesh.triangles.empty())
+        out.registered =
+            register_frame(configuration, *before.reference, *out.surface, next_pose,
+                           {registered->motion, before.nodes.last, {}, {}}, tracking_effort(effort), stages);
     return out;
 }
 

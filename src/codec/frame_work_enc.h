@@ -141,6 +141,12 @@ struct TrackedWork {
     NodeRegistration registered;
 };
 
+// What of a frame's work does not need the frame before to be coded.
+struct AheadWork {
+    std::optional<SurfaceIndex> surface;
+    std::optional<NodeRegistration> registered;  // as if the frame before had been a T-frame
+};
+
 // What is derived from one frame, computed on first use and kept. Lengths are in lattice units.
 class FrameWork {
 public:
@@ -160,6 +166,9 @@ public:
     const CodedPose pose;
     std::vector<StageTime>& stages;
 
+    // Takes over what was found before; before anything else is asked for.
+    void take(AheadWork ahead);
+
     // The current reference; there must be one.
     const ReferenceInUse& reference() const { return *sequence.reference; }
     std::int64_t frames_since_intra() const { return std::int64_t{sequence.next_frame} - reference().intra_frame; }
@@ -174,6 +183,10 @@ public:
     // Where tracking was lost: makes registered_nodes() follow limbs that another start finds. Gives whether there
     // are any; looks only once.
     bool follow_lost_limbs();
+    // Whether registered_nodes() is as it was first found.
+    bool is_as_first_registered() const { return registered_nodes_ && !followed_limbs_; }
+    // Whether the frame can be a T-frame, by its reference and by what it has.
+    bool can_be_tracked() const;
     const AnimationFit& animation_fit();  // how well the motion of the bones alone represents the frame
     // The distance between a decoded mesh and the captured one, in both directions.
     SurfaceErrors errors_of(const LatticeMesh& decoded);
@@ -187,9 +200,15 @@ private:
     std::optional<SurfaceIndex> surface_;
     std::optional<FrameMotion> bone_motion_;
     std::optional<NodeRegistration> registered_nodes_;
-    bool looked_for_limbs_ = false;
+    bool looked_for_limbs_ = false, followed_limbs_ = false;
     std::optional<AnimationFit> animation_fit_;
 };
+
+// The work of the next frame that can be done beside the coding of this one, if that becomes a T-frame whose nodes are
+// registered as here; registered: null if this one cannot become a T-frame. next_mesh as captured, on the lattice.
+AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const NodeRegistration* registered,
+                     const LatticeMesh& next_mesh, const CodedPose& next_pose, int effort,
+                     std::vector<StageTime>& stages);
 
 // Side of the cubes of space by which it is judged whether a region is lost, lattice units.
 double region_side(const Configuration& configuration);

@@ -168,6 +168,7 @@ sed -i 's/^7,[0-9]*,/7,1,/' efforts.csv
 cmp again_1.htvm again_2.htvm || fail "the same efforts give other bytes"
 expect 1 "this is no effort log" "$htvm" encode capture --repeat-efforts times.csv -o x.htvm
 expect 2 "is for --profile tracked" "$htvm" encode capture --profile topology --deadline 50 -o x.htvm
+expect 1 "give one of them" "$htvm" encode capture --latency-frames 1 --deadline 50 -o x.htvm
 expect 2 "--deadline" "$htvm" encode capture --jobs 2 --deadline 50 -o x.htvm
 expect 2 "--deadline" "$htvm" encode capture --repeat-efforts efforts.csv --deadline 50 -o x.htvm
 

@@ -1,0 +1,117 @@
+// A frame that waits for the next one, so that work of both goes side by side: the stream is the same.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "codec/moving_sequences.h"
+#include "codec/patched_sequences.h"
+#include "codec/test_sequences.h"
+#include "htvm/encoder.hpp"
+
+namespace htvm::internal {
+namespace {
+
+using namespace test;
+
+TestSequence walking(int frames) {
+    TestSequence out{"walking", {}, {}};
+    SynthOptions options;
+    options.vertices = 900;
+    for (int t = 0; t < frames; ++t) out.frames.push_back({synth_frame(options, 2 * t).mesh, {}});
+    return out;
+}
+
+using Change = std::function<void(EncoderOptions&)>;
+
+std::vector<std::vector<std::uint8_t>> stream(const TestSequence& sequence, EncoderOptions options, int latency,
+                                              unsigned threads) {
+    options.latency_frames = latency;
+    options.threads = threads;
+    auto encoder = *Encoder::create(options);
+    std::vector<std::vector<std::uint8_t>> out;
+    const auto take = [&] {
+        while (auto packet = encoder.pull()) out.push_back(write_packet(*packet));
+    };
+    std::int64_t time = 0;
+    for (const auto& frame : sequence.frames) {
+        const bool pushed = encoder.push(frame.mesh, frame.pose ? &*frame.pose : nullptr, time += 33333).has_value();
+        EXPECT_TRUE(pushed);
+        take();
+    }
+    EXPECT_TRUE(encoder.finish());
+    take();
+    return out;
+}
+
+void expect_the_same_stream(const TestSequence& sequence, const Change& change = {}) {
+    auto options = default_options(Profile::tracked);
+    if (change) change(options);
+    const auto plain = stream(sequence, options, 0, 1);
+    EXPECT_EQ(stream(sequence, options, 1, 1), plain);
+    EXPECT_EQ(stream(sequence, options, 1, 3), plain);
+}
+
+TEST(Latency, LeavesTrackedFramesAsTheyAre) { expect_the_same_stream(walking(8)); }
+
+TEST(Latency, LeavesIntraFramesAndThoseBehindThemAsTheyAre) {
+    expect_the_same_stream(walking(7), [](auto& o) { o.key_interval = 3; });
+}
+
+TEST(Latency, LeavesPatchesAndWhatFollowsThemAsTheyAre) {
+    auto options = patched_options();
+    const auto plain = stream(horned_ball(6), options, 0, 1);
+    EXPECT_EQ(stream(horned_ball(6), options, 1, 2), plain);
+    const auto is_patched = [](const std::vector<std::uint8_t>& packet) { return packet[4] == 11; };
+    EXPECT_TRUE(std::any_of(plain.begin(), plain.end(), is_patched));
+}
+
+TEST(Latency, LeavesGroupsAsTheyAre) {
+    expect_the_same_stream(walking(8), [](auto& o) { o.tracked.group = 3; });
+}
+
+TEST(Latency, LeavesARateAsItIs) {
+    expect_the_same_stream(walking(8), [](auto& o) { o.rate.bits_per_second = 300e3; });
+}
+
+TEST(Latency, LeavesOtherProfilesAsTheyAre) {
+    const auto sequence = walking(4);
+    const auto options = default_options(Profile::topology);
+    EXPECT_EQ(stream(sequence, options, 1, 2), stream(sequence, options, 0, 1));
+}
+
+TEST(Latency, LetsOneFrameWait) {
+    const auto sequence = walking(3);
+    auto options = default_options(Profile::tracked);
+    options.latency_frames = 1;
+    auto encoder = *Encoder::create(options);
+    ASSERT_TRUE(encoder.push(sequence.frames[0].mesh, nullptr, 0));
+    EXPECT_EQ(encoder.held_frames(), 1u);
+    EXPECT_TRUE(encoder.coded_frames().empty());
+    EXPECT_FALSE(encoder.pull());
+    ASSERT_TRUE(encoder.push(sequence.frames[1].mesh, nullptr, 33333));
+    EXPECT_EQ(encoder.held_frames(), 1u);
+    ASSERT_EQ(encoder.coded_frames().size(), 1u);
+    EXPECT_EQ(encoder.coded_frames()[0].info.type, FrameType::intra);
+    // A mesh that cannot be coded leaves the one that waits as it is.
+    Mesh bad = sequence.frames[2].mesh;
+    bad.triangles[0][0] = 1u << 30;
+    EXPECT_FALSE(encoder.push(bad, nullptr, 66666));
+    EXPECT_FALSE(encoder.push(sequence.frames[2].mesh, nullptr, 33333));
+    EXPECT_EQ(encoder.held_frames(), 1u);
+    ASSERT_TRUE(encoder.finish());
+    EXPECT_EQ(encoder.held_frames(), 0u);
+    ASSERT_EQ(encoder.coded_frames().size(), 1u);
+    EXPECT_EQ(encoder.coded_frames()[0].info.type, FrameType::tracked);
+}
+
+TEST(Latency, WithoutAnyFrameFinishesAnEmptyStream) {
+    auto options = default_options(Profile::tracked);
+    options.latency_frames = 1;
+    auto encoder = *Encoder::create(options);
+    EXPECT_TRUE(encoder.finish());
+    EXPECT_FALSE(encoder.pull());
+}
+
+}  // namespace
+}  // namespace htvm::internal
