@@ -15,7 +15,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     // mesh: if this frame turns out to be bad, the next T-frame does so.
     if (state.reference && referred) state.reference->tracked.reset(), state.reference->hierarchy.reset();
     const auto& external = state.options.intra_coder;
-    auto mesh = decode_intra_frame(payload, external ? &*external : nullptr);
+    auto mesh = decode_intra_frame(payload, external ? &*external : nullptr, state.threads);
     if (!mesh) return tl::unexpected(mesh.error());
     const auto step = smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step),
                                       packet.has(packet_flag::told) && packet.has(packet_flag::settled), header);

@@ -50,6 +50,27 @@ TEST(IntraFrame, DecodesToWhatTheEncoderSays) {
             }
 }
 
+// Colours are decoded behind the positions, side by side.
+TEST(IntraFrame, DecodesToTheSameOnSeveralThreadsAndRefusesTheSameDamage) {
+    const ThreadPool pool(3);
+    FramePayload payload;
+    ASSERT_TRUE(encode_intra_frame(lattice_mesh_of(tfan_test::grid(70, 70)), {.geometry_step = 1}, payload));
+    const auto decoded = decode_intra_frame(view_of(payload), nullptr, pool);
+    ASSERT_TRUE(decoded) << decoded.error().message;
+    ASSERT_GT(decoded->colours.size(), 4000u);
+    expect_same(*decoded, *decode_intra_frame(view_of(payload), nullptr));
+    for (const auto layer : {Layer::geometry, Layer::colour}) {
+        auto damaged = payload;
+        const auto& bytes = view_of(payload).of(layer);
+        damaged.set(layer, std::vector<std::uint8_t>(bytes.begin(), bytes.begin() + bytes.size() / 2));
+        const auto alone = decode_intra_frame(view_of(damaged), nullptr);
+        const auto together = decode_intra_frame(view_of(damaged), nullptr, pool);
+        ASSERT_FALSE(alone);
+        ASSERT_FALSE(together);
+        EXPECT_EQ(together.error().message, alone.error().message);
+    }
+}
+
 TEST(IntraFrame, PositionsOffTheLatticeAreRefused) {
     FramePayload payload;
     ASSERT_TRUE(encode_intra_frame(lattice_mesh_of(tfan_test::grid(3, 3)), {.geometry_step = 1}, payload).has_value());

@@ -228,7 +228,8 @@ EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<c
 
 Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> bytes,
                                                  std::span<const LatticePoint> positions, const Neighbours& neighbours,
-                                                 std::int32_t step, const Known<Colour>& known) {
+                                                 std::int32_t step, const Known<Colour>& known,
+                                                 const Progress* progress) {
     const std::size_t vertex_count = neighbours.vertex_count();
     if (step < 1 || step > 255)
         return fail(ErrorKind::corrupt_stream, "intra colours: the colour step is not within 1..255");
@@ -248,7 +249,9 @@ Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> b
     ColourHistory history(vertex_count);
     const auto contexts = std::make_unique<ColourContexts>(step);
     ReadingCoder<RangeDecoder> coder{decoder};
+    std::size_t ready = progress ? 0 : vertex_count;
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
+        if (rank >= ready) ready = progress->wait_beyond(rank);
         const auto v = neighbours.order[rank];
         if (take_known(known.is, known.value, v, history)) {
             colours[v] = known.value[v];

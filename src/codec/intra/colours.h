@@ -15,6 +15,7 @@
 
 #include "codec/intra/neighbours.h"
 #include "core/lattice.h"
+#include "core/progress.h"
 
 namespace htvm::internal {
 
@@ -31,9 +32,11 @@ EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<c
                                     std::span<const std::uint8_t> known = {});
 
 // Errors: corrupt_stream if the bytes end too early or begin with an invalid weight, if step is not 1..255, or if there
-// is not one position per vertex.
+// is not one position per vertex. progress: of the positions, if they are still being decoded: how many ranks of the
+// coding order are known.
 Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> bytes,
                                                  std::span<const LatticePoint> positions, const Neighbours& neighbours,
-                                                 std::int32_t step, const Known<Colour>& known = {});
+                                                 std::int32_t step, const Known<Colour>& known = {},
+                                                 const Progress* progress = nullptr);
 
 }  // namespace htvm::internal

@@ -9,6 +9,8 @@
 #include "codec/intra/neighbours.h"
 #include "codec/intra/positions.h"
 #include "codec/intra/tfan.h"
+#include "core/parallel.h"
+#include "core/progress.h"
 
 namespace htvm::internal {
 namespace {
@@ -69,7 +71,32 @@ Result<LatticeMesh> encode_by(const ExternalIntraCoder& coder, LatticeMesh grid,
     return mesh;
 }
 
-Result<LatticeMesh> decode_by_tfan(const FramePayloadView& payload) {
+// Colours follow behind the positions on which they depend.
+Result<void> decode_positions_and_colours(const FramePayloadView& payload, const Neighbours& neighbours,
+                                          LatticeMesh& mesh, Threads threads) {
+    constexpr std::size_t worth_a_thread = 2000;  // vertices
+    Result<void> positions;
+    Result<std::vector<Colour>> colours;
+    Progress progress;
+    mesh.positions.resize(neighbours.vertex_count());
+    parallel_invoke(
+        threads.at_most(mesh.positions.size() < worth_a_thread || !payload.has(Layer::colour) ? 1 : 2),
+        [&] {
+            const EndOfProgress end{progress};
+            positions = decode_intra_positions(payload.of(Layer::geometry), neighbours, {}, mesh.positions, &progress);
+        },
+        [&] {
+            if (!payload.has(Layer::colour)) return;
+            colours = decode_intra_colours(payload.of(Layer::colour), mesh.positions, neighbours,
+                                           static_cast<std::int32_t>(payload.header.colour_step), {}, &progress);
+        });
+    if (!positions) return positions;
+    if (!colours) return tl::unexpected(colours.error());
+    mesh.colours = std::move(*colours);
+    return {};
+}
+
+Result<LatticeMesh> decode_by_tfan(const FramePayloadView& payload, Threads threads) {
     const auto& h = payload.header;
     LatticeMesh mesh;
     auto triangles = decode_tfan(payload.of(Layer::fans), h.vertices, h.triangles);
@@ -77,15 +104,8 @@ Result<LatticeMesh> decode_by_tfan(const FramePayloadView& payload) {
     mesh.triangles = std::move(*triangles);
     const auto neighbours = find_neighbours(mesh.triangles, h.vertices);
     if (!neighbours) return fail(ErrorKind::corrupt_stream, "I-frame: " + neighbours.error().message);
-    auto positions = decode_intra_positions(payload.of(Layer::geometry), *neighbours);
-    if (!positions) return tl::unexpected(positions.error());
-    mesh.positions = std::move(*positions);
-    if (payload.has(Layer::colour)) {
-        auto colours = decode_intra_colours(payload.of(Layer::colour), mesh.positions, *neighbours,
-                                            static_cast<std::int32_t>(h.colour_step));
-        if (!colours) return tl::unexpected(colours.error());
-        mesh.colours = std::move(*colours);
-    }
+    if (auto decoded = decode_positions_and_colours(payload, *neighbours, mesh, threads); !decoded)
+        return tl::unexpected(decoded.error());
     if (payload.has(Layer::normals)) {
         auto normals = decode_attribute_values<QuantisedNormal>(payload.of(Layer::normals), *neighbours);
         if (!normals) return tl::unexpected(normals.error());
@@ -151,13 +171,14 @@ Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrame
     return decoded;
 }
 
-Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external) {
+Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external,
+                                       Threads threads) {
     const auto number = payload.header.intra_coder;
     if (number != intra_coder_tfan && (!external || external->number != number))
         return fail(ErrorKind::unsupported, "the I-frame was coded by " +
                                                 std::string(number == intra_coder_draco ? "Draco" : "another coder") +
                                                 ", which this decoder was built without");
-    auto mesh = number == intra_coder_tfan ? decode_by_tfan(payload) : decode_by(*external, payload);
+    auto mesh = number == intra_coder_tfan ? decode_by_tfan(payload, threads) : decode_by(*external, payload);
     if (!mesh) return mesh;
     const auto step = static_cast<std::int32_t>(payload.header.geometry_step);
     const std::int32_t limit = lattice_limit / step;

@@ -4,6 +4,7 @@
 
 #include "codec/stream/frame_payload.h"
 #include "core/lattice.h"
+#include "core/thread.h"
 #include "htvm/intra_coder.hpp"
 
 namespace htvm::internal {
@@ -27,6 +28,7 @@ Result<LatticeMesh> encode_intra_frame(const LatticeMesh& mesh, const IntraFrame
                                        FramePayload& payload);
 
 // external: the coder with the number that the payload names; null gives `unsupported`.
-Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external);
+Result<LatticeMesh> decode_intra_frame(const FramePayloadView& payload, const ExternalIntraCoder* external,
+                                       Threads threads = {});
 
 }  // namespace htvm::internal

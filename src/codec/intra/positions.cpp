@@ -338,9 +338,18 @@ std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q
 Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::uint8_t> bytes,
                                                          const Neighbours& neighbours,
                                                          const Known<LatticePoint>& known) {
+    std::vector<LatticePoint> points(neighbours.vertex_count());
+    if (auto ok = decode_intra_positions(bytes, neighbours, known, points, nullptr); !ok)
+        return tl::unexpected(ok.error());
+    return points;
+}
+
+Result<void> decode_intra_positions(std::span<const std::uint8_t> bytes, const Neighbours& neighbours,
+                                    const Known<LatticePoint>& known, std::span<LatticePoint> points,
+                                    Progress* progress) {
+    constexpr std::size_t told_every = 64;  // ranks
     const std::size_t vertex_count = neighbours.vertex_count();
-    std::vector<LatticePoint> points(vertex_count);
-    if (vertex_count == 0) return points;
+    if (vertex_count == 0) return {};
     ByteReader reader(bytes);
     PositionWeights weights{};
     for (auto& set : weights)
@@ -351,16 +360,17 @@ Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::ui
     const auto contexts = std::make_unique<PositionContexts>();
     ReadingCoder<RangeDecoder> coder{decoder};
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
+        if (progress && rank % told_every == 0) progress->reach(rank);
         const PositionFeatures features = position_features(points, neighbours, rank, history);
         if (const auto v = neighbours.order[rank]; is_known(known.is, v)) {
             points[v] = known.value[v];
             continue;
         }
-        if (!code_position(coder, std::span(points), neighbours, rank, features, weights, history, *contexts))
+        if (!code_position(coder, points, neighbours, rank, features, weights, history, *contexts))
             return fail(ErrorKind::corrupt_stream, "intra positions: a decoded vertex lies off the lattice");
         if (decoder.exhausted()) return fail(ErrorKind::corrupt_stream, "intra positions: the layer ends too early");
     }
-    return points;
+    return {};
 }
 
 }  // namespace htvm::internal

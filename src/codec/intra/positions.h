@@ -15,6 +15,7 @@
 
 #include "codec/intra/neighbours.h"
 #include "core/lattice.h"
+#include "core/progress.h"
 
 namespace htvm::internal {
 
@@ -27,5 +28,10 @@ std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q
 Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::uint8_t> bytes,
                                                          const Neighbours& neighbours,
                                                          const Known<LatticePoint>& known = {});
+// The same into points, one per vertex. progress: how many ranks of the coding order are decoded, for whoever follows;
+// or null.
+Result<void> decode_intra_positions(std::span<const std::uint8_t> bytes, const Neighbours& neighbours,
+                                    const Known<LatticePoint>& known, std::span<LatticePoint> points,
+                                    Progress* progress);
 
 }  // namespace htvm::internal
