@@ -3,6 +3,8 @@ export type { AudioPacket } from './audio.js';
 export { crc32 } from './crc32.js';
 export { Decoder, DecoderError, DecoderModule } from './decoder.js';
 export type { DecoderOptions, ErrorCode, Axis, Frame, FrameKind, IndexEntry, SequenceInfo } from './decoder.js';
+export { codecString, isKeyPicture, isVideo, readPicture } from './picture.js';
+export type { PictureCoder, TexturePicture } from './picture.js';
 export { streamVersion } from './layouts.js';
 export {
     isAccess, isFrame, isReference, isReferred, isStart, packetFlag, packetKind, PacketSplitter, readPacketHeader,

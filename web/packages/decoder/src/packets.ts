@@ -4,7 +4,7 @@ import { crc32 } from './crc32.js';
 
 export const packetKind = {
     sequence: 1, intra: 2, enhanced: 3, codebook: 4, index: 5, predicted: 6, tracked: 7, frontIndex: 8, audio: 10,
-    patched: 11,
+    patched: 11, texture: 12,
 } as const;
 
 /** Bits of the flags; without `told` the others are not valid. */

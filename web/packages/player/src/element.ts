@@ -39,6 +39,8 @@ export interface PlayerStatistics extends StatisticsSummary {
     indexUploads: number;
     /** Null for files. */
     live: LiveNumbers | null;
+    /** Texture pictures decoded and not shown yet. */
+    picturesAhead: number;
 }
 
 /** Where the camera is: turned about a point. Degrees to the right and up, metres. */
@@ -184,6 +186,7 @@ export class HtvmPlayerElement extends HTMLElement {
         this.#canvas.addEventListener('webglcontextrestored', () => {
             this.#contextLost = false;
             this.#scene?.restore();
+            if (this.#playback.hasPicture) this.#playback.showAgain();
             this.#invalidate();
         });
         this.addEventListener('fullscreenchange', () => this.#invalidate());
@@ -282,6 +285,7 @@ export class HtvmPlayerElement extends HTMLElement {
         return {
             ...this.#statistics.summary(), framesShown: this.#shownFrames, wasmBytes, heldBytes, geometries, textures,
             indexUploads: this.#scene?.mesh.uploads.indices ?? 0, live: this.#playback.live,
+            picturesAhead: this.#playback.picturesAhead,
         };
     }
 
@@ -561,14 +565,15 @@ export class HtvmPlayerElement extends HTMLElement {
 
     #present(frame: FrameReport, now: number): void {
         const scene = this.#stage();
-        scene.setFrame(frame);
+        const picture = this.#playback.takePicture();
+        scene.setFrame(frame, picture, this.#playback.hasPicture);
         if (frame.indices) this.#texcoords = frame.texcoords;
         if (this.#shownFrames++ === 0) {
             this.#poster.hidden = true;
             this.resetView();
             this.#orbit?.setReach(scene.view.distance);
         }
-        this.#statistics.add(frame, now);
+        this.#statistics.add(frame, now, picture);
         if (frame.live) this.#undrawn = frame;
         if (!this.#panel.hidden) this.#panel.textContent = this.#statistics.text(frame, this.#playback.buffered, this.#playback.live);
         const { frame: number, letter, timeUs, vertices, triangles, topology, preview } = frame;

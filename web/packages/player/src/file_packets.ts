@@ -7,7 +7,7 @@ import { SourceError, type ByteSource } from './byte_source.js';
 // What packets are read from.
 type Bytes = Pick<ByteSource, 'read' | 'size' | 'contentType'>;
 
-/** A packet, and the media time of its frame or sound: 0 is the first frame's. */
+/** A packet, and the media time of its frame, sound or picture: 0 is the first frame's. */
 export interface TimedPacket extends Packet {
     timeUs: number;
 }
@@ -121,7 +121,8 @@ export class FilePackets {
             if (packet.kind === packetKind.sequence) this.#sequence = packet.bytes.slice();
             if (isIndex(packet)) this.#takeIndex(packet);
             if (isFrame(packet.kind)) return this.#timed(packet);
-            const timeUs = packet.kind === packetKind.audio ? packet.timestampUs - (this.#base ?? packet.timestampUs) : 0;
+            const timed = packet.kind === packetKind.audio || packet.kind === packetKind.texture;
+            const timeUs = timed ? packet.timestampUs - (this.#base ?? packet.timestampUs) : 0;
             return { ...packet, timeUs };
         }
     }

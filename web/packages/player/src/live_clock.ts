@@ -61,7 +61,7 @@ class Transits {
 export class LiveClock {
     /** How fast present time goes; 1 but while the clock follows. */
     speed = 1;
-    #kinds = { frame: new Transits(), sound: new Transits(), arrival: new Transits() };
+    #kinds = { frame: new Transits(), picture: new Transits(), sound: new Transits(), arrival: new Transits() };
     #offsetMs = NaN;
     #targetMs = NaN;
     #atMs = 0;
@@ -74,8 +74,8 @@ export class LiveClock {
         return !Number.isNaN(this.#offsetMs);
     }
 
-    /** A frame or a piece of sound could be shown or heard from `readyMs` on. */
-    ready(kind: 'frame' | 'sound', readyMs: number, presentUs: number): void {
+    /** A frame, its texture or a piece of sound could be shown or heard from `readyMs` on. */
+    ready(kind: 'frame' | 'picture' | 'sound', readyMs: number, presentUs: number): void {
         const ms = readyMs - presentUs / 1000;
         this.#add(kind, readyMs, ms);
         if (this.started) return;
@@ -156,7 +156,7 @@ export class LiveClock {
         return { frame: frame.measure(), sound: sound.measure(), arrival: arrival.measure() };
     }
 
-    #add(kind: 'frame' | 'sound' | 'arrival', atMs: number, ms: number): void {
+    #add(kind: 'frame' | 'picture' | 'sound' | 'arrival', atMs: number, ms: number): void {
         const sinceMs = atMs - this.#beganMs;
         const lengthMs = this.started ? Math.min(windowMs, Math.max(sinceMs / 2, shortestWindowMs)) : windowMs;
         this.#kinds[kind].add({ atMs, ms });
@@ -165,9 +165,8 @@ export class LiveClock {
     }
 
     #aim(): void {
-        const frame = this.#kinds.frame.measure();
-        const sound = this.#kinds.sound.measure();
-        const high = Math.max(frame?.highMs ?? -Infinity, sound?.highMs ?? -Infinity);
+        const { frame, picture, sound } = this.#kinds;
+        const high = Math.max(...[frame, picture, sound].map((kind) => kind.measure()?.highMs ?? -Infinity));
         if (high > -Infinity) this.#targetMs = high + marginMs;
     }
 

@@ -9,6 +9,7 @@ import { FrameSender } from './frame_sender.js';
 import { LiveSource, type HubMessage, type LiveListener } from './live_source.js';
 import type { Report, Request } from './messages.js';
 import { otherTasks } from './other_tasks.js';
+import { PictureSender } from './picture_sender.js';
 
 interface Waiting {
     packet: Packet;
@@ -33,6 +34,7 @@ export class LiveSession {
     #source: Pick<LiveSource, 'connect' | 'close' | 'askForKeyFrame'>;
     #post: (report: Report, transfer?: Transferable[]) => void;
     #sender: FrameSender;
+    #pictures: PictureSender;
     #now: () => number;
     #serial: number;
     #queue: Waiting[] = [];
@@ -68,6 +70,7 @@ export class LiveSession {
         this.#post = post;
         this.#now = now;
         this.#sender = new FrameSender(post);
+        this.#pictures = new PictureSender(post);
         this.#decoder = module.createDecoder();
         this.#source = makeSource({
             packet: (packet, first) => this.#arrive(packet, first),
@@ -142,7 +145,9 @@ export class LiveSession {
             return;
         }
         const timed = isFrame(packet.kind) || packet.kind === packetKind.audio;
-        const presentUs = timed ? this.#present(packet, receivedMs) : (this.#last?.presentUs ?? 0);
+        // A picture has the time of its frame, which has come.
+        const untimedUs = packet.kind === packetKind.texture ? packet.timestampUs + this.#shiftUs : (this.#last?.presentUs ?? 0);
+        const presentUs = timed ? this.#present(packet, receivedMs) : untimedUs;
         if (packet.kind === packetKind.audio) {
             const audio = readAudio(packet);
             if (!audio) this.#notice('Some of the sound cannot be played.');
@@ -241,6 +246,8 @@ export class LiveSession {
 
     #decode({ packet, presentUs, receivedMs }: Waiting): void {
         const frameKind = isFrame(packet.kind);
+        if (!this.#pictures.take(packet, this.#serial, presentUs)) this.#notice('Some of the pictures cannot be shown.');
+        if (packet.kind === packetKind.texture) return;
         if (isStart(packet) || (this.#lost === 'tracked' && isAccess(packet))) this.#lost = 'nothing';
         const later = this.#queue.some(({ packet: { kind } }) => isFrame(kind));
         const begin = this.#now();

@@ -1,5 +1,5 @@
 // The messages between the player and its worker.
-import type { AudioPacket, SequenceInfo } from '@htvm/decoder';
+import type { AudioPacket, SequenceInfo, TexturePicture } from '@htvm/decoder';
 
 /** To the worker. `serial` counts seeks: frames of older ones are thrown away. */
 export type Request =
@@ -22,6 +22,7 @@ export type Report =
     | { type: 'extent'; durationUs: number | null; seekable: boolean }
     | FrameReport
     | AudioReport
+    | PictureReport
     /** All frames of this serial were sent. */
     | { type: 'ended'; serial: number; frames: number; durationUs: number }
     /** Something is wrong, but playing continues; a sentence. */
@@ -49,6 +50,20 @@ export interface AudioReport extends AudioPacket {
     type: 'audio';
     serial: number;
     presentUs: number;
+}
+
+/** The picture of a frame, which comes behind that frame's report; a frame has at most one. */
+export interface PictureReport extends TexturePicture {
+    type: 'picture';
+    serial: number;
+    /** Those of its frame. */
+    frame: number;
+    presentUs: number;
+    /** Number of the frame whose picture it needs; its own where it is a key picture. */
+    reference: number;
+    key: boolean;
+    /** Of its packet. */
+    bytes: number;
 }
 
 /** Of a frame of a live stream; ms since 1970, by this machine's clock. */
@@ -96,4 +111,8 @@ export interface FrameReport {
     /** Null where the frame before of the same serial had the same topology. */
     indices: Uint32Array | null;
     texcoords: Float32Array | null;
+    /** Set by the page. Number of the texture picture to be shown with it; null: there is none; undefined: not known yet. */
+    picture?: number | null;
+    /** Of the picture's packet, if it has one of its own. */
+    pictureBytes?: number;
 }

@@ -3,10 +3,14 @@
 // There are two times. Media time is the stream's: 0 is its first frame. Present time continues through loops, and starts
 // again at the media time with each seek; the clock runs in it. Of a live stream, present time is what live_clock.ts says,
 // and there is no other place to go to than now.
+//
+// A frame of a textured stream is shown together with its picture: while that is still being decoded, the frame before it stays.
+// A mesh that goes on without its picture would slide under it, and after a new reference show nonsense.
 import type { SequenceInfo } from '@htvm/decoder';
 import { LiveClock } from './live_clock.js';
 import { LiveState, type LiveStateDetail } from './live_state.js';
-import type { AudioReport, FailureCode, FrameReport, LiveReport, Report, Request } from './messages.js';
+import type { AudioReport, FailureCode, FrameReport, LiveReport, PictureReport, Report, Request } from './messages.js';
+import { Pictures, type DecodedPicture } from './pictures.js';
 
 export interface PlaybackListener {
     opened(sequence: SequenceInfo, layerNames: readonly string[]): void;
@@ -61,6 +65,9 @@ const mostFramesLive = 40; // as many as may wait in the jitter buffer
 const mostBytes = 96 << 20; // that they may take, if at least 3 can be had
 const lateFramesUs = 50000; // a live frame that comes so much later than its end is not shown any more
 const mostTraps = 3;
+const texturedFrom = 6; // version of streams whose frames have pictures
+const catchUpUs = 100000; // a picture that is so late is not waited for where decoding can go on with a later one
+const stallUs = 500000; // for one that is so late, time stands still
 
 export class Playback {
     durationUs: number | null = null;
@@ -94,6 +101,11 @@ export class Playback {
     #anchorNow = 0;
     #failed = false;
     #traps: number[] = [];
+    #pictures: Pictures;
+    #textured = false;
+    #lateFor: FrameReport | null = null; // time stands still until its picture is there
+    #arrived: FrameReport | null = null; // the last frame that came
+    #picture: number | null = null; // the last picture that came
     #idleWaiting: (() => void)[] = [];
 
     constructor(makeWorker: () => Promise<Worker>, wasmUrl: string, now: () => number, listener: PlaybackListener) {
@@ -101,6 +113,11 @@ export class Playback {
         this.#wasmUrl = wasmUrl;
         this.#now = now;
         this.#listener = listener;
+        this.#pictures = new Pictures({
+            settled: (id) => this.#pictureSettled(id),
+            isNeeded: (id) => this.#preview?.picture === id || this.#ring.some(({ picture }) => picture === id),
+            notice: (text) => listener.notice(text),
+        });
     }
 
     get playing(): boolean {
@@ -157,6 +174,25 @@ export class Playback {
         if (this.#playing && !this.#awaiting) this.#live?.clock.ready('sound', readyMs, presentUs);
     }
 
+    /** The picture of the frame that is shown now, to be shown with it and closed: once; null where that is the one before. */
+    takePicture(): DecodedPicture | null {
+        return this.#current?.picture != null ? this.#pictures.show(this.#current.picture) : null;
+    }
+
+    get picturesAhead(): number {
+        return this.#pictures.held;
+    }
+
+    /** Decodes the frame shown once more, with its picture, which the graphics card has lost. */
+    showAgain(): void {
+        this.seek(this.timeUs);
+    }
+
+    /** Whether the picture that was taken last is that of the frame shown now. */
+    get hasPicture(): boolean {
+        return this.#current?.picture != null && this.#pictures.state(this.#current.picture) === 'ready';
+    }
+
     /** How long, at this rate, until a frame is missing: microseconds; Infinity if there is none after the last. */
     get usAhead(): number {
         const last = this.#ring.at(-1) ?? this.#current;
@@ -178,6 +214,7 @@ export class Playback {
         this.#live = live ? { clock: new LiveClock(), state: new LiveState(), resting: false, leftOut: 0, notShown: 0, readyMs: new WeakMap() } : null;
         this.#traps = [];
         this.#failed = false;
+        this.#textured = false;
         this.durationUs = null;
         this.seekable = false;
         void this.#start(0);
@@ -192,6 +229,8 @@ export class Playback {
         this.#current = null;
         this.#roomSetFor = 0;
         this.#awaiting = false;
+        this.#forgetPictures();
+        this.#pictures.close();
         this.#url = '';
         this.#checkIdle();
     }
@@ -209,6 +248,7 @@ export class Playback {
         this.#anchor();
         this.#playing = false;
         this.#stalled = false;
+        this.#lateFor = null;
         if (this.#live && this.#current) this.#rest(this.#live);
     }
 
@@ -238,6 +278,7 @@ export class Playback {
         for (const frame of this.#ring.splice(0)) this.#done(frame);
         if (this.#preview) this.#done(this.#preview);
         this.#preview = null;
+        this.#forgetPictures();
         this.#awaiting = true;
         this.#stalled = false;
         this.#anchorUs = this.#soughtUs;
@@ -286,12 +327,27 @@ export class Playback {
 
     /** The frame to show from now on, or null if it is still the same. Its arrays are valid until the next one is returned. */
     tick(): FrameReport | null {
-        let show = this.#preview;
-        this.#preview = null;
+        let show: FrameReport | null = null;
+        if (this.#preview && !this.#isComing(this.#preview)) {
+            show = this.#preview;
+            this.#preview = null;
+        }
         if (!this.#awaiting) {
             const at = this.#presentUs();
             while (this.#ring.length > 0 && this.#ring[0]!.presentUs <= at) {
+                if (this.#isComing(this.#ring[0]!)) {
+                    this.#waitForPicture(this.#ring[0]!, at);
+                    break;
+                }
                 const next = this.#ring.shift()!;
+                if (next === this.#lateFor) this.#goOn();
+                if (this.#preview) this.#passOver(this.#preview, next);
+                this.#preview = null;
+                const beyond = this.#ring[0];
+                if (this.#isGone(next) && beyond && beyond.presentUs <= at) {
+                    this.#passOver(next, beyond);
+                    continue;
+                }
                 if (show && this.#live && !show.preview) ++this.#live.notShown;
                 if (show) this.#passOver(show, next);
                 show = next;
@@ -325,11 +381,78 @@ export class Playback {
         if (this.#url === '' || this.#failed || (this.#hidden && this.#playing)) return true;
         if (this.#live) return !this.#awaiting;
         const held = this.#ring.length + (this.#current ? 1 : 0) + (this.#preview ? 1 : 0);
-        return !this.#awaiting && (held >= this.#room || this.#endedSerial === this.#serial);
+        const holds = this.#due() && this.#isComing(this.#ring[0]!);
+        return !this.#awaiting && !holds && (held >= this.#room || this.#endedSerial === this.#serial);
     }
 
     #due(): boolean {
         return !this.#awaiting && this.#ring.length > 0 && this.#ring[0]!.presentUs <= this.#presentUs();
+    }
+
+    // ---- texture pictures -----------------------------------------------------------------------------------------
+
+    // Whether the frame's picture may still come.
+    #isComing({ picture }: FrameReport): boolean {
+        return picture === undefined || (picture !== null && this.#pictures.state(picture) === 'coming');
+    }
+
+    #isGone({ picture }: FrameReport): boolean {
+        return picture != null && this.#pictures.state(picture) === 'gone';
+    }
+
+    // What comes after a frame tells whether it has a picture of its own; otherwise it shows the last one.
+    #frameArrived(frame: FrameReport | null): void {
+        if (this.#arrived && this.#arrived.picture === undefined) this.#arrived.picture = this.#picture;
+        this.#arrived = frame;
+        if (frame && !this.#textured) frame.picture = null;
+    }
+
+    #takePictureReport(report: PictureReport): void {
+        if (report.serial !== this.#serial) return;
+        const frame = this.#arrived;
+        const ofFrame = frame?.presentUs === report.presentUs && frame.picture == null;
+        if (ofFrame) frame.pictureBytes = report.bytes;
+        this.#textured = true;
+        this.#picture = this.#pictures.take(report, (id) => {
+            if (ofFrame) frame.picture = id;
+        });
+    }
+
+    #pictureSettled(id: number): void {
+        const live = this.#live;
+        const frame = this.#ring.find(({ picture }) => picture === id);
+        if (live && frame) {
+            const now = this.#now();
+            live.clock.ready('picture', now, frame.presentUs);
+            live.readyMs.set(frame, Math.max(now, live.readyMs.get(frame) ?? now));
+        }
+        this.#listener.arrived();
+        this.#checkIdle();
+    }
+
+    #forgetPictures(): void {
+        this.#pictures.jumped();
+        this.#lateFor = null;
+        this.#arrived = null;
+        this.#picture = null;
+    }
+
+    // The frame is due, but its picture is not there.
+    #waitForPicture(frame: FrameReport, at: number): void {
+        const lateUs = at - frame.presentUs;
+        if (lateUs > catchUpUs) this.#pictures.catchUp(at);
+        if (this.#live || !this.#playing || this.#stalled || lateUs <= stallUs * this.#rate) return;
+        this.#anchorUs = frame.presentUs;
+        this.#anchorNow = this.#now();
+        this.#stalled = true;
+        this.#lateFor = frame;
+        this.#listener.waiting();
+    }
+
+    #goOn(): void {
+        this.#lateFor = null;
+        this.#stalled = false;
+        this.#anchorNow = this.#now();
     }
 
     #checkIdle(): void {
@@ -468,6 +591,7 @@ export class Playback {
             live: this.#live !== null,
         });
         if (this.#live?.resting) this.#send({ type: 'rest' });
+        this.#forgetPictures();
         this.#roomSetFor = 0;
         this.#send({ type: 'room', frames: this.#room });
         if (this.#serial !== serial) this.#send({ type: 'seek', serial: this.#serial, timeUs: this.#soughtUs });
@@ -503,6 +627,7 @@ export class Playback {
     #take(report: Report): void {
         switch (report.type) {
             case 'opened':
+                this.#textured ||= report.sequence.streamVersion >= texturedFrom;
                 this.#listener.opened(report.sequence, report.layerNames);
                 break;
             case 'extent':
@@ -516,9 +641,13 @@ export class Playback {
             case 'audio':
                 if (report.serial === this.#serial) this.#listener.sound(report);
                 break;
+            case 'picture':
+                this.#takePictureReport(report);
+                break;
             case 'ended':
                 if (report.serial !== this.#serial) break;
                 this.#endedSerial = report.serial;
+                this.#frameArrived(null);
                 // After a seek beyond the last frame, the picture stays.
                 this.#awaiting = false;
                 this.#stalled = false;
@@ -554,6 +683,7 @@ export class Playback {
             this.#room = Math.max(3, Math.min(most, Math.floor(mostBytes / (frame.buffer.byteLength + 1))));
             this.#send({ type: 'room', frames: this.#room });
         }
+        this.#frameArrived(frame);
         if (this.#live) this.#takeLiveFrame(this.#live, frame);
         else if (frame.preview) {
             if (this.#preview) this.#passOver(this.#preview, frame);
@@ -566,7 +696,7 @@ export class Playback {
                 this.#anchorUs = Math.max(frame.presentUs, Math.min(this.#soughtUs, end - 1));
                 this.#anchorNow = this.#now();
                 this.#listener.sought();
-            } else if (this.#stalled) {
+            } else if (this.#stalled && !this.#lateFor) {
                 this.#stalled = false;
                 this.#anchorUs = Math.max(this.#anchorUs, frame.presentUs);
                 this.#anchorNow = this.#now();

@@ -1,5 +1,5 @@
 // Draws the mesh, upright and in metres, on a floor with a grid and a contact shadow.
-import { HtvmMesh, srgbVertexColours } from '@htvm/three';
+import { HtvmMesh, pictured, srgbVertexColours } from '@htvm/three';
 import {
     Box3, Color, DirectionalLight, Group, HemisphereLight, LinearFilter, Mesh, MeshBasicMaterial, MeshLambertMaterial,
     NoBlending, OrthographicCamera, PerspectiveCamera, PlaneGeometry, Quaternion, Scene, ShaderMaterial, Vector3,
@@ -8,6 +8,7 @@ import {
 import type { Material } from 'three';
 import type { Axis } from '@htvm/decoder';
 import type { FrameReport } from './messages.js';
+import type { DecodedPicture } from './pictures.js';
 
 const axes: Record<Axis, [number, number, number]> = {
     x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1], '-x': [-1, 0, 0], '-y': [0, -1, 0], '-z': [0, 0, -1],
@@ -47,6 +48,12 @@ export class StageScene {
     #shadow: ContactShadow;
     #unlitMaterial = this.mesh.material;
     #litMaterial: Material = srgbVertexColours(new MeshLambertMaterial({ vertexColors: true }));
+    #unlitPicture: Material = pictured(new MeshBasicMaterial(), this.mesh.map);
+    #litPicture: Material = pictured(new MeshLambertMaterial(), this.mesh.map);
+    #hasPicture = false; // on the graphics card
+    #pictureTopology = -1; // of the mesh that it was shown on
+    #pictured = false; // whether the frame shows it
+    #coloured = true;
     #clayMaterial: Material = new MeshLambertMaterial({ color: 0xb9b2a8 });
     #bounds: Box3 | null = null; // of the first frame, upright, metres, not yet moved onto the floor
     #floor: number | null = null; // height of the floor in the upright mesh, metres
@@ -70,7 +77,8 @@ export class StageScene {
 
     dispose(): void {
         this.mesh.dispose();
-        for (const material of [this.#unlitMaterial, this.#litMaterial, this.#clayMaterial]) material.dispose();
+        for (const material of [this.#unlitMaterial, this.#litMaterial, this.#clayMaterial, this.#unlitPicture, this.#litPicture])
+            material.dispose();
         this.#grid.geometry.dispose();
         this.#grid.material.dispose();
         this.#shadow.dispose();
@@ -94,15 +102,29 @@ export class StageScene {
     forget(): void {
         this.#bounds = null;
         this.#home = null;
+        this.#hasPicture = this.#pictured = false;
         this.mesh.forgetTopology();
         this.mesh.geometry.setDrawRange(0, 0);
         this.#grid.visible = this.#shadow.plane.visible = false;
     }
 
-    setFrame(frame: FrameReport): void {
+    /**
+     * picture: that of the frame, which is closed here; null where it is the one before. hasPicture: whether it has one; where it
+     * is missing, the last one stays on its mesh.
+     */
+    setFrame(frame: FrameReport, picture: DecodedPicture | null = null, hasPicture = false): void {
         this.mesh.setFrame(frame);
-        const coloured = frame.colours !== null;
-        this.mesh.material = !coloured ? this.#clayMaterial : this.lit ? this.#litMaterial : this.#unlitMaterial;
+        if (picture) {
+            this.mesh.map.setPicture(picture.image, picture.gains);
+            this.renderer.initTexture(this.mesh.map);
+            picture.image.close();
+        }
+        if (picture) this.#hasPicture = true;
+        if (hasPicture) this.#pictureTopology = frame.topology;
+        const stays = hasPicture || (frame.picture != null && frame.topology === this.#pictureTopology);
+        this.#pictured = this.#hasPicture && stays && this.mesh.geometry.hasAttribute('uv');
+        this.#coloured = frame.colours !== null;
+        this.#chooseMaterial();
         if (frame.vertices > 0) {
             const box = this.#uprightBox(frame.bounds);
             if (!this.#bounds) this.#standOnFloor(box);
@@ -114,7 +136,13 @@ export class StageScene {
 
     setLit(lit: boolean): void {
         this.lit = lit;
-        if (this.mesh.material !== this.#clayMaterial) this.mesh.material = lit ? this.#litMaterial : this.#unlitMaterial;
+        this.#chooseMaterial();
+    }
+
+    #chooseMaterial(): void {
+        if (this.#pictured) this.mesh.material = this.lit ? this.#litPicture : this.#unlitPicture;
+        else if (this.#coloured) this.mesh.material = this.lit ? this.#litMaterial : this.#unlitMaterial;
+        else this.mesh.material = this.#clayMaterial;
     }
 
     /** Back to where the whole is seen, turned as given. */

@@ -9,6 +9,7 @@ import { FrameSender } from './frame_sender.js';
 import { LiveSession } from './live_session.js';
 import type { Report, Request } from './messages.js';
 import { otherTasks } from './other_tasks.js';
+import { PictureSender } from './picture_sender.js';
 
 const scope = globalThis as unknown as {
     postMessage(message: Report, transfer?: Transferable[]): void;
@@ -33,6 +34,7 @@ class Session {
     #loop: boolean;
     #resting = false;
     #sender = new FrameSender(post);
+    #pictures = new PictureSender(post);
     #wake: (() => void) | null = null;
     #opened = false;
     #reopenings = 0;
@@ -208,12 +210,15 @@ class Session {
         return this.#serial === serial;
     }
 
-    // A frame, where the packet is one; sound is sent on as it is.
+    // A frame, where the packet is one; sound and pictures are sent on as they are.
     #decode(packet: TimedPacket, serial: number): { frame: Frame; decodeMs: number } | null {
         if (packet.kind === packetKind.audio) {
             this.#sendAudio(packet, serial);
             return null;
         }
+        if (!this.#pictures.take(packet, serial, packet.timeUs + this.#loopUs))
+            this.#notice('Some of the pictures cannot be shown.');
+        if (packet.kind === packetKind.texture) return null;
         if (packet.kind === packetKind.index || packet.kind === packetKind.frontIndex) {
             this.#tellExtent();
             return null;

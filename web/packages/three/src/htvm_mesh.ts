@@ -1,5 +1,7 @@
 // Decoded frames as one three.js object, in one draw call.
-import { BufferAttribute, BufferGeometry, DynamicDrawUsage, Mesh, MeshBasicMaterial } from 'three';
+import {
+    BufferAttribute, BufferGeometry, DynamicDrawUsage, LinearFilter, Mesh, MeshBasicMaterial, NoColorSpace, Texture, Vector3,
+} from 'three';
 import type { Material, TypedArray } from 'three';
 
 /** A frame to show: a `Frame` of `@htvm/decoder`, or arrays prepared by a player. */
@@ -27,6 +29,8 @@ export interface MeshFrame {
 export class HtvmMesh extends Mesh<BufferGeometry, Material> {
     /** How often each array went to the graphics card. */
     readonly uploads = { positions: 0, indices: 0 };
+    /** The picture of a textured stream, for materials that `pictured()` made. */
+    readonly map = new PictureMap();
     #topology = -1;
 
     /** The default material shows vertex colours as they are, unlit. */
@@ -72,6 +76,7 @@ export class HtvmMesh extends Mesh<BufferGeometry, Material> {
     /** Frees what it holds on the graphics card. */
     override dispose(): void {
         this.geometry.dispose();
+        this.map.dispose();
         this.material.dispose();
     }
 
@@ -109,6 +114,55 @@ export class HtvmMesh extends Mesh<BufferGeometry, Material> {
         this.geometry.dispose();
         this.geometry.deleteAttribute(name);
     }
+}
+
+/**
+ * The picture that is drawn on a mesh by its texture coordinates, of which (0, 0) is the picture's lower left corner. It is sRGB, as
+ * vertex colours are, and its red, green and blue are multiplied by `gains`.
+ */
+export class PictureMap extends Texture {
+    readonly gains = new Vector3(1, 1, 1);
+    #side = [0, 0];
+
+    constructor() {
+        super();
+        this.colorSpace = NoColorSpace; // the material does it, behind the gains
+        this.generateMipmaps = false; // they would mix the charts of the picture
+        this.minFilter = this.magFilter = LinearFilter;
+        // Pictures go to the graphics card as they are, the upper row first.
+        this.flipY = false;
+        this.repeat.set(1, -1);
+        this.offset.set(0, 1);
+    }
+
+    /**
+     * Shows this picture from the next rendering on. A frame of a video may be closed behind that, or behind
+     * `renderer.initTexture(map)`.
+     */
+    setPicture(image: VideoFrame | ImageBitmap | HTMLCanvasElement | OffscreenCanvas, gains: readonly [number, number, number] = [1, 1, 1]): void {
+        const side = 'displayWidth' in image ? [image.displayWidth, image.displayHeight] : [image.width, image.height];
+        if (this.#side[0] !== side[0] || this.#side[1] !== side[1]) this.dispose(); // its memory cannot grow
+        this.#side = side as [number, number];
+        this.image = image;
+        this.gains.set(...gains);
+        this.needsUpdate = true;
+    }
+}
+
+/** Makes a material show the picture instead of vertex colours. Only of a frame with texture coordinates. */
+export function pictured<M extends Material & { map: Texture | null; vertexColors: boolean }>(material: M, map: PictureMap): M {
+    material.map = map;
+    material.vertexColors = false;
+    material.onBeforeCompile = (shader) => {
+        shader.uniforms['pictureGains'] = { value: map.gains };
+        shader.fragmentShader = `uniform vec3 pictureGains;\n${shader.fragmentShader}`.replace(
+            '#include <map_fragment>',
+            `vec3 picture = min(texture2D(map, vMapUv).rgb * pictureGains, vec3(1.0));
+            diffuseColor.rgb *= mix(pow((picture + 0.055) / 1.055, vec3(2.4)), picture / 12.92, vec3(lessThanEqual(picture, vec3(0.04045))));`,
+        );
+    };
+    material.customProgramCacheKey = () => 'htvm-picture';
+    return material;
 }
 
 /**

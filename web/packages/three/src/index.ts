@@ -1,2 +1,2 @@
-export { HtvmMesh, srgbVertexColours } from './htvm_mesh.js';
+export { HtvmMesh, pictured, PictureMap, srgbVertexColours } from './htvm_mesh.js';
 export type { MeshFrame } from './htvm_mesh.js';
