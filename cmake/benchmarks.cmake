@@ -9,3 +9,6 @@ endif()
 # Viewers for ./dev live-load and lossy-line.
 add_executable(live_watch bench/live/watch.cpp)
 target_link_libraries(live_watch PRIVATE htvm_live_client htvm_decoder CLI11::CLI11 fmt::fmt)
+# The pace of encoding a capture: docs/performance.md.
+add_executable(htvm_pace bench/pace/pace.cpp)
+target_link_libraries(htvm_pace PRIVATE htvm_encoder htvm_io htvm_synth CLI11::CLI11 fmt::fmt)

@@ -333,15 +333,17 @@ Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, con
     return code_moving_part(work, steps, coded);
 }
 
-Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const SurfacePatch& patch) {
+Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps) {
+    return encode_tracked(work, steps, TrackedParts::all, nullptr);
+}
+
+Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked,
+                               const SurfacePatch& patch) {
     const auto& in_use = work.reference();
-    // Not against the frame before: whoever joins later needs the references alone.
-    const auto tracked = encode_tracked(work, steps, TrackedParts::all, nullptr);
-    if (!tracked) return tl::unexpected(tracked.error());
     StageClock clock(work.stages);
     const auto coded_steps = tracked_steps(steps);
     FramePayload payload;
-    const auto& mesh = tracked->mesh;
+    const auto& mesh = tracked.mesh;
     auto patched = encode_patch({mesh.positions, mesh.triangles, mesh.colours}, in_use.decoded.tracked->hierarchy,
                                 patch, {coded_steps.geometry, coded_steps.colour}, payload);
     if (!patched) return tl::unexpected(patched.error());
@@ -349,7 +351,7 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     const auto vertices = patched->mesh.positions.size();
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;
-    payload.set(Layer::tracked, tracked->runs.payload);
+    payload.set(Layer::tracked, tracked.runs.payload);
     payload.set(Layer::pose, encode_pose(work.pose));
     Candidate out;
     out.type = FrameType::patched;
@@ -361,7 +363,7 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const S
     out.decoded = std::move(patched->mesh);
     if (denoises(work.configuration))
         out.targets =
-            on_new_reference(tracked->targets, patched->stays, out.decoded.positions.size(), filter_options(work));
+            on_new_reference(tracked.targets, patched->stays, out.decoded.positions.size(), filter_options(work));
     out.kept = keep_nodes(in_use.decoded.tracked->nodes, patched->stays);
     out.captured = captured;
     out.pose = work.pose;

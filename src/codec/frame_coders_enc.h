@@ -28,8 +28,11 @@ Result<Candidate> code_renewed_intra(FrameWork& work, const FrameSteps& steps, c
 // Motion-based coding: an EP-frame in which some bones are coded and the seams zippered, a P-frame if none is coded, a
 // whole EP-frame if nothing would be left to animate. coded: one per bone.
 Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded);
-// A T-frame of the reference alone, with a patch: see surface_patch.h.
-Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const SurfacePatch& patch);
+// A T-frame of the reference alone, on which patches are planned: whoever joins later needs the references alone.
+Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps);
+// This T-frame with a patch: see surface_patch.h.
+Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked,
+                               const SurfacePatch& patch);
 // A T-frame that has the motion of the nodes, but neither displacement nor colours.
 Result<Candidate> code_motion_alone(FrameWork& work, const FrameSteps& steps);
 

@@ -137,13 +137,46 @@ std::vector<Limb> limbs_of(const DeformableMesh& mesh, double reach) {
     return out;
 }
 
+namespace {
+
+// Whether the reference's samples at the end of each limb lie on the target: then none is lost.
+bool all_lie_on(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
+                const std::vector<Limb>& limbs, const LimbReach& options) {
+    constexpr double on = 15;  // mm: mean distance
+    const double reach = options.matched / 2 * options.millimetre;
+    std::vector<double> sum(mesh.handles.size(), 0);
+    std::vector<std::size_t> count(mesh.handles.size(), 0);
+    std::vector<bool> ends(mesh.handles.size(), false);
+    for (const auto& limb : limbs) ends[limb.handles.front()] = true;
+    for (std::size_t i = 0; i < mesh.samples.size(); ++i) {
+        const auto& blend = mesh.blends[mesh.samples[i]];
+        const auto handle = blend.handle[0];
+        if (blend.count == 0 || !ends[handle]) continue;
+        const auto& p = mesh.positions[mesh.samples[i]];
+        const auto& n = mesh.sample_normals[i];
+        const Vector3d point = motions[handle](Vector3d(p[0], p[1], p[2]));
+        const Vector3d normal = motions[handle].rotation * Vector3d(n[0], n[1], n[2]);
+        const auto found =
+            target.fine.nearest(to_floats({point.x(), point.y(), point.z()}),
+                                to_floats({normal.x(), normal.y(), normal.z()}), static_cast<float>(reach), 0.2F);
+        sum[handle] += found.found ? std::sqrt(static_cast<double>(found.squared_distance)) : reach;
+        ++count[handle];
+    }
+    return std::all_of(limbs.begin(), limbs.end(), [&](const Limb& limb) {
+        const auto tip = limb.handles.front();
+        return sum[tip] < on * options.millimetre * static_cast<double>(count[tip]);
+    });
+}
+
+}  // namespace
+
 std::vector<RigidMotion> reached_for_extremities(const DeformableMesh& mesh, const SurfaceIndex& target,
                                                  std::span<const RigidMotion> motions,
                                                  std::span<const RigidMotion> last, const LimbReach& options) {
     constexpr double bend = 0.25;  // of the limb, from its root on, in which it turns
     const double unit = options.millimetre;
     const auto limbs = limbs_of(mesh, options.apart * unit);
-    if (limbs.empty()) return {};
+    if (limbs.empty() || all_lie_on(mesh, target, motions, limbs, options)) return {};
     const auto graph = graph_of_surface(target, options.cell * unit);
     std::vector<Vector3d> free;
     for (const auto place : extremities(graph, options.apart * unit)) free.push_back(graph.places[place]);

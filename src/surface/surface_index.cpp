@@ -190,8 +190,9 @@ TrianglePoint closest_on(std::span<const Point3f> positions, const Triangle& t, 
                                to_vector(positions[t[2]]));
 }
 
-SurfacePoint surface_point(const SurfaceIndex& surface, std::uint32_t triangle, const TrianglePoint& found) {
-    SurfacePoint out{triangle, to_floats(found.shares), {}, static_cast<float>(found.squared_distance)};
+SurfacePoint surface_point(const SurfaceIndex& surface, std::uint32_t triangle, const std::array<float, 3>& shares,
+                           float squared_distance) {
+    SurfacePoint out{triangle, shares, {}, squared_distance};
     const auto& t = surface.triangles[triangle];
     for (std::size_t i = 0; i < 3; ++i)
         for (std::size_t c = 0; c < 3; ++c) out.point[i] += out.shares[c] * surface.positions[t[c]][i];
@@ -389,21 +390,24 @@ SurfacePoint SurfaceIndex::closest(const Point3f& query) const {
         const auto other = search.tree.nearest(to_floats(from * 2 - found)).index;
         if (other != nearest.index) walk_from(other);
     }
-    return surface_point(*this, best_triangle, best);
+    return surface_point(*this, best_triangle, to_floats(best.shares), static_cast<float>(best.squared_distance));
 }
 
 // ---- Surfaces: facing the same way
 
 void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
     around = triangles_around(positions.size(), triangles);
-    normals = points_of(vertex_normals(positions, triangles));
     triangle_normals.reserve(triangles.size());
+    std::vector<Vector3d> sums(positions.size(), Vector3d{});
     double area = 0;
     for (const auto& t : triangles) {
         const Vector3d across = area_vector(std::span<const Point3f>(positions), t);
         area += length(across) / 2;
         triangle_normals.push_back(to_floats(normalised(across)));
+        for (const auto v : t) sums[v] = sums[v] + across;
     }
+    normals.reserve(positions.size());
+    for (const auto& sum : sums) normals.push_back(to_floats(normalised(sum)));
     const std::size_t count = std::min(options.samples, positions.size());
     std::vector<Point3f> chosen_points(count), chosen_normals(count);
     samples.resize(count);
@@ -421,27 +425,154 @@ void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
     coarse_gap = gap_of(area, count);
 }
 
+// The closest point so far.
+struct SurfaceIndex::Best {
+    std::uint32_t triangle = none;
+    std::array<float, 3> shares{};
+    float squared_distance = std::numeric_limits<float>::infinity();
+};
+
+namespace {
+
+Point3f difference(const Point3f& a, const Point3f& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+// The place between a and b, both as seen from the query, that is nearest to it: how far from a, and squared distance.
+std::pair<float, float> closest_on_side(const Point3f& a, const Point3f& b) {
+    const Point3f side = difference(b, a);
+    const float squared_length = product(side, side);
+    const float t = squared_length > 0 ? std::clamp(-product(a, side) / squared_length, 0.0f, 1.0f) : 0.0f;
+    const Point3f p = {a[0] + side[0] * t, a[1] + side[1] * t, a[2] + side[2] * t};
+    return {t, product(p, p)};
+}
+
+}  // namespace
+
+NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, const Point3f& third, const Point3f& query,
+                                float least) {
+    // Seen from the query.
+    const Point3f a = difference(first, query), b = difference(second, query), c = difference(third, query);
+    const Point3f ab = difference(b, a), ac = difference(c, a);
+    const Point3f across = {ab[1] * ac[2] - ab[2] * ac[1], ab[2] * ac[0] - ab[0] * ac[2],
+                            ab[0] * ac[1] - ab[1] * ac[0]};
+    const float whole = product(across, across), height = product(across, a);
+    NearOnTriangle out;
+    if (height * height > least * whole) return out;
+    const float bb = product(ab, ab), bc = product(ab, ac), cc = product(ac, ac);
+    const float from_b = -product(a, ab), from_c = -product(a, ac);
+    const float v = cc * from_b - bc * from_c, w = bb * from_c - bc * from_b, u = whole - v - w;
+    const bool thin = !(whole > 1e-4f * bb * cc);
+    if (!thin && u >= 0 && v >= 0 && w >= 0) return {{u / whole, v / whole, w / whole}, height * height / whole};
+    const std::array<Point3f, 3> corners = {a, b, c};
+    const std::array<bool, 3> beyond = {thin || u < 0, thin || v < 0, thin || w < 0};
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+        if (!beyond[corner]) continue;
+        const std::size_t i = (corner + 1) % 3, j = (corner + 2) % 3;
+        const auto [along, squared] = closest_on_side(corners[i], corners[j]);
+        if (!(squared < out.squared_distance)) continue;
+        out = {{}, squared};
+        out.shares[i] = 1 - along;
+        out.shares[j] = along;
+    }
+    return out;
+}
+
+// Tries the triangles around a vertex; those that face away from `normal`, if there is one, are left out.
+void SurfaceIndex::try_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement,
+                              Best& best) const {
+    for (const auto triangle : around.of(vertex)) {
+        const Point3f& across = triangle_normals[triangle];
+        if (normal && (product(across, *normal) < agreement || across == Point3f{})) continue;
+        const auto& t = triangles[triangle];
+        // The triangle is skipped if even its plane is farther away than the best so far.
+        const float height = product(across, difference(positions[t[0]], query));
+        if (height * height > best.squared_distance) continue;
+        const auto near = near_on_triangle(positions[t[0]], positions[t[1]], positions[t[2]], query,
+                                           std::numeric_limits<float>::infinity());
+        if (near.squared_distance < best.squared_distance) best = {triangle, near.shares, near.squared_distance};
+    }
+}
+
+Neighbour SurfaceIndex::nearest_along(const Point3f& query, std::uint32_t from) const {
+    const auto squared_distance = [&](std::uint32_t vertex) {
+        const Point3f apart = difference(positions[vertex], query);
+        return product(apart, apart);
+    };
+    Neighbour best{from, squared_distance(from)};
+    for (std::uint32_t last = none; last != best.index;) {
+        last = best.index;
+        for (const auto triangle : around.of(last)) {
+            // The next corner of each: on a closed surface these are all neighbours.
+            const auto& t = triangles[triangle];
+            const std::uint32_t next = t[0] == last ? t[1] : t[1] == last ? t[2] : t[0];
+            const float d = squared_distance(next);
+            if (d < best.squared_distance) best = {next, d};
+        }
+    }
+    return best;
+}
+
+OrientedMatch SurfaceIndex::nearest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
+                                           std::uint32_t guess) const {
+    constexpr float near = 4, as_near_as_can_be = 1;  // spacings of the vertices
+    if (within.along && guess < positions.size()) {
+        const Point3f apart = difference(positions[guess], query);
+        if (product(apart, apart) < near * near * fine_gap * fine_gap) {
+            const auto found = nearest_along(query, guess);
+            const float most = std::min(within.reach, as_near_as_can_be * fine_gap);
+            if (found.squared_distance <= most * most && product(normals[found.index], normal) >= within.agreement)
+                return {found.index, found.squared_distance, true};
+            guess = found.index;
+        }
+    }
+    return fine.nearest(query, normal, within.reach, within.agreement, guess);
+}
+
+// The closest point of the triangles around a vertex; from where it lies on their rim, they go on beyond.
+SurfaceIndex::Best SurfaceIndex::closest_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal,
+                                                float agreement) const {
+    constexpr std::size_t most_tried = 12;  // number of vertices after which a walk is given up as not worth its time
+    Best best;
+    std::array<std::uint32_t, most_tried> tried{};
+    std::size_t count = 0;
+    const auto try_at = [&](std::uint32_t at) {
+        const auto end = tried.begin() + static_cast<std::ptrdiff_t>(count);
+        if (count == most_tried || std::find(tried.begin(), end, at) != end) return;
+        tried[count++] = at;
+        try_around(at, query, normal, agreement, best);
+    };
+    try_at(vertex);
+    for (auto last = none; best.triangle != last;) {
+        last = best.triangle;
+        const auto shares = best.shares;
+        for (std::size_t i = 0; i < 3; ++i)
+            if (shares[i] == 0)
+                for (const std::size_t corner : {(i + 1) % 3, (i + 2) % 3})
+                    if (shares[corner] > 0) try_at(triangles[last][corner]);
+    }
+    return best;
+}
+
 SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
                                           std::uint32_t& guess) const {
-    SurfacePoint out;
-    const auto match = fine.nearest(query, normal, within.reach, within.agreement, guess);
-    if (!match.found) return out;
+    const auto match = nearest_facing(query, normal, within, guess);
+    if (!match.found) return {};
     guess = match.index;
-    const Vector3d from = to_vector(query);
-    std::uint32_t best_triangle = none;
-    TrianglePoint best;
-    best.squared_distance = std::numeric_limits<double>::infinity();
-    for (const auto triangle : around.of(match.index)) {
-        const Point3f& across = triangle_normals[triangle];
-        if (product(across, normal) < within.agreement || across == Point3f{}) continue;
-        // The triangle is skipped if even its plane is farther away than the best so far.
-        const Point3f& corner = positions[triangles[triangle][0]];
-        const float height = product(across, {query[0] - corner[0], query[1] - corner[1], query[2] - corner[2]});
-        if (static_cast<double>(height * height) > best.squared_distance) continue;
-        const auto found = closest_on(positions, triangles[triangle], from);
-        if (found.squared_distance < best.squared_distance) best = found, best_triangle = triangle;
-    }
-    return best_triangle == none ? out : surface_point(*this, best_triangle, best);
+    Best best;
+    if (within.along)
+        best = closest_around(match.index, query, &normal, within.agreement);
+    else
+        try_around(match.index, query, &normal, within.agreement, best);
+    if (best.triangle == none) return {};
+    return surface_point(*this, best.triangle, best.shares, best.squared_distance);
+}
+
+SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std::uint32_t& guess) const {
+    const auto match = nearest_facing(query, {}, {.reach = reach, .agreement = -2}, guess);
+    if (!match.found) return {};
+    guess = match.index;
+    const auto best = closest_around(match.index, query, nullptr, 0);
+    if (best.triangle == none) return {};
+    return surface_point(*this, best.triangle, best.shares, best.squared_distance);
 }
 
 std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<const Point3f> queries,

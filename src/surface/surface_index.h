@@ -115,9 +115,21 @@ struct SurfacePoint {
     bool found() const { return triangle != nothing; }
 };
 
+// The point of a triangle that is nearest to a query, in floats: faster than closest_on_triangle(), and what captured
+// surfaces are asked for needs no more.
+struct NearOnTriangle {
+    std::array<float, 3> shares{};  // of the corners
+    float squared_distance = std::numeric_limits<float>::infinity();
+};
+// Infinitely far if even the triangle's plane is farther away than `least`, squared.
+NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, const Point3f& third, const Point3f& query,
+                                float least);
+
 struct FacingReach {
     float reach = 30;         // in the unit of the positions: nothing farther away is found
     float agreement = 0.35F;  // least dot product of the two normals
+    bool along = false;       // whether to go along the surface, from the guess and beyond the triangles around the
+                              // nearest vertex: faster where most queries lie on one sheet
 };
 
 struct SurfaceIndexOptions {
@@ -157,9 +169,27 @@ public:
     // The closest point on the triangles around the nearest vertex within reach; that vertex and the triangles must
     // face as `normal` does. Vertices at a seam are not merged: each side keeps its own, which face as their side does.
     // Merged, they would face between the two sides, and T-frames took 1 to 2 % more bits on captures in pieces. Needs
-    // options.cell > 0. guess: the vertex to begin with, or OrientedPoints::no_point; it is set to the vertex found.
+    // options.cell > 0.
+    //
+    // guess: a vertex that may be near, such as that of a neighbouring query, or OrientedPoints::no_point; it is set to
+    // the vertex found. Unless `within.along` it never changes the result.
     SurfacePoint closest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
                                 std::uint32_t& guess) const;
+
+    // The vertex that is nearest to the query, however it faces, found from vertex to vertex beginning at `from`, as
+    // long as the distance shrinks: the nearest of this sheet of the surface, as a rule. Needs options.cell > 0.
+    Neighbour nearest_along(const Point3f& query, std::uint32_t from) const;
+
+    // As OrientedPoints::nearest() among all vertices, but with `within.along`, if `guess` is near, the vertex is
+    // looked for along the surface from there, and is taken if it faces the right way and lies no farther than its
+    // neighbours.
+    OrientedMatch nearest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
+                                 std::uint32_t guess) const;
+
+    // The closest point of the surface near the query, however it faces: on the triangles around the nearest vertex
+    // within reach, then around their corners, as long as the distance shrinks. Finds less than closest() does under
+    // long triangles, and is faster. Needs options.cell > 0. guess: as of closest_facing().
+    SurfacePoint closest_within(const Point3f& query, float reach, std::uint32_t& guess) const;
 
     std::vector<Point3f> positions;  // of the mesh's vertices
     std::vector<Triangle> triangles;
@@ -176,7 +206,11 @@ public:
 
 private:
     struct Anywhere;
+    struct Best;
     void find_directions(const SurfaceIndexOptions& options);
+    Best closest_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement) const;
+    void try_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement,
+                    Best& best) const;
     const Anywhere& anywhere() const;
 
     struct OnDemand;

@@ -35,19 +35,6 @@ BlockSystem::BlockSystem(const BlockPattern& pattern)
       above(pattern.place.size(), Matrix6::Zero()),
       right(pattern.handles, Vector6::Zero()) {}
 
-void BlockSystem::clear() {
-    std::fill(diagonal.begin(), diagonal.end(), Matrix6::Zero());
-    std::fill(above.begin(), above.end(), Matrix6::Zero());
-    std::fill(right.begin(), right.end(), Vector6::Zero());
-}
-
-BlockSystem& BlockSystem::operator+=(const BlockSystem& other) {
-    for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] += other.diagonal[i];
-    for (std::size_t i = 0; i < above.size(); ++i) above[i] += other.above[i];
-    for (std::size_t i = 0; i < right.size(); ++i) right[i] += other.right[i];
-    return *this;
-}
-
 namespace {
 
 double product(const std::vector<Vector6>& a, const std::vector<Vector6>& b) {
@@ -130,6 +117,38 @@ std::vector<std::uint32_t> spread_samples(const HandleWeights& weights, std::siz
     for (const auto& vertices : region) {
         const std::size_t taken = std::min(quota, vertices.size());
         for (std::size_t i = 0; i < taken; ++i) out.push_back(vertices[(2 * i + 1) * vertices.size() / (2 * taken)]);
+    }
+    return out;
+}
+
+// Which samples are beside each other: every vertex belongs to the sample that is the fewest edges away, and samples
+// whose vertices share an edge are neighbours.
+SamplesBeside samples_beside(const DeformableMesh& mesh) {
+    constexpr auto none = std::numeric_limits<std::uint32_t>::max();
+    std::vector<std::uint32_t> sample_of(mesh.positions.size(), none), reached;
+    for (std::uint32_t i = 0; i < mesh.samples.size(); ++i) {
+        sample_of[mesh.samples[i]] = i;
+        reached.push_back(mesh.samples[i]);
+    }
+    for (std::size_t i = 0; i < reached.size(); ++i)
+        for (const auto t : mesh.around.of(reached[i]))
+            for (const auto v : mesh.triangles[t])
+                if (sample_of[v] == none) sample_of[v] = sample_of[reached[i]], reached.push_back(v);
+    std::vector<std::vector<std::uint32_t>> beside(mesh.samples.size());
+    const auto join = [&](std::uint32_t a, std::uint32_t b) {
+        if (a == b || a == none || b == none) return;
+        auto& list = beside[a];
+        if (std::find(list.begin(), list.end(), b) == list.end()) list.push_back(b), beside[b].push_back(a);
+    };
+    for (const auto& t : mesh.triangles) {
+        const auto a = sample_of[t[0]], b = sample_of[t[1]], c = sample_of[t[2]];
+        join(a, b), join(b, c), join(c, a);
+    }
+    SamplesBeside out;
+    out.first.push_back(0);
+    for (const auto& list : beside) {
+        out.samples.insert(out.samples.end(), list.begin(), list.end());
+        out.first.push_back(static_cast<std::uint32_t>(out.samples.size()));
     }
     return out;
 }
@@ -285,6 +304,8 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
     mesh.triangles.assign(triangles.begin(), triangles.end());
     mesh.around = triangles_around(positions.size(), triangles);
     mesh.weights = std::move(weights);
+    mesh.blends.reserve(mesh.weights.size());
+    for (const auto& vertex : mesh.weights) mesh.blends.push_back(blend_of(vertex));
     mesh.handles.assign(handles.begin(), handles.end());
     if (handles.empty()) return mesh;
     mesh.samples = spread_samples(mesh.weights, handles.size(), options.samples);
@@ -293,8 +314,9 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
     for (const std::uint32_t v : mesh.samples) {
         mesh.fine.samples.push_back(static_cast<std::uint32_t>(mesh.fine.samples.size()));
         mesh.sample_normals.push_back(normals[v]);
-        mesh.fine.blends.push_back(blend_of(mesh.weights[v]));
+        mesh.fine.blends.push_back(mesh.blends[v]);
     }
+    mesh.beside = samples_beside(mesh);
     mesh.sample_textures = textures_of_samples(mesh, colours);
     for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
     mesh.fine.pairs = std::move(pairs);
@@ -333,27 +355,26 @@ struct Moved {
     std::vector<Point3f> vertices;         // of the mesh; only for rounds that match to its triangles
 };
 
-Vector3d blended(const SampleBlend& blend, const std::vector<RigidMotion>& motion, const Vector3d& x) {
-    Vector3d out = Vector3d::Zero();
-    for (std::size_t k = 0; k < blend.count; ++k)
-        out += static_cast<double>(blend.weight[k]) * motion[blend.handle[k]](x);
+// What a vertex's handles do to it, blended: not rigid, but the same as the mean of what each does.
+RigidMotion blended(const SampleBlend& blend, const std::vector<RigidMotion>& motion) {
+    RigidMotion out{Matrix3d::Zero(), Vector3d::Zero()};
+    for (std::size_t k = 0; k < blend.count; ++k) {
+        const double weight = static_cast<double>(blend.weight[k]);
+        out.rotation += weight * motion[blend.handle[k]].rotation;
+        out.shift += weight * motion[blend.handle[k]].shift;
+    }
     return out;
-}
-
-Vector3d blended_turn(const SampleBlend& blend, const std::vector<RigidMotion>& motion, const Vector3d& direction) {
-    Vector3d out = Vector3d::Zero();
-    for (std::size_t k = 0; k < blend.count; ++k)
-        out += static_cast<double>(blend.weight[k]) * (motion[blend.handle[k]].rotation * direction);
-    const double length = out.norm();
-    return length > 0 ? Vector3d(out / length) : direction;
 }
 
 Moved move_samples(const Stage& stage, Threads threads) {
     Moved out{std::vector<Point3f>(stage.rest.size()), std::vector<Point3f>(stage.rest.size()), {}};
     parallel_for(stage.rest.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            out.points[i] = point_of(blended(stage.level.blends[i], stage.motion, stage.rest[i]));
-            out.normals[i] = point_of(blended_turn(stage.level.blends[i], stage.motion, stage.rest_normals[i]));
+            const RigidMotion here = blended(stage.level.blends[i], stage.motion);
+            out.points[i] = point_of(here(stage.rest[i]));
+            const Vector3d normal = here.rotation * stage.rest_normals[i];
+            const double length = normal.norm();
+            out.normals[i] = point_of(length > 0 ? Vector3d(normal / length) : stage.rest_normals[i]);
         }
     });
     return out;
@@ -406,28 +427,47 @@ float match_weight(double squared_distance, const Round& round) {
     return static_cast<float>(fade * fade);
 }
 
-// The point nearest to `query` on the moved triangles around a vertex.
-struct NearOnReference {
-    Vector3d point = Vector3d::Zero();
-    double squared_distance = std::numeric_limits<double>::infinity();
+// How far a point lies from the moved triangles around a vertex, and from there to it; none if it has no triangles.
+struct FromReference {
+    Point3f apart{};
+    float squared_distance = std::numeric_limits<float>::infinity();
 };
 
-NearOnReference nearest_around(const DeformableMesh& mesh, std::span<const Point3f> vertices, std::uint32_t vertex,
-                               const Vector3d& query) {
-    NearOnReference out;
+FromReference nearest_around(const DeformableMesh& mesh, std::span<const Point3f> vertices, std::uint32_t vertex,
+                             const Point3f& query) {
+    FromReference out;
     for (const auto triangle : mesh.around.of(vertex)) {
         const auto& t = mesh.triangles[triangle];
-        const Vector3d a = vector_of(vertices[t[0]]), b = vector_of(vertices[t[1]]), c = vector_of(vertices[t[2]]);
-        // The triangle is skipped if even its plane is farther away than the best so far.
-        const Vector3d across = (b - a).cross(c - a);
-        const double height = across.dot(query - a);
-        if (height * height > out.squared_distance * across.squaredNorm()) continue;
-        const auto found = closest_on_triangle(to_vector(point_of(query)), to_vector(vertices[t[0]]),
-                                               to_vector(vertices[t[1]]), to_vector(vertices[t[2]]));
-        if (found.squared_distance >= out.squared_distance) continue;
-        out = {found.shares[0] * a + found.shares[1] * b + found.shares[2] * c, found.squared_distance};
+        const NearOnTriangle near =
+            near_on_triangle(vertices[t[0]], vertices[t[1]], vertices[t[2]], query, out.squared_distance);
+        if (!(near.squared_distance < out.squared_distance)) continue;
+        out.squared_distance = near.squared_distance;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            out.apart[axis] =
+                query[axis] - (near.shares[0] * vertices[t[0]][axis] + near.shares[1] * vertices[t[1]][axis] +
+                               near.shares[2] * vertices[t[2]][axis]);
     }
     return out;
+}
+
+// The sample nearest to a point, among those that are reached from one beside it to the next, as long as the distance
+// shrinks.
+Neighbour nearest_along(const SamplesBeside& beside, std::span<const Point3f> points, const Point3f& query,
+                        std::uint32_t from) {
+    const auto squared_distance = [&](std::uint32_t sample) {
+        const Point3f& p = points[sample];
+        const Point3f apart = {p[0] - query[0], p[1] - query[1], p[2] - query[2]};
+        return apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+    };
+    Neighbour best{from, squared_distance(from)};
+    for (std::uint32_t last = OrientedPoints::no_point; last != best.index;) {
+        last = best.index;
+        for (const auto next : beside.of(last)) {
+            const float d = squared_distance(next);
+            if (d < best.squared_distance) best = {next, d};
+        }
+    }
+    return best;
 }
 
 // Matches in both directions: from each sample to the target, and from each of the target's samples to the nearest
@@ -438,7 +478,6 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, 
     const std::size_t forward = moved.points.size() / round.every, back = target.samples.size() / skip;
     const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
     const OrientedPoints reference(moved.points, moved.normals, cell);
-    const auto& search = round.far ? target.coarse : target.fine;
     const float gap = round.far ? target.coarse_gap : target.fine_gap;
     guesses.forward.resize(forward, OrientedPoints::no_point);
     guesses.back.resize(back, OrientedPoints::no_point);
@@ -446,8 +485,11 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, 
     const auto go_forward = [&](std::size_t i, std::uint32_t last) {
         const std::size_t sample = i * round.every;
         std::uint32_t& guess = guesses.forward[i];
-        const auto match = search.nearest(moved.points[sample], moved.normals[sample], reach, agreement,
-                                          guess == OrientedPoints::no_point ? last : guess);
+        const auto from = guess == OrientedPoints::no_point ? last : guess;
+        const auto match =
+            round.far ? target.coarse.nearest(moved.points[sample], moved.normals[sample], reach, agreement, from)
+                      : target.nearest_facing(moved.points[sample], moved.normals[sample],
+                                              {.reach = reach, .agreement = agreement, .along = true}, from);
         if (!match.found) return guess;
         guess = match.index;
         const auto vertex = round.far ? target.samples[match.index] : match.index;
@@ -455,22 +497,36 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, 
         out[i].weight = match_weight(match.squared_distance, round);
         return guess;
     };
+    // From sample to sample, beginning with the last round's, as long as the distance shrinks; where that ends far from
+    // the point or faces elsewhere, among all.
+    const bool along = !round.far && round.every == 1 && !mesh.beside.first.empty();
+    const auto nearest_sample = [&](const Point3f& point, const Point3f& normal, std::uint32_t guess,
+                                    std::uint32_t last) {
+        if (along && guess != OrientedPoints::no_point) {
+            const auto near = nearest_along(mesh.beside, moved.points, point, guess);
+            const auto most = std::min(reach, mesh.sample_gap);
+            const auto& n = moved.normals[near.index];
+            if (near.squared_distance <= most * most &&
+                n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2] >= agreement)
+                return OrientedMatch{near.index, near.squared_distance, true};
+            guess = near.index;
+        }
+        return reference.nearest(point, normal, reach, agreement, guess == OrientedPoints::no_point ? last : guess);
+    };
     const auto go_back = [&](std::size_t i, std::uint32_t last) {
         const std::uint32_t vertex = target.samples[i * skip];
         std::uint32_t& guess = guesses.back[i];
-        const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], reach, agreement,
-                                             guess == OrientedPoints::no_point ? last : guess);
+        const auto match = nearest_sample(target.positions[vertex], target.normals[vertex], guess, last);
         if (!match.found) return guess;
         guess = match.index;
         Match& there = out[forward + i];
         there = match_of(moved, match.index, target, vertex, round.gap);
         auto squared_distance = static_cast<double>(match.squared_distance);
         if (round.surfaces) {
-            const Vector3d point = vector_of(target.positions[vertex]);
-            const auto near = nearest_around(mesh, moved.vertices, mesh.samples[match.index], point);
-            if (near.squared_distance < squared_distance) {
-                squared_distance = near.squared_distance;
-                there.across = there.normal.dot(point - near.point);
+            const auto near = nearest_around(mesh, moved.vertices, mesh.samples[match.index], target.positions[vertex]);
+            if (near.squared_distance < match.squared_distance) {
+                squared_distance = static_cast<double>(near.squared_distance);
+                there.across = there.normal.dot(vector_of(near.apart));
             }
         }
         there.weight = match_weight(squared_distance, round);
@@ -627,44 +683,105 @@ Matrix3d cross_matrix(const Vector3d& r) {
     return out;
 }
 
-// A sample moves with the turn and shift of handle k by weight_k (turn x r_k + shift). The blocks are written out by
-// hand, because this is where most of the time is spent.
-void add_pull(const Stage& stage, const std::vector<Vector3d>& centres, std::size_t sample, const Pull& pull,
-              BlockSystem& system) {
-    const SampleBlend& blend = stage.level.blends[sample];
-    std::array<Vector3d, handles_per_vertex> arm;
-    std::array<Matrix3d, handles_per_vertex> pressed;  // metric * transposed cross matrix of the arm
-    auto add = [&](std::size_t a, std::size_t b, Matrix6& block) {
-        const double weight_a = static_cast<double>(blend.weight[a]), weight_b = static_cast<double>(blend.weight[b]);
-        const double both = weight_a * weight_b;
-        const Vector3d& r = arm[a];
-        for (int column = 0; column < 3; ++column) {
-            const double x = pressed[b](0, column), y = pressed[b](1, column), z = pressed[b](2, column);
-            block(0, column) += r.y() * z - r.z() * y;
-            block(1, column) += r.z() * x - r.x() * z;
-            block(2, column) += r.x() * y - r.y() * x;
-            block(3, column) += weight_a * x;
-            block(4, column) += weight_a * y;
-            block(5, column) += weight_a * z;
-        }
-        for (int column = 0; column < 3; ++column)
-            for (int row = 0; row < 3; ++row) {
-                block(row, 3 + column) += weight_b * pressed[a](column, row);
-                block(3 + row, 3 + column) += both * pull.metric(row, column);
-            }
-    };
-    for (std::size_t k = 0; k < blend.count; ++k) {
-        const std::size_t h = blend.handle[k];
-        const double weight = static_cast<double>(blend.weight[k]);
-        arm[k] = weight * (stage.motion[h](stage.rest[sample]) - centres[h]);
-        pressed[k].noalias() = pull.metric * cross_matrix(arm[k]).transpose();
-        add(k, k, system.diagonal[h]);
-        system.right[h].head<3>() += arm[k].cross(pull.force);
-        system.right[h].tail<3>() += weight * pull.force;
+// What the pulls on samples do to a turn about one common origin and a shift, the same for all handles: a symmetric
+// matrix of 6 x 6, as its rows from the diagonal on; padded for vectors. A sample's is found once, however many pairs
+// of handles move it; what it does to a handle that turns about its own centre follows from the sum over all samples
+// (about_centres()).
+using AboutOrigin = std::array<double, 24>;
+
+AboutOrigin about_origin(const Vector3d& point, const Pull& pull) {
+    const auto& m = pull.metric;
+    Matrix3d turn_shift;  // cross matrix of the point * metric
+    for (int column = 0; column < 3; ++column) turn_shift.col(column) = point.cross(Vector3d(m.col(column)));
+    const auto& b = turn_shift;
+    const double x = point.x(), y = point.y(), z = point.z();
+    // -turn_shift * cross matrix of the point
+    return {b(0, 2) * y - b(0, 1) * z,
+            b(0, 0) * z - b(0, 2) * x,
+            b(0, 1) * x - b(0, 0) * y,
+            b(0, 0),
+            b(0, 1),
+            b(0, 2),
+            b(1, 0) * z - b(1, 2) * x,
+            b(1, 1) * x - b(1, 0) * y,
+            b(1, 0),
+            b(1, 1),
+            b(1, 2),
+            b(2, 1) * x - b(2, 0) * y,
+            b(2, 0),
+            b(2, 1),
+            b(2, 2),
+            m(0, 0),
+            m(0, 1),
+            m(0, 2),
+            m(1, 1),
+            m(1, 2),
+            m(2, 2),
+            0,
+            0,
+            0};
+}
+
+void add_scaled(AboutOrigin& to, const AboutOrigin& from, double scale) {
+    for (std::size_t i = 0; i < to.size(); ++i) to[i] += scale * from[i];
+}
+
+// The sums over samples, by handle and by pair of handles, each sample with the product of its weights.
+struct PullSums {
+    std::vector<AboutOrigin> diagonal, above;
+    std::vector<Vector6> right;
+    void clear(const BlockPattern& pattern) {
+        diagonal.assign(pattern.handles, {});
+        above.assign(pattern.place.size(), {});
+        right.assign(pattern.handles, Vector6::Zero());
     }
+    PullSums& operator+=(const PullSums& other) {
+        for (std::size_t i = 0; i < diagonal.size(); ++i) add_scaled(diagonal[i], other.diagonal[i], 1);
+        for (std::size_t i = 0; i < above.size(); ++i) add_scaled(above[i], other.above[i], 1);
+        for (std::size_t i = 0; i < right.size(); ++i) right[i] += other.right[i];
+        return *this;
+    }
+};
+
+// A sample moves with the turn and shift of handle k by weight_k (turn x point + shift). point: where it lies now, seen
+// from the origin; the few millimetres by which its handles would take it elsewhere are neglected as levers.
+void add_pull(const SampleBlend& blend, const Vector3d& point, const Pull& pull, PullSums& sums) {
+    const auto form = about_origin(point, pull);
+    Vector6 force;
+    force << point.cross(pull.force), pull.force;
     std::size_t slot = 0;
-    for (std::size_t a = 0; a < blend.count; ++a)
-        for (std::size_t b = a + 1; b < blend.count; ++b) add(a, b, system.above[blend.block[slot++]]);
+    for (std::size_t a = 0; a < blend.count; ++a) {
+        const double weight = static_cast<double>(blend.weight[a]);
+        add_scaled(sums.diagonal[blend.handle[a]], form, weight * weight);
+        sums.right[blend.handle[a]] += weight * force;
+        for (std::size_t b = a + 1; b < blend.count; ++b)
+            add_scaled(sums.above[blend.block[slot++]], form, weight * static_cast<double>(blend.weight[b]));
+    }
+}
+
+// The block of two handles that turn about their own centres, as seen from the origin.
+Matrix6 about_centres(const AboutOrigin& s, const Vector3d& centre_a, const Vector3d& centre_b) {
+    Matrix3d turns, turn_shift, shifts;
+    turns << s[0], s[1], s[2], s[1], s[6], s[7], s[2], s[7], s[11];
+    turn_shift << s[3], s[4], s[5], s[8], s[9], s[10], s[12], s[13], s[14];
+    shifts << s[15], s[16], s[17], s[16], s[18], s[19], s[17], s[19], s[20];
+    const Matrix3d a = cross_matrix(centre_a), b = cross_matrix(centre_b);
+    const Matrix3d shift_turn = turn_shift.transpose() + shifts * b;
+    Matrix6 out;
+    out << turns + turn_shift * b - a * shift_turn, turn_shift - a * shifts, shift_turn, shifts;
+    return out;
+}
+
+void set_system(const BlockPattern& pattern, const PullSums& sums, const std::vector<Vector3d>& centres,
+                BlockSystem& system) {
+    for (std::size_t h = 0; h < centres.size(); ++h) {
+        system.diagonal[h] = about_centres(sums.diagonal[h], centres[h], centres[h]);
+        system.right[h] = sums.right[h];
+        system.right[h].head<3>() -= centres[h].cross(Vector3d(sums.right[h].tail<3>()));
+    }
+    for (std::size_t i = 0; i < pattern.place.size(); ++i)
+        system.above[i] =
+            about_centres(sums.above[i], centres[pattern.place[i].first], centres[pattern.place[i].second]);
 }
 
 void add_pairs(const Stage& stage, const std::vector<Vector3d>& centres, double stiffness, BlockSystem& system) {
@@ -718,18 +835,29 @@ struct RoundResult {
     double weight = 0;    // of all matches
 };
 
-RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell,
-                      BlockSystem (&systems)[2], Guesses& guesses, const DeformationOptions& options) {
+// What a level's rounds use again and again.
+struct RoundMemory {
+    BlockSystem system;
+    std::array<PullSums, 2> sums;
+    Guesses guesses;
+    explicit RoundMemory(const BlockPattern& pattern) : system(pattern), sums{}, guesses{} {}
+};
+
+RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell, RoundMemory& memory,
+                      const DeformationOptions& options) {
     Moved moved = move_samples(stage, options.threads);
     if (round.surfaces) moved.vertices = deform(stage.mesh, stage.motion, options.threads);
-    const auto matches = find_matches(stage.mesh, moved, target, round, cell, options, guesses);
+    const auto matches = find_matches(stage.mesh, moved, target, round, cell, options, memory.guesses);
     std::vector<Pull> of_colours;
     if (round.colours) of_colours = colour_pulls(stage, matches, moved, target, options);
     std::vector<Vector3d> centres(stage.centre.size());
-    for (std::size_t h = 0; h < centres.size(); ++h) centres[h] = stage.motion[h](stage.centre[h]);
+    Vector3d origin = Vector3d::Zero();
+    for (std::size_t h = 0; h < centres.size(); ++h) origin += centres[h] = stage.motion[h](stage.centre[h]);
+    origin /= static_cast<double>(centres.size());
     // Always in two halves, so that the sums do not depend on the number of threads.
     auto add_half = [&](std::size_t half) {
-        systems[half].clear();
+        auto& sums = memory.sums[half];
+        sums.clear(stage.level.pattern);
         const std::size_t begin = half * stage.rest.size() / 2, end = (half + 1) * stage.rest.size() / 2;
         auto pulls = sum_pulls(matches, round.point_share, begin, end);
         for (std::size_t i = begin; i < end && !of_colours.empty(); ++i) {
@@ -737,22 +865,28 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
             pulls[i - begin].force += of_colours[i].force;
         }
         for (std::size_t i = begin; i < end; ++i)
-            if (pulls[i - begin].metric.trace() > 0) add_pull(stage, centres, i, pulls[i - begin], systems[half]);
+            if (pulls[i - begin].metric.trace() > 0)
+                add_pull(stage.level.blends[i], vector_of(moved.points[i]) - origin, pulls[i - begin], sums);
     };
     parallel_invoke(
         options.threads, [&] { add_half(1); }, [&] { add_half(0); });
-    systems[0] += systems[1];
+    memory.sums[0] += memory.sums[1];
+    auto& system = memory.system;
+    std::vector<Vector3d> from_origin(centres);
+    for (auto& centre : from_origin) centre -= origin;
+    set_system(stage.level.pattern, memory.sums[0], from_origin, system);
     const double load = static_cast<double>(stage.rest.size()) / static_cast<double>(centres.size());
-    add_pairs(stage, centres, round.stiffness * load, systems[0]);
+    add_pairs(stage, centres, round.stiffness * load, system);
     // Handles that nothing holds stay where they are.
     const double unit = options.millimetre * options.millimetre;
-    for (auto& diagonal : systems[0].diagonal) {
+    for (auto& diagonal : system.diagonal) {
         diagonal.topLeftCorner<3, 3>().diagonal().array() += 10 * load * unit;
         diagonal.bottomRightCorner<3, 3>().diagonal().array() += 0.01 * load;
     }
     RoundResult out;
-    out.farthest = apply_step(solve(stage.level.pattern, systems[0], options.solver_iterations, 1e-3), centres,
-                              100 * options.millimetre, stage);
+    out.farthest = apply_step(
+        solve(stage.level.pattern, system, options.solver_iterations, 1e-2),
+        centres, 100 * options.millimetre, stage);
     for (const Match& match : matches) out.weight += static_cast<double>(match.weight);
     return out;
 }
@@ -817,7 +951,7 @@ void follow_groups(const DeformableMesh& mesh, const Stage& coarse, std::vector<
         }
         const Matrix3d turn = Eigen::Quaterniond(sum).normalized().toRotationMatrix();
         const Vector3d before = motion[h](mesh.handles[h]);
-        const Vector3d after = blended(blend, coarse.motion, before);
+        const Vector3d after = blended(blend, coarse.motion)(before);
         motion[h].rotation = turn * motion[h].rotation;
         motion[h].shift = after - motion[h].rotation * mesh.handles[h];
     }
@@ -840,21 +974,19 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     Stage fine = fine_stage(mesh, std::move(motion));
     if (options.coarse_rounds > 0) {
         Stage coarse = coarse_stage(mesh, fine, options.threads);
-        BlockSystem systems[2] = {BlockSystem(mesh.coarse.pattern), BlockSystem(mesh.coarse.pattern)};
-        Guesses guesses;
+        RoundMemory memory(mesh.coarse.pattern);
         for (int i = 0; i < options.coarse_rounds; ++i) {
             const double reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
-            const double moved = run_round(coarse, target, round, cell, systems, guesses, options).farthest;
+            const double moved = run_round(coarse, target, round, cell, memory, options).farthest;
             if (moved < options.settled * unit)
                 i = std::max(i, options.coarse_rounds - 2);  // the next round is the
                                                              // last
         }
         follow_groups(mesh, coarse, fine.motion);
     }
-    BlockSystem systems[2] = {BlockSystem(mesh.fine.pattern), BlockSystem(mesh.fine.pattern)};
-    Guesses guesses;
+    RoundMemory memory(mesh.fine.pattern);
     double weight = 0;
     for (int i = 0; i < options.fine_rounds; ++i) {
         auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
@@ -864,9 +996,9 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
         round.colours = i + options.colour_rounds >= options.fine_rounds && !target.colours.empty() &&
                         !mesh.sample_textures.empty();
         round.surfaces = i + options.surface_rounds >= options.fine_rounds;
-        weight = run_round(fine, target, round, cell, systems, guesses, options).weight;
+        weight = run_round(fine, target, round, cell, memory, options).weight;
     }
-    if (form && options.fine_rounds > 0) *form = form_of(mesh.fine.pattern, std::move(systems[0]), weight);
+    if (form && options.fine_rounds > 0) *form = form_of(mesh.fine.pattern, std::move(memory.system), weight);
     return fine.motion;
 }
 
@@ -1029,7 +1161,7 @@ std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMot
     const std::vector<RigidMotion> motion(motions.begin(), motions.end());
     parallel_for(out.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v)
-            out[v] = point_of(blended(blend_of(mesh.weights[v]), motion, vector_of(mesh.positions[v])));
+            out[v] = point_of(blended(mesh.blends[v], motion)(vector_of(mesh.positions[v])));
     });
     return out;
 }

@@ -43,8 +43,6 @@ struct BlockSystem {
     std::vector<Matrix6> diagonal, above;  // one per handle; one per place of the pattern
     std::vector<Vector6> right;
     explicit BlockSystem(const BlockPattern& pattern);
-    void clear();
-    BlockSystem& operator+=(const BlockSystem& other);
 };
 
 // Solves system * x = right by conjugate gradients, preconditioned with the diagonal blocks. Stops after `iterations`
@@ -118,14 +116,24 @@ struct SampleTexture {
     float unevenness = 0;  // mean square of their distances from it, levels^2
 };
 
+// For each sample those that are beside it on the surface, in compressed rows.
+struct SamplesBeside {
+    std::vector<std::uint32_t> first, samples;
+    std::span<const std::uint32_t> of(std::size_t sample) const {
+        return std::span(samples).subspan(first[sample], first[sample + 1] - first[sample]);
+    }
+};
+
 // A reference mesh prepared for deformation; built once per I-frame.
 struct DeformableMesh {
     std::vector<Point3f> positions;
     std::vector<Triangle> triangles;
     TrianglesAround around;  // each vertex
     HandleWeights weights;
+    std::vector<SampleBlend> blends;       // the same, one per vertex
     std::vector<Eigen::Vector3d> handles;  // positions of the handles
     std::vector<std::uint32_t> samples;    // indices of vertices
+    SamplesBeside beside;
     std::vector<Point3f> sample_normals;
     std::vector<SampleTexture> sample_textures;  // one per sample, or none if nothing is textured
     float sample_gap = 0;                        // approximate spacing of neighbouring samples

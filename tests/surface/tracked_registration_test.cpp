@@ -284,8 +284,8 @@ TEST(RegisterDeformation, StripesOnASleeveThatTurnsAboutItsAxisTurnTheMesh) {
     const auto reference = striped(sweep(121, 40, sleeve), 0);
     const auto shown = striped(sweep(97, 52, sleeve), turn_of_sleeve);
     EXPECT_NEAR(turn_found(shown, reference), turn_of_sleeve, 0.01);
-    EXPECT_NEAR(turn_found({}, reference), 0, 0.005);  // without the colours of either it stays as it lies
-    EXPECT_NEAR(turn_found(shown, {}), 0, 0.005);
+    EXPECT_NEAR(turn_found({}, reference), 0, 0.01);  // without the colours of either it stays as it lies
+    EXPECT_NEAR(turn_found(shown, {}), 0, 0.01);
 }
 
 TEST(RegisterDeformation, StripesAreFollowedInAnotherLightAndPastAShadow) {
@@ -308,7 +308,7 @@ TEST(RegisterDeformation, ColoursWithoutAPatternChangeNothing) {
         state = state * 1664525 + 1013904223;
         chance.push_back({static_cast<std::uint8_t>(100 + (state >> 28)), 120, 60});
     }
-    EXPECT_NEAR(turn_found(shown, chance), 0, 0.005);
+    EXPECT_NEAR(turn_found(shown, chance), 0, 0.01);
 }
 
 TEST(MovedOn, RepeatsTheLastStepOfEachHandle) {

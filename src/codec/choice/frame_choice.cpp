@@ -294,24 +294,24 @@ SurfacePatchOptions patch_options(const FrameWork& work, const FrameSteps& steps
 
 // The T-frame with the lost regions replaced; nothing if that is not possible, does not help, or costs about as much as
 // an I-frame. Where regions alone do not help, as where much is a little off, all that is lost is replaced.
-Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
+Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked) {
     using Patched = std::optional<Candidate>;
     constexpr double most_bytes = 0.8;  // of the I-frame's
-    if (work.configuration.options.tracked.patch_share <= 0 || !tracked.texcoords.empty()) return Patched();
-    auto options = patch_options(work, steps);
     // At fine steps a bit brings more where less is wrong.
     constexpr double lost_in_steps = 1.75;
     const double lost = std::min(allowed_in_region(work, work.sequence.nodes.best_fit),
                                  lost_in_steps * static_cast<double>(steps.geometry));
+    StageClock measuring(work.stages);
+    const SurfacePatchSearch search(tracked.mesh, work.reference().decoded.tracked->mesh.positions, work.mesh,
+                                    work.surface(), patch_options(work, steps));
+    measuring.done("patch");
     const std::array<double, 2> ways = {lost, 0.0};
     for (int way = 0; way < std::min<int>(work.effort.patches, ways.size()); ++way) {
-        options.region_lost = ways[static_cast<std::size_t>(way)];
         StageClock clock(work.stages);
-        const auto found = find_surface_patch(tracked, work.reference().decoded.tracked->mesh.positions, work.mesh,
-                                              work.surface(), options);
+        const auto found = search.find(ways[static_cast<std::size_t>(way)]);
         clock.done("patch");
         if (!found) continue;
-        auto out = code_patched(work, steps, *found);
+        auto out = code_patched(work, steps, tracked, *found);
         if (!out) return tl::unexpected(out.error());
         auto& fit = out->intra->fit;
         if (static_cast<double>(out->bytes()) > most_bytes * work.reference().bytes || lost_track(work, fit)) continue;
@@ -351,20 +351,32 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
-    const auto fit_of = [&] {
-        return work.tracked_fit(tracked->decoded, reference.intra.edge, reference.intra.fit.squared);
+    const auto fit_of = [&](const LatticeMesh& decoded) {
+        return work.tracked_fit(decoded, reference.intra.edge, reference.intra.fit.squared);
     };
-    auto fit = fit_of();
-    if (work.effort.follows_limbs && lost_track(work, fit) && work.follow_lost_limbs()) {
-        tracked = code_frame(FrameType::tracked, work, steps);
-        if (!tracked) return tracked;
-        fit = fit_of();
+    auto fit = fit_of(tracked->decoded);
+    bool lost = lost_track(work, fit);
+    std::optional<EncodedTrackedFrame> for_patches;  // which tells whether limbs were found, too
+    const bool may_be_patched =
+        !due && work.configuration.options.tracked.patch_share > 0 && reference.decoded.mesh().texcoords.empty();
+    if (lost) {
+        const bool limbs_moved = work.effort.follows_limbs && work.follow_lost_limbs();
+        if (may_be_patched) {
+            auto coded = code_for_patches(work, steps);
+            if (!coded) return tl::unexpected(coded.error());
+            for_patches.emplace(std::move(*coded));
+        }
+        if (limbs_moved && (!for_patches || !lost_track(work, fit_of(for_patches->mesh)))) {
+            tracked = code_frame(FrameType::tracked, work, steps);
+            if (!tracked) return tracked;
+            fit = fit_of(tracked->decoded);
+            lost = lost_track(work, fit);
+        }
     }
     const bool expensive = may_be_intra(work) && static_cast<double>(tracked->bytes()) > reference.bytes;
     const bool anew = expensive || relaid_texture(work, tracked->decoded);
-    const bool lost = lost_track(work, fit);
-    if (!anew && lost && !due) {
-        auto patched = patch(work, steps, tracked->decoded);
+    if (!anew && lost && for_patches) {
+        auto patched = patch(work, steps, *for_patches);
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) return std::move(**patched);
     }

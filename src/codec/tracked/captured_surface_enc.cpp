@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <numeric>
 
 #include "codec/intra/duplicates.h"
@@ -69,6 +70,8 @@ void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::s
 // triangles.
 SurfaceSamples samples_of(const MovedReference& moved) {
     SurfaceSamples out{points_of(moved.positions), points_of(moved.normals)};
+    out.points.reserve(moved.positions.size() + moved.triangles.size());
+    out.normals.reserve(out.points.capacity());
     for (const auto& t : moved.triangles) add_middle(out, out.points, out.normals, t);
     return out;
 }
@@ -81,8 +84,10 @@ struct SurfaceFit {
     std::vector<double> corner_weight, middle_weight;  // zero if the sample has no value
     std::vector<double> diagonal;
 
-    std::vector<double> times(const std::vector<double>& x) const;
-    std::vector<double> fitted(const std::vector<double>& seen) const;
+    // Two functions at a time, which takes vector instructions no longer than one.
+    using Both = std::array<double, 2>;
+    std::vector<Both> times(const std::vector<Both>& x) const;
+    std::array<std::vector<double>, 2> fitted(const std::vector<Both>& seen) const;
 };
 
 SurfaceFit make_surface_fit(const MovedReference& moved, const std::vector<SurfacePoint>& targets) {
@@ -104,58 +109,75 @@ SurfaceFit make_surface_fit(const MovedReference& moved, const std::vector<Surfa
     return out;
 }
 
-std::vector<double> SurfaceFit::times(const std::vector<double>& x) const {
-    std::vector<double> out(x.size());
-    for (std::size_t v = 0; v < x.size(); ++v) out[v] = corner_weight[v] * x[v];
+std::vector<SurfaceFit::Both> SurfaceFit::times(const std::vector<Both>& x) const {
+    std::vector<Both> out(x.size());
+    for (std::size_t v = 0; v < x.size(); ++v)
+        for (std::size_t i = 0; i < 2; ++i) out[v][i] = corner_weight[v] * x[v][i];
     for (std::size_t t = 0; t < triangles.size(); ++t) {
         const auto& [a, b, c] = triangles[t];
-        const double share = middle_weight[t] * (x[a] + x[b] + x[c]) / 9;
-        out[a] += share;
-        out[b] += share;
-        out[c] += share;
+        Both share{};
+        for (std::size_t i = 0; i < 2; ++i) share[i] = middle_weight[t] * (x[a][i] + x[b][i] + x[c][i]) / 9;
+        for (std::size_t i = 0; i < 2; ++i) out[a][i] += share[i];
+        for (std::size_t i = 0; i < 2; ++i) out[b][i] += share[i];
+        for (std::size_t i = 0; i < 2; ++i) out[c][i] += share[i];
     }
     return out;
 }
 
-std::vector<double> SurfaceFit::fitted(const std::vector<double>& seen) const {
+std::array<std::vector<double>, 2> SurfaceFit::fitted(const std::vector<Both>& seen) const {
     constexpr int rounds = 6;
     const std::size_t vertices = diagonal.size();
-    std::vector<double> x(vertices, 0), residual(vertices, 0);
-    for (std::size_t v = 0; v < vertices; ++v) {
-        x[v] = corner_weight[v] > 0 ? seen[v] : 0;
-        residual[v] = corner_weight[v] * seen[v];
-    }
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (const auto v : triangles[t]) residual[v] += middle_weight[t] * seen[vertices + t] / 3;
-    const auto product = times(x);
-    std::vector<double> direction(vertices);
-    double product_before = 0;
-    for (std::size_t v = 0; v < vertices; ++v) {
-        residual[v] -= product[v];
-        direction[v] = diagonal[v] > 0 ? residual[v] / diagonal[v] : 0;
-        product_before += residual[v] * direction[v];
-    }
-    for (int round = 0; round < rounds && product_before > 0; ++round) {
-        const auto image = times(direction);
-        double along = 0;
-        for (std::size_t v = 0; v < vertices; ++v) along += direction[v] * image[v];
-        if (!(along > 0)) break;
-        const double step = product_before / along;
-        double product_after = 0;
-        for (std::size_t v = 0; v < vertices; ++v) {
-            x[v] += step * direction[v];
-            residual[v] -= step * image[v];
-            if (diagonal[v] > 0) product_after += residual[v] * residual[v] / diagonal[v];
+    std::vector<Both> x(vertices), residual(vertices);
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t i = 0; i < 2; ++i) {
+            x[v][i] = corner_weight[v] > 0 ? seen[v][i] : 0;
+            residual[v][i] = corner_weight[v] * seen[v][i];
         }
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+        for (const auto v : triangles[t])
+            for (std::size_t i = 0; i < 2; ++i) residual[v][i] += middle_weight[t] * seen[vertices + t][i] / 3;
+    const auto product = times(x);
+    std::vector<Both> direction(vertices);
+    Both product_before{};
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t i = 0; i < 2; ++i) {
+            residual[v][i] -= product[v][i];
+            direction[v][i] = diagonal[v] > 0 ? residual[v][i] / diagonal[v] : 0;
+            product_before[i] += residual[v][i] * direction[v][i];
+        }
+    for (int round = 0; round < rounds && (product_before[0] > 0 || product_before[1] > 0); ++round) {
+        const auto image = times(direction);
+        Both along{}, step{}, product_after{}, turn{};
         for (std::size_t v = 0; v < vertices; ++v)
-            direction[v] =
-                (diagonal[v] > 0 ? residual[v] / diagonal[v] : 0) + product_after / product_before * direction[v];
-        product_before = product_after;
+            for (std::size_t i = 0; i < 2; ++i) along[i] += direction[v][i] * image[v][i];
+        // A function that is done stays as it is.
+        for (std::size_t i = 0; i < 2; ++i)
+            step[i] = along[i] > 0 && product_before[i] > 0 ? product_before[i] / along[i] : 0;
+        for (std::size_t v = 0; v < vertices; ++v) {
+            const double per_weight = diagonal[v] > 0 ? 1 / diagonal[v] : 0;
+            for (std::size_t i = 0; i < 2; ++i) {
+                x[v][i] += step[i] * direction[v][i];
+                residual[v][i] -= step[i] * image[v][i];
+                product_after[i] += residual[v][i] * residual[v][i] * per_weight;
+            }
+        }
+        for (std::size_t i = 0; i < 2; ++i) turn[i] = step[i] > 0 ? product_after[i] / product_before[i] : 0;
+        for (std::size_t v = 0; v < vertices; ++v) {
+            const double per_weight = diagonal[v] > 0 ? 1 / diagonal[v] : 0;
+            for (std::size_t i = 0; i < 2; ++i)
+                direction[v][i] = residual[v][i] * per_weight + turn[i] * direction[v][i];
+        }
+        for (std::size_t i = 0; i < 2; ++i) product_before[i] = step[i] > 0 ? product_after[i] : 0;
     }
     std::vector<bool> known(vertices);
     for (std::size_t v = 0; v < vertices; ++v) known[v] = diagonal[v] > 0;
-    fill_gaps(x, std::move(known), triangles);
-    return x;
+    std::array<std::vector<double>, 2> out;
+    for (std::size_t i = 0; i < 2; ++i) {
+        out[i].resize(vertices);
+        for (std::size_t v = 0; v < vertices; ++v) out[i][v] = x[v][i];
+        fill_gaps(out[i], known, triangles);
+    }
+    return out;
 }
 
 // The distance of each sample from the surface along its normal, in lattice units.
@@ -215,15 +237,23 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
                                     const SurfaceIndex& surface, double reach, Threads threads) {
     const auto samples = samples_of(moved);
-    const auto targets =
-        closest_facing(surface, samples.points, samples.normals, {.reach = static_cast<float>(reach)}, threads);
+    const auto targets = closest_facing(surface, samples.points, samples.normals,
+                                        {.reach = static_cast<float>(reach), .along = true}, threads);
     const auto fit = make_surface_fit(moved, targets);
     std::vector<std::vector<double>> seen(1);
     seen[0] = distances(samples, targets);
     if (!moved.colours.empty())
         for (auto& component : colour_changes(moved, captured, targets, threads)) seen.push_back(std::move(component));
-    parallel_for(seen.size(), threads, 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t c = begin; c < end; ++c) seen[c] = fit.fitted(seen[c]);
+    parallel_for((seen.size() + 1) / 2, threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t pair = begin; pair < end; ++pair) {
+            const bool two = 2 * pair + 1 < seen.size();
+            std::vector<SurfaceFit::Both> both(targets.size());
+            for (std::size_t i = 0; i < both.size(); ++i)
+                both[i] = {seen[2 * pair][i], two ? seen[2 * pair + 1][i] : 0};
+            auto fitted = fit.fitted(both);
+            seen[2 * pair] = std::move(fitted[0]);
+            if (two) seen[2 * pair + 1] = std::move(fitted[1]);
+        }
     });
     TrackedTargets out;
     const std::size_t vertices = moved.positions.size();
@@ -266,19 +296,23 @@ double CubeErrors::at(const Point3f& point) const {
 
 CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side,
                        std::ptrdiff_t fewest, std::ptrdiff_t left_out) {
-    std::vector<std::pair<CubeErrors::Cube, double>> sorted;
-    sorted.reserve(samples.size());
-    for (std::size_t i = 0; i < samples.size(); ++i) sorted.emplace_back(cube_of(samples[i], side), squared[i]);
-    std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
-        return a.first != b.first ? a.first < b.first : a.second < b.second;
-    });
+    // Neighbouring samples mostly lie in the same cube.
+    std::map<CubeErrors::Cube, std::vector<double>> in_cubes;
+    std::vector<double>* values = nullptr;
+    CubeErrors::Cube last{};
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const auto cube = cube_of(samples[i], side);
+        if (!values || cube != last) values = &in_cubes[last = cube];
+        values->push_back(squared[i]);
+    }
     CubeErrors out{side};
-    for (auto i = sorted.begin(), j = i; i != sorted.end(); i = j) {
-        j = std::find_if(i, sorted.end(), [&](const auto& sample) { return sample.first != i->first; });
-        if (j - i < fewest) continue;
-        const double sum = std::accumulate(i, j - left_out, 0.0,
-                                           [](double total, const auto& sample) { return total + sample.second; });
-        out.rms.emplace_back(i->first, std::sqrt(sum / static_cast<double>(j - i - left_out)));
+    for (auto& [cube, of_cube] : in_cubes) {
+        const auto count = std::ssize(of_cube);
+        if (count < fewest) continue;
+        const auto end = of_cube.end() - left_out;
+        if (left_out > 0) std::nth_element(of_cube.begin(), end, of_cube.end());
+        out.rms.emplace_back(
+            cube, std::sqrt(std::accumulate(of_cube.begin(), end, 0.0) / static_cast<double>(count - left_out)));
     }
     return out;
 }
@@ -331,12 +365,15 @@ std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, const Su
 
 TrackedFit fit_of_captured(const SurfaceSamples& captured, const SurfaceIndex& decoded,
                            const TrackedFitOptions& options) {
+    const auto reach = static_cast<float>(options.reach);
     std::vector<double> squared(captured.points.size(), options.reach * options.reach);
-    if (!decoded.empty())
-        parallel_for(squared.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i)
-                squared[i] = static_cast<double>(decoded.closest(captured.points[i]).squared_distance);
-        });
+    parallel_for(squared.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t guess = OrientedPoints::no_point;
+        for (std::size_t i = begin; i < end; ++i) {
+            const auto found = decoded.closest_within(captured.points[i], reach, guess);
+            if (found.found()) squared[i] = std::min(squared[i], static_cast<double>(found.squared_distance));
+        }
+    });
     return summed_up(captured.points, squared, options);
 }
 
@@ -350,11 +387,13 @@ TrackedFit least_of(TrackedFit fit, const TrackedFit& before) {
 
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
                                std::span<const double> intra_squared, const TrackedFitOptions& options) {
-    const auto points = points_of(decoded.positions);
-    const auto forth = fit_of_captured(sparse_samples_of(captured.positions, captured.normals, captured.triangles),
-                                       SurfaceIndex(points, decoded.triangles), options);
-    const auto samples =
-        sparse_samples_of(points, points_of(vertex_normals(decoded.positions, decoded.triangles)), decoded.triangles);
+    const double edge = mean_edge(decoded.positions, decoded.triangles, 8);
+    const SurfaceIndex index(
+        points_of(decoded.positions), decoded.triangles,
+        {.cell = static_cast<float>(std::max(2 * edge, options.reach / 24)), .threads = options.threads});
+    const auto forth =
+        fit_of_captured(sparse_samples_of(captured.positions, captured.normals, captured.triangles), index, options);
+    const auto samples = sparse_samples_of(index.positions, index.normals, index.triangles);
     auto squared = distances_of_decoded(samples, captured, options);
     std::vector<double> more(squared.size(), 0);
     if (intra_squared.size() == squared.size())

@@ -43,7 +43,17 @@ class Sides {
 public:
     Sides(std::span<const LatticePoint> positions, std::span<const Triangle> triangles)
         : triangles_(triangles), twin_(3 * triangles.size(), none) {
-        const auto around = triangles_around(positions.size(), triangles);
+        // The sides that leave each vertex, ascending, in compressed rows.
+        std::vector<std::uint32_t> first(positions.size() + 1, 0), leaving(twin_.size());
+        for (std::uint32_t s = 0; s < twin_.size(); ++s) ++first[from(s) + std::size_t{1}];
+        for (std::size_t v = 0; v < positions.size(); ++v) first[v + 1] += first[v];
+        std::vector<std::uint32_t> next_free(first.begin(), first.end() - 1);
+        for (std::uint32_t s = 0; s < twin_.size(); ++s) leaving[next_free[from(s)]++] = s;
+        const auto find = [&](std::uint32_t a, std::uint32_t b, std::vector<std::uint32_t>& found) {
+            found.clear();
+            for (auto i = first[a]; i < first[a + std::size_t{1}]; ++i)
+                if (to(leaving[i]) == b) found.push_back(leaving[i]);
+        };
         const auto agreement = [&](std::uint32_t a, std::uint32_t b) {
             return dot(normal_of(positions, triangles[a / 3]), normal_of(positions, triangles[b / 3]));
         };
@@ -51,12 +61,8 @@ public:
         for (std::uint32_t s = 0; s < twin_.size(); ++s) {
             if (from(s) == to(s)) twin_[s] = s;  // of a triangle that names a vertex twice: never a border
             if (twin_[s] != none) continue;
-            along.clear(), against.clear();
-            for (const auto t : around.of(from(s)))
-                for (std::uint32_t other = 3 * t; other < 3 * t + 3; ++other) {
-                    if (from(other) == from(s) && to(other) == to(s)) along.push_back(other);
-                    if (from(other) == to(s) && to(other) == from(s)) against.push_back(other);
-                }
+            find(from(s), to(s), along);
+            find(to(s), from(s), against);
             if (along.size() == 1 && against.size() == 1) {
                 twin_[s] = against[0], twin_[against[0]] = s;
                 continue;
@@ -125,11 +131,12 @@ std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std:
                               {.reach = static_cast<float>(how.reach), .agreement = static_cast<float>(how.agreement)},
                               how.threads);
     parallel_for(points.size(), how.threads, 512, [&](std::size_t begin, std::size_t end) {
+        std::uint32_t guess = OrientedPoints::no_point;
         for (std::size_t i = begin; i < end; ++i) {
             const double least = out[i].found() ? static_cast<double>(out[i].squared_distance) : how.reach * how.reach;
             if (least <= how.enough * how.enough) continue;
-            const auto any = surface.closest(points[i]);
-            if (static_cast<double>(any.squared_distance) >= least) continue;
+            const auto any = surface.closest_within(points[i], static_cast<float>(how.reach), guess);
+            if (!any.found() || static_cast<double>(any.squared_distance) >= least) continue;
             const auto facing = dot(to_vector(surface.triangle_normals[any.triangle]), to_vector(normals[i]));
             if (facing >= how.agreement) out[i] = any;
         }
@@ -147,7 +154,8 @@ double distance_to(const SurfacePoint& found, double reach) {
 struct Capture {
     LatticeMesh mesh;
     const SurfaceIndex& surface;
-    std::vector<bool> rim{};  // vertices on a border: beyond it nothing was seen, so nothing is known there
+    std::vector<bool> rim{};  // vertices on a border: beyond it nothing was seen, so nothing is known there; none if
+                              // there is no border
     std::vector<Point3f> points{}, normals{};
     std::vector<SurfacePoint> on_decoded{};  // the nearest point of the tracked mesh to each vertex
 
@@ -157,6 +165,7 @@ struct Capture {
     // Whether the capture's point nearest to this one lies on its border.
     bool ends_at(const Point3f& point) const {
         constexpr float inside = 1e-3F;
+        if (rim.empty()) return false;
         const auto found = surface.closest(point);
         for (std::size_t i = 0; i < 3; ++i)
             if (found.shares[i] > inside && !rim[mesh.triangles[found.triangle][i]]) return false;
@@ -171,10 +180,10 @@ struct Capture {
 // Distances of the tracked mesh from the capture, one per vertex: of the vertex itself, or of the middles of the
 // triangles around it on average if that is more. What lies beyond the capture's border does not count: it may be there
 // and have been out of sight.
-std::vector<double> errors_of(const LatticeMesh& decoded, std::span<const Point3f> points,
-                              std::span<const Point3f> normals, const TrianglesAround& around, const Capture& capture,
+std::vector<double> errors_of(const LatticeMesh& decoded, const SurfaceIndex& shown, const Capture& capture,
                               const SurfacePatchOptions& options) {
-    std::vector<Point3f> samples(points.begin(), points.end()), facing(normals.begin(), normals.end());
+    const auto& points = shown.positions;
+    std::vector<Point3f> samples(points), facing(shown.normals);
     for (const auto& t : decoded.triangles) {
         Vector3d middle{};
         for (const auto v : t) middle = middle + to_vector(decoded.positions[v]) * (1.0 / 3);
@@ -192,7 +201,7 @@ std::vector<double> errors_of(const LatticeMesh& decoded, std::span<const Point3
     });
     std::vector<double> out(points.size(), 0);
     for (std::size_t v = 0; v < out.size(); ++v) {
-        const auto triangles = around.of(v);
+        const auto triangles = shown.around.of(v);
         if (triangles.empty()) continue;
         double sum = 0;
         for (const auto t : triangles) sum += error[points.size() + t];
@@ -276,16 +285,22 @@ std::vector<double> errors_around(std::span<const Point3f> points, std::span<con
     return out;
 }
 
+// Of each vertex of the tracked mesh.
+struct LossSigns {
+    std::span<const double> error, error_around;
+    const std::vector<bool>&rims, &bad_shape;
+};
+
 // A region is lost as far as the error is over half the limit, if enough of it is over the limit. Where any cube of
 // space is lost, only regions that reach into lost cubes are.
-std::vector<bool> find_lost(const LatticeMesh& decoded, std::span<const LatticePoint> rest, const Sides& sides,
-                            std::span<const double> error, const Capture& capture, const SurfacePatchOptions& options) {
+std::vector<bool> find_lost(const LatticeMesh& decoded, const Sides& sides, const LossSigns& signs, double region_lost,
+                            const SurfacePatchOptions& options) {
     constexpr double hardly_seen = 0.25;  // how much a triangle of bad shape counts that lies on the surface
     const std::size_t vertices = decoded.positions.size();
-    std::vector<bool> rims(vertices, false);
-    add_rims_of_uncovered(capture, decoded, options, rims);
-    const auto bad_shape = distorted(decoded, rest, sides, options);
-    const auto doubtful = [&](std::uint32_t v) { return error[v] > options.lost / 2 || rims[v] || bad_shape[v]; };
+    const auto& [error, around, rims, bad_shape] = signs;
+    const auto doubtful = [&](std::uint32_t v) {
+        return signs.error[v] > options.lost / 2 || signs.rims[v] || signs.bad_shape[v];
+    };
     DisjointSets regions(vertices);
     std::vector<double> area(vertices, 0);
     for (std::uint32_t s = 0; s < sides.count(); ++s)
@@ -302,9 +317,8 @@ std::vector<bool> find_lost(const LatticeMesh& decoded, std::span<const LatticeP
     for (std::uint32_t v = 0; v < vertices; ++v)
         if (rims[v]) area[regions.of(v)] += enough;
     std::vector<bool> reaches(vertices, true);
-    const auto around = errors_around(points_of(decoded.positions), error, capture, options);
-    const auto in_lost_cube = [&](std::uint32_t v) { return around[v] > options.region_lost; };
-    if (std::any_of(around.begin(), around.end(), [&](double rms) { return rms > options.region_lost; })) {
+    const auto in_lost_cube = [&](std::uint32_t v) { return signs.error_around[v] > region_lost; };
+    if (std::any_of(around.begin(), around.end(), [&](double rms) { return rms > region_lost; })) {
         reaches.assign(vertices, false);
         for (std::uint32_t v = 0; v < vertices; ++v)
             if (in_lost_cube(v)) reaches[regions.of(v)] = true;
@@ -855,68 +869,109 @@ private:
 
 }  // namespace
 
-std::optional<SurfacePatch> find_surface_patch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
-                                               const LatticeMesh& captured, const SurfaceIndex& surface,
-                                               const SurfacePatchOptions& options) {
-    if (!captured.texcoords.empty() || captured.triangles.empty() || decoded.triangles.empty()) return std::nullopt;
-    const std::size_t vertices = decoded.positions.size();
-    const auto points = points_of(decoded.positions);
-    const auto normals = points_of(vertex_normals(decoded.positions, decoded.triangles));
-    const auto around = triangles_around(vertices, decoded.triangles);
-    const Sides sides(decoded.positions, decoded.triangles);
+struct SurfacePatchSearch::Measured {
+    const LatticeMesh &decoded, &captured;
+    const SurfaceIndex& surface;
+    SurfacePatchOptions options;
+    Sides sides;
+    Capture capture;
+    std::vector<double> error;          // of each vertex of the tracked mesh
+    std::vector<double> error_around;   // RMS in its cube of space
+    std::vector<double> edge;           // mean length of the sides at it
+    std::vector<bool> rims, bad_shape;  // what is lost whatever the error: around uncovered surface, and distorted
+    double area = 0;                    // of the tracked mesh
 
+    Measured(const LatticeMesh& tracked, std::span<const LatticePoint> rest, const LatticeMesh& mesh,
+             const SurfaceIndex& index, const SurfacePatchOptions& wanted);
+};
+
+namespace {
+
+// The captured mesh with its border.
+Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, const SurfacePatchOptions& options) {
     Capture capture{.mesh = welded(captured), .surface = surface};
-    capture.points = points_of(capture.mesh.positions);
-    capture.normals = points_of(vertex_normals(capture.mesh.positions, capture.mesh.triangles));
-    capture.rim.assign(capture.points.size(), false);
-    const Sides captured_sides(capture.mesh.positions, capture.mesh.triangles);
+    const bool as_indexed = capture.mesh.positions.size() == surface.positions.size();
+    capture.points = as_indexed ? surface.positions : points_of(capture.mesh.positions);
+    capture.normals =
+        as_indexed ? surface.normals : points_of(vertex_normals(capture.mesh.positions, capture.mesh.triangles));
+    const Sides sides(capture.mesh.positions, capture.mesh.triangles);
     std::vector<Point3f> along_rim;
     double rim_length = 0;
-    for (std::uint32_t s = 0; s < captured_sides.count(); ++s) {
-        if (captured_sides.twin(s) != none) continue;
-        const auto a = captured_sides.from(s), b = captured_sides.to(s);
+    for (std::uint32_t s = 0; s < sides.count(); ++s) {
+        if (sides.twin(s) != none) continue;
+        if (capture.rim.empty()) capture.rim.assign(capture.points.size(), false);
+        const auto a = sides.from(s), b = sides.to(s);
         capture.rim[a] = capture.rim[b] = true;
         const auto from = to_vector(capture.points[a]), to = to_vector(capture.points[b]);
         along_rim.push_back(capture.points[a]);
         along_rim.push_back(to_floats((from + to) * 0.5));
         rim_length += length(to - from);
     }
-    if (!along_rim.empty()) {
-        capture.along_rim.emplace(along_rim);
-        capture.rim_reach =
-            2 * options.simplification.surface_error + rim_length / static_cast<double>(along_rim.size());
-    }
+    if (along_rim.empty()) return capture;
+    capture.along_rim.emplace(along_rim);
+    capture.rim_reach = 2 * options.simplification.surface_error + rim_length / static_cast<double>(along_rim.size());
+    return capture;
+}
+
+}  // namespace
+
+SurfacePatchSearch::Measured::Measured(const LatticeMesh& tracked, std::span<const LatticePoint> rest,
+                                       const LatticeMesh& mesh, const SurfaceIndex& index,
+                                       const SurfacePatchOptions& wanted)
+    : decoded(tracked),
+      captured(mesh),
+      surface(index),
+      options(wanted),
+      sides(tracked.positions, tracked.triangles),
+      capture(make_capture(mesh, index, wanted)) {
     const double mean = mean_edge(decoded.positions, decoded.triangles);
-    const SurfaceIndex shown(points, decoded.triangles,
+    const SurfaceIndex shown(points_of(decoded.positions), decoded.triangles,
                              {.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
     capture.on_decoded = closest_on_same_side(shown, capture.points, capture.normals,
                                               {options.reach, options.lost / 2, 0.2, options.threads});
-
-    const auto error = errors_of(decoded, points, normals, around, capture, options);
-    auto removed = find_lost(decoded, rest, sides, error, capture, options);
-    if (std::find(removed.begin(), removed.end(), true) == removed.end()) return std::nullopt;
-
-    std::vector<double> edge(vertices, 0);
-    std::vector<double> count(vertices, 0);
+    error = errors_of(decoded, shown, capture, options);
+    error_around = errors_around(shown.positions, error, capture, options);
+    rims.assign(decoded.positions.size(), false);
+    add_rims_of_uncovered(capture, decoded, options, rims);
+    bad_shape = distorted(decoded, rest, sides, options);
+    edge.assign(decoded.positions.size(), 0);
+    std::vector<double> count(edge.size(), 0);
     for (std::uint32_t s = 0; s < sides.count(); ++s) {
         const auto a = sides.from(s), b = sides.to(s);
         const double size = length(to_vector(decoded.positions[b]) - to_vector(decoded.positions[a]));
         for (const auto v : {a, b}) edge[v] += size, count[v] += 1;
     }
-    for (std::size_t v = 0; v < vertices; ++v) edge[v] /= std::max(count[v], 1.0);
-    double total = 0;
-    for (const auto& t : decoded.triangles) total += area_of(decoded.positions, t);
+    for (std::size_t v = 0; v < edge.size(); ++v) edge[v] /= std::max(count[v], 1.0);
+    for (const auto& t : decoded.triangles) area += area_of(decoded.positions, t);
+}
 
+SurfacePatchSearch::SurfacePatchSearch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
+                                       const LatticeMesh& captured, const SurfaceIndex& surface,
+                                       const SurfacePatchOptions& options) {
+    if (!captured.texcoords.empty() || captured.triangles.empty() || decoded.triangles.empty()) return;
+    measured_ = std::make_unique<const Measured>(decoded, rest, captured, surface, options);
+}
+SurfacePatchSearch::SurfacePatchSearch(SurfacePatchSearch&&) noexcept = default;
+SurfacePatchSearch& SurfacePatchSearch::operator=(SurfacePatchSearch&&) noexcept = default;
+SurfacePatchSearch::~SurfacePatchSearch() = default;
+
+std::optional<SurfacePatch> SurfacePatchSearch::find(double region_lost) const {
+    if (!measured_) return std::nullopt;
+    const auto& m = *measured_;
+    const auto& options = m.options;
+    const std::size_t vertices = m.decoded.positions.size();
+    auto removed = find_lost(m.decoded, m.sides, {m.error, m.error_around, m.rims, m.bad_shape}, region_lost, options);
+    if (std::find(removed.begin(), removed.end(), true) == removed.end()) return std::nullopt;
     for (int attempt = 0; attempt < options.attempts; ++attempt) {
-        tidy(removed, decoded, sides, options);
-        const auto stays = remainder_of(decoded, sides, removed);
+        tidy(removed, m.decoded, m.sides, options);
+        const auto stays = remainder_of(m.decoded, m.sides, removed);
         double area = 0;
-        for (const auto& t : stays.triangles) area += area_of(decoded.positions, t);
-        if (total - area > options.most_share * total) return std::nullopt;
-        const auto outside = outside_of(stays, decoded, removed, edge, capture, options);
+        for (const auto& t : stays.triangles) area += area_of(m.decoded.positions, t);
+        if (m.area - area > options.most_share * m.area) return std::nullopt;
+        const auto outside = outside_of(stays, m.decoded, removed, m.edge, m.capture, options);
         const auto piece =
-            simplified_piece(cut_piece(outside, capture, options), captured, surface, options.simplification);
-        auto join = Joiner(decoded, sides, stays, piece, edge, capture, options).run();
+            simplified_piece(cut_piece(outside, m.capture, options), m.captured, m.surface, options.simplification);
+        auto join = Joiner(m.decoded, m.sides, stays, piece, m.edge, m.capture, options).run();
         if (join.unclear.empty()) {
             SurfacePatch out;
             out.removed = std::move(removed);
@@ -929,11 +984,17 @@ std::optional<SurfacePatch> find_surface_patch(const LatticeMesh& decoded, std::
             out.triangles.insert(out.triangles.end(), join.triangles.begin(), join.triangles.end());
             return out;
         }
-        grow(join.unclear, decoded.triangles);
+        grow(join.unclear, m.decoded.triangles);
         for (std::size_t v = 0; v < vertices; ++v)
             if (join.unclear[v]) removed[v] = true;
     }
     return std::nullopt;
+}
+
+std::optional<SurfacePatch> find_surface_patch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
+                                               const LatticeMesh& captured, const SurfaceIndex& surface,
+                                               const SurfacePatchOptions& options) {
+    return SurfacePatchSearch(decoded, rest, captured, surface, options).find(options.region_lost);
 }
 
 }  // namespace htvm::internal

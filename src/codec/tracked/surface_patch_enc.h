@@ -2,6 +2,7 @@
 // piece of the captured surface that comes in its place, already joined to what stays.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,10 +32,28 @@ struct SurfacePatchOptions {
     Threads threads = {};                       // their number does not change the result
 };
 
-// decoded: the tracked mesh as the decoder has it. rest: its vertices in the mesh that it refers to, by which stretched
-// and folded triangles are told; may be empty. surface: index by direction of `captured`. The result is nothing if
-// nothing is lost, too much is lost, the borders cannot be joined clearly, or the capture has texture coordinates: an
-// I-frame is what is left then.
+// Looks for patches of one tracked mesh. What is lost is measured once, then it may be tried to replace more or less.
+class SurfacePatchSearch {
+public:
+    // decoded: the tracked mesh as the decoder has it. rest: its vertices in the mesh that it refers to, by which
+    // stretched and folded triangles are told; may be empty. surface: index by direction of `captured`. All must
+    // outlive this object.
+    SurfacePatchSearch(const LatticeMesh& decoded, std::span<const LatticePoint> rest, const LatticeMesh& captured,
+                       const SurfaceIndex& surface, const SurfacePatchOptions& options);
+    SurfacePatchSearch(SurfacePatchSearch&&) noexcept;
+    SurfacePatchSearch& operator=(SurfacePatchSearch&&) noexcept;
+    ~SurfacePatchSearch();
+
+    // region_lost: as in the options, in place of theirs. The result is nothing if nothing is lost, too much is lost,
+    // the borders cannot be joined clearly, or the capture has texture coordinates: an I-frame is what is left then.
+    std::optional<SurfacePatch> find(double region_lost) const;
+
+private:
+    struct Measured;
+    std::unique_ptr<const Measured> measured_;  // null where no patch is possible
+};
+
+// The same in one call.
 std::optional<SurfacePatch> find_surface_patch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
                                                const LatticeMesh& captured, const SurfaceIndex& surface,
                                                const SurfacePatchOptions& options);

@@ -124,19 +124,22 @@ NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceI
                                 const DeformationOptions& options) {
     const auto from = motions_of(starts, deformable);
     NodeRegistration out;
-    out.motion = register_deformation(deformable, surface, from[nearest_of(from, deformable, surface, options)],
-                                      options, &out.form);
+    out.start = nearest_of(from, deformable, surface, options);
+    out.motion = register_deformation(deformable, surface, from[out.start], options, &out.form);
     return out;
 }
 
 bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
                        const DeformationOptions& options, NodeRegistration& registered) {
     const auto from = motions_of(starts, deformable);
-    const std::size_t nearest = nearest_of(from, deformable, surface, options);
+    // To tell where a limb comes to lie, rounds that settle it are not needed; what is taken is settled afterwards.
+    auto roughly = options;
+    roughly.fine_rounds = std::min(options.fine_rounds, 2);
+    roughly.colour_rounds = roughly.surface_rounds = 0;
     bool any = false;
     for (std::size_t i = 0; i < from.size(); ++i) {
-        if (i == nearest) continue;
-        const auto other = register_deformation(deformable, surface, from[i], options);
+        if (i == registered.start) continue;
+        const auto other = register_deformation(deformable, surface, from[i], roughly);
         if (take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form)) any = true;
     }
     const auto reached = reached_for_extremities(deformable, surface, registered.motion, starts.last,

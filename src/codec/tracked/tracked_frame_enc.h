@@ -49,6 +49,7 @@ struct NodeStarts {
 struct NodeRegistration {
     std::vector<RigidMotion> motion;  // of each node, reference -> frame
     DeformationForm form;             // how well the captured surface determines it
+    std::size_t start = 0;            // which of the starts it began at
 };
 // From the start that lies nearest to the surface.
 NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
