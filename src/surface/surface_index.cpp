@@ -578,10 +578,14 @@ SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std
 std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<const Point3f> queries,
                                          std::span<const Point3f> normals, const FacingReach& within, Threads threads) {
     std::vector<SurfacePoint> out(queries.size());
-    parallel_for(queries.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t guess = OrientedPoints::no_point;
-        for (std::size_t i = begin; i < end; ++i)
-            out[i] = surface.closest_facing(queries[i], normals[i], within, guess);
+    // Guesses may decide what is found, so they must not depend on how the threads cut the range.
+    constexpr std::size_t in_a_row = 512;
+    parallel_for((queries.size() + in_a_row - 1) / in_a_row, threads, 2, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t row = begin; row < end; ++row) {
+            std::uint32_t guess = OrientedPoints::no_point;
+            for (std::size_t i = row * in_a_row; i < std::min(queries.size(), (row + 1) * in_a_row); ++i)
+                out[i] = surface.closest_facing(queries[i], normals[i], within, guess);
+        }
     });
     return out;
 }
