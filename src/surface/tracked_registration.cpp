@@ -532,13 +532,17 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, 
         there.weight = match_weight(squared_distance, round);
         return guess;
     };
-    // Both directions are cut into slices, so that the threads have equal work.
+    // Both directions are cut into slices, so that the threads have equal work. Each begins without a guess: what is
+    // found along a surface depends on where a search begins, and must not depend on how the threads share the slices.
     constexpr std::size_t slices = 64;
     parallel_for(slices, options.threads, 4, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t last = OrientedPoints::no_point;
-        for (std::size_t i = begin * forward / slices; i < end * forward / slices; ++i) last = go_forward(i, last);
-        last = OrientedPoints::no_point;
-        for (std::size_t i = begin * back / slices; i < end * back / slices; ++i) last = go_back(i, last);
+        for (std::size_t slice = begin; slice < end; ++slice) {
+            std::uint32_t last = OrientedPoints::no_point;
+            for (std::size_t i = slice * forward / slices; i < (slice + 1) * forward / slices; ++i)
+                last = go_forward(i, last);
+            last = OrientedPoints::no_point;
+            for (std::size_t i = slice * back / slices; i < (slice + 1) * back / slices; ++i) last = go_back(i, last);
+        }
     });
     std::erase_if(out, [](const Match& m) { return !(m.weight > 0); });
     return out;
@@ -884,9 +888,8 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
         diagonal.bottomRightCorner<3, 3>().diagonal().array() += 0.01 * load;
     }
     RoundResult out;
-    out.farthest = apply_step(
-        solve(stage.level.pattern, system, options.solver_iterations, 1e-2),
-        centres, 100 * options.millimetre, stage);
+    out.farthest = apply_step(solve(stage.level.pattern, system, options.solver_iterations, 1e-2), centres,
+                              100 * options.millimetre, stage);
     for (const Match& match : matches) out.weight += static_cast<double>(match.weight);
     return out;
 }
@@ -980,9 +983,7 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
             const double moved = run_round(coarse, target, round, cell, memory, options).farthest;
-            if (moved < options.settled * unit)
-                i = std::max(i, options.coarse_rounds - 2);  // the next round is the
-                                                             // last
+            if (moved < options.settled * unit) break;
         }
         follow_groups(mesh, coarse, fine.motion);
     }
