@@ -1,5 +1,5 @@
 # What `cmake --install` installs, and where. cmake/packages.cmake makes Debian packages of it. The components are:
-# programs; runtime (the shared libraries); draco and live (those that need libdraco, OpenSSL); development.
+# programs; runtime (the shared libraries); draco, live and texture (those that need libdraco, OpenSSL, coders of video); development.
 include(CMakePackageConfigHelpers)
 set(htvm_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/htvm)
 get_property(htvm_libraries GLOBAL PROPERTY htvm_libraries)
@@ -8,7 +8,7 @@ install(DIRECTORY include/htvm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT
 
 # One export file per library and kind: find_package() reads only the requested ones.
 foreach(library ${htvm_libraries})
-  if(library MATCHES "^(draco|live)$")
+  if(library MATCHES "^(draco|live|texture)$")
     set(runtime ${library})
   else()
     set(runtime runtime)
@@ -54,10 +54,11 @@ set(description_encoder "Encoder of human time-varying meshes, for C++20 (needs 
 set(description_c_decoder "Decoder of compressed human time-varying meshes, for C")
 set(description_c "Encoder and decoder of human time-varying meshes, for C")
 set(description_draco "I-frames by Draco, for htvm's encoder and decoder")
+set(description_texture "The pictures of textured human time-varying meshes as video, for C++20 (needs the header tl/expected.hpp)")
 set(description_live "Publisher of live streams of human time-varying meshes, for C++20 (needs the header tl/expected.hpp)")
 foreach(library ${htvm_libraries})
   set(requires "")
-  if(library MATCHES "^(encoder|draco|live)$")
+  if(library MATCHES "^(encoder|draco|live|texture)$")
     set(requires "htvm-decoder = ${PROJECT_VERSION}")
   endif()
   set(private "")
@@ -65,6 +66,8 @@ foreach(library ${htvm_libraries})
     set(private -ldraco)
   elseif(library STREQUAL "live")
     set(private "-lssl -lcrypto")
+  elseif(library STREQUAL "texture")
+    set(private "-laom -lvpx -ldav1d")
   endif()
   htvm_pkg_config(${library} "${description_${library}}" "${requires}" "${private}")
 endforeach()

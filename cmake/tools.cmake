@@ -40,6 +40,13 @@ file(GLOB_RECURSE draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
 htvm_floor(draco SOURCES ${draco_sources} LINKS htvm_decoder htvm_libdraco)
 htvm_library(draco FLOORS draco LINKS decoder NEEDS $<BUILD_INTERFACE:${DRACO_LIBRARY}> $<INSTALL_INTERFACE:htvm::libdraco>)
 
+# The pictures of textures as video, and back: a library of its own, as the decoder needs none of these.
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(HTVM_VIDEO REQUIRED IMPORTED_TARGET aom vpx dav1d)
+file(GLOB picture_sources CONFIGURE_DEPENDS src/texture/picture_*.cpp src/texture/vp9_*.cpp)
+htvm_floor(texture SOURCES ${picture_sources} LINKS htvm_decoder PkgConfig::HTVM_VIDEO)
+htvm_library(texture FLOORS texture LINKS decoder NEEDS $<BUILD_INTERFACE:PkgConfig::HTVM_VIDEO> $<INSTALL_INTERFACE:htvm::video>)
+
 # The programs: everything but their main.cpp is a library, so that tests reach it. htvm_app is what users run,
 # htvm_laboratory what experiments need; both use htvm_command_line.
 function(htvm_program_library name folder)
@@ -55,8 +62,8 @@ endfunction()
 htvm_program_library(command_line command_line htvm_core htvm_io htvm_images CLI11::CLI11 fmt::fmt nlohmann_json::nlohmann_json)
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 include(cmake/live.cmake)
-htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_sound htvm_synth htvm_metrics htvm_live)
-htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_synth htvm_metrics)
+htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_sound htvm_texture htvm_synth htvm_metrics htvm_live)
+htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_texture htvm_synth htvm_metrics)
 add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)
 add_executable(htvm-lab apps/lab/main.cpp)

@@ -115,9 +115,11 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
     command
         .add_option(
             "--texture-as", options.texture_as,
-            "What becomes of a texture: colours at the vertices, or coordinates, which are kept as they are while\n"
-            "the image is left out (default: colours, unless the meshes have vertex colours of their own)")
-        ->check(CLI::IsMember({"colours", "coordinates"}));
+            "What becomes of a texture: colours at the vertices; coordinates, which are kept as they are while the\n"
+            "image is left out; captured, the same with the images, coded as video (with --profile topology); or\n"
+            "keep, with the images' files as they are (likewise). Default: colours, unless the meshes have vertex\n"
+            "colours of their own")
+        ->check(CLI::IsMember(std::vector<std::string>(std::begin(texture_uses), std::end(texture_uses))));
 }
 
 void add_texture_options(CLI::App& command, TextureOptions& options) {
@@ -137,6 +139,10 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
             "From which edge of the image the files count texture coordinates (default: top for glTF; bottom for OBJ\n"
             "and PLY; for Draco as both sides of the texture's seams agree)")
         ->check(CLI::IsMember({"bottom", "top"}));
+}
+
+bool keeps_pictures(const CaptureOptions& options) {
+    return options.texture_as == "captured" || options.texture_as == "keep";
 }
 
 bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
@@ -168,7 +174,9 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
     } else if (auto found = capture.find_files(); !found) {
         return tl::unexpected(found.error());
     }
-    auto textures = TextureFiles::open(options.texture, capture.files_);
+    auto texture_options = options.texture;
+    texture_options.keep_files = options.texture_as == "keep";
+    auto textures = TextureFiles::open(texture_options, capture.files_);
     if (!textures) return tl::unexpected(textures.error());
     capture.textures_ = std::move(*textures);
     if (auto found = capture.find_poses(); !found) return tl::unexpected(found.error());
@@ -336,6 +344,7 @@ Result<void> Capture::find_unit() {
     }
     if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) return ok;
     has_texture_ = peeked_->texture != nullptr;
+    first_texture_ = peeked_->texture;
     find_floor();
     // From files all is read again but what is kept.
     if (!pipe_) next_ = begin_;
@@ -360,22 +369,22 @@ void Capture::find_floor() {
 
 TextureUse Capture::texture_use() const {
     if (options_.texture_as == "coordinates") return TextureUse::none;
-    return options_.texture_as == "colours" ? TextureUse::always : TextureUse::where_colourless;
+    return options_.texture_as.empty() ? TextureUse::where_colourless : TextureUse::always;
 }
 
 // What becomes of the first mesh's texture.
 void Capture::tell_of_texture() const {
     const auto& image = textures_.image_name();
-    const auto& [mesh, texture] = *peeked_;
-    if (texture) {
+    const auto& [mesh, texture, file] = *peeked_;
+    if (texture && keeps_pictures(options_)) {
+        note(fmt::format(
+            "the texture ({}, {} x {} pixels) is {}", image, texture->width, texture->height,
+            options_.texture_as == "keep" ? "kept as it is" : "coded as video, with its coordinates as captured"));
+    } else if (texture) {
         note(
             fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
                         "coordinates keeps its coordinates instead",
                         image, texture->width, texture->height));
-        if (textures_.is_from_top_by_seams())
-            note(
-                "its coordinates are taken for counted from the image's top, since so both sides of its seams agree "
-                "(see --texture-origin)");
     } else if (mesh.texcoords.empty() || options_.texture.files == "none") {
         return;
     } else if (image.empty()) {
@@ -388,13 +397,19 @@ void Capture::tell_of_texture() const {
                         "its colours",
                         image));
     }
+    if (texture && textures_.is_from_top_by_seams())
+        note(
+            "its coordinates are taken for counted from the image's top, since so both sides of its seams agree (see "
+            "--texture-origin)");
 }
 
-// Colours at vertices in place of the texture.
+// Colours at vertices in place of the texture, or none where that goes into the stream.
 Mesh Capture::as_encoded(TexturedMesh captured) {
     textured_.reset();
     if (!captured.texture) return std::move(captured.mesh);
+    if (keeps_pictures(options_)) captured.mesh.colours.clear();
     textured_ = std::make_shared<const TexturedMesh>(std::move(captured));
+    if (keeps_pictures(options_)) return textured_->mesh;
     return with_vertex_colours(*textured_);
 }
 

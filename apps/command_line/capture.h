@@ -39,11 +39,20 @@ struct CaptureOptions {
     std::size_t first = 0;       // frames to leave out at the beginning
     double skeleton_offset = 0;  // seconds added to the skeleton's clock
     TextureOptions texture;      // where images are
-    std::string texture_as;      // colours: at the vertices; coordinates: the image is left out; empty: colours of what
-                                 // has no vertex colours of its own
+    std::string texture_as;      // one of texture_uses; empty: colours of what has no vertex colours of its own
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
                                              // taken
 };
+
+// What becomes of a texture:
+inline constexpr const char* texture_uses[] = {
+    "colours",      // those of vertices are made from it
+    "coordinates",  // are kept as they are, and the image is left out
+    "captured",     // the same, with the images coded as video
+    "keep",         // the same, with the images' files as they are
+};
+// Whether its images go into the stream.
+bool keeps_pictures(const CaptureOptions& options);
 
 // Adds the options above to a command.
 void add_capture_options(CLI::App& command, CaptureOptions& options);
@@ -84,12 +93,14 @@ public:
     // When it was there: of standard input, when its last byte came; of files, when the caller asked for it.
     std::chrono::steady_clock::time_point came() const { return came_; }
     std::string name() const;  // its file, or its place on standard input
-    // With its texture, before that became colours at vertices; null if it has none.
+    // With its texture, before that became colours at vertices, or as it goes into the stream; null if it has none.
     std::shared_ptr<const TexturedMesh> textured() const { return textured_; }
     std::size_t missing_before() const { return missing_; }  // frames of the numbers between it and the one before
     std::int64_t missing_timestamp_us(std::size_t k) const;  // of those, k from 0
 
     std::size_t frames() const { return frames_; }  // 0: not known, from standard input
+    // The texture of the first frame that can be read; null if it has none. Before take_first().
+    std::shared_ptr<const Image> first_texture() const { return first_texture_; }
     std::size_t dropped() const { return pipe_ ? pipe_->dropped() : 0; }
     const Skeleton& skeleton() const { return skeleton_; }
     const std::vector<double>& radii() const { return radii_; }  // from the skeleton's file; may be empty
@@ -135,7 +146,8 @@ private:
     std::size_t begin_ = 0, frames_ = 0;  // place of the first frame; their number, 0 where it is not known
 
     TextureFiles textures_;
-    bool has_texture_ = false;            // whether the first mesh's colours are those of its texture
+    bool has_texture_ = false;  // whether the first mesh's colours are those of its texture
+    std::shared_ptr<const Image> first_texture_;
     std::optional<TexturedMesh> peeked_;  // the first mesh that can be read, in mm, read beforehand to tell its unit
     std::size_t peeked_at_ = 0;           // its place
     std::size_t next_ = 0, taken_ = 0;    // place of the next frame; frames that next() gave or failed at

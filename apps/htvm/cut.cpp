@@ -11,6 +11,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/running_time.hpp"
+#include "htvm/texture.hpp"
 #include "stream_file.h"
 #include "stream_seek.h"
 
@@ -44,6 +45,7 @@ struct Cut {
     std::deque<Packet> waiting = {};    // since the last frame at which decoding can start
     std::uint32_t start_number = 0;     // the number of that frame in the input
     bool started = false;
+    bool pictures = false;  // the next picture can be decoded, as the part has those before
     Renumbering renumbering = {};
     std::uint64_t frames = 0;  // written
     std::uint32_t first_asked = 0, last_number = 0;
@@ -62,6 +64,10 @@ bool is_behind(const Cut& cut, std::uint32_t number) {
 }
 
 Result<void> write(Cut& cut, Packet packet) {
+    if (packet.kind == PacketKind::texture) {
+        cut.pictures = cut.pictures || is_key_picture(packet);
+        if (!cut.pictures) return {};
+    }
     cut.renumbering.apply(packet, cut.numbers.dependencies().sequences());
     return cut.output.write(packet);
 }

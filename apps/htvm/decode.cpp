@@ -30,12 +30,13 @@
 #include "sound_output.h"
 #include "stream_file.h"
 #include "stream_seek.h"
+#include "texture_output.h"
 
 namespace htvm::app {
 namespace {
 
 struct Options {
-    std::string input, output, audio, timestamps, format = "ply", unit = "capture", conceal = "gap";
+    std::string input, output, audio, timestamps, format = "ply", images = "png", unit = "capture", conceal = "gap";
     std::uint64_t first = 0;
     std::size_t frames = 0;
     unsigned threads = 0;
@@ -81,18 +82,24 @@ public:
     }
     // Returns the name of the file written.
     Result<std::string> write(Mesh& mesh, const FrameInfo& info, const SequenceInfo& sequence,
-                              double millimetres_per_unit) {
+                              double millimetres_per_unit, const ImageFile& image) {
         if (in_metres_) millimetres_per_unit = millimetres_per(LengthUnit::metre);
-        if (animated_) return animate(mesh, info, sequence, millimetres_per_unit);
+        if (animated_) return animate(mesh, info, sequence, millimetres_per_unit, image);
         if (!standard_) {
             const auto path = output_path(names_, info.frame);
             MeshFileOptions file_options;
             file_options.millimetres_per_unit = millimetres_per_unit;
             file_options.timestamp = time_text(info.timestamp_us);
+            if (image.bytes && unit_of_format(path))
+                file_options.image = *image.bytes;
+            else if (image.bytes)
+                if (auto ok = write_beside(path, image, file_options); !ok) return tl::unexpected(ok.error());
             if (auto ok = write_mesh(path, mesh, file_options); !ok) return tl::unexpected(ok.error());
             written_.insert(path.filename().string());
             return path.string();
         }
+        if (image.bytes && !std::exchange(told_of_images_, true))
+            note("standard output has no room for the pictures of the texture; -o with a folder or a pattern has");
         if (auto ok = scale_positions(mesh, 1 / millimetres_per_unit); !ok) return tl::unexpected(ok.error());
         const auto bytes = write_ply(mesh, time_text(info.timestamp_us));
         if (!bytes) return tl::unexpected(bytes.error());
@@ -115,8 +122,19 @@ public:
     }
 
 private:
+    // An image that frames share goes to the file of the first.
+    Result<void> write_beside(const std::filesystem::path& mesh, const ImageFile& image, MeshFileOptions& options) {
+        if (image.bytes != written_image_) {
+            image_path_ = mesh;
+            image_path_.replace_extension(image.extension);
+            if (auto ok = write_file(image_path_, *image.bytes); !ok) return ok;
+            written_image_ = image.bytes;
+        }
+        options.texture = image_path_.filename().string();
+        return {};
+    }
     Result<std::string> animate(const Mesh& mesh, const FrameInfo& info, const SequenceInfo& sequence,
-                                double millimetres_per_unit) {
+                                double millimetres_per_unit, const ImageFile& image) {
         const auto path = output_path(names_, 0);
         const auto in_file = [&](const Error& error) { return fail(error.kind, path.string() + ": " + error.message); };
         if (!animation_) {
@@ -132,7 +150,7 @@ private:
         const double seconds = static_cast<double>(info.timestamp_us) / 1e6;
         if (sequence_ != info.sequence) offset_ = end_ - seconds;
         sequence_ = info.sequence;
-        if (auto ok = animation_->add(mesh, offset_ + seconds, fmt::format("frame {}", info.frame)); !ok)
+        if (auto ok = animation_->add(mesh, offset_ + seconds, fmt::format("frame {}", info.frame), image.bytes); !ok)
             return in_file(ok.error());
         end_ = offset_ + seconds + static_cast<double>(sequence.fps_denominator) / sequence.fps_numerator;
         return path.string();
@@ -140,6 +158,9 @@ private:
 
     OutputNames names_;
     std::set<std::string> written_;
+    std::shared_ptr<const std::vector<std::uint8_t>> written_image_;  // the last
+    std::filesystem::path image_path_;                                // its file
+    bool told_of_images_ = false;
     std::optional<GltfAnimation> animation_;  // from the first frame on, if all go into one .glb
     std::optional<std::uint32_t> sequence_;   // of the last frame in it
     double offset_ = 0, end_ = 0;             // seconds: of its sequence's timestamps; when it ends
@@ -173,14 +194,19 @@ struct Decoding {
     std::uint64_t promised = 0;     // frames of the stream, by indices in front
     SoundOutput* sound = nullptr;   // takes what is read, if sound is asked for
     std::uint32_t next_number = 0;  // of the frame after the last
+    TextureOutput textures = TextureOutput(options.images);
+    std::optional<DecodedFrame> held = {};  // the last frame, until its picture has come
+    std::optional<SequenceInfo> held_sequence = {};
 };
 
 bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.written() >= d.options.frames; }
 
-Result<void> write(Decoding& d, DecodedFrame& frame) {
-    const auto unit = output_unit(d.options, *d.decoder.sequence());
+Result<void> write_now(Decoding& d, DecodedFrame& frame, const SequenceInfo& sequence) {
+    const auto unit = output_unit(d.options, sequence);
     if (!unit) return tl::unexpected(unit.error());
-    const auto name = d.output.write(frame.mesh, frame.info, *d.decoder.sequence(), *unit);
+    const auto image = frame.mesh.texcoords.empty() ? Result<ImageFile>(ImageFile{}) : d.textures.image();
+    if (!image) return tl::unexpected(image.error());
+    const auto name = d.output.write(frame.mesh, frame.info, sequence, *unit, *image);
     if (!name) return tl::unexpected(name.error());
     d.summary.times.numbers.push_back(frame.info.frame);
     d.summary.times.microseconds.push_back(frame.info.timestamp_us);
@@ -193,6 +219,21 @@ Result<void> write(Decoding& d, DecodedFrame& frame) {
     return {};
 }
 
+Result<void> write_held(Decoding& d) {
+    if (!d.held) return {};
+    auto frame = *std::exchange(d.held, std::nullopt);
+    return write_now(d, frame, *d.held_sequence);
+}
+
+// A frame's picture comes behind it: one that may have one waits for it, which is until the next frame at most.
+Result<void> write(Decoding& d, DecodedFrame frame) {
+    if (auto ok = write_held(d); !ok) return ok;
+    if (frame.mesh.texcoords.empty()) return write_now(d, frame, *d.decoder.sequence());
+    d.held_sequence = *d.decoder.sequence();
+    d.held = std::move(frame);
+    return {};
+}
+
 // More in a row would be just a still picture, and a false frame number could fill the disk with them.
 constexpr std::size_t most_concealed_in_a_row = 300;
 
@@ -201,7 +242,7 @@ Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_u
     if (d.options.conceal != "animate" || d.summary.concealed_in_a_row >= most_concealed_in_a_row) return false;
     auto frame = d.decoder.conceal(number, timestamp_us);
     if (!frame) return false;
-    if (auto ok = write(d, *frame); !ok) return tl::unexpected(ok.error());
+    if (auto ok = write(d, std::move(*frame)); !ok) return tl::unexpected(ok.error());
     ++d.summary.concealed;
     ++d.summary.concealed_in_a_row;
     return true;
@@ -288,8 +329,14 @@ Result<void> take_failure(Decoding& d, const Packet& packet, const Error& error)
 
 // Decodes the next packet; true while there is more.
 Result<bool> decode_next(Decoding& d) {
-    if (is_enough(d)) return false;
+    if (is_enough(d) && !d.held) return false;
     const auto packet = d.input.next();
+    const bool picture = packet && packet->kind == PacketKind::texture;
+    if (picture) d.textures.take(*packet);
+    if (d.held && (!packet || picture || packet->kind == PacketKind::sequence || frame_type(packet->kind))) {
+        if (auto ok = write_held(d); !ok) return tl::unexpected(ok.error());
+        if (is_enough(d) || d.output.one_file()) return false;
+    }
     if (!packet) {
         const auto promised = static_cast<std::uint32_t>(std::min<std::uint64_t>(d.promised, 0xFFFFFFFF));
         if (auto ok = fill_gap(d, promised, d.summary.timestamp_us.value_or(0), false); !ok)
@@ -299,7 +346,9 @@ Result<bool> decode_next(Decoding& d) {
     if (d.sound)
         if (auto ok = d.sound->take(*packet); !ok) return tl::unexpected(ok.error());
     const bool is_frame = frame_type(packet->kind).has_value();
+    const auto sequences = d.numbers.dependencies().sequences();
     d.numbers.take(*packet);
+    if (d.numbers.dependencies().sequences() != sequences) d.textures.begin_sequence();
     if (d.numbers.begins_sequence()) d.summary.timestamp_us.reset();  // frames before its first one never existed
     if (is_frame || packet->kind == PacketKind::index) {              // the index gives the number of frames
         // Before decoding the packet, because it may be an I-frame, which the lost frames did not refer to.
@@ -330,9 +379,9 @@ Result<bool> decode_next(Decoding& d) {
     auto& info = (**frame).info;
     info.frame = d.numbers.of(info.frame);
     info.reference = d.numbers.of(info.reference);
-    if (auto ok = write(d, **frame); !ok) return tl::unexpected(ok.error());
+    if (auto ok = write(d, std::move(**frame)); !ok) return tl::unexpected(ok.error());
     ++d.summary.decoded;
-    return !d.output.one_file();
+    return d.held || !d.output.one_file();
 }
 
 void print_json(const Summary& summary, const StreamInput& input) {
@@ -441,6 +490,7 @@ Result<void> decode(const Options& options) {
             if (!more) return tl::unexpected(more.error());
             if (!*more) break;
         }
+        if (auto ok = write_held(decoding); !ok) return ok;
         tell_lost(decoding);
     }
     if (auto ok = output->finish(); !ok) return ok;
@@ -461,7 +511,7 @@ Result<void> decode(const Options& options) {
 
 void add_decode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
-    auto* command = app.add_subcommand("decode", "Turn an .htvm stream back into meshes and sound");
+    auto* command = app.add_subcommand("decode", "Turn an .htvm stream back into meshes, their textures, and sound");
     command
         ->add_option("input", options->input,
                      "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
@@ -487,6 +537,12 @@ void add_decode(CLI::App& app, Run& run) {
         ->type_name("FILE");
     command->add_option("--format", options->format, "Format in a folder: ply (default), obj or glb")
         ->check(CLI::IsMember({"ply", "obj", "glb"}));
+    command
+        ->add_option(
+            "--images", options->images,
+            "Format of the pictures of a texture, which go beside the meshes, or into a .glb: png (default) or\n"
+            "jpeg. Image files that were kept (encode --texture-as keep) stay as they are")
+        ->check(CLI::IsMember({"png", "jpeg"}));
     std::vector<std::string> units = {"capture"};
     for (const auto& unit : length_units) units.emplace_back(unit.symbol);
     command
@@ -514,7 +570,7 @@ void add_decode(CLI::App& app, Run& run) {
         "with an I-frame at least ten frames later.\n"
         "Examples:\n"
         "  htvm decode person.htvm -o meshes/\n"
-        "  htvm decode person.htvm -o 'out/%04d.obj'\n"
+        "  htvm decode person.htvm -o 'out/%04d.obj'       with .mtl and .png files where it has a texture\n"
         "  htvm decode person.htvm -o person.glb\n"
         "  htvm decode person.htvm --audio voice.wav\n"
         "  htvm decode - -o - < person.htvm | viewer --ply\n"

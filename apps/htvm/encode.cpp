@@ -34,6 +34,27 @@ double seconds_of(const Summary& summary, double fps) {
 
 // ---- What is said of it ---------------------------------------------------------------------------------------------
 
+nlohmann::json pictures_json(const EncodeOptions& options, const PictureTotals& pictures, double seconds) {
+    const bool keep = options.capture.texture_as == "keep";
+    nlohmann::json out = {{"coder", keep ? "files" : options.pictures.codec},
+                          {"pictures", pictures.pictures},
+                          {"key_pictures", pictures.key_pictures},
+                          {"bytes", pictures.bytes},
+                          {"megabits_per_second", 8e-6 * static_cast<double>(pictures.bytes) / seconds},
+                          {"encode_seconds", pictures.seconds}};
+    return out;
+}
+
+std::string pictures_text(const EncodeOptions& options, const PictureTotals& pictures, double seconds) {
+    const bool keep = options.capture.texture_as == "keep";
+    auto out = fmt::format("of this {:.2f} Mbit/s are {}", 8e-6 * static_cast<double>(pictures.bytes) / seconds,
+                           counted(pictures.pictures, keep ? "image file" : "picture"));
+    if (!keep)
+        out += fmt::format(", {} of them key pictures, coded at {:.1f} a second", pictures.key_pictures,
+                           static_cast<double>(pictures.pictures) / std::max(pictures.seconds, 1e-9));
+    return out;
+}
+
 void report(const EncodeOptions& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes,
             double fps, std::size_t dropped_late, const Publishing* hub = nullptr, const Deadline* deadline = nullptr) {
     const auto frames = summary.totals.all().frames;
@@ -52,6 +73,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
                               {"megabits_per_second", megabits / seconds},
                               {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
         if (hub) out["not_sent_frames"] = not_sent;
+        if (keeps_pictures(options.capture)) out["pictures"] = pictures_json(options, summary.pictures, seconds);
         if (rate.controlled()) out["control"] = rate_json(rate, bytes, seconds);
         if (deadline) out["pace"] = deadline_json(*deadline);
         fmt::print("{}\n", out.dump(2));
@@ -60,6 +82,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
         note(fmt::format("{}: {}, {} bytes, {:.2f} Mbit/s at {:g} fps, encoded at {:.1f} frames/s",
                          shown_place(options.output), counted(frames, "frame"), bytes, megabits / seconds, fps,
                          static_cast<double>(frames) / summary.encode_seconds));
+        if (keeps_pictures(options.capture)) note(pictures_text(options, summary.pictures, seconds));
         if (rate.controlled()) note(rate_summary(rate, bytes, seconds));
         if (deadline) note(deadline_summary(*deadline));
     }
@@ -187,6 +210,10 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (!read) return tl::unexpected(read.error());
         efforts = std::move(*read);
     }
+    // Meshes and pictures share the rate.
+    const auto of_all = settings;
+    const bool has_pictures = keeps_pictures(options.capture);
+    if (has_pictures) settings.rate.bits_per_second *= share_of_meshes;
     for (int number = 1;; ++number) {
         // Before the first pass, so that a place that cannot be written to does not cost one.
         auto output = StreamOutput::open(options.output, options.publishing);
@@ -198,7 +225,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (!encoder) return tl::unexpected(encoder.error());
         if (number == 1) note_bones(options, settings);
         Summary summary;
-        RateReport rate(settings);
+        RateReport rate(of_all);
         Deadline deadline(options.deadline, settings.tracked.effort);
         const bool timed = options.deadline > 0 || !options.effort_log.empty() || !efforts.empty() ||
                            (is_piped(options.capture) && settings.profile == Profile::tracked);
@@ -216,6 +243,9 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
                 .warnings = number == fewest ? &warnings : nullptr,
                 .summary = summary,
                 .rate = rate};
+            auto pictures = picture_track(options, capture, settings);
+            if (!pictures) return tl::unexpected(pictures.error());
+            if (*pictures) pass.pictures = &**pictures;
             if (timed) pass.deadline = &deadline;
             pass.efforts = efforts;
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
@@ -227,10 +257,12 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
             auto done = encode_frames(pass);
             if (!done) return writes ? ended_early(pass, *output, done.error()) : done;
             if (done = finish(pass); !done) return done;
+            if (*pictures) summary.pictures = (*pictures)->totals();
         }
         const double seconds = seconds_of(summary, capture.fps());
-        if (!writes || (number < most && is_off(rate, 8.0 * static_cast<double>(output->bytes()), seconds))) {
-            if (!passes) passes.emplace(rate.bits_per_second * seconds);
+        if (!writes ||
+            (number < most && !has_pictures && is_off(rate, 8.0 * static_cast<double>(output->bytes()), seconds))) {
+            if (!passes) passes.emplace(settings.rate.bits_per_second * seconds);
             passes->add(std::move(rate.costs));
             settings.rate.first_pass = passes->expected();
             capture.rewind();
@@ -279,6 +311,28 @@ void check_jobs(const EncodeOptions& options, bool random_session) {
         throw CLI::ValidationError("--session",
                                    "is random, so the parts of several jobs would not be of one stream: give "
                                    "all the same number");
+}
+
+// What can become of a capture's pictures.
+void check_pictures(const EncodeOptions& options, const CLI::App& command) {
+    const auto& as = options.capture.texture_as;
+    for (const char* flag : {"--texture-size", "--texture-codec", "--texture-quality"})
+        if (command.count(flag) > 0 && as != "captured")
+            throw CLI::ValidationError(flag, "is for pictures that are coded as video: add --texture-as captured");
+    if (!keeps_pictures(options.capture)) return;
+    if (options.encoding.profile == "tracked")
+        throw CLI::ValidationError("--texture-as",
+                                   as + " keeps every frame's own texture coordinates, which --profile tracked does "
+                                        "not: add --profile topology");
+    if (options.capture.texture.files == "none")
+        throw CLI::ValidationError("--texture", "none leaves no images for --texture-as " + as);
+    const bool rate = is_given(options.encoding, "rate.bits_per_second");
+    if (rate && as == "keep")
+        throw CLI::ValidationError("--texture-as",
+                                   "keep leaves image files as large as they are, which no --bitrate can change; "
+                                   "captured codes them as video");
+    if (rate && options.pictures.quality)
+        throw CLI::ValidationError("--texture-quality", "follows from --bitrate; give one of the two");
 }
 
 // What goes with the clock, frame after frame.
@@ -350,6 +404,7 @@ void add_encode(CLI::App& app, Run& run) {
                    "is sent while it does not)")
         ->group(hubs);
     add_audio_options(*command, options->audio);
+    add_texture_picture_options(*command, options->pictures);
     add_encoding_options(*command, options->encoding);
     command
         ->add_option(
@@ -424,6 +479,7 @@ void add_encode(CLI::App& app, Run& run) {
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();
+        check_pictures(*options, *command);
         check_jobs(*options, !sessions.empty() && sessions[0] == "random");
         if (live::looks_like_hub_address(options->output) && options->in_groups())
             throw CLI::ValidationError("--jobs", "encodes groups of frames at once: for files, not for what is live");

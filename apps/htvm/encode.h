@@ -8,6 +8,7 @@
 #include "command_line/capture.h"
 #include "encoder_options.h"
 #include "htvm/result.hpp"
+#include "picture_track.h"
 #include "publishing.h"
 
 namespace htvm::app {
@@ -23,6 +24,7 @@ struct EncodeOptions {
     std::string output;
     PublishingOptions publishing;  // where the output is a hub
     AudioOptions audio;
+    TexturePictureOptions pictures;  // where the capture's images go into the stream
     bool drop_late = false;      // of standard input: drops the oldest of frames that come faster than they are encoded
     double deadline = 0;         // milliseconds from a mesh's arrival to its packet; 0: none
     std::string effort_log;      // file: writes what was decided of each frame; empty: nowhere

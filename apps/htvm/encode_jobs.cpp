@@ -67,6 +67,7 @@ void find_stand_in(Pass& pass, const Group& group) {
     if (!before || !*before) return;
     pass.last = std::move(**before);
     if (const auto* pose = pass.capture.pose()) pass.last_pose = *pose;
+    if (pass.pictures) pass.last_textured = pass.capture.textured();
 }
 
 Result<CodedGroup> code_group(Work& work, Capture& capture, const Group& group) {
@@ -94,11 +95,15 @@ Result<CodedGroup> code_group(Work& work, Capture& capture, const Group& group) 
               .summary = out.summary,
               .rate = rate,
               .saw_triangles = !work.first_mesh.triangles.empty()};
+    auto pictures = picture_track(work.options, capture, work.settings);
+    if (!pictures) return tl::unexpected(pictures.error());
+    if (*pictures) pass.pictures = &**pictures;
     capture.restrict_to(group.first, group.frames);
     find_stand_in(pass, group);
     if (auto done = encode_frames(pass); !done) return tl::unexpected(done.error());
     if (auto done = finish(pass); !done) return tl::unexpected(done.error());
     out.costs = std::move(rate.costs);
+    if (*pictures) out.summary.pictures = (*pictures)->totals();
     return out;
 }
 

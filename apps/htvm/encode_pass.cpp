@@ -18,7 +18,15 @@ Result<void> drain(const Pass& pass) {
     while (auto packet = pass.encoder.pull()) {
         pass.rate.buffer.add(*packet);
         if (!pass.write) continue;
+        const PacketHeader header = *packet;
+        const auto bytes = packet->payload.size() + packet_overhead;
         if (auto written = pass.write(std::move(*packet)); !written) return written;
+        if (!pass.pictures) continue;
+        auto picture = pass.pictures->behind(header, bytes);
+        if (!picture) return tl::unexpected(picture.error());
+        if (!*picture) continue;
+        pass.rate.buffer.add(**picture);
+        if (auto written = pass.write(std::move(**picture)); !written) return written;
     }
     return {};
 }
@@ -57,7 +65,9 @@ Result<void> follow_line(Pass& pass) {
                                   pass.rate.bits_per_second / 1e6));
     pass.slower_line = slower ? *bits_per_second : 0;
     pass.rate.line_was_slower = pass.rate.line_was_slower || slower;
-    return pass.encoder.set_bitrate(*bits_per_second);
+    if (!pass.pictures) return pass.encoder.set_bitrate(*bits_per_second);
+    pass.pictures->set_bitrate(*bits_per_second);
+    return pass.encoder.set_bitrate(share_of_meshes * *bits_per_second);
 }
 
 double milliseconds_since(std::chrono::steady_clock::time_point then) {
@@ -77,7 +87,8 @@ enum class Coded { yes, dropped };
 
 // Under rate control a frame that does not fit is dropped, and the stream goes on without it; but not the first, as all
 // others need an I-frame before them.
-Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us) {
+Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us,
+                   const std::shared_ptr<const TexturedMesh>& textured) {
     auto& summary = pass.summary;
     const auto start = std::chrono::steady_clock::now();
     TimedFrame timed;
@@ -103,6 +114,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         pass.step("dropped");
         return Coded::dropped;
     }
+    if (pass.pictures && textured) pass.pictures->add(timestamp_us, textured->texture, textured->texture_file);
     if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
     if (pass.deadline) {
         timed.took = milliseconds_since(start);
@@ -115,7 +127,8 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
 
 // The frame before, once more.
 Result<void> repeat(Pass& pass, std::int64_t timestamp_us) {
-    const auto coded = code(pass, *pass.last, pass.last_pose ? &*pass.last_pose : nullptr, timestamp_us);
+    const auto coded =
+        code(pass, *pass.last, pass.last_pose ? &*pass.last_pose : nullptr, timestamp_us, pass.last_textured);
     return coded ? Result<void>() : tl::unexpected(coded.error());
 }
 
@@ -176,11 +189,12 @@ void keep_last(Pass& pass, Mesh mesh) {
     if (!pass.options.fill && pass.options.on_bad_frame != "repeat") return;
     pass.last = std::move(mesh);
     if (const auto* pose = pass.capture.pose()) pass.last_pose = *pose;
+    if (pass.pictures) pass.last_textured = pass.capture.textured();
 }
 
 Result<void> take(Pass& pass, Mesh& mesh) {
     if (auto fine = check_triangles(pass, mesh); !fine) return fine;
-    const auto coded = code(pass, mesh, pass.capture.pose(), pass.capture.timestamp_us());
+    const auto coded = code(pass, mesh, pass.capture.pose(), pass.capture.timestamp_us(), pass.capture.textured());
     if (!coded) return tl::unexpected(coded.error());
     if (*coded == Coded::yes) keep_last(pass, std::move(mesh));
     return {};
@@ -205,6 +219,10 @@ void add(Summary& summary, Summary behind) {
     summary.missing += behind.missing;
     summary.filled += behind.filled;
     extend(summary.bounds, behind.bounds);
+    summary.pictures.pictures += behind.pictures.pictures;
+    summary.pictures.key_pictures += behind.pictures.key_pictures;
+    summary.pictures.bytes += behind.pictures.bytes;
+    summary.pictures.seconds += behind.pictures.seconds;
 }
 
 void FrameWarnings::tell(Kind kind, const std::string& line) {
@@ -212,6 +230,26 @@ void FrameWarnings::tell(Kind kind, const std::string& line) {
     const std::lock_guard lock(mutex_);
     const auto told = ++told_[kind];
     if (told <= most) warn(told < most ? line : line + "; others like it follow");
+}
+
+Result<std::optional<PictureTrack>> picture_track(const EncodeOptions& options, const Capture& capture,
+                                                  const EncoderOptions& settings) {
+    if (!keeps_pictures(options.capture)) return std::nullopt;
+    const auto first = capture.first_texture();
+    if (!first) return fail(ErrorKind::bad_input, "the capture's first mesh has no texture");
+    PictureTrack::Settings out;
+    out.options = options.pictures;
+    out.keep = options.capture.texture_as == "keep";
+    out.width = first->width;
+    out.height = first->height;
+    out.quality = options.encoding.quality;
+    out.frames_per_second = capture.fps();
+    if (settings.rate.bits_per_second > 0) out.bits_per_second = settings.rate.bits_per_second / share_of_meshes;
+    out.buffer_seconds = settings.rate.buffer_seconds;
+    out.threads = settings.threads;
+    auto track = PictureTrack::create(out);
+    if (!track) return tl::unexpected(track.error());
+    return std::optional(std::move(*track));
 }
 
 Result<void> encode_frames(Pass& pass) {

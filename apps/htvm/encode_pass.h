@@ -14,6 +14,7 @@
 #include "deadline.h"
 #include "encode.h"
 #include "htvm/encoder.hpp"
+#include "picture_track.h"
 #include "rate_report.h"
 
 namespace htvm::app {
@@ -29,6 +30,7 @@ struct Summary {
     std::size_t left_out = 0, repeated = 0;  // bad ones
     std::size_t missing = 0, filled = 0;     // by the numbers of the files
     std::optional<SpaceBounds> bounds;       // of the decoded meshes
+    PictureTotals pictures;
     nlohmann::json list = nlohmann::json::array();
 };
 // Of frames behind those summed up so far, whose own numbers begin with 0.
@@ -59,12 +61,18 @@ struct Pass {
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
     Deadline* deadline = nullptr;   // how much is searched for each frame, and how long that takes; null: not counted
     std::vector<int> efforts = {};  // of the first frames, in place of what the deadline says
-    double slower_line = 0;         // the bitrate that the line carries at present, where it is below the one asked for
-    bool saw_triangles = false;     // in a frame so far, or of those before
+    PictureTrack* pictures = nullptr;  // of the frames; null: none go into the stream
+    double slower_line = 0;      // the bitrate that the line carries at present, where it is below the one asked for
+    bool saw_triangles = false;  // in a frame so far, or of those before
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
     std::optional<Mesh> last = {};
     std::optional<Pose> last_pose = {};
+    std::shared_ptr<const TexturedMesh> last_textured = {};
 };
+
+// The pictures of a capture that keeps them, as the options say; nothing for others.
+Result<std::optional<PictureTrack>> picture_track(const EncodeOptions& options, const Capture& capture,
+                                                  const EncoderOptions& settings);
 
 // Ends with an error of any kind where it is stopped.
 Result<void> encode_frames(Pass& pass);

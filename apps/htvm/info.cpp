@@ -16,6 +16,7 @@
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/running_time.hpp"
+#include "htvm/texture.hpp"
 #include "metrics/recoded_area.h"
 #include "rate_report.h"
 #include "stream_file.h"
@@ -204,6 +205,38 @@ Result<void> add(AudioTotals& totals, const Packet& packet) {
     return {};
 }
 
+// The pictures of the whole stream.
+struct StreamPictures {
+    std::uint64_t pictures = 0, keys = 0, bytes = 0;
+    TexturePicture first = {};  // without its bytes
+    bool differ = false;        // in coder or size
+};
+
+Result<void> add(StreamPictures& totals, const Packet& packet) {
+    auto picture = read_texture_picture(packet);
+    if (!picture)
+        return picture.error().kind == ErrorKind::unsupported ? Result<void>() : tl::unexpected(picture.error());
+    picture->coded = {};
+    if (totals.pictures++ == 0) totals.first = *picture;
+    totals.keys += is_key_picture(packet) ? 1 : 0;
+    totals.bytes += packet.payload.size() + packet_overhead;
+    totals.differ = totals.differ || picture->coder != totals.first.coder || picture->width != totals.first.width ||
+                    picture->height != totals.first.height;
+    return {};
+}
+
+nlohmann::json pictures_json(const StreamPictures& totals, double seconds) {
+    if (totals.pictures == 0) return {};
+    return {{"coder", name_of(totals.first.coder)},
+            {"width", totals.first.width},
+            {"height", totals.first.height},
+            {"differ", totals.differ},
+            {"pictures", totals.pictures},
+            {"key_pictures", totals.keys},
+            {"bytes", totals.bytes},
+            {"megabits_per_second", 8e-6 * static_cast<double>(totals.bytes) / seconds}};
+}
+
 nlohmann::json audio_json(const AudioTotals& totals) {
     if (totals.packets == 0) return {};
     return {{"coder", "opus"}, {"channels", totals.channels}, {"seconds", totals.seconds()}, {"bytes", totals.bytes}};
@@ -225,6 +258,7 @@ Result<void> info(const Options& options) {
     std::optional<StreamIndex> front;
     bool grouped = false;
     AudioTotals audio;
+    StreamPictures pictures;
     PatchedArea patched;
     nlohmann::json sequences = nlohmann::json::array();
     std::optional<SequenceInfo> first_sequence;
@@ -251,6 +285,9 @@ Result<void> info(const Options& options) {
         if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
         if (packet->kind == PacketKind::audio)
             if (auto ok = add(audio, *packet); !ok)
+                return fail(ok.error().kind, options.input + ": " + ok.error().message);
+        if (packet->kind == PacketKind::texture)
+            if (auto ok = add(pictures, *packet); !ok)
                 return fail(ok.error().kind, options.input + ": " + ok.error().message);
         if (packet->kind == PacketKind::front_index && !front) {
             auto read = read_index(*packet);
@@ -293,7 +330,8 @@ Result<void> info(const Options& options) {
     const auto& s = *headers.sequence();
     const double seconds = static_cast<double>(count > 0 ? time.total_us() : time.one_frame_us()) / 1e6;
     const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
-    const auto outside_frames = bytes - totals.all().bytes.total() - audio.bytes;  // sequence headers, the index
+    const auto outside_frames =
+        bytes - totals.all().bytes.total() - audio.bytes - pictures.bytes;  // sequence headers, the index
     if (options.json) {
         nlohmann::json out{{"sequence", sequence_json(first_sequence ? *first_sequence : s)},
                            {"sequences", sequences},
@@ -301,6 +339,7 @@ Result<void> info(const Options& options) {
                            {"bytes", bytes},
                            {"bytes_outside_frames", outside_frames},
                            {"audio", audio_json(audio)},
+                           {"pictures", pictures_json(pictures, seconds)},
                            {"patched_area", patched_area_json(patched)},
                            {"index", index},
                            {"front_index", front ? index_json(*front) : nlohmann::json()},
@@ -320,6 +359,11 @@ Result<void> info(const Options& options) {
         if (audio.packets > 0)
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);
+        if (pictures.pictures > 0)
+            fmt::print("pictures: {}, {} x {} pixels{}, {}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n",
+                       name_of(pictures.first.coder), pictures.first.width, pictures.first.height,
+                       pictures.differ ? " and others" : "", counted(pictures.pictures, "picture"), pictures.keys,
+                       pictures.bytes, 8e-6 * static_cast<double>(pictures.bytes) / seconds);
         if (patched.patched > 0)
             fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
                        counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);

@@ -12,11 +12,13 @@
 
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
+#include "htvm/picture_decoder.hpp"
 #include "io/mesh_file.h"
 #include "io/sequence.h"
 #include "io/texture_colours.h"
 #include "stream_file.h"
 #include "stream_seek.h"
+#include "texture_output.h"
 
 namespace htvm::app {
 
@@ -76,19 +78,41 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
         DecoderOptions options;
         FrameNumbers numbers = {};
         bool begun = false;
+        PictureDecoder pictures;
+        std::optional<Packet> ahead = {};  // read while looking for a frame's picture
     };
-    source.mesh_at = [reading = std::make_shared<Reading>(Reading{std::move(*input), Decoder(options), options})](
+    source.mesh_at = [reading = std::make_shared<Reading>(
+                          Reading{std::move(*input), Decoder(options), options, {}, false, picture_decoder(), {}})](
                          MeshSource& self, std::size_t position) -> Result<TexturedMesh> {
-        auto& [stream, decoder, settings, numbers, begun] = *reading;
+        auto& [stream, decoder, settings, numbers, begun, pictures, ahead] = *reading;
         const auto number = self.numbers[position];
         if (!std::exchange(begun, true) && position > 0)
             if (const auto start = go_to_frame(stream, self.name, number, settings.max_packet_bytes))
                 numbers.begin(start->first_needed_frame, start->first_needed_number);
-        while (const auto packet = stream.next()) {
+        const auto next = [&]() { return ahead ? std::exchange(ahead, std::nullopt) : stream.next(); };
+        while (const auto packet = next()) {
+            const auto sequences = numbers.dependencies().sequences();
             numbers.take(*packet);
+            if (numbers.dependencies().sequences() != sequences) pictures.reset();
+            if (packet->kind == PacketKind::texture) (void)pictures.take(*packet);
             auto frame = decoder.push(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
-            if (*frame && numbers.of((*frame)->info.frame) == number) return TexturedMesh(std::move((*frame)->mesh));
+            if (!*frame || numbers.of((*frame)->info.frame) != number) continue;
+            TexturedMesh out(std::move((*frame)->mesh));
+            // Its picture comes behind it, before the next frame.
+            const auto is_beside = [](PacketKind kind) {
+                return kind == PacketKind::texture || kind == PacketKind::audio;
+            };
+            while ((ahead = stream.next()) && is_beside(ahead->kind)) {
+                numbers.take(*ahead);
+                if (ahead->kind == PacketKind::texture && !pictures.take(*ahead))
+                    return fail(ErrorKind::corrupt_stream,
+                                fmt::format("{}: the picture of frame {} cannot be decoded", self.name, number));
+            }
+            if (!out.mesh.texcoords.empty()) out.texture = pictures.image();
+            if (out.texture && out.mesh.colours.empty())
+                out.mesh.colours = colours_from_texture(out.mesh, *out.texture);
+            return out;
         }
         return fail(ErrorKind::corrupt_stream, self.name + " changed while it was read");
     };
@@ -127,8 +151,9 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
         return fail(ErrorKind::bad_input, "standard input is not read here; give files, a folder or an .htvm stream");
     if (names.size() == 1 && name.ends_with(".htvm")) {
         if (!options.texture.files.empty() || options.texture.origin != TextureOrigin::by_format)
-            return fail(ErrorKind::bad_input,
-                        name + " is a stream, which has no texture; --texture and --texture-origin are for mesh files");
+            return fail(
+                ErrorKind::bad_input,
+                name + " is a stream, whose texture is inside; --texture and --texture-origin are for mesh files");
         return open_stream(name, options.limits);
     }
     const bool guess = options.unit == "auto";
@@ -149,7 +174,7 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
                          MeshSource& self, std::size_t position) mutable -> Result<TexturedMesh> {
         auto textured = textures.read(position, TextureUse::where_colourless);
         if (!textured) return textured;
-        auto& [mesh, texture] = *textured;
+        auto& [mesh, texture, file] = *textured;
         if (std::exchange(self.guesses_unit, false))
             self.millimetres_per_unit = millimetres_per(likely_unit(paths[position], mesh));
         if (const auto ok = scale_positions(mesh, self.millimetres_per_unit); !ok) return tl::unexpected(ok.error());

@@ -66,7 +66,8 @@ Result<void> StreamJoin::take(Packet packet) {
     }
     // What comes behind a frame stays there, also behind the last one.
     const bool before_frame = !stream_.begun || stream_.header;
-    if (packet.kind == PacketKind::audio && !before_frame) return output_.write(moved(std::move(packet)));
+    const bool stays = packet.kind == PacketKind::audio || packet.kind == PacketKind::texture;
+    if (stays && !before_frame) return output_.write(moved(std::move(packet)));
     if (!frame_type(packet.kind)) {
         stream_.waiting.push_back(std::move(packet));
         return {};

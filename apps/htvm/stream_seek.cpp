@@ -6,6 +6,7 @@
 
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
+#include "htvm/texture.hpp"
 
 namespace htvm::app {
 
@@ -85,9 +86,17 @@ struct Walk {
 struct FromIndex {
     std::vector<std::uint64_t> before;  // places of packets: the sequence header, frames that it refers to
     std::uint64_t offset = 0;
-    std::uint64_t number = 0;  // of the frame there
-    std::uint64_t frames = 0;  // of the stream up to the end of the index's part
+    std::uint64_t number = 0;    // of the frame there
+    std::uint64_t frames = 0;    // of the stream up to the end of the index's part
+    std::uint64_t pictures = 0;  // from here up to the offset are the pictures that one there may need
 };
+
+// The picture behind the frame at this place; nothing if it has none.
+std::optional<SeekableStream::Place> picture_behind(SeekableStream& stream, std::uint64_t offset) {
+    const auto frame = stream.at(offset);
+    const auto behind = frame ? stream.at(frame->end()) : std::nullopt;
+    return behind && behind->header.kind == PacketKind::texture ? behind : std::nullopt;
+}
 
 std::optional<FromIndex> from_index(SeekableStream& stream, std::uint64_t frame) {
     std::uint64_t numbered = 0;  // frames of the parts before, each with an index of its own
@@ -104,6 +113,14 @@ std::optional<FromIndex> from_index(SeekableStream& stream, std::uint64_t frame)
         const auto* sequence = point ? sequence_of(index->index, *point) : nullptr;
         if (!sequence) return std::nullopt;
         FromIndex out{{}, index->begin + point->offset, numbered + point->frame, numbered + index->index.frames};
+        // Not every place to start has a key picture.
+        out.pictures = out.offset;
+        const auto* with_key = point;
+        for (auto picture = picture_behind(stream, out.pictures); picture && !is_key_picture(picture->header);
+             picture = picture_behind(stream, out.pictures)) {
+            if (with_key == index->index.points.data() || with_key[-1].frame < sequence->first_frame) break;
+            out.pictures = index->begin + (--with_key)->offset;
+        }
         for (const auto* at = point; at->back > 0;) {
             at -= at->back;
             out.before.push_back(index->begin + at->offset);
@@ -125,6 +142,12 @@ std::optional<StreamStart> find_start(SeekableStream& stream, std::uint64_t fram
     if (const auto start = from_index(stream, frame)) {
         for (const auto before : start->before)
             if (!walk.take(before)) return std::nullopt;
+        for (offset = start->pictures; offset < start->offset;) {
+            const auto place = stream.at(offset);
+            if (!place) return std::nullopt;
+            if (place->header.kind == PacketKind::texture) (void)walk.take(offset);
+            offset = place->end();
+        }
         offset = start->offset;
         begin_number = start->number;
         out.promised = start->frames;

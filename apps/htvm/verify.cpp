@@ -13,8 +13,10 @@
 #include "htvm/audio.hpp"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
+#include "htvm/picture_decoder.hpp"
 #include "io/mesh_file.h"
 #include "stream_file.h"
+#include "texture_output.h"
 
 namespace htvm::app {
 namespace {
@@ -49,6 +51,10 @@ struct Verification {
     std::optional<std::size_t> lost = {};           // the newest problem that is of frames whose reference is missing
     std::optional<double> audio_end = {};           // microseconds
     std::uint64_t audio_packets = 0;
+    std::uint64_t pictures = 0;
+    PictureDecoder shown = picture_decoder();
+    std::optional<std::uint32_t> last_picture = {};  // own number of its frame
+    std::optional<std::string> lost_picture = {};    // why those up to the next key picture cannot be decoded
 };
 
 void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
@@ -58,6 +64,9 @@ void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
         v.droppable.clear();
         v.why.clear();
         v.audio_end.reset();
+        v.shown.reset();
+        v.last_picture.reset();
+        v.lost_picture.reset();
     }
     if (v.last_number && number <= *v.last_number) problem(fmt::format("comes after frame {}", *v.last_number));
     if (v.last_number && number > *v.last_number + 1)
@@ -104,6 +113,24 @@ void check_audio(Verification& v, const Packet& packet, std::uint32_t number) {
     v.audio_end = begin + 1e6 * static_cast<double>(audio->samples()) / audio_samples_per_second;
 }
 
+// Pictures come behind their frame, one at most, and each decodes from those before it.
+void check_picture(Verification& v, const Packet& packet, std::uint32_t number) {
+    const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
+    ++v.pictures;
+    if (!v.last_number || *v.last_number != number) problem("there is a picture of it, but not directly behind it");
+    if (v.last_picture && packet.frame <= *v.last_picture) problem("it has a second picture");
+    v.last_picture = packet.frame;
+    const bool goes_on = v.lost_picture && !is_key_picture(packet);
+    const auto decoded = v.shown.take(packet);
+    if (decoded) v.lost_picture.reset();
+    if (decoded || goes_on) return;  // said once of those behind each other
+    v.lost_picture = decoded.error().message;
+    const auto kind = decoded.error().kind;
+    if (kind == ErrorKind::limit || kind == ErrorKind::unsupported) v.refused = kind;
+    problem(decoded.error().message +
+            (is_key_picture(packet) ? "" : ", nor do those up to the next key picture decode"));
+}
+
 void check_decoding(Verification& v, const Packet& packet, std::uint32_t number) {
     const auto decoded = v.decoder.decode(packet);
     const bool is_frame = frame_type(packet.kind).has_value();
@@ -137,6 +164,7 @@ void take(Verification& v, const Packet& packet) {
         check_dependencies(v, packet, number);
     }
     if (packet.kind == PacketKind::audio) check_audio(v, packet, number);
+    if (packet.kind == PacketKind::texture) check_picture(v, packet, number);
     check_decoding(v, packet, number);
 }
 
@@ -187,6 +215,7 @@ Result<void> run_verify(const Options& options) {
                                           {"sequences", v.numbers.dependencies().sequences()},
                                           {"index", v.index.has_value()},
                                           {"audio_packets", v.audio_packets},
+                                          {"pictures", v.pictures},
                                           {"damaged_bytes", input->damaged_bytes()},
                                           {"problems", problems}}
                                .dump(2));
@@ -201,9 +230,10 @@ Result<void> run_verify(const Options& options) {
         }
         if (v.problems.size() > most) fmt::print("and {} more\n", v.problems.size() - most);
         if (sound)
-            fmt::print("{}: {} in {}, all sound{}{}\n", options.input, counted(v.frames, "frame"),
+            fmt::print("{}: {} in {}, all sound{}{}{}\n", options.input, counted(v.frames, "frame"),
                        counted(v.numbers.dependencies().sequences(), "sequence"), v.index ? ", with an index" : "",
-                       v.audio_packets > 0 ? ", with audio" : "");
+                       v.audio_packets > 0 ? ", with audio" : "",
+                       v.pictures > 0 ? ", with " + counted(v.pictures, "picture") : "");
     }
     if (sound) return {};
     return fail(v.refused.value_or(ErrorKind::corrupt_stream),

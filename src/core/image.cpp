@@ -3,6 +3,54 @@
 #include <algorithm>
 #include <cmath>
 
+namespace htvm {
+namespace {
+
+// Which pixels of a side of so many make up each of those of another, and how much of each: shares add up to 1.
+struct Share {
+    std::size_t pixel;
+    float share;
+};
+std::vector<std::vector<Share>> shares(int from, int to) {
+    std::vector<std::vector<Share>> out(static_cast<std::size_t>(to));
+    const double size = static_cast<double>(from) / to;
+    for (int i = 0; i < to; ++i) {
+        const double begin = i * size, end = (i + 1) * size;
+        for (int pixel = static_cast<int>(begin); pixel < std::min(from, static_cast<int>(std::ceil(end))); ++pixel) {
+            const double covered = std::min(end, pixel + 1.0) - std::max(begin, static_cast<double>(pixel));
+            if (covered > 0)
+                out[static_cast<std::size_t>(i)].push_back(
+                    {static_cast<std::size_t>(pixel), static_cast<float>(covered / size)});
+        }
+    }
+    return out;
+}
+
+}  // namespace
+
+Image resized(const Image& image, int width, int height) {
+    const auto columns = shares(image.width, width), rows = shares(image.height, height);
+    const auto from_width = 3 * static_cast<std::size_t>(image.width);
+    Image out{width, height, {}};
+    out.rgb.reserve(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    std::vector<float> row(from_width);
+    for (const auto& of_row : rows) {
+        std::fill(row.begin(), row.end(), 0.0f);
+        for (const auto& [y, share] : of_row)
+            for (std::size_t i = 0; i < from_width; ++i)
+                row[i] += share * static_cast<float>(image.rgb[y * from_width + i]);
+        for (const auto& of_column : columns)
+            for (std::size_t c = 0; c < 3; ++c) {
+                float sum = 0.5f;
+                for (const auto& [x, share] : of_column) sum += share * row[3 * x + c];
+                out.rgb.push_back(static_cast<std::uint8_t>(std::min(sum, 255.0f)));
+            }
+    }
+    return out;
+}
+
+}  // namespace htvm
+
 namespace htvm::internal {
 
 namespace {

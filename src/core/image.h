@@ -9,14 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "htvm/image.hpp"  // IWYU pragma: export
 #include "htvm/mesh.hpp"
 
 namespace htvm {
-
-struct Image {
-    int width = 0, height = 0;
-    std::vector<std::uint8_t> rgb;  // 3 bytes per pixel, row by row from the top left
-};
 
 // The largest side of an image that is read as a texture.
 inline constexpr int largest_image_side = 4096;
@@ -25,9 +21,14 @@ struct TexturedMesh {
     TexturedMesh() = default;
     TexturedMesh(Mesh own, std::shared_ptr<const Image> image = nullptr)
         : mesh(std::move(own)), texture(std::move(image)) {}
-    Mesh mesh;                             // with texture coordinates, if there is a texture
-    std::shared_ptr<const Image> texture;  // null: none; frames may share it
+    Mesh mesh;                                                      // with texture coordinates, if there is a texture
+    std::shared_ptr<const Image> texture;                           // null: none; frames may share it
+    std::shared_ptr<const std::vector<std::uint8_t>> texture_file;  // the image's file, where it is to be kept as it is
 };
+
+// The image at another size, neither of which may be empty: each pixel is the mean of the area that it covers, so that
+// making it smaller does not alias.
+Image resized(const Image& image, int width, int height);
 
 namespace internal {
 

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
@@ -29,7 +31,9 @@ public:
     // A frame that is shown from then on; in mm. A time that is not after the one before is put right after it. A mesh
     // without vertices shows nothing. Fails (bad_input) if check_mesh does or a position is too large; (limit) if the
     // file would become larger than the 4 GiB that a .glb can hold; disk_full.
-    Result<void> add(const Mesh& mesh, double seconds, const std::string& name);
+    // image: the file of its texture's image (gltf.h); one that is the same memory as the last is not repeated.
+    Result<void> add(const Mesh& mesh, double seconds, const std::string& name,
+                     const std::shared_ptr<const std::vector<std::uint8_t>>& image = nullptr);
     // end_seconds: when the last frame ends.
     Result<void> finish(double end_seconds);
 
@@ -49,6 +53,8 @@ private:
     internal::GltfTopology topology_;
     std::uint64_t json_bytes_ = 1000;  // at most, so far
     std::optional<Frame> last_;
+    std::shared_ptr<const std::vector<std::uint8_t>> last_image_;
+    std::size_t image_ = 0;  // its number
     nlohmann::json nodes_ = nlohmann::json::array(), samplers_ = nlohmann::json::array(),
                    channels_ = nlohmann::json::array();
 };

@@ -16,17 +16,24 @@ using nlohmann::json;
 
 enum class Target { none = 0, vertices = 34962, triangles = 34963 };
 
-constexpr int triangle_list = 4, point_list = 0;          // modes of primitives
-constexpr int captured_colours = 0, without_colours = 1;  // numbers of materials
+constexpr int triangle_list = 4, point_list = 0;                  // modes of primitives
+constexpr std::size_t captured_colours = 0, without_colours = 1;  // numbers of materials; then one for each image
 
-json materials() {
+json materials(std::size_t images) {
     const json surface = {{"metallicFactor", 0}, {"roughnessFactor", 0.9}};
     const json captured = {{"name", "captured colours"},
                            {"pbrMetallicRoughness", surface},
                            {"extensions", {{"KHR_materials_unlit", json::object()}}},
                            {"doubleSided", true}};
     const json without = {{"name", "without colours"}, {"pbrMetallicRoughness", surface}, {"doubleSided", true}};
-    return json::array({captured, without});
+    json out = json::array({captured, without});
+    for (std::size_t image = 0; image < images; ++image) {
+        auto textured = captured;
+        textured["name"] = "captured texture";
+        textured["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", image}};
+        out.push_back(std::move(textured));
+    }
+    return out;
 }
 
 void put(GltfBuffer& buffer, std::uint64_t value, std::size_t bytes) {
@@ -96,7 +103,16 @@ std::size_t add_texcoords(GltfBuffer& buffer, std::span<const Vector2f> texcoord
 
 }  // namespace
 
-std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topology) {
+std::size_t add_image(GltfBuffer& buffer, std::span<const std::uint8_t> file) {
+    const bool png = file.size() > 1 && file[1] == 'P';
+    buffer.views.push_back({{"buffer", 0}, {"byteOffset", buffer.size()}, {"byteLength", file.size()}});
+    buffer.images.push_back({{"bufferView", buffer.views.size() - 1}, {"mimeType", png ? "image/png" : "image/jpeg"}});
+    buffer.bytes.insert(buffer.bytes.end(), file.begin(), file.end());
+    while (buffer.size() % 4 != 0) buffer.bytes.push_back(0);
+    return buffer.images.size() - 1;
+}
+
+std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topology, std::optional<std::size_t> image) {
     if (!topology.known || topology.triangles != mesh.triangles || topology.texcoords != mesh.texcoords) {
         topology = {mesh.triangles, mesh.texcoords, 0, 0, true};
         if (!mesh.triangles.empty()) topology.triangle_accessor = add_triangles(buffer, mesh.triangles);
@@ -104,11 +120,14 @@ std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topolog
     }
     json attributes = {{"POSITION", add_positions(buffer, mesh.positions)}};
     if (!mesh.normals.empty()) attributes["NORMAL"] = add_vectors<3>(buffer, mesh.normals, Target::vertices);
-    if (!mesh.colours.empty()) attributes["COLOR_0"] = add_colours(buffer, mesh.colours);
+    if (!mesh.colours.empty() && !image) attributes["COLOR_0"] = add_colours(buffer, mesh.colours);
     if (!mesh.texcoords.empty()) attributes["TEXCOORD_0"] = topology.texcoord_accessor;
+    const auto material = image                  ? without_colours + 1 + *image
+                          : mesh.colours.empty() ? without_colours
+                                                 : captured_colours;
     json primitive = {{"attributes", std::move(attributes)},
                       {"mode", mesh.triangles.empty() ? point_list : triangle_list},
-                      {"material", mesh.colours.empty() ? without_colours : captured_colours}};
+                      {"material", material}};
     if (!mesh.triangles.empty()) primitive["indices"] = topology.triangle_accessor;
     json entry = json::object();
     entry["primitives"].push_back(std::move(primitive));
@@ -136,7 +155,12 @@ std::vector<std::uint8_t> glb_front(json root, const GltfBuffer& buffer) {
         root["bufferViews"] = buffer.views;
         root["accessors"] = buffer.accessors;
         root["meshes"] = buffer.meshes;
-        root["materials"] = materials();
+        root["materials"] = materials(buffer.images.size());
+        if (!buffer.images.empty()) {
+            root["images"] = buffer.images;
+            for (std::size_t image = 0; image < buffer.images.size(); ++image)
+                root["textures"].push_back({{"source", image}});
+        }
         root["extensionsUsed"].push_back("KHR_materials_unlit");
     }
     // Names and texts may be any bytes.

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,7 +14,7 @@ namespace htvm::internal {
 // The lists of the JSON that grow with each mesh, and the bytes of the buffer that they refer to.
 struct GltfBuffer {
     nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array(),
-                   meshes = nlohmann::json::array();
+                   meshes = nlohmann::json::array(), images = nlohmann::json::array();
     std::vector<std::uint8_t> bytes;  // those not yet written elsewhere
     std::uint64_t written = 0;        // how many were before them
     std::uint64_t size() const { return written + bytes.size(); }
@@ -27,10 +28,15 @@ struct GltfTopology {
     bool known = false;
 };
 
+// Adds the file of an image, PNG or JPEG, and gives its number.
+std::size_t add_image(GltfBuffer& buffer, std::span<const std::uint8_t> file);
+
 // Adds a mesh that has vertices, whose positions are in the file's unit, and gives its number in `meshes`. Without
 // triangles it is drawn as points. Triangles and texture coordinates that equal those of `topology` are not repeated;
-// afterwards it holds the mesh's.
-std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topology);
+// afterwards it holds the mesh's. image: the number of its texture's, if it has one, in whose place it then has no
+// colours.
+std::size_t add_mesh(GltfBuffer& buffer, const Mesh& mesh, GltfTopology& topology,
+                     std::optional<std::size_t> image = std::nullopt);
 
 // An accessor of single floats, or of rows of three, as samplers of animations need them; bounds are given in the JSON.
 std::size_t add_numbers(GltfBuffer& buffer, std::span<const float> numbers);

@@ -7,14 +7,16 @@ namespace htvm {
 
 using namespace internal;
 
-Result<std::vector<std::uint8_t>> write_gltf(const Mesh& mesh) {
+Result<std::vector<std::uint8_t>> write_gltf(const Mesh& mesh, std::span<const std::uint8_t> image) {
     if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
     GltfBuffer buffer;
     nlohmann::json root = {{"asset", {{"version", "2.0"}, {"generator", "htvm"}}}, {"scene", 0}};
     nlohmann::json scene = nlohmann::json::object();  // an empty list of nodes is not allowed
     if (!mesh.positions.empty()) {
         GltfTopology topology;
-        const auto number = add_mesh(buffer, mesh, topology);
+        std::optional<std::size_t> texture;
+        if (!image.empty() && !mesh.texcoords.empty()) texture = add_image(buffer, image);
+        const auto number = add_mesh(buffer, mesh, topology, texture);
         root["nodes"].push_back({{"mesh", number}});
         scene["nodes"].push_back(0);
     }

@@ -145,12 +145,17 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         written = &scaled;
     }
     if (*format != MeshFormat::obj) {
-        const auto bytes =
-            *format == MeshFormat::ply ? write_ply(*written, options.timestamp, options.texture) : write_gltf(*written);
+        const auto bytes = *format == MeshFormat::ply ? write_ply(*written, options.timestamp, options.texture)
+                                                      : write_gltf(*written, options.image);
         if (!bytes) return fail_at(path, bytes.error());
         return write_file(path, *bytes);
     }
-    const auto text = write_obj(*written);
+    auto material = path;
+    if (!options.texture.empty()) {
+        material.replace_extension(".mtl");
+        if (auto ok = write_file(material, write_obj_material(options.texture)); !ok) return ok;
+    }
+    const auto text = write_obj(*written, options.texture.empty() ? std::string() : material.filename().string());
     if (!text) return fail_at(path, text.error());
     return write_file(path, *text);
 }

@@ -21,7 +21,9 @@ struct MeshFileOptions {
     double millimetres_per_unit = 1;  // for the file's coordinates: 1000 for a file in metres; finite, above 0
     MeshLimits limits;                // the largest mesh to accept
     std::string timestamp;            // for the comment of a PLY file that is written (ply.h); empty: none
-    std::string texture;              // likewise, the name of its image
+    std::string texture;  // of a PLY or OBJ file that is written, the name of its image; an OBJ's material then
+                          // goes to a file of the same name that ends in .mtl
+    std::span<const std::uint8_t> image;  // of a .glb that is written, the file of its image: PNG or JPEG
 };
 
 // When a PLY file says that its frame was captured (ply.h); empty if it does not say, is no PLY or cannot be read.

@@ -408,9 +408,14 @@ std::vector<ObjMaterial> read_obj_materials(std::string_view text) {
     return out;
 }
 
-Result<std::string> write_obj(const Mesh& mesh) {
+std::string write_obj_material(std::string_view image) {
+    return "newmtl texture\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nmap_Kd " + std::string(image) + '\n';
+}
+
+Result<std::string> write_obj(const Mesh& mesh, std::string_view material_file) {
     if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
     std::string text;
+    if (!material_file.empty()) text.append("mtllib ").append(material_file).append("\n");
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
         append_statement(text, "v", mesh.positions[v]);
         if (!mesh.colours.empty()) {
@@ -424,6 +429,7 @@ Result<std::string> write_obj(const Mesh& mesh) {
     }
     for (const Vector2f& texcoord : mesh.texcoords) append_statement(text, "vt", texcoord), text += '\n';
     for (const Vector3f& normal : mesh.normals) append_statement(text, "vn", normal), text += '\n';
+    if (!material_file.empty()) text += "usemtl texture\n";
     for (const Triangle& triangle : mesh.triangles) {
         text += 'f';
         for (const std::uint32_t index : triangle) {

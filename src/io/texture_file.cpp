@@ -255,28 +255,42 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
     if (!image) return tl::unexpected(image.error());
     if (options_.origin == TextureOrigin::by_format && says_no_origin(path)) {
         if (!from_top_by_seams_)
-            if (const auto difference = difference_at_seams(mesh, **image))
+            if (const auto difference = difference_at_seams(mesh, *image->image))
                 from_top_by_seams_ = difference->from_top < difference->from_bottom;
-        // The image, as the coordinates are to stay what the file says wherever they are coded or compared.
-        if (is_from_top_by_seams())
-            return TexturedMesh(std::move(mesh), std::make_shared<const Image>(turned_over(**image)));
+        // The image, as the coordinates are to stay what the file says wherever they are coded or compared; but a file
+        // that is kept cannot be turned.
+        if (is_from_top_by_seams() && options_.keep_files) {
+            turn_over(mesh);
+        } else if (is_from_top_by_seams()) {
+            if (!kept_turned_) kept_turned_ = std::make_shared<const Image>(turned_over(*image->image));
+            return TexturedMesh(std::move(mesh), kept_turned_);
+        }
     }
-    return TexturedMesh(std::move(mesh), std::move(*image));
+    TexturedMesh out(std::move(mesh), std::move(image->image));
+    out.texture_file = std::move(image->file);
+    return out;
 }
 
-Result<std::shared_ptr<const Image>> TextureFiles::read_image_of(const Found& found, const fs::path& mesh) {
-    if (found.bytes) {
-        auto image = read_image(*found.bytes);
-        if (!image) return fail_at(mesh, image.error().kind, found.name + ": " + image.error().message);
-        return std::make_shared<const Image>(std::move(*image));
+Result<TextureFiles::ReadImage> TextureFiles::read_image_of(const Found& found, const fs::path& mesh) {
+    if (!found.bytes && kept_.image && kept_path_ == found.path) return kept_;
+    ReadImage out;
+    std::vector<std::uint8_t> file;
+    if (!found.bytes && options_.keep_files) {
+        auto bytes = read_file(found.path);
+        if (!bytes) return tl::unexpected(bytes.error());
+        file = std::move(*bytes);
+    } else if (found.bytes && options_.keep_files) {
+        file = *found.bytes;
     }
-    if (!kept_ || kept_path_ != found.path) {
-        auto image = read_image_file(found.path);
-        if (!image) return tl::unexpected(image.error());
-        kept_ = std::make_shared<const Image>(std::move(*image));
-        kept_path_ = found.path;
-    }
-    return kept_;
+    auto image = found.bytes ? read_image(*found.bytes) : read_image_file(found.path);
+    if (!image && found.bytes) return fail_at(mesh, image.error().kind, found.name + ": " + image.error().message);
+    if (!image) return tl::unexpected(image.error());
+    out.image = std::make_shared<const Image>(std::move(*image));
+    if (options_.keep_files) out.file = std::make_shared<const std::vector<std::uint8_t>>(std::move(file));
+    kept_turned_.reset();
+    kept_ = out;
+    kept_path_ = found.bytes ? fs::path() : found.path;
+    return out;
 }
 
 Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const MeshFileOptions& options) {

@@ -29,6 +29,9 @@ struct TextureOptions {
     // the meshes name, or that lie beside them.
     std::string files;
     TextureOrigin origin = TextureOrigin::by_format;
+    // Whether files are kept as they are, in TexturedMesh::texture_file. Where the seams say that coordinates are
+    // counted from the top, then these are turned over, and not the image.
+    bool keep_files = false;
 };
 
 // Which meshes need their image.
@@ -67,7 +70,11 @@ private:
     };
     Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place,
                                    const TextureReference& said, TextureUse use);
-    Result<std::shared_ptr<const Image>> read_image_of(const Found& found, const std::filesystem::path& mesh);
+    struct ReadImage {
+        std::shared_ptr<const Image> image;
+        std::shared_ptr<const std::vector<std::uint8_t>> file;  // where it is to be kept
+    };
+    Result<ReadImage> read_image_of(const Found& found, const std::filesystem::path& mesh);
     Result<Found> find(const std::filesystem::path& mesh, std::size_t place, const TextureReference& said) const;
 
     TextureOptions options_;
@@ -76,7 +83,8 @@ private:
     std::string image_name_;
     std::optional<bool> from_top_by_seams_;  // decided by the first mesh that has seams
     std::filesystem::path kept_path_;        // of the image that was read last, which frames may share
-    std::shared_ptr<const Image> kept_;
+    ReadImage kept_;
+    std::shared_ptr<const Image> kept_turned_;  // the same image turned over, once that was needed
 };
 
 }  // namespace htvm

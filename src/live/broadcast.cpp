@@ -5,6 +5,7 @@
 
 #include "codec/frame_kinds.h"
 #include "htvm/decoder.hpp"
+#include "htvm/texture.hpp"
 
 namespace htvm::live {
 namespace {
@@ -53,12 +54,17 @@ std::optional<std::uint64_t> Broadcast::push(SharedPacket packet, Clock::time_po
     next_place_ = place + 1;
     // What is left of the sequence before must not be sent behind the new header.
     if (dependencies_.sequences() != sequence) closure_.clear();
-    const bool frame = packet->is_frame();
+    const bool frame = packet->is_frame(), picture = packet->is_picture();
+    if (picture && dependencies_.picture_closure().empty()) return place;  // nobody could decode it
     packets_[place] = std::move(packet);
     kept_ = ascending(dependencies_.kept());
+    kept_pictures_ = picture ? united(kept_pictures_, {place}) : kept_pictures_;
+    std::erase_if(kept_pictures_, [&](auto one) { return !std::binary_search(kept_.begin(), kept_.end(), one); });
     const auto closure = ascending(dependencies_.closure());
     if (frame) closure_ = closure;
     forget_all_but(united(united(kept_, closure_), {place}));
+    if (kept_bytes() > limits_.kept_bytes)
+        forget_all_but(united(without(united(kept_, closure_), kept_pictures_), {place}));
     if (kept_bytes() > limits_.kept_bytes) forget_all_but({place});
     if (frame && closure.empty()) {
         ++undecodable_;
@@ -66,7 +72,9 @@ std::optional<std::uint64_t> Broadcast::push(SharedPacket packet, Clock::time_po
     }
     for (auto& [viewer, queue] : viewers_) {
         const bool slept = queue.waiting.empty();
-        if (queue.in_step)
+        if (queue.in_step && picture)
+            give_picture(queue, place, now);
+        else if (queue.in_step)
             give_in_step(queue, place, now);
         else if (frame)
             try_to_follow(queue, now);
@@ -85,9 +93,20 @@ bool Broadcast::is_kept(const LivePacket& packet) const {
     return std::any_of(kept_.begin(), kept_.end(), same) || std::any_of(closure_.begin(), closure_.end(), same);
 }
 
+bool Broadcast::is_picture(std::uint64_t place) const {
+    return std::binary_search(kept_pictures_.begin(), kept_pictures_.end(), place);
+}
+
+bool Broadcast::has_all_pictures() const {
+    return std::all_of(kept_pictures_.begin(), kept_pictures_.end(),
+                       [&](std::uint64_t place) { return packets_.contains(place); });
+}
+
 std::optional<std::vector<Broadcast::Placed>> Broadcast::kept() const {
     std::vector<Placed> out;
+    const bool pictures = has_all_pictures();
     for (const auto place : united(kept_, closure_)) {
+        if (!pictures && is_picture(place)) continue;
         const auto found = packets_.find(place);
         if (found == packets_.end()) return std::nullopt;
         out.push_back({place, found->second});
@@ -103,6 +122,7 @@ void Broadcast::forget() {
     packets_.clear();
     kept_.clear();
     closure_.clear();
+    kept_pictures_.clear();
     next_place_ = 0;
     for (auto& [viewer, queue] : viewers_) queue = {.wake = queue.wake, .counters = queue.counters};
 }
@@ -152,6 +172,8 @@ void Broadcast::give(Queue& queue, std::uint64_t place, Clock::time_point now) {
 void Broadcast::give_in_step(Queue& queue, std::uint64_t place, Clock::time_point now) {
     const auto& packet = *packets_.at(place);
     if (fits(queue, packet, now)) return give(queue, place, now);
+    drop_pictures(queue);
+    if (fits(queue, packet, now)) return give(queue, place, now);
     const bool frame = packet.is_frame();
     // Nothing depends on it, as on sound.
     if (packet.header.has(packet_flag::droppable)) {
@@ -162,12 +184,33 @@ void Broadcast::give_in_step(Queue& queue, std::uint64_t place, Clock::time_poin
     if (frame) try_to_follow(queue, now);
 }
 
+// Pictures may fill half of a queue: the rest is the meshes'.
+void Broadcast::give_picture(Queue& queue, std::uint64_t place, Clock::time_point now) {
+    const auto& packet = *packets_.at(place);
+    const bool room = queue.waiting.empty() || (2 * (queue.bytes + packet.bytes.size()) <= limits_.bytes &&
+                                                2 * (now - queue.waiting.front().arrived) <= limits_.wait);
+    queue.pictures = room && (queue.pictures || is_key_picture(packet.header));
+    if (queue.pictures) return give(queue, place, now);
+    ++queue.counters.dropped_pictures;
+}
+
+void Broadcast::drop_pictures(Queue& queue) {
+    queue.pictures = false;
+    std::erase_if(queue.waiting, [&](const Waiting& waiting) {
+        if (!waiting.packet->is_picture()) return false;
+        queue.bytes -= waiting.packet->bytes.size();
+        ++queue.counters.dropped_pictures;
+        return true;
+    });
+}
+
 // What waits is dropped: by the time it could be sent it would be late. `place`: the packet that does not fit.
 void Broadcast::fall_behind(Queue& queue, std::uint64_t place) {
     Places dropped;
     for (const auto& waiting : queue.waiting) {
         dropped.push_back(waiting.place);
         if (waiting.packet->is_frame()) ++queue.counters.dropped_frames;
+        if (waiting.packet->is_picture()) ++queue.counters.dropped_pictures;
     }
     dropped.push_back(place);
     std::sort(dropped.begin(), dropped.end());
@@ -175,13 +218,15 @@ void Broadcast::fall_behind(Queue& queue, std::uint64_t place) {
     queue.waiting.clear();
     queue.bytes = 0;
     queue.in_step = false;
+    queue.pictures = false;
     ++queue.counters.fallen_behind;
 }
 
 // Gives the newest frame with all that it and later ones need, if that is little, or the viewer has just come. Missed
-// references count by their bytes alone: until the next I-frame, which may be long in coming, no frame needs fewer.
+// references count by their bytes alone: until the next I-frame, which may be long in coming, no frame needs fewer. Who
+// comes is given the pictures too, if they are not much; who comes back waits for the next key picture.
 void Broadcast::try_to_follow(Queue& queue, Clock::time_point now) {
-    const auto needed = without(united(kept_, closure_), queue.has);
+    auto needed = without(without(united(kept_, closure_), kept_pictures_), queue.has);
     std::size_t missed = 0, references = 0, bytes = 0;  // of the missed frames, how many are references
     bool there = true;
     for (const auto place : needed) {
@@ -198,6 +243,11 @@ void Broadcast::try_to_follow(Queue& queue, Clock::time_point now) {
         if (!queue.joining) ++queue.counters.dropped_frames;
         return;
     }
+    std::size_t picture_bytes = 0;
+    const bool pictures = queue.joining && has_all_pictures();
+    for (const auto place : kept_pictures_) picture_bytes += pictures ? packets_.at(place)->bytes.size() : 0;
+    queue.pictures = pictures && !kept_pictures_.empty() && bytes + picture_bytes <= limits_.bytes;
+    if (queue.pictures) needed = united(needed, kept_pictures_);
     // A header that was repeated comes behind the I-frame that it is needed for.
     for (const bool header : {true, false})
         for (const auto place : needed)

@@ -1,6 +1,7 @@
 // One live stream on its way from its publisher to its viewers. A late viewer is sent what the newest frame needs, then
 // everything as it comes. What waits for a slow viewer is bounded, so it neither delays the others nor takes memory:
 // it is dropped up to the next frame that needs little, and counted. What a viewer is sent can always be decoded.
+// Pictures of textures are dropped first, up to the next key picture: the meshes go on, wearing the last one.
 //
 // Only headers are read (docs/bitstream.md, section 2.2), and there is no network here: a server pushes packets in, and
 // takes for each viewer the next packet to write.
@@ -28,6 +29,7 @@ struct LivePacket {
     std::optional<Stamp> stamp{};  // for measurement
 
     bool is_frame() const;
+    bool is_picture() const { return header.kind == PacketKind::texture; }
     // Whether it is the reference of the frames that follow.
     bool is_reference() const;
     // Whether it and what follows can be decoded by whoever has the reference, without the T-frames before it.
@@ -49,7 +51,8 @@ struct BroadcastLimits {
 struct ViewerCounters {
     std::uint64_t packets = 0, bytes = 0;  // taken to be written
     std::uint64_t dropped_frames = 0;
-    std::uint64_t fallen_behind = 0;  // how often
+    std::uint64_t dropped_pictures = 0;  // of textures: the meshes come without them
+    std::uint64_t fallen_behind = 0;     // how often
 };
 
 class Broadcast {
@@ -105,15 +108,20 @@ private:
         std::size_t bytes = 0;             // of what waits
         bool in_step = false;              // it was given all that later frames may need
         bool joining = true;               // it was not given a frame yet
+        bool pictures = false;             // it was given all pictures that the next one may need
         std::vector<std::uint64_t> has{};  // if not in step: which of kept_ it was sent, ascending
         ViewerCounters counters{};
     };
     bool fits(const Queue& queue, const LivePacket& packet, Clock::time_point now) const;
     void give(Queue& queue, std::uint64_t place, Clock::time_point now);
     void give_in_step(Queue& queue, std::uint64_t place, Clock::time_point now);
+    void give_picture(Queue& queue, std::uint64_t place, Clock::time_point now);
+    void drop_pictures(Queue& queue);
     void fall_behind(Queue& queue, std::uint64_t place);
     void try_to_follow(Queue& queue, Clock::time_point now);
     bool is_kept(const LivePacket& packet) const;
+    bool is_picture(std::uint64_t place) const;
+    bool has_all_pictures() const;
     void forget_all_but(const std::vector<std::uint64_t>& needed);
 
     BroadcastLimits limits_;
@@ -122,6 +130,8 @@ private:
         packets_;  // by place: those of kept_ and closure_, unless they were too large
     // Ascending: what later frames may need, and what the newest frame needs; empty if that cannot be decoded.
     std::vector<std::uint64_t> kept_, closure_;
+    std::vector<std::uint64_t> kept_pictures_;  // those of kept_ that are pictures; where they are too many, not in
+                                                // packets_
     std::map<Viewer, Queue> viewers_;
     Viewer next_viewer_ = 0;
     std::uint64_t undecodable_ = 0, next_place_ = 0;

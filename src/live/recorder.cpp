@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "htvm/stream_index.hpp"
+#include "htvm/texture.hpp"
 #include "io/output_file.h"
 
 namespace htvm::live {
@@ -269,6 +270,7 @@ struct Stream {
     bool file = false;                     // one has begun, and nothing happened to it
     bool whole = false;                    // what comes next can be decoded from what is in it,
     bool reference = false;                // or at least what needs the reference alone
+    bool pictures = false;                 // the next picture can be decoded, as the file has those before
     Recorder::Clock::time_point begun{};   // the file
     std::optional<Recorder::Clock::time_point> failed{};
 };
@@ -342,11 +344,16 @@ bool Recorder::take(const std::string& name, const SharedPacket& packet, Clock::
     if (begins_file(header) && (!stream.file || due)) {
         stream.whole = stream.reference = stream.file = put(stream.header, options.folder / recording_name(name, time));
         stream.begun = now;
+        stream.pictures = false;
         stream.failed.reset();
     } else if (begins_file(header) || (stream.file && stream.reference && packet->is_access())) {
         stream.whole = stream.reference = true;
     } else if (!stream.whole && frame && stream.file) {
         ++state_->shared->dropped_frames;
+    }
+    if (packet->is_picture()) {
+        stream.pictures = stream.whole && (stream.pictures || is_key_picture(header)) && put(packet, {});
+        return false;
     }
     const bool taken = stream.whole && put(packet, {});
     if (!taken && (packet->is_reference() || header.kind == PacketKind::codebook)) stream.reference = false;

@@ -10,12 +10,18 @@ bool RepeatedPackets::is_repeat(const PacketHeader& header) {
         header_ = header.has(packet_flag::session) ? std::optional(header.reference) : std::nullopt;
         frame_.reset();
         audio_us_.reset();
+        picture_.reset();
         return false;
     }
     if (!header_) return false;
     if (header.kind == PacketKind::audio) {
         if (audio_us_ && header.timestamp_us <= *audio_us_) return true;
         audio_us_ = header.timestamp_us;
+        return false;
+    }
+    if (header.kind == PacketKind::texture) {
+        if (picture_ && header.frame <= *picture_) return true;
+        picture_ = header.frame;
         return false;
     }
     if (frame_ && header.frame <= *frame_) return true;

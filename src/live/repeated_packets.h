@@ -20,6 +20,7 @@ private:
     std::optional<std::uint32_t> header_;   // the CRC of the one in force, if it has a session
     std::optional<std::uint32_t> frame_;    // the last one's number
     std::optional<std::int64_t> audio_us_;  // of the last sound
+    std::optional<std::uint32_t> picture_;  // the last picture's frame
 };
 
 }  // namespace htvm::live

@@ -65,7 +65,7 @@ expect 1 "square.obj: this is no PNG, JPEG or WebP image; save it as one of them
 mkdir some && grep '^[vf]' square.obj | tee some/a_1.obj >some/a_2.obj && cp skin.png some/a_1.png
 expect 1 "some/a_2.obj: there is no image for it, as there is for others" "$htvm" encode some -o x.htvm
 expect 0 "1 bad frame left out" "$htvm" encode some --on-bad-frame skip -o x.htvm
-expect 1 "x.htvm is a stream, which has no texture" "$htvm" still x.htvm --texture skin.png -o x.png
+expect 1 "x.htvm is a stream, whose texture is inside" "$htvm" still x.htvm --texture skin.png -o x.png
 expect 2 "left not in {bottom,top}" "$htvm" still square.obj --texture-origin left -o x.png
 rm skin.png
 expect 1 'square.obj: its image "skin.png" is not in its folder; --texture gives its place, or none to go on without' \

@@ -371,5 +371,115 @@ TEST(Broadcast, AfterItForgotItsViewersGoOnWithTheNextClosure) {
     EXPECT_EQ(viewer.take_numbers(), (Numbers{-1, 5, 6}));
 }
 
+// ---- Pictures of textures -------------------------------------------------------------------------------------------
+
+SharedPacket picture(std::uint32_t frame, std::size_t bytes = 200) {
+    return packet(PacketKind::texture, frame, frame - 1, referred, bytes);
+}
+SharedPacket key_picture(std::uint32_t frame, std::size_t bytes = 400) {
+    return packet(PacketKind::texture, frame, frame, referred | access, bytes);
+}
+bool is_picture(const SharedPacket& packet) { return packet->is_picture(); }
+
+// The frames' numbers, and those of pictures with a minus one hundred.
+Numbers numbers_of(const std::vector<SharedPacket>& packets) {
+    Numbers out;
+    for (const auto& one : packets)
+        if (one->header.kind != PacketKind::sequence)
+            out.push_back(static_cast<int>(one->header.frame) - (one->is_picture() ? 100 : 0));
+    return out;
+}
+
+TEST(Broadcast, ALateViewerGetsThePicturesSinceTheLastKeyPicture) {
+    Broadcast broadcast;
+    broadcast.push(header(), start);
+    for (const auto& next : {intra(0), key_picture(0), tracked(1), picture(1), tracked(2), key_picture(2), tracked(3),
+                             picture(3), tracked(4)})
+        broadcast.push(next, start);
+    Watching viewer(broadcast);
+    EXPECT_EQ(numbers_of(viewer.take()), (Numbers{0, 1, 2, -98, 3, -97, 4}));
+    broadcast.push(picture(4), start);
+    EXPECT_EQ(numbers_of(viewer.take()), (Numbers{-96}));
+}
+
+TEST(Broadcast, ASlowViewerLosesPicturesUpToTheNextKeyPictureAndNoMeshes) {
+    Broadcast broadcast({.bytes = 3000, .wait = 10s});
+    Watching slow(broadcast);
+    broadcast.push(header(), start);
+    broadcast.push(intra(0, 500), start);
+    broadcast.push(key_picture(0), start);
+    for (std::uint32_t i = 1; i <= 15; ++i) {
+        broadcast.push(tracked(i), start);
+        broadcast.push(picture(i), start);
+    }
+    auto got = slow.take();
+    EXPECT_EQ(std::count_if(got.begin(), got.end(), [](const auto& one) { return one->is_frame(); }), 16);
+    const auto pictures = std::count_if(got.begin(), got.end(), is_picture);
+    EXPECT_LT(pictures, 16);
+    EXPECT_EQ(broadcast.counters(slow.viewer).dropped_frames, 0u);
+    EXPECT_EQ(broadcast.counters(slow.viewer).dropped_pictures, static_cast<std::uint64_t>(16 - pictures));
+    for (const auto& next : {tracked(16), picture(16), tracked(17), key_picture(17), tracked(18), picture(18)})
+        broadcast.push(next, start);
+    EXPECT_EQ(numbers_of(slow.take()), (Numbers{16, 17, -83, 18, -82}));
+}
+
+TEST(Broadcast, PicturesThatWaitMakeRoomForMeshes) {
+    Broadcast broadcast({.bytes = 1000, .wait = 10s});
+    Watching slow(broadcast);
+    broadcast.push(header(), start);
+    broadcast.push(intra(0, 110), start);
+    broadcast.push(key_picture(0, 250), start);
+    for (std::uint32_t i = 1; i <= 6; ++i) broadcast.push(tracked(i), start);
+    EXPECT_EQ(numbers_of(slow.take()), (Numbers{0, 1, 2, 3, 4, 5, 6}));
+    EXPECT_EQ(broadcast.counters(slow.viewer).dropped_pictures, 1u);
+    EXPECT_EQ(broadcast.counters(slow.viewer).fallen_behind, 0u);
+}
+
+TEST(Broadcast, WhoComesBackWaitsForAKeyPicture) {
+    Broadcast broadcast({.bytes = 1000, .wait = 10s, .most_missed = 1});
+    Watching slow(broadcast);
+    broadcast.push(header(), start);
+    broadcast.push(intra(0, 110), start);
+    broadcast.push(key_picture(0, 120), start);
+    for (std::uint32_t i = 1; i <= 10; ++i) broadcast.push(tracked(i), start);
+    EXPECT_EQ(broadcast.counters(slow.viewer).fallen_behind, 1u);
+    EXPECT_EQ(numbers_of(slow.take()), Numbers{});
+    for (const auto& next : {intra(11, 110), picture(11, 50), tracked(12), key_picture(12, 50), tracked(13)})
+        broadcast.push(next, start);
+    EXPECT_EQ(numbers_of(slow.take()), (Numbers{11, 12, -88, 13}));
+}
+
+TEST(Broadcast, PicturesThatNobodyCouldDecodeGoNoFurther) {
+    Broadcast broadcast;
+    Watching viewer(broadcast);
+    broadcast.push(header(), start);
+    for (const auto& next :
+         {intra(0), picture(0), tracked(1), picture(1), tracked(2), key_picture(2), tracked(3), picture(3)})
+        broadcast.push(next, start);
+    EXPECT_EQ(numbers_of(viewer.take()), (Numbers{0, 1, 2, -98, 3, -97}));
+}
+
+TEST(Broadcast, WherePicturesAreTooManyToBeKeptMeshesStillAre) {
+    Broadcast broadcast({.kept_bytes = 3000});
+    broadcast.push(header(), start);
+    broadcast.push(intra(0), start);
+    broadcast.push(key_picture(0), start);
+    for (std::uint32_t i = 1; i <= 10; ++i) {
+        broadcast.push(tracked(i), start);
+        broadcast.push(picture(i), start);
+    }
+    EXPECT_LE(broadcast.kept_bytes(), 3000u);
+    Watching viewer(broadcast);
+    EXPECT_EQ(numbers_of(viewer.take()), (Numbers{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10}));
+    broadcast.push(tracked(11), start);
+    broadcast.push(picture(11), start);
+    EXPECT_EQ(numbers_of(viewer.take()), Numbers{11});
+    broadcast.push(tracked(12), start);
+    broadcast.push(key_picture(12), start);
+    EXPECT_EQ(numbers_of(viewer.take()), (Numbers{12, -88}));
+    Watching late(broadcast);
+    EXPECT_EQ(numbers_of(late.take()).back(), -88);
+}
+
 }  // namespace
 }  // namespace htvm::live

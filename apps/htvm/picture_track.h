@@ -1,0 +1,99 @@
+// The pictures of a textured capture, coded and laid behind the frames of its stream.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/image.h"
+#include "htvm/packet.hpp"
+#include "htvm/picture_encoder.hpp"
+#include "htvm/result.hpp"
+#include "htvm/texture.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace htvm::app {
+
+struct TexturePictureOptions {
+    int size = 0;                   // pixels of the longer side; 0: as captured
+    std::string codec = "av1";      // or vp9
+    std::optional<double> quality;  // 0..100; not given: that of the meshes
+};
+
+// Adds --texture-size, --texture-codec and --texture-quality to a command.
+void add_texture_picture_options(CLI::App& command, TexturePictureOptions& options);
+
+// The coder's quantiser for a quality at which neither meshes nor pictures spend bits that the others' errors hide.
+int quantiser_of(PictureCoder coder, double quality);
+
+// Of a rate for both, what the meshes are given: so their errors and those of the pictures are worth the same bits.
+inline constexpr double share_of_meshes = 0.35;
+
+struct PictureTotals {
+    std::size_t pictures = 0, key_pictures = 0;
+    std::uint64_t bytes = 0;  // of their packets
+    double seconds = 0;       // that coding them took
+};
+
+// Takes the picture of each frame that goes into the encoder of meshes, and gives it out behind that frame's packet.
+class PictureTrack {
+public:
+    // Of images of this size, which others are brought to. With keep, files go as they are. bits_per_second: of meshes
+    // and pictures together; 0: by the quality.
+    struct Settings {
+        TexturePictureOptions options;
+        bool keep = false;
+        int width = 0, height = 0;  // of the capture's first image
+        double quality = 50, frames_per_second = 30;
+        double bits_per_second = 0, buffer_seconds = 1;
+        unsigned threads = 0;
+    };
+    static Result<PictureTrack> create(const Settings& settings);
+
+    // Of the pictures in the stream; 0 where files are kept, which may differ.
+    std::uint32_t width() const { return width_; }
+    std::uint32_t height() const { return height_; }
+
+    // The picture of a frame with this timestamp: a later frame without one shows it too.
+    void add(std::int64_t timestamp_us, std::shared_ptr<const Image> image,
+             std::shared_ptr<const std::vector<std::uint8_t>> file);
+    // What comes behind a packet of the stream, of which it takes every one, in order: nothing where the picture is the
+    // one before, and the frame none to start at. bytes: of the packet; what these leave of the rate, pictures take.
+    Result<std::optional<Packet>> behind(const PacketHeader& packet, std::size_t bytes);
+    // The rate of all, from the next picture on.
+    void set_bitrate(double bits_per_second) { bits_per_second_ = bits_per_second; }
+    const PictureTotals& totals() const { return totals_; }
+
+private:
+    struct Waiting {
+        std::int64_t timestamp_us;
+        std::shared_ptr<const Image> image;
+        std::shared_ptr<const std::vector<std::uint8_t>> file;
+    };
+    PictureTrack() = default;
+    Result<void> follow_meshes(std::size_t bytes);
+    Result<Packet> coded_as_video(const PacketHeader& frame, const Waiting& picture, bool key);
+    Result<Packet> kept_file(const PacketHeader& frame, const Waiting& picture) const;
+
+    std::uint32_t width_ = 0, height_ = 0;
+    PictureCoder coder_ = PictureCoder::av1;
+    std::optional<PictureEncoder> encoder_;  // none: files are kept
+    std::deque<Waiting> waiting_;
+    std::shared_ptr<const Image> last_;         // that was coded
+    std::optional<std::uint32_t> last_number_;  // of its frame
+    std::optional<std::uint32_t> last_key_;     // of the last key picture's
+    double frames_per_second_ = 30;
+    double bits_per_second_ = 0;            // 0: by the quality
+    std::optional<double> of_meshes_ = {};  // of these, as of late
+    double set_ = 0;                        // what the encoder was told
+    PictureTotals totals_;
+};
+
+}  // namespace htvm::app

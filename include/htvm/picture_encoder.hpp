@@ -1,0 +1,53 @@
+// Codes the pictures of a textured stream as video: AV1 by libaom, VP9 by libvpx. Each picture is coded as it comes,
+// without those that follow it, so that a live stream waits for nothing.
+//
+// Part of the library htvm::texture, which needs libaom, libvpx and libdav1d.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "htvm/picture_planes.hpp"
+#include "htvm/result.hpp"
+#include "htvm/texture.hpp"
+
+namespace htvm {
+
+struct PictureEncoderOptions {
+    PictureCoder coder = PictureCoder::av1;  // or vp9
+    std::uint32_t width = 0, height = 0;     // pixels, 16..most_picture_side
+    double frames_per_second = 30;
+    int quantiser = 32;          // 0..63, where no rate is given: how coarse pictures are, the same for all
+    double bits_per_second = 0;  // 0: by the quantiser. Otherwise the rate is kept to, over the buffer
+    double buffer_seconds = 1;   // of the receiver
+    int speed = 8;               // 5..9: 9 takes half the time of 5, and some 5 % more bits
+    unsigned threads = 0;        // 0: one per core. The bytes are the same for any number
+};
+
+struct CodedPicture {
+    std::vector<std::uint8_t> bytes;  // as TexturePicture::coded
+    bool key = false;
+};
+
+class PictureEncoder {
+public:
+    // bad_input: an option is out of its range; unsupported: the coder is none of video.
+    static Result<PictureEncoder> create(const PictureEncoderOptions& options);
+    PictureEncoder(PictureEncoder&&) noexcept;
+    PictureEncoder& operator=(PictureEncoder&&) noexcept;
+    ~PictureEncoder();
+
+    // The next picture, of the size given before. The first is a key picture, and so is one that is asked to be.
+    Result<CodedPicture> encode(const PicturePlanes& picture, bool key = false);
+    // From the next picture on. Only where there was no rate, or one, from the beginning.
+    Result<void> set_quantiser(int quantiser);
+    Result<void> set_bitrate(double bits_per_second);
+
+private:
+    struct State;
+    explicit PictureEncoder(std::unique_ptr<State> state);
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace htvm

@@ -1,0 +1,101 @@
+#!/usr/bin/env bash
+# Streams with pictures: encode --texture-as, and what info, verify, cut, join, decode and compare make of them.
+. "$(dirname "$0")/expect.sh"
+
+"$htvm" synth walk --frames 9 --vertices 300 --texture 256 --texture-format png >/dev/null 2>&1
+encode() { "$htvm" encode walk --profile topology --keyint 4 "$@" 2>/dev/null; }
+json() { "$htvm" info "$1" --json | python3 -c "import json, sys; print(json.load(sys.stdin)[\"pictures\"]$2)"; }
+
+# A picture behind every frame, key pictures where decoding starts.
+for codec in av1 vp9; do
+    encode --texture-as captured --texture-codec $codec -o $codec.htvm || fail "encode by $codec"
+    expect 0 "256 x 256 pixels, 9 pictures" "$htvm" info $codec.htvm
+    [ "$(json $codec.htvm '["coder"].lower()')" = $codec ] || fail "the coder is not $codec"
+    [ "$(json $codec.htvm '["key_pictures"]')" = 1 ] || fail "$codec: not one key picture"
+    expect 0 "9 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify $codec.htvm
+done
+# They show the captured texture, which colours at vertices blur.
+ssim() { "$htvm" compare walk "$1" --only m3 --views 2 --frames 1 --json 2>/dev/null | python3 -c 'import json, sys; print(json.load(sys.stdin)["frames"][0]["m3_unlit"]["ssim"])'; }
+encode --texture-as captured --texture-quality 100 -o fine.htvm
+encode --texture-as captured --texture-quality 0 -o coarse.htvm
+[ "$(json fine.htvm '["bytes"]')" -gt $((2 * $(json coarse.htvm '["bytes"]'))) ] || fail "quality makes no difference"
+encode --texture-as colours -q 42 -o colours.htvm
+python3 -c 'import sys; sys.exit(not float(sys.argv[1]) > float(sys.argv[2]) + 0.02)' "$(ssim fine.htvm)" "$(ssim colours.htvm)" ||
+    fail "pictures, $(ssim fine.htvm), are no more like the capture than colours, $(ssim colours.htvm)"
+encode --texture-as captured --texture-size 32 -o small.htvm
+expect 0 "32 x 32 pixels" "$htvm" info small.htvm
+
+# Files that are kept come back as they were.
+encode --texture-as keep -o kept.htvm
+expect 0 "pictures: PNG, 256 x 256 pixels, 9 pictures" "$htvm" info kept.htvm
+expect 0 "with 9 pictures" "$htvm" verify kept.htvm
+"$htvm" decode kept.htvm -o kept 2>/dev/null
+for image in walk/*.png; do
+    cmp -s "$image" "kept/${image#walk/frame_}" || fail "$image is not kept"
+done
+
+# Decoded: images beside the meshes, which name them, or inside.
+"$htvm" decode av1.htvm -o ply 2>/dev/null
+"$htvm" decode av1.htvm -o obj --format obj --images jpeg 2>/dev/null
+"$htvm" decode av1.htvm -o glb --format glb 2>/dev/null
+"$htvm" decode av1.htvm -o whole.glb 2>/dev/null
+for format in ply:png obj:jpg obj:mtl; do
+    folder=${format%:*}
+    [ "$(ls "$folder"/*."${format#*:}" | wc -l)" = 9 ] || fail "there are not 9 .${format#*:} beside the .$folder"
+done
+for meshes in ply obj glb; do
+    expect 0 "the texture (" "$htvm" encode $meshes --profile topology --frames 2 --texture-as captured -o again.htvm
+done
+"$htvm" decode av1.htvm --first 5 --frames 2 -o part 2>/dev/null
+for image in part/*.png; do cmp -s "$image" "ply/${image#part/}" || fail "from frame 5 on, $image is another"; done
+[ "$(ls part/*.png | wc -l)" = 2 ] || fail "two frames have not two images"
+
+# Cut, joined, encoded in groups.
+expect 0 "18 frames" "$htvm" join av1.htvm av1.htvm -o twice.htvm
+expect 0 "18 frames in 1 sequence, all sound, with an index, with 18 pictures" "$htvm" verify twice.htvm
+"$htvm" cut twice.htvm --first 9 -o second.htvm 2>/dev/null
+expect 0 "9 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify second.htvm
+# From the middle on there is none up to the next key picture.
+"$htvm" cut twice.htvm --first 4 -o middle.htvm 2>/dev/null
+expect 0 "14 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify middle.htvm
+encode --texture-as captured --jobs 1 -o one.htvm
+encode --texture-as captured --jobs 2 -o two.htvm
+cmp -s one.htvm two.htvm || fail "the number of jobs changes the stream"
+expect 0 "with 9 pictures" "$htvm" verify one.htvm
+
+# A damaged picture costs no frame.
+python3 - av1.htvm damaged.htvm <<'PYTHON'
+import struct, sys
+data = bytearray(open(sys.argv[1], "rb").read())
+at, pictures = 0, 0
+while at < len(data):
+    kind, size = data[at + 4], struct.unpack("<I", data[at + 24 : at + 28])[0]
+    pictures += kind == 12
+    if kind == 12 and pictures == 2:
+        data[at + 34] ^= 255
+    at += 36 + size
+open(sys.argv[2], "wb").write(data)
+PYTHON
+expect 3 "not part of an undamaged packet" "$htvm" verify damaged.htvm
+"$htvm" decode damaged.htvm -o damaged 2>/dev/null
+[ "$(ls damaged/*.ply | wc -l)" = 9 ] || fail "a damaged picture costs frames"
+
+# A rate that meshes and pictures share.
+"$htvm" encode walk --profile topology --texture-as captured --bitrate 4 -o rate.htvm 2>/dev/null
+python3 - "$("$htvm" info rate.htvm --json | python3 -c 'import json, sys; print(json.load(sys.stdin)["megabits_per_second"])')" <<'PYTHON' || fail "the rate is not met"
+import sys
+sys.exit(not float(sys.argv[1]) <= 5.2)
+PYTHON
+
+# What does not go together is said.
+no() { expect 2 "$1" "$htvm" encode walk -o never.htvm "${@:2}"; }
+no "add --profile topology" --texture-as captured
+no "add --texture-as captured" --texture-size 64
+no "keep leaves image files as large as they are" --profile topology --texture-as keep --bitrate 2
+no "follows from --bitrate" --profile topology --texture-as captured --bitrate 2 --texture-quality 5
+no "leaves no images" --profile topology --texture-as captured --texture none
+"$htvm" synth plain --frames 2 --vertices 200 >/dev/null 2>&1
+expect 1 "no texture" "$htvm" encode plain --profile topology --texture-as captured -o never.htvm
+[ ! -e never.htvm ] || fail "something was written"
+
+done_with "pictures in streams are written, found, cut, joined, decoded and checked"

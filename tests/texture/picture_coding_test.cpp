@@ -1,0 +1,251 @@
+// Pictures to video and back, by both coders.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include "htvm/picture_decoder.hpp"
+#include "htvm/picture_encoder.hpp"
+#include "io/image_file.h"
+
+namespace htvm {
+namespace {
+
+constexpr int width = 160, height = 96;
+
+// Waves that move.
+Image waves(int time, int of_width = width, int of_height = height) {
+    Image out{of_width, of_height, {}};
+    for (int y = 0; y < of_height; ++y)
+        for (int x = 0; x < of_width; ++x)
+            for (int k = 0; k < 3; ++k)
+                out.rgb.push_back(static_cast<std::uint8_t>(128 + 60 * std::sin((x + 2 * time) / 9.0 + k) +
+                                                            50 * std::sin((y - time) / 7.0 - k)));
+    return out;
+}
+
+double psnr(const Image& a, const Image& b) {
+    EXPECT_EQ(a.rgb.size(), b.rgb.size());
+    double sum = 0;
+    for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::pow(int{a.rgb[i]} - int{b.rgb[i]}, 2);
+    return 10 * std::log10(255.0 * 255 * static_cast<double>(a.rgb.size()) / std::max(sum, 1.0));
+}
+
+PictureEncoderOptions small(PictureCoder coder) {
+    PictureEncoderOptions out;
+    out.coder = coder;
+    out.width = width;
+    out.height = height;
+    out.quantiser = 20;
+    return out;
+}
+
+// Packets of so many pictures, those in `keys` being key pictures.
+std::vector<Packet> coded(const PictureEncoderOptions& options, int pictures, const std::vector<int>& keys = {}) {
+    auto encoder = PictureEncoder::create(options);
+    EXPECT_TRUE(encoder) << encoder.error().message;
+    std::vector<Packet> out;
+    for (int i = 0; i < pictures; ++i) {
+        const bool key = std::find(keys.begin(), keys.end(), i) != keys.end();
+        const auto picture = encoder->encode(
+            OwnPlanes(waves(i, static_cast<int>(options.width), static_cast<int>(options.height))).view(), key);
+        EXPECT_TRUE(picture) << picture.error().message;
+        EXPECT_EQ(picture->key, key || i == 0);
+        TexturePicture written;
+        written.coder = options.coder;
+        written.width = options.width;
+        written.height = options.height;
+        written.coded = picture->bytes;
+        const auto frame = static_cast<std::uint32_t>(i);
+        out.push_back(write_texture_picture(written, {frame, picture->key ? frame : frame - 1, 1000 * i, true}));
+    }
+    return out;
+}
+
+class PictureCoding : public ::testing::TestWithParam<PictureCoder> {};
+INSTANTIATE_TEST_SUITE_P(BothCoders, PictureCoding, ::testing::Values(PictureCoder::av1, PictureCoder::vp9),
+                         [](const auto& instance) { return std::string(name_of(instance.param)); });
+
+TEST_P(PictureCoding, OnePacketAPictureComesBackLikeIt) {
+    PictureDecoder decoder;
+    int i = 0;
+    for (const auto& packet : coded(small(GetParam()), 6)) {
+        const auto taken = decoder.take(packet);
+        ASSERT_TRUE(taken) << taken.error().message;
+        EXPECT_EQ(decoder.frame(), packet.frame);
+        ASSERT_TRUE(decoder.planes());
+        EXPECT_EQ(decoder.planes()->width, static_cast<std::uint32_t>(width));
+        EXPECT_GT(psnr(*decoder.image(), waves(i++)), 32);
+    }
+    EXPECT_EQ(i, 6);
+}
+
+TEST_P(PictureCoding, DecodingStartsAtAKeyPictureAndNowhereElse) {
+    const auto packets = coded(small(GetParam()), 8, {5});
+    PictureDecoder decoder;
+    EXPECT_FALSE(decoder.take(packets[3]));
+    EXPECT_EQ(decoder.image(), nullptr);
+    for (std::size_t i = 5; i < 8; ++i) {
+        const auto taken = decoder.take(packets[i]);
+        ASSERT_TRUE(taken) << taken.error().message;
+        EXPECT_GT(psnr(*decoder.image(), waves(static_cast<int>(i))), 32);
+    }
+}
+
+TEST_P(PictureCoding, AfterALostPictureTheLastOneStaysUntilTheNextKeyPicture) {
+    const auto packets = coded(small(GetParam()), 8, {5});
+    PictureDecoder decoder;
+    ASSERT_TRUE(decoder.take(packets[0]));
+    const auto first = *decoder.image();
+    for (const std::size_t i : {2, 3, 4}) {
+        const auto taken = decoder.take(packets[i]);
+        ASSERT_FALSE(taken);
+        EXPECT_EQ(taken.error().kind, ErrorKind::corrupt_stream);
+        EXPECT_EQ(decoder.image()->rgb, first.rgb);
+        EXPECT_EQ(decoder.frame(), 0u);
+    }
+    EXPECT_TRUE(decoder.take(packets[5]));
+}
+
+TEST_P(PictureCoding, DamagedBytesAreAnErrorOrAPictureAndTheNextKeyPictureIsSound) {
+    const auto packets = coded(small(GetParam()), 4, {3});
+    std::srand(1);
+    for (int trial = 0; trial < 200; ++trial) {
+        PictureDecoder decoder;
+        ASSERT_TRUE(decoder.take(packets[0]));
+        auto damaged = packets[1];
+        for (int k = 0; k < 3; ++k)
+            damaged.payload[10 + static_cast<std::size_t>(std::rand()) % (damaged.payload.size() - 10)] =
+                static_cast<std::uint8_t>(std::rand());
+        (void)decoder.take(damaged);
+        (void)decoder.take(packets[2]);
+        ASSERT_TRUE(decoder.take(packets[3]));
+        EXPECT_GT(psnr(*decoder.image(), waves(3)), 32);
+    }
+}
+
+TEST_P(PictureCoding, AQuantiserThatIsCoarserTakesFewerBits) {
+    const auto bytes = [&](int quantiser) {
+        auto options = small(GetParam());
+        options.quantiser = quantiser;
+        std::size_t out = 0;
+        for (const auto& packet : coded(options, 5)) out += packet.payload.size();
+        return out;
+    };
+    EXPECT_LT(bytes(55), bytes(35));
+    EXPECT_LT(bytes(35), bytes(10));
+}
+
+TEST_P(PictureCoding, TheQuantiserCanChangeFromPictureToPicture) {
+    auto options = small(GetParam());
+    options.quantiser = 60;
+    auto encoder = PictureEncoder::create(options);
+    ASSERT_TRUE(encoder);
+    const auto coarse = encoder->encode(OwnPlanes(waves(0)).view());
+    ASSERT_TRUE(encoder->set_quantiser(5));
+    const auto fine = encoder->encode(OwnPlanes(waves(0)).view(), true);
+    ASSERT_TRUE(coarse && fine);
+    EXPECT_GT(fine->bytes.size(), 2 * coarse->bytes.size());
+    EXPECT_FALSE(encoder->set_bitrate(1e5)) << "there was no rate from the beginning";
+}
+
+TEST_P(PictureCoding, KeepsToARate) {
+    auto options = small(GetParam());
+    options.bits_per_second = 60e3;
+    options.buffer_seconds = 1;
+    std::size_t bytes = 0;
+    for (const auto& packet : coded(options, 90)) bytes += packet.payload.size();
+    EXPECT_NEAR(8.0 * static_cast<double>(bytes) / 3, 60e3, 15e3);
+}
+
+TEST_P(PictureCoding, TheBytesAreTheSameForAnyNumberOfThreads) {
+    auto options = small(GetParam());
+    options.width = options.height = 1024;
+    options.threads = 1;
+    const auto by_one = coded(options, 3);
+    options.threads = 3;
+    const auto by_three = coded(options, 3);
+    for (std::size_t i = 0; i < by_one.size(); ++i) EXPECT_EQ(by_one[i].payload, by_three[i].payload) << i;
+}
+
+TEST_P(PictureCoding, OddSidesComeBack) {
+    auto options = small(GetParam());
+    options.width = 99;
+    options.height = 51;
+    PictureDecoder decoder;
+    for (const auto& packet : coded(options, 2)) ASSERT_TRUE(decoder.take(packet));
+    EXPECT_EQ(decoder.image()->width, 99);
+    EXPECT_EQ(decoder.image()->height, 51);
+    EXPECT_GT(psnr(*decoder.image(), waves(1, 99, 51)), 30);
+}
+
+TEST_P(PictureCoding, APictureOfAnotherSizeThanItsPacketSaysIsAnError) {
+    auto packet = coded(small(GetParam()), 1)[0];
+    auto picture = *read_texture_picture(packet);
+    const std::vector<std::uint8_t> bytes(picture.coded.begin(), picture.coded.end());
+    picture.coded = bytes;
+    picture.width = 32;
+    PictureDecoder decoder;
+    const auto taken = decoder.take(write_texture_picture(picture, {}));
+    ASSERT_FALSE(taken);
+    EXPECT_EQ(taken.error().kind, ErrorKind::corrupt_stream);
+}
+
+TEST_P(PictureCoding, WhatIsLargerThanAllowedIsRefusedBeforeItIsDecoded) {
+    auto packet = coded(small(GetParam()), 1)[0];
+    PictureDecoderOptions options;
+    options.largest_side = 64;
+    PictureDecoder decoder(options);
+    const auto taken = decoder.take(packet);
+    ASSERT_FALSE(taken);
+    EXPECT_EQ(taken.error().kind, ErrorKind::limit);
+    // Nor where the packet lies about it.
+    auto picture = *read_texture_picture(packet);
+    const std::vector<std::uint8_t> bytes(picture.coded.begin(), picture.coded.end());
+    picture.coded = bytes;
+    picture.width = picture.height = 64;
+    EXPECT_FALSE(decoder.take(write_texture_picture(picture, {})));
+}
+
+TEST(PictureEncoder, RefusesWhatItCannotCode) {
+    for (const auto& change : std::vector<void (*)(PictureEncoderOptions&)>{
+             [](auto& o) { o.coder = PictureCoder::png; }, [](auto& o) { o.width = 0; },
+             [](auto& o) { o.height = 5000; }, [](auto& o) { o.quantiser = 64; },
+             [](auto& o) { o.frames_per_second = 0; }, [](auto& o) { o.bits_per_second = -1; },
+             [](auto& o) { o.speed = 12; }}) {
+        auto options = small(PictureCoder::av1);
+        change(options);
+        EXPECT_FALSE(PictureEncoder::create(options));
+    }
+    auto encoder = PictureEncoder::create(small(PictureCoder::av1));
+    EXPECT_FALSE(encoder->encode(OwnPlanes(waves(0, 32, 32)).view()));
+}
+
+TEST(PictureDecoder, ReadsImageFilesWhereItIsGivenAReader) {
+    const auto file = write_png_image(waves(0));
+    ASSERT_TRUE(file);
+    TexturePicture picture;
+    picture.coder = PictureCoder::png;
+    picture.width = width;
+    picture.height = height;
+    picture.gains = {picture_gain_one, picture_gain_one / 2, picture_gain_one};
+    picture.coded = *file;
+    const auto packet = write_texture_picture(picture, {});
+    const auto refused = PictureDecoder().take(packet);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().kind, ErrorKind::unsupported);
+    PictureDecoderOptions options;
+    options.read_image_file = [](std::span<const std::uint8_t> bytes) { return read_image(bytes); };
+    PictureDecoder decoder(options);
+    ASSERT_TRUE(decoder.take(packet));
+    EXPECT_EQ(decoder.planes(), nullptr);
+    const auto shown = decoder.image();
+    const auto expected = waves(0);
+    for (std::size_t i = 0; i < expected.rgb.size(); ++i)
+        ASSERT_EQ(shown->rgb[i], i % 3 == 1 ? (expected.rgb[i] + 1) / 2 : expected.rgb[i]);
+}
+
+}  // namespace
+}  // namespace htvm
