@@ -279,7 +279,8 @@ test('without a decoder for them pictures are left out, and words say why', asyn
 
 // ---- in Chromium --------------------------------------------------------------------------------------------------------
 
-let browser, server, work, meshes;
+let browser, server, work;
+let meshes, ownMeshes; // streams: tracked, and with every frame's own connectivity
 
 // Each frame has colours that no other near it has.
 const colour = (frame, quarter) => [0, 1, 2].map((channel) => 40 + ((frame * (37 + 14 * channel) + quarter * 61 + channel * 97) % 176));
@@ -311,11 +312,11 @@ async function makeSquare(folder) {
     }
 }
 
-// The meshes with these pictures: a picture behind each frame but for those to be left out.
-function withPictures(coder, pictures, { leaveOut = [], ...more } = {}) {
+// Meshes with these pictures: a picture behind each frame but for those to be left out.
+function withPictures(coder, pictures, { leaveOut = [], of = meshes, ...more } = {}) {
     const out = [];
     let before = 0;
-    for (const one of packetsOf(meshes)) {
+    for (const one of packetsOf(of)) {
         if (one.kind === packetKind.index || one.kind === packetKind.frontIndex) continue;
         out.push(one.bytes);
         if (!isFrame(one.kind) || leaveOut.includes(one.frame)) continue;
@@ -330,24 +331,31 @@ function withPictures(coder, pictures, { leaveOut = [], ...more } = {}) {
 let starts; // frames at which decoding can start
 let pictures; // of each coder
 
+const startsOf = (stream) => packetsOf(stream).filter((one) => isFrame(one.kind) && isAccess(one)).map(({ frame }) => frame);
+
 before(async () => {
     if (!program) return;
     work = await mkdtemp(join(tmpdir(), 'htvm-textures-'));
     await makeSquare(join(work, 'capture'));
     const stream = join(work, 'square.htvm');
-    const words = ['encode', join(work, 'capture'), '--fps', '30', '--access-interval', '10', '--texture-as', 'coordinates', '-q', '60', '-o', stream];
-    execFileSync(program, words, { stdio: 'pipe' });
-    meshes = await readFile(stream);
+    const encode = async (...more) => {
+        const words = ['encode', join(work, 'capture'), '--fps', '30', '--texture-as', 'coordinates', '-q', '60', ...more, '-o', stream];
+        execFileSync(program, words, { stdio: 'pipe' });
+        return readFile(stream);
+    };
+    meshes = await encode('--access-interval', '10');
+    ownMeshes = await encode('--profile', 'topology', '--keyint', '300');
     server = await new TestServer({ '': path('pages'), player: path('../packages/player/dist') }).start();
     server.pageHeaders = { 'Content-Security-Policy': "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; connect-src 'self' ws:" };
     browser = await launch();
     const page = await newPage();
     const colours = Array.from({ length: frames }, (_, frame) => coloursOf(frame));
     pictures = {};
-    starts = packetsOf(meshes).filter((one) => isFrame(one.kind) && isAccess(one)).map(({ frame }) => frame);
+    starts = startsOf(meshes);
     const make = (coder, more) =>
         page.evaluate(([name, all, how]) => window.pictures.makePictures(name, all, how), [coder, colours, { keys: starts, ...more }]);
     for (const coder of ['VP9', 'AV1', 'PNG', 'JPEG', 'WebP']) pictures[coder] = await make(coder, {});
+    pictures.own = await make('AV1', { keys: startsOf(ownMeshes) });
     pictures.limited = await make('VP9', { fullRange: false });
     await page.close();
     for (const coder of Object.keys(coders)) server.made.set(`${coder}.htvm`, withPictures(coder, pictures[coder]));
@@ -455,6 +463,16 @@ inPage('a frame without a picture shows the last one; gains raise what is decode
         assert.equal(await last(page), frame);
         assertShown(await shown(page), raised(picture), 3, `frame ${frame}`);
     }
+});
+
+inPage('pictures of frames that a seek leaves out are decoded for those that need them', async (page) => {
+    server.made.set('own.htvm', withPictures('AV1', pictures.own, { of: ownMeshes }));
+    const frame = frames - 2;
+    assert.ok(frame - Math.max(...startsOf(ownMeshes)) >= 3, `${startsOf(ownMeshes)}`);
+    await openPlayer(page, 'own');
+    await page.evaluate((at) => test.seek(at), (frame + 0.4) / 30);
+    assert.equal(await last(page), frame);
+    assertShown(await shown(page), coloursOf(frame), 8, `frame ${frame}`);
 });
 
 inPage('where pictures are damaged, words say so, and the rest is shown', async (page) => {

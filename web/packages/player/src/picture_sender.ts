@@ -10,12 +10,17 @@ export class PictureSender {
         this.#post = post;
     }
 
+    /** A frame that is not decoded. */
+    passed({ frame }: Packet): void {
+        this.#frame = frame;
+    }
+
     /**
      * Takes packets of frames and of pictures, in order. False for a picture that cannot be read; one that is not behind its
      * frame, or a second one, is passed over.
      */
     take(packet: Packet, serial: number, presentUs: number): boolean {
-        if (isFrame(packet.kind)) this.#frame = packet.frame;
+        if (isFrame(packet.kind)) this.passed(packet);
         if (packet.kind !== packetKind.texture || packet.frame !== this.#frame) return true;
         this.#frame = null;
         const picture = readPicture(packet);

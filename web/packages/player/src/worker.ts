@@ -190,7 +190,10 @@ class Session {
         let left = group.filter(({ kind }) => isFrame(kind)).length;
         const begin = group.map(isAccess).lastIndexOf(true); // before it is what it refers to
         for (const [place, packet] of group.entries()) {
-            if (isFrame(packet.kind) && --left > 0 && !isReferred(packet)) continue; // no later frame needs it
+            if (isFrame(packet.kind) && --left > 0 && !isReferred(packet)) {
+                this.#pictures.passed(packet); // no later frame needs it, but a later picture may need its picture
+                continue;
+            }
             const frame = this.#decode(packet, serial);
             if (!frame) continue;
             const preview = left > 0;
