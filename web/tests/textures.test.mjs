@@ -8,7 +8,7 @@ import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { build } from 'esbuild';
-import { codecString, isAccess, isFrame, packetKind, readPicture } from '../packages/decoder/dist/node.js';
+import { codecString, isAccess, isFrame, isKeyPicture, packetKind, readPicture } from '../packages/decoder/dist/node.js';
 import { launch } from './browser.mjs';
 import { LiveHub, Publishing } from './live_hub.mjs';
 import { TestServer } from './server.mjs';
@@ -492,6 +492,29 @@ inPage('a browser without WebCodecs shows the meshes, and says why without pictu
     await page.evaluate(() => test.run());
     assert.equal(await last(page), frames - 1);
 }, 'delete globalThis.VideoDecoder');
+
+for (const codec of ['av1', 'vp9'])
+    inPage(`a capture with images, encoded with ${codec}, is shown with them, wherever playing starts`, async (page) => {
+        const capture = join(work, 'capture');
+        for (const [frame, { bytes }] of pictures.PNG.entries())
+            await writeFile(join(capture, `${String(frame).padStart(3, '0')}.png`), Uint8Array.from(bytes));
+        const stream = join(work, `${codec}.htvm`);
+        const words = ['--fps', '30', '--profile', 'topology', '--keyint', '10', '--texture-as', 'captured', '--texture-codec', codec, '--texture-quality', '80'];
+        execFileSync(program, ['encode', capture, ...words, '-o', stream], { stdio: 'pipe' });
+        const bytes = await readFile(stream);
+        // There are places to start that have no key picture.
+        const keys = packetsOf(bytes).filter(isKeyPicture).map(({ frame }) => frame);
+        assert.ok(startsOf(bytes).some((start) => !keys.includes(start)), `${startsOf(bytes)}; ${keys}`);
+        server.made.set(`${codec}.htvm`, bytes);
+        await openPlayer(page, codec);
+        assertShown(await shown(page), coloursOf(0), 16, 'frame 0');
+        for (const frame of [9, 28, 14, 1]) {
+            await page.evaluate((at) => test.seek(at), (frame + 0.4) / 30);
+            assert.equal(await last(page), frame);
+            assertShown(await shown(page), coloursOf(frame), 16, `frame ${frame}`);
+        }
+        assert.deepEqual(await page.evaluate(() => test.notices), []);
+    });
 
 test('live: who joins in the middle sees frames with their own pictures', options, async () => {
     const hub = await new LiveHub().start();

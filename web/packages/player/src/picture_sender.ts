@@ -10,7 +10,7 @@ export class PictureSender {
         this.#post = post;
     }
 
-    /** A frame that is not decoded. */
+    /** A frame, or the frame of a picture, that is not decoded, whose picture may come nevertheless. */
     passed({ frame }: Packet): void {
         this.#frame = frame;
     }

@@ -1,6 +1,6 @@
 // The player's worker: fetches, decodes, computes normals, and sends frames as long as the player has room for them.
 import {
-    Decoder, DecoderError, DecoderModule, isAccess, isFrame, isReference, isReferred, isStart, packetKind, readAudio,
+    Decoder, DecoderError, DecoderModule, isAccess, isFrame, isKeyPicture, isReference, isReferred, isStart, packetKind, readAudio,
     type Frame,
 } from '@htvm/decoder';
 import { ByteSource, Interrupted, SourceChanged, SourceError } from './byte_source.js';
@@ -20,6 +20,8 @@ const post = (report: Report, transfer: Transferable[] = []): void => scope.post
 const mostReopenings = 4;
 const roundingUs = 500; // so near before a frame's time, that frame is meant
 const previewBeyond = 3; // frames between where decoding starts and what is sought
+const backUs = 1e6; // so far before a place without a key picture one is looked for; then twice as far, and so on
+const mostBackUs = 64e6;
 
 class Session {
     #url: string;
@@ -46,6 +48,8 @@ class Session {
     #surveyAt = 1; // frames sent before what is beyond is looked for
     #reportedExtent = '';
     #at = 0; // time of the packet being decoded
+    #textured = false;
+    #beyond: TimedPacket | null = null; // read already, behind what was sought
 
     constructor(request: Request & { type: 'open' }, module: DecoderModule, source: ByteSource) {
         this.#url = request.url;
@@ -140,7 +144,8 @@ class Session {
             this.#survey();
             sought = null;
             for (;;) {
-                const packet = await this.#file.next();
+                const packet = this.#beyond ?? (await this.#file.next());
+                this.#beyond = null;
                 if (!packet) break;
                 const frame = this.#decode(packet, serial);
                 if (!frame) continue;
@@ -160,6 +165,7 @@ class Session {
     #begin(timeUs: number): void {
         const header = this.#file.seek(timeUs);
         this.#frames = 0;
+        this.#beyond = null;
         this.#decoder.discard();
         if (!header) return;
         this.#decoder.sendPacket(header);
@@ -168,32 +174,21 @@ class Session {
 
     // Reads on to the frame at that time and decodes only what it needs. quietly: without a preview, as in a loop.
     async #seekAndShow(serial: number, timeUs: number, quietly: boolean): Promise<'shown' | 'superseded'> {
-        let group: TimedPacket[] = [];
-        let bytes = 0;
-        for (;;) {
-            const packet = await this.#file.next();
-            if (this.#serial !== serial) return 'superseded';
-            if (!packet) break;
-            if (isAccess(packet) && packet.timeUs <= timeUs) {
-                group = isStart(packet) ? [] : group.filter((before) => isReference(before) || before.kind === packetKind.codebook);
-                bytes = group.reduce((sum, { size }) => sum + size, 0);
-            }
-            group.push({ ...packet, bytes: packet.bytes.slice() });
-            bytes += packet.size;
-            if (isFrame(packet.kind) && packet.timeUs + this.#file.frameUs > timeUs + roundingUs) break;
-            if (bytes > 1 << 26) break;
-            if (packet.kind === packetKind.sequence) {
-                // Frames' duration is in it.
-                this.#decode(group.pop()!, serial);
-            }
+        let group: TimedPacket[] | null;
+        for (let back = backUs; ; back *= 2) {
+            group = await this.#gather(serial, timeUs);
+            if (!group) return 'superseded';
+            // Not every place to start has a key picture.
+            const pictures = group.filter(({ kind }) => kind === packetKind.texture);
+            const beginUs = group.filter(isAccess).at(-1)?.timeUs ?? 0;
+            if (pictures.length === 0 || pictures.some(isKeyPicture) || beginUs <= 0 || back > mostBackUs) break;
+            this.#begin(Math.max(0, beginUs - back));
         }
         let left = group.filter(({ kind }) => isFrame(kind)).length;
         const begin = group.map(isAccess).lastIndexOf(true); // before it is what it refers to
         for (const [place, packet] of group.entries()) {
-            if (isFrame(packet.kind) && --left > 0 && !isReferred(packet)) {
-                this.#pictures.passed(packet); // no later frame needs it, but a later picture may need its picture
-                continue;
-            }
+            if (isFrame(packet.kind) && --left > 0 && !isReferred(packet)) continue; // no later frame needs it
+            if (packet.kind === packetKind.texture) this.#pictures.passed(packet); // a later picture may need it, whatever becomes of its frame
             const frame = this.#decode(packet, serial);
             if (!frame) continue;
             const preview = left > 0;
@@ -205,6 +200,41 @@ class Session {
             if (this.#serial !== serial) return 'superseded';
         }
         return 'shown';
+    }
+
+    // What the frame at that time needs, and the frame; null if something else is sought meanwhile.
+    async #gather(serial: number, timeUs: number): Promise<TimedPacket[] | null> {
+        let group: TimedPacket[] = [];
+        let bytes = 0;
+        let there = false;
+        for (;;) {
+            const packet = await this.#file.next();
+            if (this.#serial !== serial) return null;
+            if (!packet) break;
+            if (there && packet.kind !== packetKind.texture && packet.kind !== packetKind.audio) {
+                this.#beyond = { ...packet, bytes: packet.bytes.slice() };
+                break;
+            }
+            const keep = (kept: (before: TimedPacket) => boolean): void => {
+                group = group.filter(kept);
+                bytes = group.reduce((sum, { size }) => sum + size, 0);
+            };
+            if (isAccess(packet) && packet.timeUs <= timeUs) {
+                const start = isStart(packet);
+                keep((before) => before.kind === packetKind.texture || (!start && (isReference(before) || before.kind === packetKind.codebook)));
+            }
+            if (packet.kind === packetKind.texture) this.#textured = true;
+            if (isKeyPicture(packet)) keep(({ kind }) => kind !== packetKind.texture);
+            group.push({ ...packet, bytes: packet.bytes.slice() });
+            bytes += packet.size;
+            if (isFrame(packet.kind) && packet.timeUs + this.#file.frameUs > timeUs + roundingUs) there = true;
+            if ((there && (!this.#textured || packet.kind === packetKind.texture)) || bytes > 1 << 26) break;
+            if (packet.kind === packetKind.sequence) {
+                // Frames' duration is in it.
+                this.#decode(group.pop()!, serial);
+            }
+        }
+        return group;
     }
 
     // Waits until the player has room for a frame. False if it has asked for another place meanwhile.
@@ -219,6 +249,7 @@ class Session {
             this.#sendAudio(packet, serial);
             return null;
         }
+        this.#textured ||= packet.kind === packetKind.texture;
         if (!this.#pictures.take(packet, serial, packet.timeUs + this.#loopUs))
             this.#notice('Some of the pictures cannot be shown.');
         if (packet.kind === packetKind.texture) return null;
