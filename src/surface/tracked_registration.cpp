@@ -983,7 +983,7 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
             const double moved = run_round(coarse, target, round, cell, memory, options).farthest;
-            if (moved < options.settled * unit) break;
+            if (moved < options.settled * unit) i = std::max(i, options.coarse_rounds - 2);  // one more round
         }
         follow_groups(mesh, coarse, fine.motion);
     }

@@ -62,7 +62,7 @@ struct DeformationOptions {
     double millimetre = 1;            // the length of a millimetre in units of the positions: 16 on a lattice of 1/16
                                       // mm
     int coarse_rounds = 6;            // most rounds with groups of handles that move together, to cover large motion
-    double settled = 2;               // mm: a round in which no group moves farther than this is the last
+    double settled = 2;               // mm: once no group moves farther than this in a round, the next is the last
     int fine_rounds = 4;              // rounds with all handles
     double coarse_spacing = 180;      // mm between the centres of groups
     double far_reach = 250;           // mm: search distance of the first coarse round
