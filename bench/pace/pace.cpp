@@ -51,9 +51,10 @@ std::vector<htvm::Mesh> read_capture(const Options& options) {
         fmt::print(stderr, "{}\n", files.error().message);
         return out;
     }
+    htvm::MeshFileOptions file;
+    file.millimetres_per_unit = options.unit;
     for (std::size_t i = options.first; i < files->paths.size() && out.size() < options.frames; ++i) {
-        auto mesh = htvm::read_mesh(
-            files->paths[i], {.millimetres_per_unit = options.unit, .limits = {}, .timestamp = {}, .texture = {}});
+        auto mesh = htvm::read_mesh(files->paths[i], file);
         if (!mesh) {
             fmt::print(stderr, "{}\n", mesh.error().message);
             return {};
