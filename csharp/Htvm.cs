@@ -117,7 +117,8 @@ namespace Htvm
         public uint FloorKnown;
         public double Floor;
         public uint Metadata;
-        public uint Reserved;
+        public uint TextureLayout;
+        public uint TextureWidth, TextureHeight;
     }
 
     // Made by Decoder.Options().

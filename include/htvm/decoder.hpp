@@ -25,6 +25,7 @@
 #include "htvm/result.hpp"
 #include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
+#include "htvm/texture_layout.hpp"
 #include "htvm/threads.hpp"
 
 namespace htvm {
@@ -62,6 +63,7 @@ struct SequenceInfo {
     UpAxis up = UpAxis::unknown;
     std::optional<double> floor;  // mm, coordinate on the axis that is up; none: not known
     std::vector<MetadataEntry> metadata;
+    StreamTexture texture;
 };
 
 // A frame on loan: valid until the next non-const call on the decoder, or until the decoder is moved or destroyed.

@@ -90,6 +90,10 @@ public:
     FrameCost last_cost() const;
     Mesh reconstruction() const;
     Mesh reconstruction(std::size_t coded) const;  // the same of one of coded_frames()
+    // Of the last vertices of the reconstruction, which its charts' seams repeat, which ones they are: they have the
+    // same positions. None without charts.
+    std::span<const std::uint32_t> repeated_vertices() const;
+    std::span<const std::uint32_t> repeated_vertices(std::size_t coded) const;
     // Of the reconstructions of all frames queued with that one; nothing if they have no vertices.
     std::optional<SpaceBounds> bounds() const;
     // How long the stages of the last push() or finish() took.

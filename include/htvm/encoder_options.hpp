@@ -10,6 +10,7 @@
 #include "htvm/intra_coder.hpp"
 #include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
+#include "htvm/texture_layout.hpp"
 #include "htvm/threads.hpp"
 
 namespace htvm {
@@ -131,6 +132,11 @@ struct EncoderOptions {
     TrackedOptions tracked;
     TopologyOptions topology;
     RateOptions rate;
+    // What the stream says of its pictures, which come beside the encoder's packets. With TextureLayout::charts, for
+    // Profile::tracked only, meshes are pushed without texture coordinates and without the seams of any;
+    // reconstruction() has coordinates of its own, and the vertices on its seams repeated. Colours then are not coded,
+    // but tracking goes by them.
+    StreamTexture texture;
 };
 
 // The default options of a profile: those of EncoderOptions for Profile::tracked. The others have an I-frame every 30

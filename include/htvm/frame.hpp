@@ -56,6 +56,7 @@ enum class Layer : std::uint8_t {
     tracked = 12,  // a T-frame's payload
     removed = 13,  // what a patch takes out
     border = 14,   // where a patch is joined
+    charts = 15,   // how triangles lie in the texture's picture
 };
 
 struct LayerName {
@@ -77,6 +78,7 @@ inline constexpr std::array frame_layers = {
     LayerName{Layer::tracked, "tracked"},
     LayerName{Layer::removed, "removed"},
     LayerName{Layer::border, "border"},
+    LayerName{Layer::charts, "charts"},
 };
 inline constexpr std::size_t layer_count = frame_layers.size() + 1;  // the largest number plus one; 0 is not a layer
 

@@ -239,6 +239,9 @@ enum {
     HTVM_UP_MINUS_Z = 6
 };
 
+/* Where texture coordinates come from: none, as captured, the stream's own charts. */
+enum { HTVM_TEXTURE_NONE = 0, HTVM_TEXTURE_CAPTURED = 1, HTVM_TEXTURE_CHARTS = 2 };
+
 typedef struct htvm_sequence_info {
     uint32_t struct_size; /* number of bytes of this struct that were filled in */
     uint32_t joints, bones;
@@ -254,7 +257,8 @@ typedef struct htvm_sequence_info {
     uint32_t floor_known;                    /* 1: floor is */
     double floor;                            /* mm: the floor's coordinate on the axis that is up */
     uint32_t metadata;                       /* how many entries htvm_decoder_metadata() has */
-    uint32_t reserved;                       /* 0 */
+    uint32_t texture_layout;                 /* HTVM_TEXTURE_... */
+    uint32_t texture_width, texture_height;  /* of the texture's pictures, pixels; 0 without one */
 } htvm_sequence_info;
 
 /* The contents of the sequence header. HTVM_AGAIN until one was decoded. */
@@ -275,7 +279,7 @@ htvm_status htvm_decoder_metadata(htvm_decoder* decoder, uint32_t entry, char* k
 /* Where the current frame's bytes went: bytes[0] headers, counts and checksums, bytes[n] the layer of number n
  * (docs/bitstream.md, section 4). HTVM_LAYERS numbers are always enough. HTVM_BAD_INPUT: there is no current frame.
  * HTVM_BUFFER_TOO_SMALL below HTVM_LAYERS. */
-enum { HTVM_LAYERS = 15 };
+enum { HTVM_LAYERS = 16 };
 htvm_status htvm_decoder_layer_bytes(htvm_decoder* decoder, uint64_t* bytes, size_t capacity);
 /* What people call layer n: "geometry"; "overhead" for 0. NULL where there is no such layer. */
 const char* htvm_layer_name(uint32_t layer);

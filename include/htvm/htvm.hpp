@@ -18,4 +18,5 @@
 #include "htvm/scene.hpp"            // IWYU pragma: export
 #include "htvm/skeleton.hpp"         // IWYU pragma: export
 #include "htvm/texture.hpp"          // IWYU pragma: export
+#include "htvm/texture_layout.hpp"   // IWYU pragma: export
 #include "htvm/threads.hpp"          // IWYU pragma: export

@@ -127,7 +127,9 @@ class htvm_sequence_info(Structure):
         ("floor_known", c_uint32),
         ("floor", c_double),
         ("metadata", c_uint32),
-        ("reserved", c_uint32),
+        ("texture_layout", c_uint32),
+        ("texture_width", c_uint32),
+        ("texture_height", c_uint32),
     ]
 
 

@@ -13,6 +13,9 @@
 
 static_assert(HTVM_UP_UNKNOWN == static_cast<int>(htvm::UpAxis::unknown) &&
               HTVM_UP_MINUS_Z == static_cast<int>(htvm::UpAxis::minus_z));
+static_assert(HTVM_TEXTURE_NONE == static_cast<int>(htvm::TextureLayout::none) &&
+              HTVM_TEXTURE_CAPTURED == static_cast<int>(htvm::TextureLayout::captured) &&
+              HTVM_TEXTURE_CHARTS == static_cast<int>(htvm::TextureLayout::charts));
 
 using htvm::c_api::check_struct;
 using htvm::c_api::guarded;
@@ -320,6 +323,9 @@ htvm_status htvm_decoder_sequence(htvm_decoder* decoder, htvm_sequence_info* inf
     out.floor_known = sequence->floor.has_value();
     out.floor = sequence->floor.value_or(0);
     out.metadata = static_cast<std::uint32_t>(sequence->metadata.size());
+    out.texture_layout = static_cast<std::uint32_t>(sequence->texture.layout);
+    out.texture_width = static_cast<std::uint32_t>(sequence->texture.width);
+    out.texture_height = static_cast<std::uint32_t>(sequence->texture.height);
     const auto written = htvm::c_api::write_struct(out, info, info_size);
     return written == HTVM_OK ? HTVM_OK : decoder->error.set(written, "info is NULL or info_size not its sizeof");
 }

@@ -39,21 +39,70 @@ Rotation product(const Rotation& a, const Rotation& b) {
     return out;
 }
 
+namespace {
+
+// A copy moves with the vertex that it is one of.
+template <class Values>
+void repeat(std::span<const std::uint32_t> copied, Values& values) {
+    if (values.empty()) return;
+    values.reserve(values.size() + copied.size());
+    for (const auto v : copied) values.push_back(values[v]);
+}
+
+}  // namespace
+
 void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topology, Pose pose) {
     const auto& lattice = state.header->lattice;
+    const auto* textured = mesh.textured && !mesh.textured->empty() ? mesh.textured : nullptr;
     auto& shown = state.shown;
     shown.topology = 0;
     to_millimetres(mesh.positions, lattice, shown.positions);
     to_unit_normals(mesh.normals, shown.normals);
     if (shown.texcoords_topology != topology) {
         shown.texcoords_topology = 0;
-        to_texcoords(mesh.texcoords, shown.texcoords);
+        if (textured)
+            to_texcoords(textured->texcoords, chart_texcoord_unit, shown.texcoords);
+        else
+            to_texcoords(mesh.texcoords, captured_texcoord_unit, shown.texcoords);
         shown.texcoords_topology = topology;
     }
-    shown.triangles = mesh.triangles;
+    shown.triangles = textured ? textured->triangles : mesh.triangles;
     shown.colours = mesh.colours;
+    if (textured) {
+        repeat(textured->copied, shown.positions);
+        repeat(textured->copied, shown.normals);
+        if (!mesh.colours.empty()) {
+            shown.own_colours.assign(mesh.colours.begin(), mesh.colours.end());
+            repeat(textured->copied, shown.own_colours);
+            shown.colours = shown.own_colours;
+        }
+    }
     shown.pose = std::move(pose);
     shown.topology = topology;
+}
+
+Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloadView& payload, const LatticeMesh& mesh,
+                                    std::vector<CornerTexcoords> before) {
+    const auto& picture = state.header->texture;
+    if (picture.layout != TextureLayout::charts || (before.empty() && !payload.has(Layer::charts)))
+        return TexturedSurface();
+    if (!mesh.texcoords.empty())
+        return fail(ErrorKind::corrupt_stream, "a frame that has both charts and texture coordinates");
+    const auto triangles = std::span(mesh.triangles).subspan(before.size());
+    if (!triangles.empty()) {
+        const auto layout = decode_charts(payload.of(Layer::charts), mesh.positions, triangles);
+        if (!layout) return tl::unexpected(layout.error());
+        const auto corners = chart_texcoords(*layout, picture, mesh.positions, triangles);
+        if (!corners) return tl::unexpected(corners.error());
+        before.insert(before.end(), corners->begin(), corners->end());
+    }
+    auto out = textured_surface(mesh.positions.size(), mesh.triangles, std::move(before));
+    if (!out) return out;
+    if (out->texcoords.size() > state.options.max_vertices)
+        return fail(ErrorKind::limit, "with those repeated at its charts' seams, the frame has " +
+                                          std::to_string(out->texcoords.size()) +
+                                          " vertices, more than this decoder accepts; raise its max_vertices");
+    return out;
 }
 
 Result<void> check_reference(const DecoderState& state, const Packet& packet) {
@@ -75,6 +124,7 @@ SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
     if (header.floor)
         info.floor = to_millimetres({*header.floor, *header.floor, *header.floor}, header.lattice)[axis_of(header.up)];
     info.metadata = header.metadata;
+    info.texture = header.texture;
     info.lattice_step = header.lattice.step();
     info.fps_numerator = header.fps_numerator;
     info.fps_denominator = header.fps_denominator;
@@ -141,6 +191,11 @@ std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const
                              coded.triangles + (adds ? held.triangles : 0)};
     if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);
     if (state.alone) kept += memory_of_reference(counts(state.alone->mesh));
+    if (state.header->texture.layout == TextureLayout::charts) {
+        kept += memory_of_charts(held);
+        if (rules.renews) kept += memory_of_charts(renewed);
+        if (state.alone) kept += memory_of_charts(counts(state.alone->mesh));
+    }
     kept += hidden_frames(state, packet) * memory_of_tracked_frame(held);
     return kept;
 }

@@ -37,7 +37,8 @@ Pose moved_pose(const DecoderState& state, std::span<const QuantisedTransform> t
 // Connectivity, colours and texture coordinates are those of the I-frame.
 void show_animated(DecoderState& state, const AnimatedFrame& frame) {
     const auto& mesh = state.reference->mesh();
-    show(state, {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords},
+    show(state,
+         {frame.positions, mesh.triangles, mesh.colours, frame.normals, mesh.texcoords, &state.reference->textured},
          state.reference_topology, moved_pose(state, frame.transforms));
 }
 

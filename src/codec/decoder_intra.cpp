@@ -19,11 +19,13 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     if (!mesh) return tl::unexpected(mesh.error());
     const auto step = smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step),
                                       packet.has(packet_flag::told) && packet.has(packet_flag::settled), header);
+    auto textured = read_charts(state, payload, *mesh);
+    if (!textured) return tl::unexpected(textured.error());
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {
-        IntraAlone alone{packet.frame, topology, std::move(*mesh), std::move(shown)};
-        show(state, view_of(alone.mesh), topology, alone.pose);
+        IntraAlone alone{packet.frame, topology, std::move(*mesh), std::move(*textured), std::move(shown)};
+        show(state, view_of(alone.mesh, &alone.textured), topology, alone.pose);
         state.alone = std::move(alone);
         return {};
     }
@@ -31,12 +33,13 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     // the nodes, a third of the work is done at once, which makes this frame and the next take about the same time.
     ReferenceFacts facts{.number = packet.frame,
                          .step = step,
-                         .captured = {payload.header.source_vertices, payload.header.source_triangles}};
+                         .captured = {payload.header.source_vertices, payload.header.source_triangles},
+                         .textured = std::move(*textured)};
     auto reference = make_reference(header, std::move(facts), std::move(*mesh), std::move(*pose),
                                     {.bones = false, .nodes = false}, state.threads);
     if (!reference) return tl::unexpected(reference.error());
     derive_hierarchy(*reference, header);
-    show(state, view_of(reference->mesh()), topology, std::move(shown));
+    show(state, view_of(reference->mesh(), &reference->textured), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*reference);
     state.reference_topology = topology;
@@ -48,7 +51,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
 
 bool show_intra_alone(DecoderState& state) {
     if (!state.alone) return false;
-    show(state, view_of(state.alone->mesh), state.alone->topology, state.alone->pose);
+    show(state, view_of(state.alone->mesh, &state.alone->textured), state.alone->topology, state.alone->pose);
     return true;
 }
 

@@ -33,9 +33,16 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     // With what the patch added, the mesh may be larger than its header says, and than its reference.
     if (auto ok = check_limits({}, {mesh.positions.size(), mesh.triangles.size()}, {}, 0, state.options); !ok)
         return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
+    const auto& before = state.reference->textured;
+    auto textured = before.empty() ? Result<TexturedSurface>()
+                                   : read_charts(state, payload, mesh,
+                                                 corners_that_stay(before.corners, triangles,
+                                                                   reference.mesh.positions.size(), patched->stays));
+    if (!textured) return tl::unexpected(textured.error());
     ReferenceFacts facts{.number = packet.frame,
                          .captured = {payload.header.source_vertices, payload.header.source_triangles},
-                         .kept = keep_nodes(reference.nodes, patched->stays)};
+                         .kept = keep_nodes(reference.nodes, patched->stays),
+                         .textured = std::move(*textured)};
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     // Its nodes are for the next frame to derive, so that no frame has to do the work of two. A part is done here by a
@@ -44,7 +51,7 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
                                   {.bones = false, .nodes = false}, state.threads);
     if (!renewed) return tl::unexpected(renewed.error());
     if (!derives_for_itself) derive_hierarchy(*renewed, header);
-    show(state, view_of(renewed->mesh()), topology, std::move(shown));
+    show(state, view_of(renewed->mesh(), &renewed->textured), topology, std::move(shown));
     // Nothing can fail from here on.
     state.reference = std::move(*renewed);
     state.reference_topology = topology;

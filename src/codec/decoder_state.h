@@ -25,9 +25,10 @@ struct LatticeMeshView {
     std::span<const Colour> colours;
     std::span<const QuantisedNormal> normals;
     std::span<const QuantisedTexcoord> texcoords;
+    const TexturedSurface* textured = nullptr;  // how it is shown where the stream has charts
 };
-inline LatticeMeshView view_of(const LatticeMesh& mesh) {
-    return {mesh.positions, mesh.triangles, mesh.colours, mesh.normals, mesh.texcoords};
+inline LatticeMeshView view_of(const LatticeMesh& mesh, const TexturedSurface* textured = nullptr) {
+    return {mesh.positions, mesh.triangles, mesh.colours, mesh.normals, mesh.texcoords, textured};
 }
 
 // The frame decoded last, in millimetres. Arrays are reused from frame to frame; triangles and colours stay where they
@@ -40,7 +41,8 @@ struct ShownFrame {
     std::uint32_t texcoords_topology = 0;  // topology number of the frame they belong to
     std::span<const Triangle> triangles;
     std::span<const Colour> colours;
-    LatticeMesh own;  // the mesh of a frame that shares nothing with its reference
+    std::vector<Colour> own_colours;  // where vertices are repeated
+    LatticeMesh own;                  // the mesh of a frame that shares nothing with its reference
     Pose pose;
 };
 
@@ -75,6 +77,7 @@ struct DecodedNodes {
 struct IntraAlone {
     std::uint32_t frame = 0, topology = 0;
     LatticeMesh mesh;
+    TexturedSurface textured;
     Pose pose;
 };
 
@@ -105,6 +108,11 @@ inline std::uint32_t new_topology(DecoderState& state) {
 // Makes this the mesh that is shown. The mesh is not copied: if the object is moved later, its arrays must stay in
 // place, as those of a std::vector do. Throws only std::bad_alloc; then nothing is shown.
 void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topology, Pose pose);
+
+// The mesh with the charts of the frame's layer; nothing if the stream or an I-frame has none. before: the coordinates
+// of the first triangles, which a TP-frame keeps.
+Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloadView& payload, const LatticeMesh& mesh,
+                                    std::vector<CornerTexcoords> before = {});
 
 // An error if the packet does not refer to the current I-frame.
 Result<void> check_reference(const DecoderState& state, const Packet& packet);

@@ -37,7 +37,8 @@ Pose tracked_pose(const DecoderState& state, std::span<const QuantisedTransform>
 
 void show_tracked(DecoderState& state, const DecodedTrackedFrame& frame, Pose pose) {
     const auto& mesh = state.reference->mesh();
-    show(state, {frame.positions, mesh.triangles, frame.colours, frame.normals, mesh.texcoords},
+    show(state,
+         {frame.positions, mesh.triangles, frame.colours, frame.normals, mesh.texcoords, &state.reference->textured},
          state.reference_topology, std::move(pose));
 }
 

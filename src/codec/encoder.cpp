@@ -9,6 +9,7 @@
 #include <deque>
 #include <new>
 #include <stdexcept>
+#include <utility>
 
 #include "codec/choice/frame_choice.h"
 #include "codec/encoder_check.h"
@@ -34,6 +35,7 @@ struct Output {
     std::uint32_t header_sent = 0;  // number of the frame with which the sequence header was last sent
 };
 
+<<<<<<< HEAD
 // A frame on the lattice, that is coded now or waits for the next one, with what was found of it meanwhile.
 struct PushedFrame {
     LatticeMesh mesh;
@@ -42,6 +44,12 @@ struct PushedFrame {
     bool force_intra = false;
     int effort = usual_effort;
     AheadWork ahead = {};
+=======
+// A mesh as the decoder shows it.
+struct ShownMesh {
+    LatticeMesh mesh;
+    std::vector<std::uint32_t> repeated;  // at the seams of charts: which vertices the last ones are
+>>>>>>> 5c46c2f (Charts: a layout of the texture that the stream has of its own, derived from decoded positions)
 };
 
 }  // namespace
@@ -62,7 +70,7 @@ struct Encoder::State {
     std::optional<GroupAnchor> anchor;   // what the next group may refer to; none: the reference alone
     // Of the frames whose packets the last call queued; if it queued none, of the last one before.
     std::vector<EncodedFrame> coded;
-    std::vector<LatticeMesh> decoded;
+    std::vector<ShownMesh> decoded;
     bool coded_none = true;
     std::vector<StageTime> stages;
     std::vector<std::uint32_t> distance_order_counts;
@@ -159,6 +167,8 @@ Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
         header.floor = static_cast<std::int32_t>(floor);
     }
     if (options.tracked.group > 1) header.version = grouped_version;
+    header.texture = options.texture;
+    if (options.texture.layout != TextureLayout::none) header.version = textured_version;
     header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
     header.weight_width = on_lattice(options.topology.weight_width * units);
     if (configuration.tracked()) {
@@ -206,13 +216,21 @@ std::uint8_t flags_of(const Candidate& candidate) {
 // What a call codes, until nothing can fail any more.
 struct Outcome {
     std::vector<EncodedFrame> coded;
-    std::vector<LatticeMesh> decoded;
+    std::vector<ShownMesh> decoded;
     std::optional<GroupAnchor> anchor;  // none: as it was
 };
 
+// A candidate's mesh as the decoder shows it. reference: that the candidate refers to, or null.
+ShownMesh shown(const Candidate& candidate, const Reference* reference) {
+    const bool refers = candidate.type == FrameType::tracked || candidate.type == FrameType::predicted;
+    const auto& textured = refers && reference ? reference->textured : candidate.textured;
+    return {shown_mesh(candidate.decoded, textured), textured.copied};
+}
+
 // Numbers and queues a frame's packets, and counts their bytes by layer.
-void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us, const FrameCost& cost,
-                Outcome& outcome) {
+void send_frame(State& state, Candidate& candidate, const Reference* reference, std::int64_t timestamp_us,
+                const FrameCost& cost, Outcome& outcome) {
+    auto decoded = shown(candidate, reference);
     FrameInfo info;
     LayerBytes codebooks;
     for (auto& packet : candidate.packets) {
@@ -233,8 +251,8 @@ void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us, c
             info.source_triangles = candidate.captured.triangles;
             info.bytes = with_overhead(candidate.shares, packet);
         }
-        info.vertices = static_cast<std::uint32_t>(candidate.decoded.positions.size());
-        info.triangles = static_cast<std::uint32_t>(candidate.decoded.triangles.size());
+        info.vertices = static_cast<std::uint32_t>(decoded.mesh.positions.size());
+        info.triangles = static_cast<std::uint32_t>(decoded.mesh.triangles.size());
         info.bytes += codebooks;
         // Where nothing refers to it while others are referred to, it is no place to start from.
         if (stands_alone(candidate.type) && (candidate.referred || state.configuration.intra_alone()))
@@ -242,7 +260,7 @@ void send_frame(State& state, Candidate& candidate, std::int64_t timestamp_us, c
     }
     for (auto& packet : candidate.packets) send(state.output, std::move(packet));
     outcome.coded.push_back({info, cost});
-    outcome.decoded.push_back(std::move(candidate.decoded));
+    outcome.decoded.push_back(std::move(decoded));
 }
 
 // Codes these frames as a group. Returns what the next one may refer to.
@@ -256,8 +274,10 @@ Result<GroupAnchor> send_group(State& state, const GroupAnchor* before, std::spa
         auto info = *inspect(frame.packet);
         info.source_vertices = static_cast<std::uint32_t>(captured.positions.size());
         info.source_triangles = static_cast<std::uint32_t>(captured.triangles.size());
-        info.vertices = static_cast<std::uint32_t>(frame.decoded.positions.size());
-        info.triangles = static_cast<std::uint32_t>(frame.decoded.triangles.size());
+        const auto& textured = state.sequence.reference->decoded.textured;
+        ShownMesh decoded{shown_mesh(frame.decoded, textured), textured.copied};
+        info.vertices = static_cast<std::uint32_t>(decoded.mesh.positions.size());
+        info.triangles = static_cast<std::uint32_t>(decoded.mesh.triangles.size());
         info.bytes = with_overhead(frame.shares, frame.packet);
         info.group = static_cast<std::uint8_t>(held.size());
         info.place = static_cast<std::uint8_t>(i + 1);
@@ -266,7 +286,7 @@ Result<GroupAnchor> send_group(State& state, const GroupAnchor* before, std::spa
         cost.bits = 8.0 * static_cast<double>(info.bytes.total());
         send(state.output, std::move(frame.packet));
         outcome.coded.push_back({info, cost});
-        outcome.decoded.push_back(std::move(frame.decoded));
+        outcome.decoded.push_back(std::move(decoded));
     }
     return std::move(group->anchor);
 }
@@ -318,6 +338,7 @@ Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* p
     auto coded_pose = state.poses.next(mesh, pose, state.configuration.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");
+<<<<<<< HEAD
     PushedFrame out;
     out.mesh = std::move(*on_lattice);
     out.pose = std::move(*coded_pose);
@@ -351,6 +372,18 @@ Result<Candidate> choose_beside(State& state, FrameWork& work, bool force_intra,
 Result<void> code_frame_of(State& state, PushedFrame frame, PushedFrame* next) {
     const auto timestamp_us = frame.timestamp_us;
     FrameWork work(state.configuration, state.sequence, frame.effort, std::move(frame.mesh), std::move(frame.pose),
+=======
+    std::vector<Colour> colours;
+    if (state.configuration.options.texture.layout == TextureLayout::charts) {
+        if (!mesh.texcoords.empty())
+            return fail(ErrorKind::bad_input,
+                        "the mesh has texture coordinates, but with texture.layout charts the stream has its own: "
+                        "push it without them and without their seams");
+        colours = std::exchange(on_lattice->colours, {});
+    }
+    FrameWork work(state.configuration, state.sequence, state.effort, std::move(*on_lattice), std::move(colours),
+                   std::move(*coded_pose),
+>>>>>>> 5c46c2f (Charts: a layout of the texture that the stream has of its own, derived from decoded positions)
                    state.stages);
     work.take(std::move(frame.ahead));
     auto chosen = choose_beside(state, work, frame.force_intra, next);
@@ -366,7 +399,8 @@ Result<void> code_frame_of(State& state, PushedFrame frame, PushedFrame* next) {
         Outcome outcome;
         if (auto sent = send_held(state, state.held, outcome); !sent) return sent;
         if (brings_header(state, *chosen)) send_header(state, timestamp_us);
-        send_frame(state, *chosen, timestamp_us, cost, outcome);
+        const auto* reference = state.sequence.reference ? &state.sequence.reference->decoded : nullptr;
+        send_frame(state, *chosen, reference, timestamp_us, cost, outcome);
         // Nothing can fail from here on.
         state.held.clear();
         commit(state, std::move(outcome));
@@ -577,8 +611,8 @@ FrameCost Encoder::last_cost() const { return state_->coded.empty() ? FrameCost(
 std::optional<SpaceBounds> Encoder::bounds() const {
     // Rounding to single precision keeps the order, so the corners can be found on the lattice.
     std::optional<std::vector<LatticePoint>> corners;
-    for (const auto& mesh : state_->decoded)
-        for (const auto& p : mesh.positions) {
+    for (const auto& decoded : state_->decoded)
+        for (const auto& p : decoded.mesh.positions) {
             if (!corners) corners.emplace(2, p);
             auto &low = corners->front(), &high = corners->back();
             low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
@@ -594,7 +628,15 @@ Mesh Encoder::reconstruction() const {
     return state_->decoded.empty() ? Mesh() : reconstruction(state_->decoded.size() - 1);
 }
 Mesh Encoder::reconstruction(std::size_t coded) const {
-    return to_mesh(state_->decoded[coded], state_->configuration.header.lattice);
+    const bool charts = state_->configuration.options.texture.layout == TextureLayout::charts;
+    return to_mesh(state_->decoded[coded].mesh, state_->configuration.header.lattice,
+                   charts ? chart_texcoord_unit : captured_texcoord_unit);
+}
+std::span<const std::uint32_t> Encoder::repeated_vertices() const {
+    return state_->decoded.empty() ? std::span<const std::uint32_t>() : repeated_vertices(state_->decoded.size() - 1);
+}
+std::span<const std::uint32_t> Encoder::repeated_vertices(std::size_t coded) const {
+    return state_->decoded[coded].repeated;
 }
 const std::vector<StageTime>& Encoder::stage_times() const { return state_->stages; }
 const std::vector<std::uint32_t>& Encoder::distance_order_counts() const { return state_->distance_order_counts; }

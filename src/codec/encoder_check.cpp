@@ -1,11 +1,13 @@
 #include "codec/encoder_check.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "codec/stream/frame_payload.h"
 #include "codec/stream/sequence.h"
 #include "htvm/option_list.hpp"
+#include "htvm/texture.hpp"
 
 namespace htvm::internal {
 namespace {
@@ -54,6 +56,24 @@ Result<void> check_scene(const EncoderOptions& o) {
     return check_metadata(o.metadata);
 }
 
+Result<void> check_texture(const EncoderOptions& o) {
+    const auto& texture = o.texture;
+    if (texture.layout > TextureLayout::charts) return bad("texture.layout must be none, captured or charts");
+    if (texture.layout == TextureLayout::none) {
+        if (texture.width != 0 || texture.height != 0)
+            return bad("a size of pictures does nothing without texture.layout");
+        return {};
+    }
+    const int least = std::min(texture.width, texture.height), most = std::max(texture.width, texture.height);
+    if (least < 1 || most > static_cast<int>(most_picture_side))
+        return bad("texture.width and texture.height must be within 1 and " + std::to_string(most_picture_side));
+    if (texture.layout == TextureLayout::charts) {
+        if (o.profile != Profile::tracked) return bad("texture.layout charts goes with the tracked profile only");
+        if (least < 64) return bad("with texture.layout charts pictures must be at least 64 pixels wide and high");
+    }
+    return {};
+}
+
 Result<void> check_skeleton(const EncoderOptions& o) {
     const auto& skeleton = o.skeleton;
     if (skeleton.joint_names.size() > 1024 || skeleton.bones.size() > 1024)
@@ -78,6 +98,7 @@ Result<void> check(const EncoderOptions& o) {
         (o.intra_coder->number == intra_coder_tfan || !o.intra_coder->encode || !o.intra_coder->decode))
         return bad("the intra coder must have a number above 0, encode and decode");
     if (auto fine = check_scene(o); !fine) return fine;
+    if (auto fine = check_texture(o); !fine) return fine;
     return check_skeleton(o);
 }
 

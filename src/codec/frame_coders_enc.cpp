@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "codec/charts/chart_packing_enc.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/paper/animated_frame.h"
 #include "codec/stream/sequence.h"
 #include "codec/tracked/captured_surface_enc.h"
+#include "codec/tracked/frame_group.h"
 
 namespace htvm::internal {
 namespace {
@@ -137,6 +139,40 @@ Candidate code_moving_part(FrameWork& work, const FrameSteps& steps, const std::
     return code_residuals(work, source, steps);
 }
 
+struct Charts {
+    TexturedSurface textured;  // empty where the stream has no charts, or the mesh no triangles
+    std::uint32_t scale = 0;
+};
+
+Result<Charts> add_charts(const LatticeMesh& mesh, const StreamTexture& texture, FramePayload& payload) {
+    if (texture.layout != TextureLayout::charts || mesh.triangles.empty()) return Charts();
+    auto placed = lay_out(mesh.positions, mesh.triangles, texture);
+    if (!placed) return tl::unexpected(placed.error());
+    payload.set(Layer::charts, std::move(placed->layer));
+    auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(placed->corners));
+    if (!textured) return tl::unexpected(textured.error());
+    return Charts{std::move(*textured), placed->scale};
+}
+
+// The patched mesh with the charts of what stays and new ones for the piece; nothing if the picture has no room.
+std::optional<TexturedSurface> add_charts_of_piece(const PatchedSurface& patched, const Reference& before,
+                                                   const StreamTexture& texture, std::uint32_t scale,
+                                                   FramePayload& payload) {
+    if (before.textured.empty()) return TexturedSurface();
+    const auto& mesh = patched.mesh;
+    auto corners = corners_that_stay(before.textured.corners, before.mesh().triangles, before.mesh().positions.size(),
+                                     patched.stays);
+    const auto piece = std::span(mesh.triangles).subspan(corners.size());
+    if (!piece.empty()) {
+        auto placed = lay_out_beside(mesh.positions, piece, texture, corners, scale);
+        if (!placed) return std::nullopt;
+        payload.set(Layer::charts, std::move(placed->layer));
+        corners.insert(corners.end(), placed->corners.begin(), placed->corners.end());
+    }
+    auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(corners));
+    return textured ? std::optional(std::move(*textured)) : std::nullopt;
+}
+
 // renewed: the tracked mesh, which is coded instead of the capture; or null.
 Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse use,
                              const LatticeMesh* renewed = nullptr) {
@@ -167,7 +203,10 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;
     payload.set(Layer::pose, encode_pose(work.pose));
+    const auto charts = add_charts(*decoded, configuration.options.texture, payload);
+    if (!charts) return tl::unexpected(charts.error());
     Candidate out;
+    out.textured = charts->textured;
     out.type = FrameType::intra;
     out.reference = work.sequence.next_frame;
     out.decoded = std::move(*decoded);
@@ -181,6 +220,8 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     facts.step = step;
     facts.edge = work.edge();
     facts.steps = steps;
+    facts.chart_scale = charts->scale;
+    if (referred_to) facts.colours = work.colours_at(out.decoded);
     clock.done("intra coding");
     if (tracked && referred_to && out.referred) facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
     facts.vertices = out.decoded.positions.size();
@@ -253,7 +294,10 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     out.reference = from_last ? *nodes.frame : reference.number;
     out.referred = references == TrackedReferences::previous;
     out.access = !from_last;
-    out.packets.push_back(frame_packet(PacketKind::tracked, std::move(encoded->runs.payload)));
+    auto& payload = encoded->runs.payload;
+    const bool grouped = work.configuration.header.version >= grouped_version;
+    out.packets.push_back(frame_packet(
+        PacketKind::tracked, grouped ? write_group_payload({.length = 1, .frame = 1}, {&payload, 1}) : payload));
     out.decoded = std::move(encoded->mesh);
     out.captured = counts_of(work.mesh);
     out.shares = encoded->runs.shares;
@@ -337,8 +381,8 @@ Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& 
     return encode_tracked(work, steps, TrackedParts::all, nullptr);
 }
 
-Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const EncodedTrackedFrame& tracked,
-                               const SurfacePatch& patch) {
+Result<std::optional<Candidate>> code_patched(FrameWork& work, const FrameSteps& steps,
+                                              const EncodedTrackedFrame& tracked, const SurfacePatch& patch) {
     const auto& in_use = work.reference();
     StageClock clock(work.stages);
     const auto coded_steps = tracked_steps(steps);
@@ -357,9 +401,13 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const E
     out.type = FrameType::patched;
     out.reference = in_use.decoded.number;
     out.referred = true;
+    smooth_what_is_new(*patched, coded_steps.geometry, !mesh.normals.empty());
+    auto textured = add_charts_of_piece(*patched, in_use.decoded, work.configuration.options.texture,
+                                        in_use.intra.chart_scale, payload);
+    if (!textured) return std::optional<Candidate>();
+    out.textured = std::move(*textured);
     out.renewed =
         vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
-    smooth_what_is_new(*patched, coded_steps.geometry, !mesh.normals.empty());
     out.decoded = std::move(patched->mesh);
     if (denoises(work.configuration))
         out.targets =
@@ -376,9 +424,10 @@ Result<Candidate> code_patched(FrameWork& work, const FrameSteps& steps, const E
     facts.step = 1;
     facts.steps = steps;
     facts.edge = work.edge();
+    facts.colours = work.colours_at(out.decoded);
     clock.done("patch coding");
     facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
-    return out;
+    return std::optional(std::move(out));
 }
 
 Result<Candidate> code_motion_alone(FrameWork& work, const FrameSteps& steps) {

@@ -12,7 +12,7 @@ using enum Layer;
 constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
     {.type = FrameType::intra,
      .packet = PacketKind::intra,
-     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra},
+     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts},
      .refers_to = RefersTo::nothing,
      .codebooks = false,
      .referred = true,
@@ -53,7 +53,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .decode = decode_tracked},
     {.type = FrameType::patched,
      .packet = PacketKind::patched,
-     .layers = {pose, tracked, removed, border, fans, geometry, colour},
+     .layers = {pose, tracked, removed, border, fans, geometry, colour, charts},
      .refers_to = RefersTo::reference,
      .codebooks = false,
      .referred = true,

@@ -35,10 +35,13 @@ std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration
     return out;
 }
 
-SurfaceIndex surface_of(const Configuration& configuration, const LatticeMesh& mesh, std::vector<StageTime>& stages) {
+// colours: of the mesh where it has none of its own, or none.
+SurfaceIndex surface_of(const Configuration& configuration, const LatticeMesh& mesh, const std::vector<Colour>& colours,
+                        std::vector<StageTime>& stages) {
     StageClock clock(stages);
     auto out = configuration.tracked() ? captured_surface(mesh, deformation_options(configuration))
                                        : SurfaceIndex(points_of(mesh.positions), mesh.triangles);
+    if (!colours.empty()) out.colours = colours;
     clock.done("search structures");
     return out;
 }
@@ -86,9 +89,9 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
         return out;
     }
     const bool patched = sent.type == FrameType::patched;
-    auto decoded =
-        make_reference(configuration.header, {before.next_frame, sent.intra->step, sent.captured, std::move(sent.kept)},
-                       sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
+    auto decoded = make_reference(
+        configuration.header, {before.next_frame, sent.intra->step, sent.captured, std::move(sent.kept), sent.textured},
+        sent.decoded, std::move(sent.pose), derived_of(configuration), configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto in_use = std::make_shared<ReferenceInUse>();
     in_use->decoded = std::move(*decoded);
@@ -102,7 +105,8 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
     out.nodes.best_fit = sent.best_fit;
     out.nodes.targets = patched ? std::move(sent.targets) : on_new_reference(before.nodes.targets, {}, 0, {});
     if (in_use->decoded.tracked)
-        in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration));
+        in_use->deformable = make_tracked_deformable(*in_use->decoded.tracked, deformation_options(configuration),
+                                                     in_use->intra.colours);
     else if (in_use->decoded.has_bones)
         in_use->search = make_reference_search(in_use->decoded.skinned);
     if (patched && sent.nodes && !sent.nodes->before_last.empty())
@@ -122,7 +126,7 @@ double FrameWork::edge() {
 }
 
 const SurfaceIndex& FrameWork::surface() {
-    if (!surface_) surface_ = surface_of(configuration, mesh, stages);
+    if (!surface_) surface_ = surface_of(configuration, mesh, colours, stages);
     return *surface_;
 }
 
@@ -145,6 +149,28 @@ const FrameMotion& FrameWork::bone_motion() {
                                          configuration.threads, stages);
     }
     return *bone_motion_;
+}
+
+std::vector<Colour> FrameWork::colours_at(const LatticeMesh& decoded) {
+    if (colours.empty()) return {};
+    const auto& captured = surface();
+    const auto points = points_of(decoded.positions);
+    const auto normals = points_of(vertex_normals(decoded.positions, decoded.triangles));
+    const auto found =
+        closest_facing(captured, points, normals, {.reach = static_cast<float>(30 * configuration.adult_millimetre)},
+                       configuration.threads);
+    std::vector<Colour> out;
+    for (const auto& at : found) {
+        Colour colour{};
+        for (std::size_t c = 0; c < 3 && at.found(); ++c) {
+            float level = 0;
+            for (std::size_t i = 0; i < 3; ++i)
+                level += at.shares[i] * static_cast<float>(colours[mesh.triangles[at.triangle][i]][c]);
+            colour[c] = static_cast<std::uint8_t>(std::clamp(level + 0.5F, 0.0F, 255.0F));
+        }
+        out.push_back(colour);
+    }
+    return out;
 }
 
 const NodeRegistration& FrameWork::registered_nodes() {
@@ -211,10 +237,10 @@ TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_e
 }
 
 AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const NodeRegistration* registered,
-                     const LatticeMesh& next_mesh, const CodedPose& next_pose, int effort,
-                     std::vector<StageTime>& stages) {
+                     const LatticeMesh& next_mesh, const std::vector<Colour>& next_colours, const CodedPose& next_pose,
+                     int effort, std::vector<StageTime>& stages) {
     AheadWork out;
-    out.surface = surface_of(configuration, next_mesh, stages);
+    out.surface = surface_of(configuration, next_mesh, next_colours, stages);
     if (registered && !next_mesh.triangles.empty())
         out.registered =
             register_frame(configuration, *before.reference, *out.surface, next_pose,

@@ -48,9 +48,11 @@ struct IntraFacts {
     FrameSteps steps;          // the steps asked for
     double edge = 0;           // mean edge of the captured mesh, in lattice units
     std::size_t vertices = 0;  // of the last I-frame that was made of the capture; later ones may be the tracked mesh
-    TrackedFit fit;            // of the I-frame itself, if T-frames refer to it
-    SurfaceErrors plain;       // for choice by rate and distortion: the errors of an I-frame at `steps` that nothing
-                               // refers to
+    std::uint32_t chart_scale = 0;  // ChartLayout::scale, if the stream has charts
+    std::vector<Colour> colours;    // of the reference's vertices, for tracking alone: where frames have none; or none
+    TrackedFit fit;                 // of the I-frame itself, if T-frames refer to it
+    SurfaceErrors plain;  // for choice by rate and distortion: the errors of an I-frame at `steps` that nothing
+                          // refers to
 };
 
 // The current reference, and what the encoder derives from it.
@@ -99,7 +101,8 @@ struct Candidate {
     std::uint32_t reference = 0;  // number of the frame that it refers to; of an I-frame, its own
     bool referred = false;        // whether later frames may refer to it; an I- or TP-frame then becomes the reference
     bool access = true;           // whether it is an I-frame or refers to a reference
-    LatticeMesh decoded;          // the mesh that the decoder will have
+    LatticeMesh decoded;          // the mesh that the decoder will have, without the seams of charts
+    TexturedSurface textured;     // I, TP: of `decoded`, if the stream has charts
     CapturedCounts captured;      // of the mesh that it was made of
     LayerBytes shares;            // T: its layers' of its bytes, which its packet does not tell
     FrameSteps steps;             // T: the steps asked for
@@ -151,18 +154,20 @@ struct AheadWork {
 class FrameWork {
 public:
     FrameWork(const Configuration& settled, const Sequence& before, int effort_of_frame, LatticeMesh captured,
-              CodedPose captured_pose, std::vector<StageTime>& times)
+              std::vector<Colour> captured_colours, CodedPose captured_pose, std::vector<StageTime>& times)
         : configuration(settled),
           sequence(before),
           effort(tracking_effort(effort_of_frame)),
           mesh(std::move(captured)),
+          colours(std::move(captured_colours)),
           pose(std::move(captured_pose)),
           stages(times) {}
 
     const Configuration& configuration;
     const Sequence& sequence;
-    const TrackingEffort effort;  // for this frame
-    const LatticeMesh mesh;       // as captured
+    const TrackingEffort effort;        // for this frame
+    const LatticeMesh mesh;             // as captured
+    const std::vector<Colour> colours;  // of its vertices where they are not coded, for tracking alone; or none
     const CodedPose pose;
     std::vector<StageTime>& stages;
 
@@ -180,6 +185,8 @@ public:
     // The motion of each bone, and of each node, relative to the reference.
     const FrameMotion& bone_motion();
     const NodeRegistration& registered_nodes();
+    // What of `colours` is seen at the vertices of a decoded mesh.
+    std::vector<Colour> colours_at(const LatticeMesh& decoded);
     // Where tracking was lost: makes registered_nodes() follow limbs that another start finds. Gives whether there
     // are any; looks only once.
     bool follow_lost_limbs();
@@ -207,8 +214,8 @@ private:
 // The work of the next frame that can be done beside the coding of this one, if that becomes a T-frame whose nodes are
 // registered as here; registered: null if this one cannot become a T-frame. next_mesh as captured, on the lattice.
 AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const NodeRegistration* registered,
-                     const LatticeMesh& next_mesh, const CodedPose& next_pose, int effort,
-                     std::vector<StageTime>& stages);
+                     const LatticeMesh& next_mesh, const std::vector<Colour>& next_colours, const CodedPose& next_pose,
+                     int effort, std::vector<StageTime>& stages);
 
 // Side of the cubes of space by which it is judged whether a region is lost, lattice units.
 double region_side(const Configuration& configuration);

@@ -9,7 +9,6 @@ namespace htvm::internal {
 namespace {
 
 constexpr double normal_scale = 127.0;
-constexpr double texcoord_scale = 4096.0;
 constexpr double texcoord_limit = 4096.0;
 // Half the lattice, so that predictions and residuals of captured values stay on it.
 constexpr std::int32_t capture_limit = lattice_limit / 2;
@@ -100,7 +99,7 @@ Result<LatticeMesh> to_lattice(const Mesh& mesh, const Lattice& lattice) {
         if (!(std::abs(t[0]) < texcoord_limit) || !(std::abs(t[1]) < texcoord_limit))
             return fail(ErrorKind::bad_input,
                         "vertex " + std::to_string(k) + " has a texture coordinate beyond 4096 or not finite");
-        out.texcoords.push_back({rounded(t[0] * texcoord_scale), rounded(t[1] * texcoord_scale)});
+        out.texcoords.push_back({rounded(t[0] * captured_texcoord_unit), rounded(t[1] * captured_texcoord_unit)});
     }
     return out;
 }
@@ -130,18 +129,17 @@ void to_unit_normals(std::span<const QuantisedNormal> normals, std::vector<Vecto
     }
 }
 
-void to_texcoords(std::span<const QuantisedTexcoord> texcoords, std::vector<Vector2f>& out) {
+void to_texcoords(std::span<const QuantisedTexcoord> texcoords, double unit, std::vector<Vector2f>& out) {
     out.clear();
     out.reserve(texcoords.size());
-    for (const auto& t : texcoords)
-        out.push_back({static_cast<float>(t[0] / texcoord_scale), static_cast<float>(t[1] / texcoord_scale)});
+    for (const auto& t : texcoords) out.push_back({static_cast<float>(t[0] / unit), static_cast<float>(t[1] / unit)});
 }
 
-Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice) {
+Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice, double texcoord_unit) {
     Mesh out;
     to_millimetres(mesh.positions, lattice, out.positions);
     to_unit_normals(mesh.normals, out.normals);
-    to_texcoords(mesh.texcoords, out.texcoords);
+    to_texcoords(mesh.texcoords, texcoord_unit, out.texcoords);
     out.triangles = mesh.triangles;
     out.colours = mesh.colours;
     return out;

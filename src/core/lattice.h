@@ -59,12 +59,13 @@ Result<LatticeMesh> to_lattice(const Mesh& mesh, const Lattice& lattice);
 Result<LatticePoint> to_lattice(const std::array<double, 3>& point, const Lattice& lattice);
 
 // Parts of a mesh as floats for display, written into arrays that may be reused: positions in millimetres, normals of
-// unit length (zero where the mesh has none), texture coordinates as captured.
+// unit length (zero where the mesh has none), texture coordinates, of which `unit` make 1.
+inline constexpr double captured_texcoord_unit = 4096;
 void to_millimetres(std::span<const LatticePoint> positions, const Lattice& lattice, std::vector<Vector3f>& out);
 void to_unit_normals(std::span<const QuantisedNormal> normals, std::vector<Vector3f>& out);
-void to_texcoords(std::span<const QuantisedTexcoord> texcoords, std::vector<Vector2f>& out);
+void to_texcoords(std::span<const QuantisedTexcoord> texcoords, double unit, std::vector<Vector2f>& out);
 // The whole mesh as floats.
-Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice);
+Mesh to_mesh(const LatticeMesh& mesh, const Lattice& lattice, double texcoord_unit = captured_texcoord_unit);
 std::array<double, 3> to_millimetres(LatticePoint point, const Lattice& lattice);
 
 }  // namespace htvm::internal

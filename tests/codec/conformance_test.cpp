@@ -1,7 +1,8 @@
 // Streams that every version must decode to the same integers, each with a digest per frame: *.htvm and *.digests in
 // tests/data/conformance. Those whose names have no number are of the stream's version 1, NAME_2 and NAME_3 of versions
-// 2 and 3, and no encoder writes them any more; NAME_4 are of version 4, NAME_5 of 5. HTVM_WRITE_CONFORMANCE=1 in the
-// environment rewrites all of versions 4 and 5 that are there; NAME_4 writes that one, whether it is there or not.
+// 2 and 3, and no encoder writes them any more; NAME_4 are of version 4, NAME_5 of 5, NAME_6 of 6.
+// HTVM_WRITE_CONFORMANCE=1 in the environment rewrites all of versions 4 to 6 that are there; NAME_4 writes that one,
+// whether it is there or not.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -317,6 +318,19 @@ void write_audio_between() {
     write_packets("audio", packets);
 }
 
+// What version 6 brought: charts, of an I-frame, T-frames in groups, a patch and what follows it; the first frame shows
+// vertices without triangles, too.
+void write_charts() {
+    auto options = patched_options();
+    options.texture = {TextureLayout::charts, 256, 192};
+    options.tracked.group = 2;
+    auto ball = horned_ball(7, 3);
+    auto& first = ball.frames[0].mesh;
+    first.positions.push_back({0, 500, 0});
+    first.colours.push_back({1, 2, 3});
+    write_stream("charts", ball, options);
+}
+
 void write_all() {
     fs::create_directories(folder);
     write_audio_between();
@@ -328,6 +342,7 @@ void write_all() {
     write_patched();
     write_patched_by_chance();
     write_grouped();
+    write_charts();
     write_sequences();
 
     TestSequence spokes{"awkward, moving", {}, {}};

@@ -13,6 +13,7 @@ import sys
 import zlib
 
 from audio import read_audio
+from charts import TexturedSurface, decode_corners
 from conventions import Corrupt, Unsupported, check
 from enhanced import decode_enhanced_mesh, decode_predicted_mesh, read_codebook
 from group import FrameGroup, read_group_payload
@@ -21,7 +22,7 @@ from nodes import Kept, smoothed
 from reference import Reference, decode_pose
 from patched import decode_patched_mesh
 from picture import Pictures
-from stream import (AUDIO, CODEBOOK, ENHANCED, INTRA, PATCHED, PICTURE, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
+from stream import (AUDIO, CHARTS, CODEBOOK, ENHANCED, INTRA, PATCHED, PICTURE, POSE, PREDICTED, SEQUENCE, TRACKED, packets,
                     read_coded_frame, read_frame_payload, read_sequence_header)
 from tracked import TrackedReference, decode_tracked_mesh
 
@@ -36,12 +37,28 @@ def digest(mesh):
     return crc
 
 
+def textured_surface(header, frame, mesh, before=()):
+    """How the mesh is shown in a stream with charts (6.8), or None. before: coordinates that a TP-frame keeps."""
+    if header.layout != 2 or (not before and CHARTS not in frame.layers):
+        return None
+    check(not mesh.texcoords, "it has both charts and texture coordinates")
+    corners, triangles = list(before), mesh.triangles[len(before):]
+    if triangles:
+        corners += decode_corners(frame.layer(CHARTS), header.picture, mesh.positions, triangles)
+    return TexturedSurface(len(mesh.positions), mesh.triangles, corners) if corners else None
+
+
 class Group:
     """An I- or TP-frame and what T-frames make of it (8.11)."""
 
-    def __init__(self, mesh, frame, number, step=1, kept=Kept()):
+    def __init__(self, mesh, frame, number, step=1, kept=Kept(), textured=None):
         self.mesh, self.frame, self.number, self.step, self.kept = mesh, frame, number, step, kept
+        self.textured = textured
         self.reference = self.state = self.last = self.group = None
+
+    def shown(self, mesh):
+        """A mesh of its vertices, as it is shown."""
+        return self.textured.show(mesh) if self.textured else mesh
 
     def tracked_reference(self, header):
         check(header.node_spacing > 0, "the header allows no tracked frames")
@@ -84,8 +101,14 @@ class Group:
         check(packet.referred(), "a patched frame that nothing may refer to")
         frame = read_coded_frame(packet)
         joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
-        mesh, kept = decode_patched_mesh(frame, self.tracked_reference(header))
-        return mesh, joints, Group(mesh, frame, packet.frame, kept=kept)
+        mesh, stay, kept = decode_patched_mesh(frame, self.tracked_reference(header))
+        textured = None
+        if self.textured:
+            stays = set(stay)
+            before = [corners for triangle, corners in zip(self.mesh.triangles, self.textured.corners)
+                      if stays.issuperset(triangle)]
+            textured = textured_surface(header, frame, mesh, before)
+        return mesh, joints, Group(mesh, frame, packet.frame, kept=kept, textured=textured)
 
 
 def decode_stream(data):
@@ -123,26 +146,26 @@ def decode_stream(data):
                     if not packet.settled():
                         mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
                     step = 1
-                if not packet.referred():
-                    yield packet, header, mesh
-                    continue
-                reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
-                group = Group(mesh, frame, packet.frame, step)
-                yield packet, header, mesh
+                textured = textured_surface(header, frame, mesh)
+                shown = textured.show(mesh) if textured else mesh
+                if packet.referred():
+                    reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
+                    group = Group(mesh, frame, packet.frame, step, textured=textured)
+                yield packet, header, shown
             elif packet.kind == TRACKED:
                 check(group, "its reference is not there")
-                yield packet, header, group.decode(packet, header)
+                yield packet, header, group.shown(group.decode(packet, header))
             elif packet.kind == PATCHED:
                 check(group, "its reference is not there")
                 mesh, joints, group = group.decode_patched(packet, header)
                 reference, books = Reference(mesh, joints, header, packet.frame), [None, None]
-                yield packet, header, mesh
+                yield packet, header, group.shown(mesh)
             elif packet.kind in (ENHANCED, PREDICTED):
                 check(header, "a frame came before any sequence header")
                 check(reference and reference.frame == packet.reference, "its reference is not there")
                 if packet.kind == PREDICTED:
                     frame = read_frame_payload(packet.payload)
-                    yield packet, header, decode_predicted_mesh(frame, reference)
+                    yield packet, header, group.shown(decode_predicted_mesh(frame, reference))
                 else:
                     frame = read_coded_frame(packet)
                     yield packet, header, decode_enhanced_mesh(frame, reference, books, header.m)

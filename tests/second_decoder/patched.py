@@ -87,7 +87,7 @@ def decode_places(data, triangles, vertices, border):
 
 
 def decode_patched_mesh(frame, reference):
-    """The mesh, and what it takes over of the reference's nodes. frame: its payload."""
+    """The mesh, the vertices that stay, and what it takes over of the reference's nodes. frame: its payload."""
     check(not reference.mesh.texcoords, "its reference has texture coordinates")
     tracked, _ = decode_tracked_mesh(frame.layer(TRACKED_RUN), 4, reference, None)
     removed = decode_removed(frame.layer(REMOVED), len(tracked.positions), reference.levels)
@@ -123,4 +123,4 @@ def decode_patched_mesh(frame, reference):
     mesh.positions = smoothed(mesh.positions, mesh.triangles, step, len(stay))
     if reference.mesh.normals:
         mesh.normals = quantised_normals(mesh)
-    return mesh, Kept(reference.nodes, stay)
+    return mesh, stay, Kept(reference.nodes, stay)

@@ -58,8 +58,8 @@ def read_sequence_header(payload):
     header = Header()
     check(read.take(4) == b"htvm", "this is no htvm stream")
     version = read.field("H")
-    if not 1 <= version <= 5:
-        raise Unsupported("version %d; this decoder reads 1 to 5" % version)
+    if not 1 <= version <= 6:
+        raise Unsupported("version %d; this decoder reads 1 to 6" % version)
     header.version = version
     header.bits = read.field("B")
     header.origin = [read.field("i") for _ in range(3)]
@@ -94,6 +94,13 @@ def read_sequence_header(payload):
             check(abs(header.floor) <= L and header.up > 0, "the floor is out of range")
         if optional & 2:
             header.metadata = read_metadata(read)
+    header.layout, header.picture = 0, (0, 0)
+    if version >= 6:
+        header.layout, header.picture = read.varint(), (read.varint(), read.varint())
+        if header.layout > 2:
+            raise Unsupported("texture layout %d" % header.layout)
+        sizes = range(1, 4097) if header.layout > 0 else [0]
+        check(all(side in sizes for side in header.picture), "the size of the pictures is out of range")
     header.bytes = payload
     return header
 
@@ -118,7 +125,7 @@ def read_metadata(read):
 # ---------------------------------------------------------------------------------------------- 4. frame payload
 
 (POSE, TRANSFORMS, GEOMETRY, COLOUR, NORMALS, TEXCOORDS, MAPPING, FANS, DISTANCE_ORDERS, EXTERNAL,
- CODED_BONES, TRACKED_RUN, REMOVED, BORDER) = range(1, 15)
+ CODED_BONES, TRACKED_RUN, REMOVED, BORDER, CHARTS) = range(1, 16)
 
 
 class Frame:
@@ -141,7 +148,7 @@ def read_frame_payload(payload):
     frame.layers = {}
     for number, size in table:
         layer = read.take(size)
-        if number < 15:
+        if number < 16:
             check(number not in frame.layers, "a layer comes twice")
             frame.layers[number] = layer
     return frame

@@ -311,8 +311,10 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
         const auto found = search.find(ways[static_cast<std::size_t>(way)]);
         clock.done("patch");
         if (!found) continue;
-        auto out = code_patched(work, steps, tracked, *found);
-        if (!out) return tl::unexpected(out.error());
+        auto coded = code_patched(work, steps, tracked, *found);
+        if (!coded) return tl::unexpected(coded.error());
+        auto& out = *coded;
+        if (!out) continue;
         auto& fit = out->intra->fit;
         if (static_cast<double>(out->bytes()) > most_bytes * work.reference().bytes || lost_track(work, fit)) continue;
         fit = least_of(std::move(fit), work.reference().intra.fit);

@@ -40,6 +40,7 @@ Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts fa
     out.step = facts.step;
     out.captured = facts.captured;
     out.kept = std::move(facts.kept);
+    out.textured = std::move(facts.textured);
     out.skinned.mesh = std::move(mesh);
     out.skinned.joints = std::move(pose.joints);
     out.skinned.orientations = std::move(pose.orientations);

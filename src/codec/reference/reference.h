@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "codec/charts/chart_layer.h"
 #include "codec/reference/skinning.h"
 #include "codec/reference/transforms.h"
 #include "codec/stream/sequence.h"
@@ -18,6 +19,7 @@ struct Reference {
     std::uint32_t number = 0;  // of the frame
     std::int32_t step = 1;     // of its positions, in lattice units; 1 if they were smoothed
     CapturedCounts captured;   // what its frame was captured with
+    TexturedSurface textured;  // where the stream has charts: of the mesh
     ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
     bool has_bones = false;    // whether it was derived
     std::optional<TrackedReference> tracked;   // what depends on the nodes, if it was derived
@@ -38,6 +40,7 @@ struct ReferenceFacts {
     std::int32_t step = 1;
     CapturedCounts captured;
     KeptNodes kept = {};  // of a TP-frame
+    TexturedSurface textured = {};
 };
 
 // Smooths an I-frame's mesh within its quantiser cells, as it is shown in streams with nodes from

@@ -7,6 +7,7 @@
 
 #include "core/bytes.h"
 #include "core/crc32.h"
+#include "htvm/texture.hpp"
 
 namespace htvm::internal {
 namespace {
@@ -94,6 +95,19 @@ Result<void> read_what_version_2_added(ByteReader& in, SequenceHeader& out) {
     return {};
 }
 
+Result<StreamTexture> read_texture(ByteReader& in) {
+    const auto layout = in.varint(), width = in.varint(), height = in.varint();
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
+    if (layout > static_cast<std::uint64_t>(TextureLayout::charts))
+        return fail(ErrorKind::unsupported,
+                    "sequence header: this decoder does not know texture layout " + std::to_string(layout));
+    const bool textured = layout != static_cast<std::uint64_t>(TextureLayout::none);
+    const std::uint64_t least = textured ? 1 : 0, most = textured ? most_picture_side : 0u;
+    if (std::min(width, height) < least || std::max(width, height) > most)
+        return fail(ErrorKind::corrupt_stream, "sequence header: the size of the texture's pictures is out of range");
+    return StreamTexture{static_cast<TextureLayout>(layout), static_cast<int>(width), static_cast<int>(height)};
+}
+
 }  // namespace
 
 Result<void> check_metadata(std::span<const MetadataEntry> metadata) {
@@ -144,6 +158,11 @@ std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
     out.u8(static_cast<std::uint8_t>((header.floor ? has_floor : 0) | (header.metadata.empty() ? 0 : has_metadata)));
     if (header.floor) out.u32(static_cast<std::uint32_t>(*header.floor));
     if (!header.metadata.empty()) write_metadata(out, header.metadata);
+    if (header.version >= textured_version) {
+        out.varint(static_cast<std::uint64_t>(header.texture.layout));
+        out.varint(static_cast<std::uint64_t>(header.texture.width));
+        out.varint(static_cast<std::uint64_t>(header.texture.height));
+    }
     return out.take();
 }
 
@@ -209,6 +228,11 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
     }
     if (version > 1)
         if (auto read = read_what_version_2_added(in, out); !read) return tl::unexpected(read.error());
+    if (version >= textured_version) {
+        const auto texture = read_texture(in);
+        if (!texture) return tl::unexpected(texture.error());
+        out.texture = *texture;
+    }
     return out;
 }
 

@@ -13,12 +13,14 @@
 #include "htvm/result.hpp"
 #include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
+#include "htvm/texture_layout.hpp"
 
 namespace htvm::internal {
 
 // Raised with every change of the syntax, or of a constant that both sides use. Versions from oldest_version to
-// newest_version are read, stream_version is written, and grouped_version where T-frames come in groups.
-inline constexpr std::uint16_t stream_version = 4, newest_version = 5;
+// newest_version are read, stream_version is written, grouped_version where T-frames come in groups, and
+// textured_version where there is a texture.
+inline constexpr std::uint16_t stream_version = 4, newest_version = 6;
 inline constexpr std::uint16_t oldest_version = 1;
 
 // From this version on a sequence header has a session. The headers of all versions since have the same syntax.
@@ -30,6 +32,9 @@ inline constexpr std::uint16_t tracked_run_version = 3;
 inline constexpr std::uint16_t shown_smoothed_version = 4;
 // From this version on a T-frame's payload begins with its place in a group (tracked/frame_group.h).
 inline constexpr std::uint16_t grouped_version = 5;
+// From this version on a sequence header says how meshes wear a texture, and frames may have charts
+// (charts/chart_layer.h).
+inline constexpr std::uint16_t textured_version = 6;
 
 // The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (paper/mtfan.h). The
 // paper's are 8, 16 and 32.
@@ -55,6 +60,7 @@ struct SequenceHeader {
     UpAxis up = UpAxis::unknown;
     std::optional<std::int32_t> floor;  // coordinate of the floor on the axis that is up, lattice units
     std::vector<MetadataEntry> metadata;
+    StreamTexture texture;
 };
 
 // Limits of the metadata: bytes of a key (at least 1), of a value, and in total; number of entries.

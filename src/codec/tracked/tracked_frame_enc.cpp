@@ -82,11 +82,13 @@ TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, cons
     return out;
 }
 
-DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options) {
+DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options,
+                                       std::span<const Colour> colours) {
     std::vector<Eigen::Vector3d> handles;
     for (const auto pivot : reference.graph.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
     return make_deformable(points_of(reference.mesh.positions), reference.mesh.triangles, reference.nodes.weights,
-                           handles, pairs_of(reference), options, reference.mesh.colours);
+                           handles, pairs_of(reference), options,
+                           colours.empty() ? std::span<const Colour>(reference.mesh.colours) : colours);
 }
 
 namespace {

@@ -39,7 +39,8 @@ struct TrackedFrameOptions {
 };
 
 // The reference, prepared for registration; made once per I-frame.
-DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options);
+DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options,
+                                       std::span<const Colour> colours = {});
 
 // Possible starts of a registration, each one motion per node, or empty. last, before_last: of the two previous frames.
 // gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node.
