@@ -33,6 +33,8 @@ htvm_floor(synth DIRECTORY src/synth LINKS htvm_core Eigen3::Eigen)
 if(HTVM_SANITIZE MATCHES "address")
   target_compile_options(htvm_synth PRIVATE -fno-sanitize=all -O2)
 endif()
+# Above the encoder's surface: pictures of a capture's texture in the layout of a stream's charts.
+htvm_floor(texture_baking SOURCES src/texture/texture_baking.cpp LINKS htvm_core htvm_surface)
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
 
 # Draco-coded I-frames: plugs into the encoder and the decoder, which do not depend on libdraco.
@@ -63,7 +65,7 @@ htvm_program_library(command_line command_line htvm_core htvm_io htvm_images CLI
 target_compile_definitions(htvm_command_line PUBLIC HTVM_VERSION="${PROJECT_VERSION}")
 include(cmake/live.cmake)
 htvm_program_library(app htvm htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_sound htvm_texture htvm_synth htvm_metrics htvm_live)
-htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_texture htvm_synth htvm_metrics)
+htvm_program_library(laboratory lab htvm_command_line htvm_encoder htvm_decoder htvm_draco htvm_texture htvm_texture_baking htvm_synth htvm_metrics)
 add_executable(htvm apps/htvm/main.cpp)
 target_link_libraries(htvm PRIVATE htvm_app)
 add_executable(htvm-lab apps/lab/main.cpp)

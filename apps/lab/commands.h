@@ -10,5 +10,6 @@ void add_rd(CLI::App& app, app::Run& run);
 void add_reproduce(CLI::App& app, app::Run& run);
 void add_events(CLI::App& app, app::Run& run);
 void add_endure(CLI::App& app, app::Run& run);
+void add_bake(CLI::App& app, app::Run& run);
 
 }  // namespace htvm::lab

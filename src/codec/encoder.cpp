@@ -35,21 +35,21 @@ struct Output {
     std::uint32_t header_sent = 0;  // number of the frame with which the sequence header was last sent
 };
 
-<<<<<<< HEAD
 // A frame on the lattice, that is coded now or waits for the next one, with what was found of it meanwhile.
 struct PushedFrame {
     LatticeMesh mesh;
+    std::vector<Colour> colours;  // of its vertices where they are not coded
     CodedPose pose;
     std::int64_t timestamp_us = 0;
     bool force_intra = false;
     int effort = usual_effort;
     AheadWork ahead = {};
-=======
+};
+
 // A mesh as the decoder shows it.
 struct ShownMesh {
     LatticeMesh mesh;
     std::vector<std::uint32_t> repeated;  // at the seams of charts: which vertices the last ones are
->>>>>>> 5c46c2f (Charts: a layout of the texture that the stream has of its own, derived from decoded positions)
 };
 
 }  // namespace
@@ -221,9 +221,10 @@ struct Outcome {
 };
 
 // A candidate's mesh as the decoder shows it. reference: that the candidate refers to, or null.
-ShownMesh shown(const Candidate& candidate, const Reference* reference) {
+ShownMesh shown(Candidate& candidate, const Reference* reference) {
     const bool refers = candidate.type == FrameType::tracked || candidate.type == FrameType::predicted;
     const auto& textured = refers && reference ? reference->textured : candidate.textured;
+    if (textured.empty()) return {std::move(candidate.decoded), {}};
     return {shown_mesh(candidate.decoded, textured), textured.copied};
 }
 
@@ -338,8 +339,14 @@ Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* p
     auto coded_pose = state.poses.next(mesh, pose, state.configuration.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");
-<<<<<<< HEAD
     PushedFrame out;
+    if (state.configuration.options.texture.layout == TextureLayout::charts) {
+        if (!mesh.texcoords.empty())
+            return fail(ErrorKind::bad_input,
+                        "the mesh has texture coordinates, but with texture.layout charts the stream has its own: "
+                        "push it without them and without their seams");
+        out.colours = std::exchange(on_lattice->colours, {});
+    }
     out.mesh = std::move(*on_lattice);
     out.pose = std::move(*coded_pose);
     out.effort = state.effort;
@@ -360,7 +367,7 @@ Result<Candidate> choose_beside(State& state, FrameWork& work, bool force_intra,
         state.configuration.threads, [&] { chosen = choose_frame(work, state.control, bits, force_intra); },
         [&] {
             next->ahead = work_ahead(state.configuration, state.sequence, registered ? &*registered : nullptr,
-                                     next->mesh, next->pose, next->effort, stages);
+                                     next->mesh, next->colours, next->pose, next->effort, stages);
         });
     state.stages.insert(state.stages.end(), stages.begin(), stages.end());
     const bool as_assumed = *chosen && (*chosen)->type == FrameType::tracked && work.is_as_first_registered();
@@ -371,20 +378,8 @@ Result<Candidate> choose_beside(State& state, FrameWork& work, bool force_intra,
 // next: pushed behind it, or null.
 Result<void> code_frame_of(State& state, PushedFrame frame, PushedFrame* next) {
     const auto timestamp_us = frame.timestamp_us;
-    FrameWork work(state.configuration, state.sequence, frame.effort, std::move(frame.mesh), std::move(frame.pose),
-=======
-    std::vector<Colour> colours;
-    if (state.configuration.options.texture.layout == TextureLayout::charts) {
-        if (!mesh.texcoords.empty())
-            return fail(ErrorKind::bad_input,
-                        "the mesh has texture coordinates, but with texture.layout charts the stream has its own: "
-                        "push it without them and without their seams");
-        colours = std::exchange(on_lattice->colours, {});
-    }
-    FrameWork work(state.configuration, state.sequence, state.effort, std::move(*on_lattice), std::move(colours),
-                   std::move(*coded_pose),
->>>>>>> 5c46c2f (Charts: a layout of the texture that the stream has of its own, derived from decoded positions)
-                   state.stages);
+    FrameWork work(state.configuration, state.sequence, frame.effort, std::move(frame.mesh), std::move(frame.colours),
+                   std::move(frame.pose), state.stages);
     work.take(std::move(frame.ahead));
     auto chosen = choose_beside(state, work, frame.force_intra, next);
     if (!chosen) return tl::unexpected(chosen.error());

@@ -40,6 +40,7 @@ public:
     explicit ImagePyramid(const Image& image);
     const Image& image() const { return *image_; }
     std::size_t levels() const { return 1 + smaller_.size(); }
+    const Image& at_level(std::size_t level) const { return level == 0 ? *image_ : smaller_[level - 1]; }
 
     // The level whose texels are nearest in size to `texels` of the image's, counted along a side.
     std::size_t level_for(double texels) const;

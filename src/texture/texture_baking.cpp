@@ -173,24 +173,36 @@ void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> rep
     }
     if (in_space > 0) next.texels_per_millimetre = std::sqrt(in_picture / in_space);
 
-    // The gutters grow ring by ring from the charts, so each of their texels comes from one of the nearest.
-    std::vector<std::array<Texel, 2>> ring, further;
-    for (const auto texel : next.inside) ring.push_back({texel, texel});
+    // The gutters grow ring by ring from the charts, so that each of their texels is of the nearest.
+    const auto for_each_around = [&](Texel texel, int reach, const auto& at) {
+        const int x = static_cast<int>(texel) % width, y = static_cast<int>(texel) / width;
+        for (int v = std::max(y - reach, 0); v <= std::min(y + reach, height - 1); ++v)
+            for (int u = std::max(x - reach, 0); u <= std::min(x + reach, width - 1); ++u)
+                at(static_cast<Texel>(v * width + u), (u - x) * (u - x) + (v - y) * (v - y));
+    };
+    std::vector<Texel> ring = next.inside, further, gutter;
     for (int step = 0; step < gutter_texels; ++step) {
         further.clear();
-        for (const auto& [texel, source] : ring) {
-            const int x = static_cast<int>(texel) % width, y = static_cast<int>(texel) / width;
-            for (const auto& [dx, dy] :
-                 {std::array{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}) {
-                if (x + dx < 0 || y + dy < 0 || x + dx >= width || y + dy >= height) continue;
-                const auto to = static_cast<Texel>((y + dy) * width + x + dx);
-                if (next.chart_of_texel[to] != 0) continue;
+        for (const auto texel : ring)
+            for_each_around(texel, 1, [&](Texel to, int) {
+                if (next.chart_of_texel[to] != 0) return;
                 next.chart_of_texel[to] = next.chart_of_texel[texel];
-                further.push_back({to, source});
-            }
-        }
-        next.gutter.insert(next.gutter.end(), further.begin(), further.end());
+                further.push_back(to);
+            });
+        gutter.insert(gutter.end(), further.begin(), further.end());
         ring.swap(further);
+    }
+    std::vector<std::uint8_t> is_inside(texels, 0);
+    for (const auto texel : next.inside) is_inside[texel] = 1;
+    for (const auto texel : gutter) {
+        Texel source = texel;
+        int least = std::numeric_limits<int>::max();
+        for_each_around(texel, gutter_texels, [&](Texel from, int squared) {
+            if (is_inside[from] == 0 || squared >= least) return;
+            least = squared;
+            source = from;
+        });
+        next.gutter.push_back({texel, source});
     }
     // What lies between charts is nobody's, and stays as it is unless all is new.
     if (any_stays)
@@ -213,13 +225,15 @@ std::vector<TextureBaker::Match> TextureBaker::matches(const Mesh& captured, con
     std::vector<Point3f> normals = captured.normals;
     if (normals.empty())
         for (const auto& n : vertex_normals(captured.positions, captured.triangles)) normals.push_back(to_floats(n));
-    const auto found = closest_facing(surface, captured.positions, normals,
-                                      {.reach = static_cast<float>(options_.reach)}, options_.threads);
+    // The search begins at the nearest vertex, which may be an edge farther away than the surface.
+    const double reach = options_.reach + 2 * edge;
+    const auto found =
+        closest_facing(surface, captured.positions, normals, {.reach = static_cast<float>(reach)}, options_.threads);
     std::vector<Match> out(found.size());
     parallel_for(found.size(), options_.threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v) {
             if (!found[v].found()) continue;
-            // The search begins at the nearest vertex; the closest point may be in a triangle without it.
+            // The closest point may be in a triangle without the nearest vertex.
             const auto p = to_vector(captured.positions[v]);
             const auto closest_in = [&](std::uint32_t t) {
                 const auto& [a, b, c] = layout_.welded[t];
@@ -240,6 +254,7 @@ std::vector<TextureBaker::Match> TextureBaker::matches(const Mesh& captured, con
                 }
                 if (triangle == from) break;
             }
+            if (best.squared_distance > options_.reach * options_.reach) continue;
             out[v].triangle = triangle;
             for (std::size_t i = 0; i < 3; ++i) out[v].shares[i] = static_cast<float>(best.shares[i]);
             out[v].distance = static_cast<float>(std::sqrt(best.squared_distance));
@@ -353,8 +368,8 @@ void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::sp
 std::array<double, 3> TextureBaker::exposure() const {
     std::array<double, 3> out = {1, 1, 1};
     constexpr int least = 24, most = 235;  // levels in which neither noise nor clipping counts much
-    constexpr std::size_t every = 7, fewest = 500;
-    constexpr double per_step = 1024, smallest = 0.003;
+    constexpr std::size_t every = 5, fewest = 300;
+    constexpr double per_step = 1024, smallest = 0.003, largest = 2;
     for (std::size_t c = 0; c < 3; ++c) {
         std::vector<std::uint32_t> votes(static_cast<std::size_t>(4 * per_step), 0);
         std::size_t all = 0;
@@ -375,6 +390,7 @@ std::array<double, 3> TextureBaker::exposure() const {
         const double within =
             votes[step] > 0 ? (0.5 * static_cast<double>(all) - static_cast<double>(sum)) / votes[step] : 0;
         const double gain = (static_cast<double>(step) + within) / per_step;
+        if (gain > largest || gain < 1 / largest) return {1, 1, 1};  // another picture, not another exposure
         out[c] = std::abs(gain - 1) < smallest ? 1 : gain;
     }
     return out;

@@ -97,7 +97,8 @@ TEST(Charts, TheLargestMeshAtTheLargestScaleDoesNotOverflow) {
 
 TEST(Charts, ALayerComesBackAsItWas) {
     const auto mesh = ball(2000, 12);
-    std::mt19937 random(1);
+    std::mt19937 engine(1);
+    const auto random = [&] { return static_cast<std::uint32_t>(engine()); };
     for (const std::uint32_t most : {1u, 3u, 40u, 255u}) {
         ChartLayout layout;
         layout.scale = 1 + random() % largest_scale;
@@ -212,7 +213,8 @@ TEST(Charts, ASheetThatIsFoldedBackOverItselfIsCutAtTheFold) {
 }
 
 TEST(Charts, AnySoupOfTrianglesHasALayout) {
-    std::mt19937 random(7);
+    std::mt19937 engine(7);
+    const auto random = [&] { return static_cast<std::uint32_t>(engine()); };
     for (const std::size_t triangles : {1u, 30u, 400u}) {
         LatticeMesh mesh;
         for (std::size_t v = 0; v < 60; ++v) {

@@ -28,7 +28,7 @@ expect 0 "htvm-lab " "$lab" --version
 expect 2 "" "$lab"
 expect 2 "htvm-lab: error: there is no command 'nonsense'; 'htvm-lab --help' lists them" "$lab" nonsense
 expect 2 "it is 'htvm encode'" "$lab" encode capture -o x.htvm
-for command in rd decoding reproduce events endure; do expect 0 "Usage" "$lab" $command --help; done
+for command in rd decoding reproduce events endure bake; do expect 0 "Usage" "$lab" $command --help; done
 
 # The sweep: tables, or only JSON on standard output; stored results are used again.
 expect 2 "--output is required" "$lab" rd capture
