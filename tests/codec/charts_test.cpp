@@ -263,7 +263,7 @@ TEST(Charts, WhereThePictureIsFullNoPieceFits) {
     const auto mesh = ball(2000, 16);
     const auto whole = lay_out(mesh.positions, mesh.triangles, picture_256);
     ASSERT_TRUE(whole);
-    EXPECT_FALSE(lay_out_beside(mesh.positions, mesh.triangles, picture_256, whole->corners, whole->scale));
+    EXPECT_FALSE(lay_out_beside(mesh.positions, mesh.triangles, picture_256, whole->corners, 2 * whole->scale));
 }
 
 TEST(Charts, AVertexOfTwoPairsOfCoordinatesIsRepeatedBehindTheMesh) {

@@ -289,9 +289,15 @@ std::optional<PlacedCharts> lay_out_beside(std::span<const LatticePoint> positio
                 corner[axis] = static_cast<std::int32_t>((corner[axis] * sides[axis]) >> (picture_bits - texel_bits));
         cover(cells, corners, cell, 0);
     }
-    if (!pack_at_scale(layout, cells, cells.height(), cell, positions, triangles)) return std::nullopt;
-    auto out = placed(layout, positions, triangles, picture);
-    return out ? std::optional(std::move(*out)) : std::nullopt;
+    // Smaller charts rather than none, down to half the size.
+    for (const std::int32_t size : {usual_size, 13, 10, 8}) {
+        auto tried = layout;
+        for (auto& chart : tried.charts) chart.size = size;
+        if (!pack_at_scale(tried, cells, cells.height(), cell, positions, triangles)) continue;
+        auto out = placed(tried, positions, triangles, picture);
+        return out ? std::optional(std::move(*out)) : std::nullopt;
+    }
+    return std::nullopt;
 }
 
 }  // namespace htvm::internal

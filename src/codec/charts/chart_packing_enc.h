@@ -22,7 +22,8 @@ struct PlacedCharts {
 Result<PlacedCharts> lay_out(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
                              const StreamTexture& picture);
 
-// A piece's, beside triangles that have coordinates and keep them, at their scale; nothing if there is no room.
+// A piece's, beside triangles that have coordinates and keep them: at their scale, or down to half of it where the
+// picture is nearly full; nothing if there is no room.
 std::optional<PlacedCharts> lay_out_beside(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
                                            const StreamTexture& picture, std::span<const CornerTexcoords> taken,
                                            std::uint32_t scale);
