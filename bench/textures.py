@@ -58,8 +58,7 @@ def main():
     def m3(decoded):
         said = json.loads(run(htvm, "compare", capture, decoded, "--frames", frames, "--only", "m3", "--views",
                               given.views, "--json"))
-        unlit = said["summary"]["m3_unlit"] if "summary" in said else said["m3_unlit"]
-        return unlit["foreground_db"]
+        return said["sequence"]["m3_unlit"]["foreground_db"]
 
     def tell(name, bytes_of_all, bytes_of_pictures, decibel):
         print("| %s | %.3f | %.3f | %.2f |" % (name, 8e-6 * bytes_of_all / seconds, 8e-6 * bytes_of_pictures / seconds,

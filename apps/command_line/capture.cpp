@@ -115,10 +115,11 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
     command
         .add_option(
             "--texture-as", options.texture_as,
-            "What becomes of a texture: colours at the vertices; coordinates, which are kept as they are while the\n"
-            "image is left out; captured, the same with the images, coded as video (with --profile topology); or\n"
-            "keep, with the images' files as they are (likewise). Default: colours, unless the meshes have vertex\n"
-            "colours of their own")
+            "What becomes of a texture: picture, drawn anew in a layout that lasts, and coded as video (with "
+            "--profile\n"
+            "tracked); captured, coordinates as they are and images coded as video (with --profile topology); keep,\n"
+            "the same with the images' files as they are; coordinates, the same without images; or colours at the\n"
+            "vertices. Default: colours, unless the meshes have vertex colours of their own")
         ->check(CLI::IsMember(std::vector<std::string>(std::begin(texture_uses), std::end(texture_uses))));
 }
 
@@ -142,7 +143,7 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
 }
 
 bool keeps_pictures(const CaptureOptions& options) {
-    return options.texture_as == "captured" || options.texture_as == "keep";
+    return options.texture_as == "picture" || options.texture_as == "captured" || options.texture_as == "keep";
 }
 
 bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
@@ -344,7 +345,6 @@ Result<void> Capture::find_unit() {
     }
     if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) return ok;
     has_texture_ = peeked_->texture != nullptr;
-    first_texture_ = peeked_->texture;
     find_floor();
     // From files all is read again but what is kept.
     if (!pipe_) next_ = begin_;
@@ -377,9 +377,10 @@ void Capture::tell_of_texture() const {
     const auto& image = textures_.image_name();
     const auto& [mesh, texture, file] = *peeked_;
     if (texture && keeps_pictures(options_)) {
-        note(fmt::format(
-            "the texture ({}, {} x {} pixels) is {}", image, texture->width, texture->height,
-            options_.texture_as == "keep" ? "kept as it is" : "coded as video, with its coordinates as captured"));
+        note(fmt::format("the texture ({}, {} x {} pixels) is {}", image, texture->width, texture->height,
+                         options_.texture_as == "keep"      ? "kept as it is"
+                         : options_.texture_as == "picture" ? "drawn anew in a layout that lasts, and coded as video"
+                                                            : "coded as video, with its coordinates as captured"));
     } else if (texture) {
         note(
             fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
@@ -407,9 +408,11 @@ void Capture::tell_of_texture() const {
 Mesh Capture::as_encoded(TexturedMesh captured) {
     textured_.reset();
     if (!captured.texture) return std::move(captured.mesh);
-    if (keeps_pictures(options_)) captured.mesh.colours.clear();
+    const bool as_captured = keeps_pictures(options_) && options_.texture_as != "picture";
+    if (as_captured) captured.mesh.colours.clear();
     textured_ = std::make_shared<const TexturedMesh>(std::move(captured));
-    if (keeps_pictures(options_)) return textured_->mesh;
+    if (as_captured) return textured_->mesh;
+    // Tracking goes by the colours at vertices, where there are pictures too.
     return with_vertex_colours(*textured_);
 }
 

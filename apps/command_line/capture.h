@@ -48,7 +48,8 @@ struct CaptureOptions {
 inline constexpr const char* texture_uses[] = {
     "colours",      // those of vertices are made from it
     "coordinates",  // are kept as they are, and the image is left out
-    "captured",     // the same, with the images coded as video
+    "picture",      // is drawn anew in a layout that lasts, and coded as video
+    "captured",     // its coordinates and images as they are, these coded as video
     "keep",         // the same, with the images' files as they are
 };
 // Whether its images go into the stream.
@@ -99,8 +100,8 @@ public:
     std::int64_t missing_timestamp_us(std::size_t k) const;  // of those, k from 0
 
     std::size_t frames() const { return frames_; }  // 0: not known, from standard input
-    // The texture of the first frame that can be read; null if it has none. Before take_first().
-    std::shared_ptr<const Image> first_texture() const { return first_texture_; }
+    // The first frame that can be read, with its texture; null if it has none. Before next() and take_first().
+    const TexturedMesh* first_textured() const { return peeked_ && peeked_->texture ? &*peeked_ : nullptr; }
     std::size_t dropped() const { return pipe_ ? pipe_->dropped() : 0; }
     const Skeleton& skeleton() const { return skeleton_; }
     const std::vector<double>& radii() const { return radii_; }  // from the skeleton's file; may be empty
@@ -146,8 +147,7 @@ private:
     std::size_t begin_ = 0, frames_ = 0;  // place of the first frame; their number, 0 where it is not known
 
     TextureFiles textures_;
-    bool has_texture_ = false;  // whether the first mesh's colours are those of its texture
-    std::shared_ptr<const Image> first_texture_;
+    bool has_texture_ = false;            // whether the first mesh's colours are those of its texture
     std::optional<TexturedMesh> peeked_;  // the first mesh that can be read, in mm, read beforehand to tell its unit
     std::size_t peeked_at_ = 0;           // its place
     std::size_t next_ = 0, taken_ = 0;    // place of the next frame; frames that next() gave or failed at

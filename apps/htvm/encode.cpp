@@ -41,6 +41,7 @@ nlohmann::json pictures_json(const EncodeOptions& options, const PictureTotals& 
                           {"key_pictures", pictures.key_pictures},
                           {"bytes", pictures.bytes},
                           {"megabits_per_second", 8e-6 * static_cast<double>(pictures.bytes) / seconds},
+                          {"draw_seconds", pictures.baking_seconds},
                           {"encode_seconds", pictures.seconds}};
     return out;
 }
@@ -49,9 +50,10 @@ std::string pictures_text(const EncodeOptions& options, const PictureTotals& pic
     const bool keep = options.capture.texture_as == "keep";
     auto out = fmt::format("of this {:.2f} Mbit/s are {}", 8e-6 * static_cast<double>(pictures.bytes) / seconds,
                            counted(pictures.pictures, keep ? "image file" : "picture"));
-    if (!keep)
-        out += fmt::format(", {} of them key pictures, coded at {:.1f} a second", pictures.key_pictures,
-                           static_cast<double>(pictures.pictures) / std::max(pictures.seconds, 1e-9));
+    const auto each_second = [&](double in) { return static_cast<double>(pictures.pictures) / std::max(in, 1e-9); };
+    if (!keep) out += fmt::format(", {} of them key pictures, ", pictures.key_pictures);
+    if (pictures.baking_seconds > 0) out += fmt::format("drawn at {:.1f}, ", each_second(pictures.baking_seconds));
+    if (!keep) out += fmt::format("coded at {:.1f} a second", each_second(pictures.seconds));
     return out;
 }
 
@@ -317,15 +319,25 @@ void check_jobs(const EncodeOptions& options, bool random_session) {
 void check_pictures(const EncodeOptions& options, const CLI::App& command) {
     const auto& as = options.capture.texture_as;
     for (const char* flag : {"--texture-size", "--texture-codec", "--texture-quality"})
-        if (command.count(flag) > 0 && as != "captured")
-            throw CLI::ValidationError(flag, "is for pictures that are coded as video: add --texture-as captured");
+        if (command.count(flag) > 0 && as != "captured" && as != "picture")
+            throw CLI::ValidationError(flag,
+                                       "is for pictures that are coded as video: add --texture-as picture or captured");
     if (!keeps_pictures(options.capture)) return;
-    if (options.encoding.profile == "tracked")
+    const bool tracked = options.encoding.profile == "tracked";
+    if (tracked && as != "picture")
         throw CLI::ValidationError("--texture-as",
                                    as + " keeps every frame's own texture coordinates, which --profile tracked does "
-                                        "not: add --profile topology");
+                                        "not: add --profile topology, or give picture");
+    if (!tracked && as == "picture")
+        throw CLI::ValidationError("--texture-as",
+                                   "picture is drawn on a mesh that lasts, as --profile tracked makes it; with other "
+                                   "profiles give captured");
     if (options.capture.texture.files == "none")
         throw CLI::ValidationError("--texture", "none leaves no images for --texture-as " + as);
+    if (as == "picture" && options.in_groups())
+        throw CLI::ValidationError("--texture-as",
+                                   "picture goes through the capture in one, as each frame's is drawn over the one "
+                                   "before; not with --jobs or --job");
     const bool rate = is_given(options.encoding, "rate.bits_per_second");
     if (rate && as == "keep")
         throw CLI::ValidationError("--texture-as",
@@ -349,6 +361,30 @@ void check_pace(const EncodeOptions& options) {
         throw CLI::ValidationError(flag, "goes with one pass over the frames, not with --passes 2");
 }
 
+// What the sequence header says of a capture's pictures, and how often they can be started at.
+Result<void> set_texture(const EncodeOptions& options, const Capture& capture, EncoderOptions& settings) {
+    if (!keeps_pictures(options.capture)) return {};
+    const auto* first = capture.first_textured();
+    if (!first) return fail(ErrorKind::bad_input, "the capture's first mesh has no texture");
+    const bool bake = options.capture.texture_as == "picture";
+    settings.texture.layout = bake ? TextureLayout::charts : TextureLayout::captured;
+    const auto& image = *first->texture;
+    const int size = options.capture.texture_as == "keep" ? 0 : options.pictures.size;
+    constexpr long least = 16;
+    if (bake) {
+        settings.texture.width = settings.texture.height = size > 0 ? size : picture_side_for(*first);
+    } else {
+        const double scale = size > 0 ? static_cast<double>(size) / std::max(image.width, image.height) : 1;
+        settings.texture.width = static_cast<int>(std::max(least, std::lround(scale * image.width)));
+        settings.texture.height = static_cast<int>(std::max(least, std::lround(scale * image.height)));
+    }
+    // A key picture takes as many bits as a second of others.
+    constexpr int frames_between_key_pictures = 90;
+    if (bake && !is_given(options.encoding, "tracked.access_interval"))
+        settings.tracked.access_interval = frames_between_key_pictures;
+    return {};
+}
+
 }  // namespace
 
 Result<void> encode(const EncodeOptions& options) {
@@ -357,6 +393,7 @@ Result<void> encode(const EncodeOptions& options) {
     if (!capture) return tl::unexpected(capture.error());
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
+    if (auto set = set_texture(options, *capture, *settings); !set) return set;
     // A group's packets come once its last frame is captured.
     const bool live = live::looks_like_hub_address(options.output) || options.deadline > 0;
     if (settings->tracked.group > 1 && live)

@@ -34,7 +34,13 @@ Result<void> drain(const Pass& pass) {
 // Counts the frames that were coded last, and writes their packets.
 Result<void> take_coded(Pass& pass) {
     auto& summary = pass.summary;
+    std::size_t coded = 0;
     for (const auto& [info, cost] : pass.encoder.coded_frames()) {
+        if (pass.pictures && pass.write && pass.pictures->bakes()) {
+            const auto repeated = pass.encoder.repeated_vertices(coded);
+            pass.pictures->show(info.frame, pass.encoder.reconstruction(coded), {repeated.begin(), repeated.end()});
+        }
+        ++coded;
         add(summary.totals, info);
         add_coded(pass.rate, cost);
         if (!pass.options.json || !pass.write) continue;
@@ -114,7 +120,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         pass.step("dropped");
         return Coded::dropped;
     }
-    if (pass.pictures && textured) pass.pictures->add(timestamp_us, textured->texture, textured->texture_file);
+    if (pass.pictures && pass.write && textured) pass.pictures->add(timestamp_us, textured);
     if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
     if (pass.deadline) {
         timed.took = milliseconds_since(start);
@@ -223,6 +229,7 @@ void add(Summary& summary, Summary behind) {
     summary.pictures.key_pictures += behind.pictures.key_pictures;
     summary.pictures.bytes += behind.pictures.bytes;
     summary.pictures.seconds += behind.pictures.seconds;
+    summary.pictures.baking_seconds += behind.pictures.baking_seconds;
 }
 
 void FrameWarnings::tell(Kind kind, const std::string& line) {
@@ -235,13 +242,12 @@ void FrameWarnings::tell(Kind kind, const std::string& line) {
 Result<std::optional<PictureTrack>> picture_track(const EncodeOptions& options, const Capture& capture,
                                                   const EncoderOptions& settings) {
     if (!keeps_pictures(options.capture)) return std::nullopt;
-    const auto first = capture.first_texture();
-    if (!first) return fail(ErrorKind::bad_input, "the capture's first mesh has no texture");
     PictureTrack::Settings out;
     out.options = options.pictures;
     out.keep = options.capture.texture_as == "keep";
-    out.width = first->width;
-    out.height = first->height;
+    out.bake = options.capture.texture_as == "picture";
+    out.width = settings.texture.width;
+    out.height = settings.texture.height;
     out.quality = options.encoding.quality;
     out.frames_per_second = capture.fps();
     if (settings.rate.bits_per_second > 0) out.bits_per_second = settings.rate.bits_per_second / share_of_meshes;

@@ -14,16 +14,17 @@ namespace htvm::app {
 namespace {
 
 constexpr const char* group = "Pictures of textures";
+constexpr std::array<std::uint16_t, 3> no_gains = {picture_gain_one, picture_gain_one, picture_gain_one};
 
-// Where who watches may start without the frames before: there pictures start too. But for I-frames that are many, as
-// where they cost no more than EP-frames: key pictures always cost more.
+// Where who watches may start without the frames before: there pictures start too. Not where such frames are many, as
+// I-frames are where they cost no more than EP-frames, or T-frames of the reference alone: key pictures always cost more.
 bool is_start(const PacketHeader& frame, std::optional<std::uint32_t> last_key) {
     using namespace packet_flag;
     constexpr std::uint32_t apart = 30;
     const auto type = frame_type(frame.kind);
     if (!type || !frame.has(referred)) return false;
-    if (*type == FrameType::intra) return !last_key || frame.frame - *last_key >= apart;
-    return *type == FrameType::tracked && frame.has(access);
+    const bool start = *type == FrameType::intra || (*type == FrameType::tracked && frame.has(access));
+    return start && (!last_key || frame.frame - *last_key >= apart);
 }
 
 std::optional<PictureCoder> coder_of_file(const std::vector<std::uint8_t>& bytes) {
@@ -65,11 +66,14 @@ Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     PictureTrack out;
     if (settings.keep) return out;
     out.coder_ = settings.options.codec == "vp9" ? PictureCoder::vp9 : PictureCoder::av1;
-    const int longer = std::max(settings.width, settings.height);
-    const double scale = settings.options.size > 0 ? static_cast<double>(settings.options.size) / longer : 1;
-    constexpr long least = 16;
-    out.width_ = static_cast<std::uint32_t>(std::max(least, std::lround(scale * settings.width)));
-    out.height_ = static_cast<std::uint32_t>(std::max(least, std::lround(scale * settings.height)));
+    out.width_ = static_cast<std::uint32_t>(settings.width);
+    out.height_ = static_cast<std::uint32_t>(settings.height);
+    if (settings.bake) {
+        TextureBakingOptions baking;
+        baking.width = settings.width;
+        baking.height = settings.height;
+        out.baker_.emplace(baking);
+    }
     PictureEncoderOptions options;
     options.coder = out.coder_;
     options.width = out.width_;
@@ -88,9 +92,8 @@ Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     return out;
 }
 
-void PictureTrack::add(std::int64_t timestamp_us, std::shared_ptr<const Image> image,
-                       std::shared_ptr<const std::vector<std::uint8_t>> file) {
-    waiting_.push_back({timestamp_us, std::move(image), std::move(file)});
+void PictureTrack::add(std::int64_t timestamp_us, std::shared_ptr<const TexturedMesh> textured) {
+    waiting_.push_back({timestamp_us, std::move(textured)});
 }
 
 // Meshes take more at times; over a second or so, pictures then take less.
@@ -115,15 +118,19 @@ Result<std::optional<Packet>> PictureTrack::behind(const PacketHeader& packet, s
     // Those of frames that were dropped go.
     while (!waiting_.empty() && waiting_.front().timestamp_us < packet.timestamp_us) waiting_.pop_front();
     if (waiting_.empty() || waiting_.front().timestamp_us != packet.timestamp_us) return std::nullopt;
-    const auto picture = std::move(waiting_.front());
+    const auto captured = std::move(waiting_.front().textured);
     waiting_.pop_front();
     const bool key = is_start(packet, last_key_) || !last_;
-    if (!picture.image || (picture.image == last_ && !key)) return std::nullopt;
+    if (!captured->texture || (!baker_ && captured->texture == last_ && !key)) return std::nullopt;
     const auto start = std::chrono::steady_clock::now();
-    auto coded = encoder_ ? coded_as_video(packet, picture, key) : kept_file(packet, picture);
-    totals_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const double baking = totals_.baking_seconds;
+    auto coded = baker_     ? baked(packet, *captured, key)
+                 : encoder_ ? coded_as_video(packet, *captured->texture, no_gains, key)
+                            : kept_file(packet, *captured);
+    totals_.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() -
+                       (totals_.baking_seconds - baking);
     if (!coded) return tl::unexpected(coded.error());
-    last_ = picture.image;
+    last_ = captured->texture;
     last_number_ = packet.frame;
     ++totals_.pictures;
     totals_.key_pictures += is_key_picture(*coded) ? 1 : 0;
@@ -132,8 +139,24 @@ Result<std::optional<Packet>> PictureTrack::behind(const PacketHeader& packet, s
     return std::optional(std::move(*coded));
 }
 
-Result<Packet> PictureTrack::coded_as_video(const PacketHeader& frame, const Waiting& picture, bool key) {
-    const auto& image = *picture.image;
+// The captured texture, drawn in the layout of the mesh that is shown.
+Result<Packet> PictureTrack::baked(const PacketHeader& frame, const TexturedMesh& captured, bool key) {
+    const auto start = std::chrono::steady_clock::now();
+    const auto found = shown_.find(frame.frame);
+    if (found == shown_.end()) return fail(ErrorKind::bad_input, "nothing is shown of a frame that has a texture");
+    const auto shown = std::move(found->second);
+    shown_.erase(shown_.begin(), std::next(found));
+    auto drawn = baker_->bake(captured, shown.mesh, shown.repeated);
+    totals_.baking_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (!drawn) return tl::unexpected(drawn.error());
+    std::array<std::uint16_t, 3> gains{};
+    for (std::size_t k = 0; k < 3; ++k)
+        gains[k] = static_cast<std::uint16_t>(std::clamp(std::lround(drawn->gains[k] * picture_gain_one), 1L, 65535L));
+    return coded_as_video(frame, drawn->picture, gains, key);
+}
+
+Result<Packet> PictureTrack::coded_as_video(const PacketHeader& frame, const Image& image,
+                                            const std::array<std::uint16_t, 3>& gains, bool key) {
     const auto width = static_cast<int>(width_), height = static_cast<int>(height_);
     const bool fits = image.width == width && image.height == height;
     const OwnPlanes planes(fits ? image : resized(image, width, height));
@@ -143,20 +166,21 @@ Result<Packet> PictureTrack::coded_as_video(const PacketHeader& frame, const Wai
     out.coder = coder_;
     out.width = width_;
     out.height = height_;
+    out.gains = gains;
     out.coded = coded->bytes;
     return write_texture_picture(
         out, {frame.frame, coded->key ? frame.frame : *last_number_, frame.timestamp_us, /*referred=*/true});
 }
 
-Result<Packet> PictureTrack::kept_file(const PacketHeader& frame, const Waiting& picture) const {
-    const auto coder = picture.file ? coder_of_file(*picture.file) : std::nullopt;
+Result<Packet> PictureTrack::kept_file(const PacketHeader& frame, const TexturedMesh& captured) const {
+    const auto coder = captured.texture_file ? coder_of_file(*captured.texture_file) : std::nullopt;
     if (!coder) return fail(ErrorKind::bad_input, "an image's file cannot be kept, as it is none of PNG, JPEG or WebP");
     TexturePicture out;
     out.coder = *coder;
     out.matrix = ColourMatrix::none;
-    out.width = static_cast<std::uint32_t>(picture.image->width);
-    out.height = static_cast<std::uint32_t>(picture.image->height);
-    out.coded = *picture.file;
+    out.width = static_cast<std::uint32_t>(captured.texture->width);
+    out.height = static_cast<std::uint32_t>(captured.texture->height);
+    out.coded = *captured.texture_file;
     return write_texture_picture(out, {frame.frame, frame.frame, frame.timestamp_us, /*referred=*/true});
 }
 

@@ -1,9 +1,11 @@
 // The pictures of a textured capture, coded and laid behind the frames of its stream.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +16,7 @@
 #include "htvm/picture_encoder.hpp"
 #include "htvm/result.hpp"
 #include "htvm/texture.hpp"
+#include "texture/texture_baking.h"
 
 namespace CLI {
 class App;
@@ -40,6 +43,7 @@ struct PictureTotals {
     std::size_t pictures = 0, key_pictures = 0;
     std::uint64_t bytes = 0;  // of their packets
     double seconds = 0;       // that coding them took
+    double baking_seconds = 0;
 };
 
 // Takes the picture of each frame that goes into the encoder of meshes, and gives it out behind that frame's packet.
@@ -50,20 +54,22 @@ public:
     struct Settings {
         TexturePictureOptions options;
         bool keep = false;
-        int width = 0, height = 0;  // of the capture's first image
+        bool bake = false;          // images are drawn anew in the layout of the meshes shown
+        int width = 0, height = 0;  // of the pictures
         double quality = 50, frames_per_second = 30;
         double bits_per_second = 0, buffer_seconds = 1;
         unsigned threads = 0;
     };
     static Result<PictureTrack> create(const Settings& settings);
 
-    // Of the pictures in the stream; 0 where files are kept, which may differ.
-    std::uint32_t width() const { return width_; }
-    std::uint32_t height() const { return height_; }
-
     // The picture of a frame with this timestamp: a later frame without one shows it too.
-    void add(std::int64_t timestamp_us, std::shared_ptr<const Image> image,
-             std::shared_ptr<const std::vector<std::uint8_t>> file);
+    void add(std::int64_t timestamp_us, std::shared_ptr<const TexturedMesh> textured);
+    // Whether it wants to know what is shown of each frame, which is drawn on.
+    bool bakes() const { return baker_.has_value(); }
+    // Before the frame's packet comes. repeated: Encoder::repeated_vertices().
+    void show(std::uint32_t frame, Mesh mesh, std::vector<std::uint32_t> repeated) {
+        shown_[frame] = {std::move(mesh), std::move(repeated)};
+    }
     // What comes behind a packet of the stream, of which it takes every one, in order: nothing where the picture is the
     // one before, and the frame none to start at. bytes: of the packet; what these leave of the rate, pictures take.
     Result<std::optional<Packet>> behind(const PacketHeader& packet, std::size_t bytes);
@@ -74,17 +80,24 @@ public:
 private:
     struct Waiting {
         std::int64_t timestamp_us;
-        std::shared_ptr<const Image> image;
-        std::shared_ptr<const std::vector<std::uint8_t>> file;
+        std::shared_ptr<const TexturedMesh> textured;
+    };
+    struct Shown {
+        Mesh mesh;
+        std::vector<std::uint32_t> repeated;
     };
     PictureTrack() = default;
     Result<void> follow_meshes(std::size_t bytes);
-    Result<Packet> coded_as_video(const PacketHeader& frame, const Waiting& picture, bool key);
-    Result<Packet> kept_file(const PacketHeader& frame, const Waiting& picture) const;
+    Result<Packet> baked(const PacketHeader& frame, const TexturedMesh& captured, bool key);
+    Result<Packet> coded_as_video(const PacketHeader& frame, const Image& image,
+                                  const std::array<std::uint16_t, 3>& gains, bool key);
+    Result<Packet> kept_file(const PacketHeader& frame, const TexturedMesh& captured) const;
 
     std::uint32_t width_ = 0, height_ = 0;
     PictureCoder coder_ = PictureCoder::av1;
     std::optional<PictureEncoder> encoder_;  // none: files are kept
+    std::optional<TextureBaker> baker_;
+    std::map<std::uint32_t, Shown> shown_;
     std::deque<Waiting> waiting_;
     std::shared_ptr<const Image> last_;         // that was coded
     std::optional<std::uint32_t> last_number_;  // of its frame

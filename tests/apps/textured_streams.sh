@@ -14,6 +14,8 @@ for codec in av1 vp9; do
     [ "$(json $codec.htvm '["key_pictures"]')" = 1 ] || fail "$codec: not one key picture"
     expect 0 "9 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify $codec.htvm
 done
+# The second decoder finds each behind its frame.
+PYTHONDONTWRITEBYTECODE=1 python3 "$project/tests/second_decoder/decoder.py" av1.htvm >second || fail "$(tail -1 second)"
 # They show the captured texture, which colours at vertices blur.
 ssim() { "$htvm" compare walk "$1" --only m3 --views 2 --frames 1 --json 2>/dev/null | python3 -c 'import json, sys; print(json.load(sys.stdin)["frames"][0]["m3_unlit"]["ssim"])'; }
 encode --texture-as captured --texture-quality 100 -o fine.htvm
@@ -24,6 +26,17 @@ python3 -c 'import sys; sys.exit(not float(sys.argv[1]) > float(sys.argv[2]) + 0
     fail "pictures, $(ssim fine.htvm), are no more like the capture than colours, $(ssim colours.htvm)"
 encode --texture-as captured --texture-size 32 -o small.htvm
 expect 0 "32 x 32 pixels" "$htvm" info small.htvm
+
+# In a layout that lasts, on tracked meshes; also in groups, and at a rate.
+for options in "" "--group 4" "--bitrate 2" "--texture-codec vp9"; do
+    "$htvm" encode walk --texture-as picture --texture-size 256 $options -o picture.htvm 2>/dev/null || fail "picture $options"
+    expect 0 "256 x 256 pixels, 9 pictures" "$htvm" info picture.htvm
+    expect 0 "9 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify picture.htvm
+done
+"$htvm" encode walk --texture-as picture --texture-size 256 -q 60 -o picture.htvm 2>/dev/null
+"$htvm" encode walk --texture-as colours -q 60 -o tracked.htvm 2>/dev/null
+python3 -c 'import sys; sys.exit(not float(sys.argv[1]) > float(sys.argv[2]))' "$(ssim picture.htvm)" "$(ssim tracked.htvm)" ||
+    fail "pictures, $(ssim picture.htvm), are no more like the capture than colours, $(ssim tracked.htvm)"
 
 # Files that are kept come back as they were.
 encode --texture-as keep -o kept.htvm
@@ -90,7 +103,9 @@ PYTHON
 # What does not go together is said.
 no() { expect 2 "$1" "$htvm" encode walk -o never.htvm "${@:2}"; }
 no "add --profile topology" --texture-as captured
-no "add --texture-as captured" --texture-size 64
+no "with other profiles give captured" --profile topology --texture-as picture
+no "goes through the capture in one" --texture-as picture --jobs 2
+no "add --texture-as picture or captured" --texture-size 64
 no "keep leaves image files as large as they are" --profile topology --texture-as keep --bitrate 2
 no "follows from --bitrate" --profile topology --texture-as captured --bitrate 2 --texture-quality 5
 no "leaves no images" --profile topology --texture-as captured --texture none

@@ -71,7 +71,7 @@ rm skin.png
 expect 1 'square.obj: its image "skin.png" is not in its folder; --texture gives its place, or none to go on without' \
     "$htvm" encode square.obj -o x.htvm
 expect 0 "" "$htvm" encode square.obj --texture none -o x.htvm
-expect 2 "--texture-as" "$htvm" encode capture --texture-as picture -o x.htvm
+expect 2 "--texture-as" "$htvm" encode capture --texture-as pixels -o x.htvm
 # A bad image makes its frame a bad one.
 echo nonsense >capture/frame_00001.jpg
 expect 1 "capture/frame_00001.jpg: this is no PNG, JPEG or WebP image" "$htvm" encode capture -o x.htvm
