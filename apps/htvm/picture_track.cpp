@@ -17,7 +17,8 @@ constexpr const char* group = "Pictures of textures";
 constexpr std::array<std::uint16_t, 3> no_gains = {picture_gain_one, picture_gain_one, picture_gain_one};
 
 // Where who watches may start without the frames before: there pictures start too. Not where such frames are many, as
-// I-frames are where they cost no more than EP-frames, or T-frames of the reference alone: key pictures always cost more.
+// I-frames are where they cost no more than EP-frames, or T-frames of the reference alone: key pictures always cost
+// more.
 bool is_start(const PacketHeader& frame, std::optional<std::uint32_t> last_key) {
     using namespace packet_flag;
     constexpr std::uint32_t apart = 30;

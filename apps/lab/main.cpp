@@ -12,7 +12,8 @@ int main(int argc, char** argv) {
         "  htvm-lab rd CAPTURE -o out/rd              rates and errors of coders at several qualities\n"
         "  htvm-lab decoding STREAM                   how long each frame takes to decode\n"
         "  htvm-lab reproduce CAPTURE -o out/report   the published experiments, as one page to look at\n"
-        "  htvm-lab bake CAPTURE -o out/baked         a textured capture's pictures in the layout of a stream's charts\n"
+        "  htvm-lab bake CAPTURE -o out/baked         a textured capture's pictures in the layout of a stream's "
+        "charts\n"
         "Or with nothing at all: they make a synthetic one, whose truth is known.\n"
         "  htvm-lab events --motion fast              whether hands and feet are followed\n"
         "  htvm-lab endure --minutes 5                whether anything grows with time";

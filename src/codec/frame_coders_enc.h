@@ -31,7 +31,8 @@ Result<Candidate> code_renewed_intra(FrameWork& work, const FrameSteps& steps, c
 Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded);
 // A T-frame of the reference alone, on which patches are planned: whoever joins later needs the references alone.
 Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps);
-// This T-frame with a patch: see surface_patch.h. Nothing where the texture's picture has no room for the patch's charts.
+// This T-frame with a patch: see surface_patch.h. Nothing where the texture's picture has no room for the patch's
+// charts.
 Result<std::optional<Candidate>> code_patched(FrameWork& work, const FrameSteps& steps,
                                               const EncodedTrackedFrame& tracked, const SurfacePatch& patch);
 // A T-frame that has the motion of the nodes, but neither displacement nor colours.
