@@ -60,7 +60,7 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
 
 int quantiser_of(PictureCoder coder, double quality) {
     const double offset = coder == PictureCoder::vp9 ? -4 : 0;  // the same number is coarser
-    return static_cast<int>(std::clamp(std::lround(62 - 0.55 * quality + offset), 1L, 63L));
+    return static_cast<int>(std::clamp(std::lround(73 - 0.55 * quality + offset), 1L, 63L));
 }
 
 Result<PictureTrack> PictureTrack::create(const Settings& settings) {

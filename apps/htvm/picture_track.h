@@ -37,7 +37,7 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
 int quantiser_of(PictureCoder coder, double quality);
 
 // Of a rate for both, what the meshes are given: so their errors and those of the pictures are worth the same bits.
-inline constexpr double share_of_meshes = 0.35;
+inline constexpr double share_of_meshes = 0.5;
 
 struct PictureTotals {
     std::size_t pictures = 0, key_pictures = 0;
