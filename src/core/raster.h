@@ -27,7 +27,7 @@ void for_each_cell(std::array<RasterPoint, 3> corners, const RasterBounds& bound
     const auto area = edge(corners[0], corners[1], corners[2][0], corners[2][1]);
     if (area == 0) return;
     if (area < 0) std::swap(corners[1], corners[2]);
-    const auto& [a, b, c] = corners;
+    const RasterPoint &a = corners[0], &b = corners[1], &c = corners[2];
     const auto first = [&](std::size_t axis) {  // the first cell whose centre is not before the triangle
         return (std::min({a[axis], b[axis], c[axis]}) + cell / 2 - 1) >> raster_bits;
     };

@@ -13,8 +13,8 @@ fail() { echo "FAILED: $*"; exit 1; }
 cpack -G DEB --config "$build/CPackConfig.cmake" -B "$work" >cpack.log 2>&1 || { cat cpack.log; exit 1; }
 version=$(sed -nE 's/^set\(CPACK_PACKAGE_VERSION "(.*)"\)/\1/p' "$build/CPackConfig.cmake")
 machine=$(dpkg --print-architecture) shared=libhtvm${version%.*}
-draco=libhtvm-draco${version%.*} live=libhtvm-live${version%.*}
-for package in htvm "$shared" "$draco" "$live" libhtvm-dev; do
+draco=libhtvm-draco${version%.*} live=libhtvm-live${version%.*} texture=libhtvm-texture${version%.*}
+for package in htvm "$shared" "$draco" "$live" "$texture" libhtvm-dev; do
     file=${package}_${version}_$machine.deb
     [ -f "$file" ] || fail "$file was not made"
     dpkg-deb -c "$file" | awk '{ print $6 }' >"$package.files"
@@ -32,19 +32,23 @@ has "$shared" "lib/.*/libhtvm_c.so.$version" "lib/.*/libhtvm_decoder.so.${versio
 has libhtvm-dev include/htvm/htvm.h 'lib/.*/libhtvm_decoder\.(a|so)' 'lib/.*/pkgconfig/htvm-c.pc' \
     'lib/.*/cmake/htvm/htvm-config.cmake'
 has "$live" "lib/.*/libhtvm_live.so.${version%.*}"
+has "$texture" "lib/.*/libhtvm_texture.so.${version%.*}"
 depends() { dpkg-deb -f "$1_${version}_$machine.deb" Depends; }
 [[ $(depends htvm) == *libc6* && $(depends htvm) == *libembree* ]] || fail "htvm depends on: $(depends htvm)"
-[[ $(depends "$shared") == *libstdc++6* && $(depends "$shared") != *draco* && $(depends "$shared") != *ssl* ]] ||
+[[ $(depends "$shared") == *libstdc++6* && $(depends "$shared") != *draco* && $(depends "$shared") != *ssl* &&
+    $(depends "$shared") != *aom* ]] ||
     fail "$shared depends on: $(depends "$shared")"
 [[ $(depends "$live") == *libssl3* ]] || fail "$live depends on: $(depends "$live")"
+[[ $(depends "$texture") == *libaom* && $(depends "$texture") == *libdav1d* ]] ||
+    fail "$texture depends on: $(depends "$texture")"
 [[ $(depends libhtvm-dev) == *libexpected-dev* && $(depends libhtvm-dev) == *"$shared (= $version)"* ]] ||
     fail "libhtvm-dev depends on: $(depends libhtvm-dev)"
 
-if [ "$(id -u)" -ne 0 ] || dpkg-query -W htvm libhtvm-dev "$shared" "$draco" "$live" >/dev/null 2>&1; then
+if [ "$(id -u)" -ne 0 ] || dpkg-query -W htvm libhtvm-dev "$shared" "$draco" "$live" "$texture" >/dev/null 2>&1; then
     echo "Not root, or the packages are installed already: their installation is not tried."
     exit 0
 fi
-installed=(htvm libhtvm-dev "$shared" "$draco" "$live")
+installed=(htvm libhtvm-dev "$shared" "$draco" "$live" "$texture")
 dpkg -i ./*.deb >dpkg.log 2>&1 || { cat dpkg.log; exit 1; }
 [ "$(/usr/bin/htvm --version)" = "htvm $version" ] || fail "/usr/bin/htvm does not run"
 ! command -v man >/dev/null || man -w htvm-encode >/dev/null || fail "man does not find htvm-encode"

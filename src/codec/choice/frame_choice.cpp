@@ -256,7 +256,7 @@ double allowed_in_region(const FrameWork& work, double best) {
 // such as a hand.
 bool lost_track(const FrameWork& work, const TrackedFit& fit) {
     constexpr double more_strays = 0.004, worst_to_best = 2.2;
-    constexpr double quantised = 0.5;  // steps
+    constexpr double quantised = 0.75;  // steps
     const auto& reference = work.reference();
     const double best_fit = work.sequence.nodes.best_fit;
     const double best = best_fit > 0 ? best_fit : fit.rms;
