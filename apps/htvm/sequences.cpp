@@ -89,7 +89,9 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
         if (!std::exchange(begun, true) && position > 0)
             if (const auto start = go_to_frame(stream, self.name, number, settings.max_packet_bytes))
                 numbers.begin(start->first_needed_frame, start->first_needed_number);
-        const auto next = [&]() { return ahead ? std::exchange(ahead, std::nullopt) : stream.next(); };
+        const auto next = [&on = *reading]() {
+            return on.ahead ? std::exchange(on.ahead, std::nullopt) : on.input.next();
+        };
         while (const auto packet = next()) {
             const auto sequences = numbers.dependencies().sequences();
             numbers.take(*packet);

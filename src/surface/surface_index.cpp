@@ -567,11 +567,13 @@ SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& n
 }
 
 SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std::uint32_t& guess) const {
-    const auto match = nearest_facing(query, {}, {.reach = reach, .agreement = -2}, guess);
+    // The corners of a triangle within reach may be farther away.
+    constexpr float longest_side = 4;  // spacings of the vertices
+    const auto match = nearest_facing(query, {}, {.reach = reach + longest_side * fine_gap, .agreement = -2}, guess);
     if (!match.found) return {};
     guess = match.index;
     const auto best = closest_around(match.index, query, nullptr, 0);
-    if (best.triangle == none) return {};
+    if (best.triangle == none || best.squared_distance > reach * reach) return {};
     return surface_point(*this, best.triangle, best.shares, best.squared_distance);
 }
 

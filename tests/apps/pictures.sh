@@ -112,7 +112,7 @@ expect 0 "unlit M3, the same pictures without shading" "$htvm" compare red.obj r
     fail "equal frames flicker: $(cat squares.json)"
 "$htvm" compare walk walk.htvm "${measure[@]}" >walk.json
 [ "$(field walk.json frames 0 kind) $(field walk.json frames 0 flicker)" = "I none" ] || fail "nothing is before the first frame"
-[ "$(field walk.json sequence flicker into I frames) $(field walk.json sequence flicker into T frames)" = "2 9" ] ||
+[ "$(field walk.json sequence flicker into I frames) $(field walk.json sequence flicker into T frames)" = "2 8" ] ||
     fail "flicker by kind: $(field walk.json sequence flicker)"
 [ "$(field walk.json sequence flicker into I unlit over_tracked_beside still largest)" != none ] || fail "I-frames have no T-frames beside"
 expect 0 "into 2 I-frames" "$htvm" compare walk walk.htvm --only flicker --views 2 "${small[@]}"
