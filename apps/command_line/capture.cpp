@@ -128,8 +128,8 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
         .add_option(
             "--texture", options.files,
             "The texture, PNG, JPEG or WebP: an image for all meshes, a pattern such as tex_%05d.jpg for one each,\n"
-            "or none (default: the image that the meshes' files name, else the one beside a mesh that is called\n"
-            "like it)")
+            "a video of one each, which ffmpeg decodes, or none (default: the image that the meshes' files name, else\n"
+            "the one beside a mesh that is called like it)")
         ->type_name("FILE");
     command
         .add_option_function<std::string>(
@@ -430,10 +430,10 @@ Result<std::optional<TexturedMesh>> Capture::read_file() {
     at_ = place;
     timestamp_us_ = file_times_.empty() ? regular_time(places_[place]) : file_times_[place];
     before_us_ = before;
-    const bool begun = ahead_ && ahead_->place == place;
+    const bool begun = ahead_ && ahead_->mesh.valid() && ahead_->place == place;
     auto mesh = peeked_ && place == peeked_at_ ? Result<TexturedMesh>(*std::exchange(peeked_, std::nullopt))
                 : begun                        ? ahead_->mesh.get()
-                                               : textures_.read(place, texture_use(), mesh_options());
+                                               : textures().read(place, texture_use(), mesh_options());
     // Who takes a second frame will take a third.
     if (taken_ > 0) begin_to_read_next();
     if (!mesh) return tl::unexpected(mesh.error());
@@ -443,7 +443,7 @@ Result<std::optional<TexturedMesh>> Capture::read_file() {
 void Capture::begin_to_read_next() {
     const bool last = next_ == begin_ + frames_ || (options_.frames > 0 && taken_ + 1 >= options_.frames);
     if (last || (peeked_ && next_ == peeked_at_)) return;
-    if (!ahead_) ahead_ = std::make_shared<Ahead>(Ahead{textures_, 0, {}});
+    if (!ahead_) ahead_ = std::make_shared<Ahead>(Ahead{std::move(textures_), 0, {}});
     ahead_->place = next_;
     ahead_->mesh =
         std::async(std::launch::async, [&files = ahead_->files, place = next_, use = texture_use(),
@@ -467,7 +467,7 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
         if (auto ok = scale_positions(mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
         TextureReference said;
         if (!image.empty()) add_image(said, image);
-        auto textured = textures_.with_image(std::move(mesh), said, texture_use());
+        auto textured = textures_.with_image(std::move(mesh), place, said, texture_use());
         if (!textured) return fail(textured.error().kind, fmt::format("{}: {}", name(), textured.error().message));
         return std::optional<TexturedMesh>{std::move(*textured)};
     }
@@ -503,8 +503,13 @@ Result<std::optional<Mesh>> Capture::next() {
     return std::optional<Mesh>{as_encoded(std::move(**captured))};
 }
 
+TextureFiles& Capture::textures() {
+    if (ahead_) ahead_->mesh = {};  // waits for what is being read
+    return ahead_ ? ahead_->files : textures_;
+}
+
 void Capture::rewind() {
-    ahead_.reset();
+    if (ahead_) ahead_->mesh = {};
     at_.reset();
     next_ = begin_;
     taken_ = 0;

@@ -122,6 +122,7 @@ private:
     void find_floor();
     void tell_of_texture() const;
     TextureUse texture_use() const;
+    TextureFiles& textures();
     Result<std::optional<TexturedMesh>> read_file();
     void begin_to_read_next();
     MeshFileOptions mesh_options() const;
@@ -146,7 +147,7 @@ private:
     std::vector<double> radii_;
     std::size_t begin_ = 0, frames_ = 0;  // place of the first frame; their number, 0 where it is not known
 
-    TextureFiles textures_;
+    TextureFiles textures_;               // until ahead_ has it
     bool has_texture_ = false;            // whether the first mesh's colours are those of its texture
     std::optional<TexturedMesh> peeked_;  // the first mesh that can be read, in mm, read beforehand to tell its unit
     std::size_t peeked_at_ = 0;           // its place
@@ -158,7 +159,7 @@ private:
     std::shared_ptr<const TexturedMesh> textured_;
 
     // The next file, which is read while the caller has the one before: of Draco that takes a fifth as long as to
-    // encode it. The thread that reads has `files` to itself.
+    // encode it. The thread that reads has `files` to itself until its mesh is taken.
     struct Ahead {
         TextureFiles files;
         std::size_t place = 0;

@@ -11,10 +11,10 @@
 #include <sstream>
 #include <vector>
 
-#include "command_line/child_program.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "encode.h"
+#include "io/child_program.h"
 #include "io/number_text.h"
 #include "io/sequence.h"
 #include "live/file_server.h"
@@ -95,7 +95,7 @@ bool holds_streams(const fs::path& folder) {
 // It may run as long as the browser does, and says nothing.
 void open_browser(const std::string& url) {
     const bool screen = std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY") || std::getenv("BROWSER");
-    if (screen) start_program({"xdg-open", url}, {-1, false, false});
+    if (screen) start_program({"xdg-open", url}, {our_stream, no_stream, no_stream});
 }
 
 // For captures that streams are compared with: every vertex and triangle, each frame by itself.

@@ -167,6 +167,7 @@ Result<void> render_all(const Options& options, Frames& frames, const std::vecto
 }
 
 Result<void> render(Options options) {
+    options.picture.texture.ffmpeg = options.video.ffmpeg;
     watch_for_interruption();
     auto source = open_source(options);
     if (!source) return tl::unexpected(source.error());

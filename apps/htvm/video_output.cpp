@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "command_line/child_program.h"
+#include "io/child_program.h"
 #include "io/output_file.h"
 
 namespace htvm::app {
@@ -116,7 +116,7 @@ Result<void> VideoOutput::start_ffmpeg() {
     if (::pipe2(ends.data(), O_CLOEXEC) != 0) return tl::unexpected(write_error("a pipe to ffmpeg", errno));
     // An ffmpeg that ends early is an error of write(), not the end of this program.
     std::signal(SIGPIPE, SIG_IGN);
-    ffmpeg_ = start_program(words, {ends[0], false, true});
+    ffmpeg_ = start_program(words, {ends[0], no_stream, our_stream});
     ::close(ends[0]);
     pipe_ = ends[1];
     if (ffmpeg_ != 0) return {};

@@ -164,12 +164,24 @@ Result<TextureFiles> TextureFiles::open(const TextureOptions& options, const Seq
     const auto images = find_sequence(what);
     if (!images) return fail(images.error().kind, "--texture: " + images.error().message);
     const bool is_pattern = images->paths != std::vector<fs::path>{what};
+    if (!is_pattern && is_video_file_name(what)) {
+        if (options.keep_files)
+            return fail(
+                ErrorKind::bad_input,
+                "--texture " + what + " is a video, whose pictures are no files that could be kept as they are");
+        auto video = TextureVideo::open(what, options.ffmpeg);
+        if (!video) return fail(video.error().kind, "--texture: " + video.error().message);
+        out.video_ = std::move(*video);
+        out.times_ = places_in_time(meshes);
+        return out;
+    }
     if (!is_pattern) {
         out.images_ = images->paths;
         return out;
     }
     if (meshes.paths.empty())
-        return fail(ErrorKind::bad_input, "--texture " + what + ": meshes from standard input take one image for all");
+        return fail(ErrorKind::bad_input,
+                    "--texture " + what + ": meshes from standard input take one image for all, or a video");
     auto each = images_of_pattern(what, *images, meshes);
     if (!each) return tl::unexpected(each.error());
     out.images_ = std::move(*each);
@@ -177,6 +189,7 @@ Result<TextureFiles> TextureFiles::open(const TextureOptions& options, const Seq
 }
 
 std::vector<std::filesystem::path> TextureFiles::known_images() const {
+    if (video_) return {video_->path()};
     if (options_.files == "none" || !images_.empty()) return images_;
     std::vector<fs::path> out;
     for (const auto& mesh : meshes_.paths)
@@ -188,6 +201,11 @@ Result<TextureFiles::Found> TextureFiles::find(const fs::path& mesh, std::size_t
                                                const TextureReference& said) const {
     Found out;
     if (options_.files == "none") return out;
+    if (video_) {
+        out.name = video_->path().string();
+        out.picture = place < times_.size() ? static_cast<std::size_t>(times_[place]) : place;
+        return out;
+    }
     if (!images_.empty()) {
         out.path = images_.size() == 1 ? images_[0] : images_[place];
         out.name = out.path.string();
@@ -230,7 +248,7 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
     if ((options_.origin == TextureOrigin::top && !from_top) || (options_.origin == TextureOrigin::bottom && from_top))
         turn_over(mesh);
     if (mesh.positions.empty()) return TexturedMesh(std::move(mesh));
-    const bool is_named = !images_.empty();
+    const bool is_named = !images_.empty() || video_;
     if (mesh.texcoords.empty()) {
         if (is_named || use == TextureUse::always)
             return fail_at(path, ErrorKind::bad_input,
@@ -272,6 +290,7 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
 }
 
 Result<TextureFiles::ReadImage> TextureFiles::read_image_of(const Found& found, const fs::path& mesh) {
+    if (found.picture) return picture_of_video(*found.picture, mesh);
     if (!found.bytes && kept_.image && kept_path_ == found.path) return kept_;
     ReadImage out;
     std::vector<std::uint8_t> file;
@@ -293,6 +312,19 @@ Result<TextureFiles::ReadImage> TextureFiles::read_image_of(const Found& found, 
     return out;
 }
 
+Result<TextureFiles::ReadImage> TextureFiles::picture_of_video(std::size_t number, const fs::path& mesh) {
+    if (kept_picture_ == number) return kept_;
+    auto image = video_->picture(number);
+    if (!image)
+        return fail_at(mesh, image.error().kind,
+                       "there is no picture " + std::to_string(number) +
+                           " (of 0, 1, ...) for it in the video: " + image.error().message);
+    kept_turned_.reset();
+    kept_ = {std::make_shared<const Image>(std::move(*image)), nullptr};
+    kept_picture_ = number;
+    return kept_;
+}
+
 Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const MeshFileOptions& options) {
     const auto& path = meshes_.paths[place];
     TextureReference said;
@@ -301,8 +333,9 @@ Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const
     return completed(std::move(*mesh), path, place, said, use);
 }
 
-Result<TexturedMesh> TextureFiles::with_image(Mesh mesh, const TextureReference& said, TextureUse use) {
-    return completed(std::move(mesh), {}, 0, said, use);
+Result<TexturedMesh> TextureFiles::with_image(Mesh mesh, std::size_t place, const TextureReference& said,
+                                              TextureUse use) {
+    return completed(std::move(mesh), {}, place, said, use);
 }
 
 }  // namespace htvm

@@ -1,4 +1,4 @@
-// Which image belongs to a mesh, and meshes with their images: one for all frames, or one each.
+// Which image belongs to a mesh, and meshes with their images: one for all frames, or one each, in files or a video.
 //
 // In this order: the image that the user names; the one that the mesh's file names (map_Kd of an OBJ's material,
 // "comment TextureFile" of a PLY, the base colour's texture of a glTF, which may be inside of it); the one beside the
@@ -16,6 +16,7 @@
 #include "io/mesh_file.h"
 #include "io/sequence.h"
 #include "io/texture_reference.h"
+#include "io/texture_video.h"
 
 namespace htvm {
 
@@ -25,13 +26,14 @@ namespace htvm {
 enum class TextureOrigin { by_format, bottom, top };
 
 struct TextureOptions {
-    // An image for all frames; a pattern with a %d, of an image for each; "none": no image is read; empty: those that
-    // the meshes name, or that lie beside them.
+    // An image for all frames; a pattern with a %d, of an image for each; a video, whose pictures are those of the
+    // frames in time; "none": no image is read; empty: those that the meshes name, or that lie beside them.
     std::string files;
     TextureOrigin origin = TextureOrigin::by_format;
     // Whether files are kept as they are, in TexturedMesh::texture_file. Where the seams say that coordinates are
     // counted from the top, then these are turned over, and not the image.
     bool keep_files = false;
+    std::string ffmpeg = "ffmpeg";  // the program that decodes videos
 };
 
 // Which meshes need their image.
@@ -44,14 +46,14 @@ enum class TextureUse {
 class TextureFiles {
 public:
     // For meshes of one capture. Fails (bad_input) if the images that the options name are not there, or not for all
-    // of the meshes. Without meshes (standard input) there is one image for all.
+    // of the meshes. Without meshes (standard input) there is one image for all, or a video.
     static Result<TextureFiles> open(const TextureOptions& options, const SequenceFiles& meshes = {});
 
     // Reads the mesh at that place of the capture, with its image where `use` says so and there is one.
     Result<TexturedMesh> read(std::size_t place, TextureUse use, const MeshFileOptions& options = {});
 
-    // The same for a mesh that was read already, from standard input.
-    Result<TexturedMesh> with_image(Mesh mesh, const TextureReference& said, TextureUse use);
+    // The same for a mesh that was read already, from standard input, at that place among all that came.
+    Result<TexturedMesh> with_image(Mesh mesh, std::size_t place, const TextureReference& said, TextureUse use);
 
     // Of the mesh that was read last: whether there is an image for it, read or not, and what it is called.
     const std::string& image_name() const { return image_name_; }  // empty: there is none
@@ -67,6 +69,7 @@ private:
         std::string name;            // empty: there is no image
         std::filesystem::path path;  // empty: the bytes are inside of the mesh's file
         const std::vector<std::uint8_t>* bytes = nullptr;
+        std::optional<std::size_t> picture = {};  // of the video
     };
     Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place,
                                    const TextureReference& said, TextureUse use);
@@ -74,15 +77,19 @@ private:
         std::shared_ptr<const Image> image;
         std::shared_ptr<const std::vector<std::uint8_t>> file;  // where it is to be kept
     };
+    Result<ReadImage> picture_of_video(std::size_t number, const std::filesystem::path& mesh);
     Result<ReadImage> read_image_of(const Found& found, const std::filesystem::path& mesh);
     Result<Found> find(const std::filesystem::path& mesh, std::size_t place, const TextureReference& said) const;
 
     TextureOptions options_;
     SequenceFiles meshes_;
     std::vector<std::filesystem::path> images_;  // that the user named: one for all, or one for each mesh
+    std::optional<TextureVideo> video_;          // or this
+    std::vector<std::uint64_t> times_;           // of the meshes in the video, in pictures
     std::string image_name_;
-    std::optional<bool> from_top_by_seams_;  // decided by the first mesh that has seams
-    std::filesystem::path kept_path_;        // of the image that was read last, which frames may share
+    std::optional<bool> from_top_by_seams_;    // decided by the first mesh that has seams
+    std::filesystem::path kept_path_;          // of the image that was read last, which frames may share
+    std::optional<std::size_t> kept_picture_;  // or its number in the video
     ReadImage kept_;
     std::shared_ptr<const Image> kept_turned_;  // the same image turned over, once that was needed
 };

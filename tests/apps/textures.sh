@@ -77,4 +77,49 @@ echo nonsense >capture/frame_00001.jpg
 expect 1 "capture/frame_00001.jpg: this is no PNG, JPEG or WebP image" "$htvm" encode capture -o x.htvm
 expect 0 "1 bad frame left out" "$htvm" encode capture --on-bad-frame skip -o x.htvm
 
+# A video is the same as its pictures, wherever reading begins, in several passes and in groups.
+if command -v ffmpeg >/dev/null; then
+    "$htvm" synth walk --frames 9 --vertices 300 --texture 64 --texture-format png --quiet
+    mkdir meshes && cp walk/*.ply meshes
+    ffmpeg -v error -i walk/frame_%05d.png -c:v libx264rgb -crf 0 clip.mp4
+    for options in "" "--first 3 --frames 4" "--keyint 3 --jobs 2" "--bitrate 1" "--texture-as picture" \
+        "--profile topology --texture-as captured"; do
+        "$htvm" encode walk $options -o images.htvm --quiet
+        "$htvm" encode meshes --texture clip.mp4 $options -o video.htvm --quiet || fail "a video with '$options'"
+        cmp -s images.htvm video.htvm || fail "a video gives another stream than its pictures, with '$options'"
+    done
+    "$htvm" encode walk -o images.htvm --quiet
+    cat meshes/*.ply | "$htvm" encode - --texture clip.mp4 -o video.htvm --quiet
+    cmp -s images.htvm video.htvm || fail "a video with meshes from standard input gives another stream"
+    "$htvm" still walk --frame 7 -o images.png --quiet
+    "$htvm" still meshes --texture clip.mp4 --frame 7 -o video.png --quiet
+    cmp -s images.png video.png || fail "the still shows another picture of the video"
+    expect 0 "" "$htvm" compare meshes images.htvm --texture clip.mp4 --only m3 --views 1
+    rm {walk,meshes}/frame_0000{4,5}.ply  # what is missing is missing in time
+    "$htvm" encode walk -o images.htvm --quiet
+    "$htvm" encode meshes --texture clip.mp4 -o video.htvm --quiet
+    cmp -s images.htvm video.htvm || fail "where meshes are missing, pictures of the video are not passed over"
+
+    ffmpeg -v error -i clip.mp4 -frames:v 3 -c copy short.mp4
+    expect 1 "meshes/frame_00003.ply: there is no picture 3 (of 0, 1, ...) for it in the video: short.mp4 has 3 pictures" \
+        "$htvm" encode meshes --texture short.mp4 -o x.htvm
+    expect 0 "4 bad frames replaced by the frame before" \
+        "$htvm" encode meshes --texture short.mp4 --on-bad-frame repeat -o x.htvm
+    echo nonsense >nonsense.mp4
+    expect 1 "--texture: nonsense.mp4 is no video that ffmpeg can decode" "$htvm" encode meshes --texture nonsense.mp4 -o x.htvm
+    ffmpeg -v error -f lavfi -i testsrc=size=4098x64 -frames:v 1 large.mp4
+    expect 5 "large.mp4: its pictures have 4098 x 64 pixels; up to 4096 x 4096 are read" \
+        "$htvm" encode meshes --texture large.mp4 -o x.htvm
+    for size in 64x64 96x64; do ffmpeg -v error -f lavfi -i testsrc=size=$size -frames:v 1 -f mjpeg -; done |
+        ffmpeg -v error -f mjpeg -i - -c copy sizes.mkv
+    expect 1 "sizes.mkv changes its size, at picture 1" "$htvm" encode meshes --texture sizes.mkv -o x.htvm
+    expect 1 "short.mp4 is a video, whose pictures are no files that could be kept" \
+        "$htvm" encode meshes --texture short.mp4 --texture-as keep --profile topology -o x.htvm
+else
+    echo "ffmpeg is not installed: no video is a texture"
+fi
+touch video.mp4
+expect 4 "video.mp4 is a video, which the program ffmpeg decodes, and that was not found: install ffmpeg" \
+    env PATH=/nowhere "$htvm" encode square.obj --texture video.mp4 -o x.htvm
+
 done_with "textured captures"

@@ -1,4 +1,4 @@
-#include "command_line/child_program.h"
+#include "io/child_program.h"
 
 #include <fcntl.h>
 #include <spawn.h>
@@ -10,7 +10,7 @@
 
 extern char** environ;
 
-namespace htvm::app {
+namespace htvm {
 
 pid_t start_program(std::vector<std::string> words, const ChildStreams& streams) {
     std::vector<char*> arguments;
@@ -18,16 +18,22 @@ pid_t start_program(std::vector<std::string> words, const ChildStreams& streams)
     arguments.push_back(nullptr);
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
-    if (streams.input >= 0) posix_spawn_file_actions_adddup2(&actions, streams.input, STDIN_FILENO);
-    if (!streams.output) posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    if (!streams.errors) posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    const auto give = [&](int stream, int as, int access) {
+        if (stream >= 0) posix_spawn_file_actions_adddup2(&actions, stream, as);
+        if (stream == no_stream) posix_spawn_file_actions_addopen(&actions, as, "/dev/null", access, 0);
+    };
+    give(streams.input, STDIN_FILENO, O_RDONLY);
+    give(streams.output, STDOUT_FILENO, O_WRONLY);
+    give(streams.errors, STDERR_FILENO, O_WRONLY);
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
     sigset_t signals;
     sigemptyset(&signals);
     for (const int signal : {SIGINT, SIGPIPE}) sigaddset(&signals, signal);
     posix_spawnattr_setsigdefault(&attributes, &signals);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
+    posix_spawnattr_setpgroup(&attributes, 0);
+    posix_spawnattr_setflags(&attributes,
+                             static_cast<short>(POSIX_SPAWN_SETSIGDEF | (streams.apart ? POSIX_SPAWN_SETPGROUP : 0)));
     pid_t child = 0;
     const int error = posix_spawnp(&child, arguments[0], &actions, &attributes, arguments.data(), environ);
     posix_spawnattr_destroy(&attributes);
@@ -43,4 +49,4 @@ bool ends_well(pid_t child) {
     return ended == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-}  // namespace htvm::app
+}  // namespace htvm
