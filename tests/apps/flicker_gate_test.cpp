@@ -1,5 +1,6 @@
 // The gate against flicker: where a frame refers to no other, or replaces a part of the mesh, pictures change no more
-// than at the T-frames beside it, lit and unlit, but for the motion of the capture (metrics/flicker.h).
+// than at the T-frames beside it, lit and unlit, but for the motion of the capture (metrics/flicker.h). Nor do they
+// where a textured capture begins another layout.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,9 +11,13 @@
 
 #include "htvm/decoder.hpp"
 #include "htvm/encoder.hpp"
+#include "htvm/picture_decoder.hpp"
+#include "io/texture_colours.h"
 #include "metrics/flicker.h"
 #include "metrics/shapes.h"
+#include "picture_track.h"
 #include "synth/synth.h"
+#include "synth/texture.h"
 
 namespace htvm {
 namespace {
@@ -121,6 +126,78 @@ INSTANTIATE_TEST_SUITE_P(Captures, FlickerGate,
                          testing::Values(Gate{"fast", SynthMotion::fast, 2.25, 1.1, 1.1, 1.1, 1.1},
                                          Gate{"calm_and_clean", SynthMotion::calm, 0, 1.3, 1.6, 1.2, 1.15}),
                          [](const auto& of) { return std::string(of.param.name); });
+
+// A textured capture, as encode --texture-as picture codes it, from eight frames before another layout begins.
+constexpr int first_of_layout = 30, beside = 8;
+Coded code_textured(const SynthOptions& capture) {
+    constexpr SynthTextureOptions images{.size = 512};
+    auto options = default_options(Profile::tracked);
+    options.texture = {TextureLayout::charts, 384, 384};
+    auto encoder = Encoder::create(options);
+    app::PictureTrack::Settings settings;
+    settings.bake = true;
+    settings.width = settings.height = 384;
+    settings.quality = 42;
+    auto track = app::PictureTrack::create(settings);
+    EXPECT_TRUE(encoder && track);
+    Decoder decoder;
+    PictureDecoder pictures;
+    FlickerOptions views;
+    views.views.views = 4;
+    FlickerMeter meter(views);
+    Coded out;
+    for (int frame = first_of_layout - beside; frame < first_of_layout + beside; ++frame) {
+        auto made = synth_texture(capture, images, synth_frame(capture, frame), frame);
+        EXPECT_EQ(made.layout, frame < first_of_layout ? 0 : 1);
+        const auto original = std::make_shared<const TexturedMesh>(
+            std::move(made.mesh), std::make_shared<const Image>(std::move(made.image)));
+        EXPECT_TRUE(encoder->push(with_vertex_colours(*original), nullptr, frame * 33333LL));
+        track->add(frame * 33333LL, original);
+        const auto repeated = encoder->repeated_vertices();
+        track->show(encoder->last_frame().frame, encoder->reconstruction(), {repeated.begin(), repeated.end()});
+        TexturedMesh shown;
+        while (const auto packet = encoder->pull()) {
+            auto decoded = decoder.push(*packet);
+            EXPECT_TRUE(decoded.has_value());
+            if (decoded && *decoded) shown.mesh = std::move((*decoded)->mesh);
+            const auto picture = track->behind(*packet, packet->payload.size());
+            EXPECT_TRUE(picture.has_value());
+            if (picture && *picture && !pictures.take(**picture)) ADD_FAILURE() << "a picture cannot be decoded";
+        }
+        shown.texture = pictures.image();
+        if (!shown.texture) {
+            ADD_FAILURE() << "frame " << frame << " has no picture";
+            return out;
+        }
+        // As commands read them.
+        const auto coloured = [](TexturedMesh mesh) {
+            mesh.mesh.colours = colours_from_texture(mesh.mesh, *mesh.texture);
+            return mesh;
+        };
+        out.kinds.push_back(encoder->last_frame().type);
+        const auto change = meter.add(coloured(*original), coloured(shown));
+        EXPECT_TRUE(change.has_value());
+        out.changes.push_back(change && *change ? **change : FrameFlicker{});
+    }
+    return out;
+}
+
+TEST(NewLayouts, DoNotStandOut) {
+    SynthOptions capture;
+    capture.motion = SynthMotion::calm;
+    capture.vertices = 4000;
+    capture.surface_noise_power = 0;
+    const Coded coded = code_textured(capture);
+    ASSERT_EQ(coded.changes.size(), 2u * beside);
+    for (const auto measure : {decoded_change, flicker_ratio, still_change}) {
+        std::vector<double> values = {std::numeric_limits<double>::infinity()};
+        for (std::size_t frame = 1; frame < coded.changes.size(); ++frame)
+            values.push_back(measure(coded.changes[frame].unlit));
+        const auto over = flicker_beside_tracked(coded.kinds, values, beside);
+        ASSERT_TRUE(over) << "the capture tests nothing";
+        EXPECT_LE(*over, 1.1);
+    }
+}
 
 }  // namespace
 }  // namespace htvm
