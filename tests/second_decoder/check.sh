@@ -109,6 +109,10 @@ contains tracked
 for stream in "$here"/../data/conformance/*.htvm; do
     stored "$stream"
 done
+# Its pictures, as far as it reads them.
+python3 "$here/picture.py" "$here/../data/conformance/pictures_6.htvm" >"$work/pictures"
+cut -d' ' -f1-10 "$here/../data/conformance/pictures_6.pictures" | cmp - "$work/pictures" ||
+    { echo "pictures_6: other pictures"; cat "$work/pictures"; exit 1; }
 python3 "$here/awkward.py" "$work/awkward"
 for sequence in "$work"/awkward/*; do
     name=$(basename "$sequence")

@@ -1,5 +1,12 @@
 """Chapter 14 of docs/bitstream.md: packets of texture pictures. What AV1, VP9 and the coders of images code is not
-decoded."""
+decoded.
+
+  picture.py STREAM.htvm    prints the pictures as tests/data/conformance/pictures_6.pictures has them, but for the digest of
+                            what is decoded
+"""
+import sys
+import zlib
+
 from conventions import Bytes, check
 
 VIDEO, IMAGES = (1, 2), (16, 17, 18)
@@ -43,3 +50,23 @@ class Pictures:
         check(packet.reference in (packet.frame, self.last), "the picture that it needs is not there")
         if packet.referred():
             self.last = packet.frame
+
+
+def main(path):
+    from stream import PICTURE, packets
+
+    with open(path, "rb") as file:
+        data = file.read()
+    for packet in packets(data):
+        if packet.kind != PICTURE:
+            continue
+        picture = read_picture(packet)
+        if picture is None:
+            print("%d unknown" % packet.frame)
+            continue
+        print(packet.frame, picture.coder, picture.width, picture.height, *picture.gains, picture.matrix,
+              int(picture.full_range), "%08x" % zlib.crc32(picture.coded))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
