@@ -1,7 +1,5 @@
 #include "captures.h"
 
-#include <benchmark/benchmark.h>
-
 #include <cstdio>
 #include <cstdlib>
 #include <string>

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "command_line/terminal.h"
 #include "io/mesh_file.h"
 #include "io/number_text.h"
 #include "io/output_file.h"
@@ -18,8 +19,6 @@ namespace {
 constexpr std::array<double, 10> shares = {0.45, 0.7, 0.75, 0.9, 0.95, 1, 1.3, 1.8, 2.2, 5};
 
 double share_of(int effort) { return shares[static_cast<std::size_t>(std::clamp(effort, 0, 9))]; }
-
-std::string frames_text(std::size_t count) { return fmt::format("{} {}", count, count == 1 ? "frame" : "frames"); }
 
 }  // namespace
 
@@ -75,8 +74,8 @@ std::string deadline_summary(const Deadline& deadline) {
     std::size_t alone = 0;
     for (const auto& frame : deadline.frames()) alone += frame.effort == 0 ? 1 : 0;
     return out + fmt::format("; deadline {:g} ms: {} late, {} with less effort, {} of them as motion alone",
-                             deadline.milliseconds(), frames_text(deadline.late()), frames_text(deadline.lowered()),
-                             alone);
+                             deadline.milliseconds(), counted(deadline.late(), "frame"),
+                             counted(deadline.lowered(), "frame"), alone);
 }
 
 nlohmann::json deadline_json(const Deadline& deadline) {

@@ -93,6 +93,15 @@ enum class Coded { yes, dropped };
 
 // Under rate control a frame that does not fit is dropped, and the stream goes on without it; but not the first, as all
 // others need an I-frame before them.
+bool is_of_dropped(const Pass& pass, const Error& error) {
+    return error.kind == ErrorKind::limit && pass.rate.rate_controlled() && !pass.rate.costs.empty();
+}
+
+void drop(Pass& pass, const std::string& frame, const Error& error) {
+    add_dropped(pass.rate);
+    warn_of_frame(pass, FrameWarnings::dropped, fmt::format("{} is dropped: {}", frame, error.message));
+}
+
 Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us,
                    const std::shared_ptr<const TexturedMesh>& textured) {
     auto& summary = pass.summary;
@@ -107,16 +116,13 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
     const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
     summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    const bool dropped =
-        !pushed && pushed.error().kind == ErrorKind::limit && pass.rate.rate_controlled() && !pass.rate.costs.empty();
+    const bool dropped = !pushed && is_of_dropped(pass, pushed.error());
     if (!pushed && !dropped)
         return fail(pushed.error().kind, fmt::format("{}: {}", pass.capture.name(), pushed.error().message));
     if (summary.frames++ == 0) summary.first_us = timestamp_us;
     summary.last_us = timestamp_us;
     if (dropped) {
-        add_dropped(pass.rate);
-        warn_of_frame(pass, FrameWarnings::dropped,
-                      fmt::format("{} is dropped: {}", pass.capture.name(), pushed.error().message));
+        drop(pass, pass.capture.name(), pushed.error());
         pass.step("dropped");
         return Coded::dropped;
     }
@@ -276,11 +282,8 @@ Result<void> finish(Pass& pass) {
     const auto start = std::chrono::steady_clock::now();
     auto finished = pass.encoder.finish();
     // The frame that waited may not fit.
-    if (!finished && finished.error().kind == ErrorKind::limit && pass.rate.rate_controlled() &&
-        !pass.rate.costs.empty()) {
-        add_dropped(pass.rate);
-        warn_of_frame(pass, FrameWarnings::dropped,
-                      fmt::format("the last frame is dropped: {}", finished.error().message));
+    if (!finished && is_of_dropped(pass, finished.error())) {
+        drop(pass, "the last frame", finished.error());
         finished = pass.encoder.finish();
     }
     pass.summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

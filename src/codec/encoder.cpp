@@ -358,7 +358,7 @@ Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* p
 Result<Candidate> choose_beside(State& state, FrameWork& work, bool force_intra, PushedFrame* next) {
     const auto bits = [&](const Candidate& candidate) { return bits_of(state, candidate); };
     if (!next) return choose_frame(work, state.control, bits, force_intra);
-    const bool may_be_tracked = work.can_be_tracked();
+    const bool may_be_tracked = state.configuration.tracked() && work.can_refer();
     std::optional<NodeRegistration> registered;
     if (may_be_tracked) registered = work.registered_nodes();
     std::optional<Result<Candidate>> chosen;

@@ -203,10 +203,10 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;
     payload.set(Layer::pose, encode_pose(work.pose));
-    const auto charts = add_charts(*decoded, configuration.options.texture, payload);
+    auto charts = add_charts(*decoded, configuration.options.texture, payload);
     if (!charts) return tl::unexpected(charts.error());
     Candidate out;
-    out.textured = charts->textured;
+    out.textured = std::move(charts->textured);
     out.type = FrameType::intra;
     out.reference = work.sequence.next_frame;
     out.decoded = std::move(*decoded);

@@ -135,9 +135,20 @@ void FrameWork::take(AheadWork ahead) {
     registered_nodes_ = std::move(ahead.registered);
 }
 
-bool FrameWork::can_be_tracked() const {
-    return configuration.tracked() && sequence.reference && reference().decoded.tracked &&
-           !reference().decoded.mesh().positions.empty() && carries_surface();
+namespace {
+
+bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
+    return a.colours.empty() == b.colours.empty() && a.normals.empty() == b.normals.empty() &&
+           a.texcoords.empty() == b.texcoords.empty();
+}
+
+}  // namespace
+
+bool FrameWork::can_be_moved() const {
+    if (!sequence.reference) return false;
+    const auto& decoded = reference().decoded;
+    const bool derived = configuration.tracked() ? decoded.tracked.has_value() : decoded.has_bones;
+    return derived && !decoded.mesh().positions.empty() && carries_surface() && same_attributes(mesh, decoded.mesh());
 }
 
 const FrameMotion& FrameWork::bone_motion() {

@@ -192,8 +192,10 @@ public:
     bool follow_lost_limbs();
     // Whether registered_nodes() is as it was first found.
     bool is_as_first_registered() const { return registered_nodes_ && !followed_limbs_; }
-    // Whether the frame can be a T-frame, by its reference and by what it has.
-    bool can_be_tracked() const;
+    // Whether the bones or nodes of the reference can move it to this frame, by what both have; and whether the frame
+    // may refer to it as well.
+    bool can_be_moved() const;
+    bool can_refer() const { return !configuration.intra_alone() && can_be_moved(); }
     const AnimationFit& animation_fit();  // how well the motion of the bones alone represents the frame
     // The distance between a decoded mesh and the captured one, in both directions.
     SurfaceErrors errors_of(const LatticeMesh& decoded);

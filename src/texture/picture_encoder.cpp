@@ -46,6 +46,20 @@ Result<void> check(const PictureEncoderOptions& options) {
     return {};
 }
 
+// Both libraries' images have these members.
+template <class LibraryImage>
+void lend_planes(LibraryImage& image, const PicturePlanes& picture) {
+    image.w = image.d_w = picture.width;
+    image.h = image.d_h = picture.height;
+    image.bit_depth = 8;
+    image.bps = 12;
+    image.x_chroma_shift = image.y_chroma_shift = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+        image.planes[k] = const_cast<unsigned char*>(picture.samples[k]);
+        image.stride[k] = static_cast<int>(picture.strides[k]);
+    }
+}
+
 unsigned thread_count(unsigned asked) {
     constexpr unsigned most = 16;  // more find nothing to do in a picture
     return std::clamp(asked > 0 ? asked : std::thread::hardware_concurrency(), 1u, most);
@@ -140,19 +154,11 @@ struct Av1 {
     Result<CodedPicture> encode(const PicturePlanes& picture, std::int64_t time, unsigned long ticks, bool key) {
         aom_image_t image{};
         image.fmt = AOM_IMG_FMT_I420;
-        image.w = image.d_w = picture.width;
-        image.h = image.d_h = picture.height;
-        image.bit_depth = 8;
-        image.bps = 12;
-        image.x_chroma_shift = image.y_chroma_shift = 1;
+        lend_planes(image, picture);
         image.cp = AOM_CICP_CP_BT_709;
         image.tc = AOM_CICP_TC_SRGB;
         image.mc = AOM_CICP_MC_BT_709;
         image.range = AOM_CR_STUDIO_RANGE;
-        for (std::size_t k = 0; k < 3; ++k) {
-            image.planes[k] = const_cast<unsigned char*>(picture.samples[k]);
-            image.stride[k] = static_cast<int>(picture.strides[k]);
-        }
         if (aom_codec_encode(&context, &image, time, ticks, key ? AOM_EFLAG_FORCE_KF : 0) != AOM_CODEC_OK)
             return refused(why());
         CodedPicture out;
@@ -218,15 +224,7 @@ struct Vp9 {
         image.fmt = VPX_IMG_FMT_I420;
         image.cs = VPX_CS_BT_709;
         image.range = VPX_CR_STUDIO_RANGE;
-        image.w = image.d_w = picture.width;
-        image.h = image.d_h = picture.height;
-        image.bit_depth = 8;
-        image.bps = 12;
-        image.x_chroma_shift = image.y_chroma_shift = 1;
-        for (std::size_t k = 0; k < 3; ++k) {
-            image.planes[k] = const_cast<unsigned char*>(picture.samples[k]);
-            image.stride[k] = static_cast<int>(picture.strides[k]);
-        }
+        lend_planes(image, picture);
         if (vpx_codec_encode(&context, &image, time, ticks, key ? VPX_EFLAG_FORCE_KF : 0, VPX_DL_REALTIME) !=
             VPX_CODEC_OK)
             return refused(why());

@@ -108,8 +108,7 @@ TextureBaker::TextureBaker(const TextureBakingOptions& options) : options_(optio
     drawn_ = picture_;
 }
 
-// ---- The layout
-// ------------------------------------------------------------------------------------------------------
+// ---- The layout ----------------------------------------------------------------------------------------------------
 
 bool TextureBaker::is_new(const Mesh& shown) const {
     return layout_.triangles != shown.triangles || layout_.texcoords != shown.texcoords;
@@ -212,8 +211,7 @@ void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> rep
     layout_ = std::move(next);
 }
 
-// ---- Where captured vertices lie
-// -------------------------------------------------------------------------------------
+// ---- Where captured vertices lie -----------------------------------------------------------------------------------
 
 std::vector<TextureBaker::Match> TextureBaker::matches(const Mesh& captured, const Mesh& shown,
                                                        std::size_t own_vertices) const {
@@ -263,8 +261,7 @@ std::vector<TextureBaker::Match> TextureBaker::matches(const Mesh& captured, con
     return out;
 }
 
-// ---- Drawing
-// ---------------------------------------------------------------------------------------------------------
+// ---- Drawing -------------------------------------------------------------------------------------------------------
 
 void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::span<const Match> matches) {
     const Mesh& mesh = captured.mesh;
@@ -361,8 +358,7 @@ void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::sp
     }
 }
 
-// ---- Exposure and what is not seen
-// -----------------------------------------------------------------------------------
+// ---- Exposure and what is not seen ---------------------------------------------------------------------------------
 
 // The median of what texels that were known became, each a vote for a gain.
 std::array<double, 3> TextureBaker::exposure() const {

@@ -101,8 +101,7 @@ Vector3d mean_normal(const Faces& faces, std::span<const std::uint32_t> of) {
     return normalised(sum);
 }
 
-// ---- The cover
-// -------------------------------------------------------------------------------------------------------
+// ---- The cover -----------------------------------------------------------------------------------------------------
 
 // Gives numbers from `count` on to the largest regions that face a direction, down to the given area.
 void cover(const Faces& faces, double least_area, Labels& labels, std::uint32_t& count) {
@@ -170,8 +169,7 @@ void cover_the_rest(const Faces& faces, Labels& labels, std::uint32_t& count) {
     }
 }
 
-// ---- Growing anew
-// ----------------------------------------------------------------------------------------------------
+// ---- Growing anew --------------------------------------------------------------------------------------------------
 
 std::vector<std::vector<std::uint32_t>> members(const Labels& labels, std::uint32_t count) {
     std::vector<std::vector<std::uint32_t>> out(count);
@@ -257,8 +255,7 @@ void smooth_borders(const Faces& faces, std::uint32_t count, Labels& labels) {
         }
 }
 
-// ---- Overlaps
-// --------------------------------------------------------------------------------------------------------
+// ---- Overlaps ------------------------------------------------------------------------------------------------------
 
 struct Frame {
     Vector3d x{}, y{}, direction{};
@@ -394,8 +391,7 @@ void cut_overlaps(const Faces& faces, const Mesh2& mesh, Labels& labels, std::ui
     count = static_cast<std::uint32_t>(charts.size());
 }
 
-// ---- Joining
-// ---------------------------------------------------------------------------------------------------------
+// ---- Joining -------------------------------------------------------------------------------------------------------
 
 // Joins charts that lie beside each other as long as that is possible: the smallest first, with the neighbour to which
 // it has the longest border. A crumb, such as the inside of a wrinkle, is joined in any case: a few triangles then show
@@ -431,8 +427,7 @@ void join(const Faces& faces, const Mesh2& mesh, double area, std::uint32_t coun
     }
 }
 
-// ---- The result
-// ------------------------------------------------------------------------------------------------------
+// ---- The result ----------------------------------------------------------------------------------------------------
 
 // The turn about the direction at which the box around the faces has the least area, its long side up.
 Frame turned(const Mesh2& mesh, std::span<const std::uint32_t> faces, const Vector3d& direction) {

@@ -16,8 +16,7 @@ tl::unexpected<Error> corrupt(const char* what) { return fail(ErrorKind::corrupt
 constexpr int scale_bits = 24, place_bits = 12, rotation_raw_bits = 8, largest_raw_bits = 2;
 constexpr std::int32_t coarse_limit = (1 << rotation_bits) / coarse_rotation;
 
-// ---- Which triangles belong to which chart
-// ---------------------------------------------------------------------------
+// ---- Which triangles belong to which chart -------------------------------------------------------------------------
 //
 // A triangle mostly belongs to the chart of a neighbour that came before it. Asked first is the chart to which most of
 // its corners belonged last, in contexts of how many they are and of how well the triangle faces that chart's plane,
@@ -190,8 +189,7 @@ Result<ChartLayout> decode_charts(std::span<const std::uint8_t> bytes, std::span
     return out;
 }
 
-// ---- Coordinates
-// -----------------------------------------------------------------------------------------------------
+// ---- Coordinates ---------------------------------------------------------------------------------------------------
 
 std::vector<CornerTexcoords> projected_corners(const ChartLayout& layout, std::span<const LatticePoint> positions,
                                                std::span<const Triangle> triangles) {
@@ -255,8 +253,7 @@ Result<std::vector<CornerTexcoords>> chart_texcoords(const ChartLayout& layout, 
     return out;
 }
 
-// ---- What is shown
-// ---------------------------------------------------------------------------------------------------
+// ---- What is shown -------------------------------------------------------------------------------------------------
 
 Result<TexturedSurface> textured_surface(std::size_t vertices, std::span<const Triangle> triangles,
                                          std::vector<CornerTexcoords> corners) {

@@ -30,24 +30,8 @@ FrameSteps steps_of_quality(const Configuration& configuration, double quality) 
     return steps_of(configuration, steps);
 }
 
-bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
-    return a.colours.empty() == b.colours.empty() && a.normals.empty() == b.normals.empty() &&
-           a.texcoords.empty() == b.texcoords.empty();
-}
-
-// Whether the bones or nodes of the reference can move it to this frame.
-bool can_be_moved(const FrameWork& work) {
-    if (!work.sequence.reference) return false;
-    const auto& reference = work.reference().decoded;
-    const bool derived = work.configuration.tracked() ? reference.tracked.has_value() : reference.has_bones;
-    return derived && !reference.mesh().positions.empty() && work.carries_surface() &&
-           same_attributes(work.mesh, reference.mesh());
-}
-
-bool can_refer(const FrameWork& work) { return !work.configuration.intra_alone() && can_be_moved(work); }
-
 bool is_due(const FrameWork& work) {
-    return !can_refer(work) || work.frames_since_intra() >= work.configuration.options.key_interval;
+    return !work.can_refer() || work.frames_since_intra() >= work.configuration.options.key_interval;
 }
 
 // The shortest key interval has passed: an I-frame is allowed if it saves bits.
@@ -398,7 +382,7 @@ Result<Candidate> choose(FrameWork& work, const FrameSteps& steps, bool force_in
     const auto& options = work.configuration.options;
     const auto choice = options.topology.frame_choice;
     if (!work.carries_surface()) return code_lone_intra(work, steps);
-    if (options.profile == Profile::tracked && can_refer(work))
+    if (options.profile == Profile::tracked && work.can_refer())
         return choose_tracked(work, steps, force_intra || is_due(work));
     if (force_intra || is_due(work) || is_scene_change(work)) {
         if (options.profile != Profile::tracked && choice == FrameChoice::rate_distortion)
@@ -482,7 +466,7 @@ Result<Candidate> code_within_buffer(FrameWork& work, RateController& rate, cons
         if (lower >= quality) break;
         quality = lower;
     }
-    if (can_be_moved(work)) {
+    if (work.can_be_moved()) {
         auto stand_in = code_stand_in(work, quality);
         if (!stand_in) return stand_in;
         stand_in->quality = quality;
