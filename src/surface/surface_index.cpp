@@ -397,6 +397,7 @@ SurfacePoint SurfaceIndex::closest(const Point3f& query) const {
 
 void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
     around = triangles_around(positions.size(), triangles);
+    find_fans();
     triangle_normals.reserve(triangles.size());
     std::vector<Vector3d> sums(positions.size(), Vector3d{});
     double area = 0;
@@ -423,6 +424,13 @@ void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
         [&] { fine = OrientedPoints(positions, normals, options.cell); });
     fine_gap = gap_of(area, positions.size());
     coarse_gap = gap_of(area, count);
+}
+
+void SurfaceIndex::find_fans() {
+    fans_.resize(around.triangles.size());
+    std::vector<std::uint32_t> next(around.first.begin(), around.first.end() - 1);
+    for (const auto& t : triangles)
+        for (std::size_t i = 0; i < 3; ++i) fans_[next[t[i]]++] = t[(i + 1) % 3];
 }
 
 // The closest point so far.
@@ -493,22 +501,11 @@ void SurfaceIndex::try_around(std::uint32_t vertex, const Point3f& query, const 
 }
 
 Neighbour SurfaceIndex::nearest_along(const Point3f& query, std::uint32_t from) const {
-    const auto squared_distance = [&](std::uint32_t vertex) {
-        const Point3f apart = difference(positions[vertex], query);
-        return product(apart, apart);
-    };
-    Neighbour best{from, squared_distance(from)};
-    for (std::uint32_t last = none; last != best.index;) {
-        last = best.index;
-        for (const auto triangle : around.of(last)) {
-            // The next corner of each: on a closed surface these are all neighbours.
-            const auto& t = triangles[triangle];
-            const std::uint32_t next = t[0] == last ? t[1] : t[1] == last ? t[2] : t[0];
-            const float d = squared_distance(next);
-            if (d < best.squared_distance) best = {next, d};
-        }
-    }
-    return best;
+    // On a closed surface the corners after a vertex are all its neighbours.
+    return internal::nearest_along(positions, query, from, [&](std::uint32_t vertex) {
+        return std::span(fans_).subspan(around.first[vertex],
+                                        around.first[vertex + std::size_t{1}] - around.first[vertex]);
+    });
 }
 
 OrientedMatch SurfaceIndex::nearest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,

@@ -38,6 +38,27 @@ struct Neighbour {
     float squared_distance = 0;
 };
 
+// The nearest of the points that are reached from one beside it to the next, beginning at `from`, as long as the
+// distance shrinks. beside: gives the indices of the points beside one.
+template <class Beside>
+Neighbour nearest_along(std::span<const Point3f> points, const Point3f& query, std::uint32_t from,
+                        const Beside& beside) {
+    const auto squared_distance = [&](std::uint32_t point) {
+        const Point3f& p = points[point];
+        const Point3f apart = {p[0] - query[0], p[1] - query[1], p[2] - query[2]};
+        return apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
+    };
+    Neighbour best{from, squared_distance(from)};
+    for (auto last = std::numeric_limits<std::uint32_t>::max(); last != best.index;) {
+        last = best.index;
+        for (const auto next : beside(last)) {
+            const float d = squared_distance(next);
+            if (d < best.squared_distance) best = {next, d};
+        }
+    }
+    return best;
+}
+
 // Points in a k-d tree (nanoflann's).
 class NearestPoints {
 public:
@@ -208,10 +229,13 @@ private:
     struct Anywhere;
     struct Best;
     void find_directions(const SurfaceIndexOptions& options);
+    void find_fans();
     Best closest_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement) const;
     void try_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement,
                     Best& best) const;
     const Anywhere& anywhere() const;
+
+    std::vector<std::uint32_t> fans_;  // of the triangles around each vertex, as in `around`, the corner after it
 
     struct OnDemand;
     std::unique_ptr<OnDemand> on_demand_;

@@ -450,26 +450,6 @@ FromReference nearest_around(const DeformableMesh& mesh, std::span<const Point3f
     return out;
 }
 
-// The sample nearest to a point, among those that are reached from one beside it to the next, as long as the distance
-// shrinks.
-Neighbour nearest_along(const SamplesBeside& beside, std::span<const Point3f> points, const Point3f& query,
-                        std::uint32_t from) {
-    const auto squared_distance = [&](std::uint32_t sample) {
-        const Point3f& p = points[sample];
-        const Point3f apart = {p[0] - query[0], p[1] - query[1], p[2] - query[2]};
-        return apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2];
-    };
-    Neighbour best{from, squared_distance(from)};
-    for (std::uint32_t last = OrientedPoints::no_point; last != best.index;) {
-        last = best.index;
-        for (const auto next : beside.of(last)) {
-            const float d = squared_distance(next);
-            if (d < best.squared_distance) best = {next, d};
-        }
-    }
-    return best;
-}
-
 // Matches in both directions: from each sample to the target, and from each of the target's samples to the nearest
 // moved sample, or to the triangles around that.
 std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, const SurfaceIndex& target,
@@ -503,7 +483,8 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, 
     const auto nearest_sample = [&](const Point3f& point, const Point3f& normal, std::uint32_t guess,
                                     std::uint32_t last) {
         if (along && guess != OrientedPoints::no_point) {
-            const auto near = nearest_along(mesh.beside, moved.points, point, guess);
+            const auto near =
+                nearest_along(moved.points, point, guess, [&](std::uint32_t sample) { return mesh.beside.of(sample); });
             const auto most = std::min(reach, mesh.sample_gap);
             const auto& n = moved.normals[near.index];
             if (near.squared_distance <= most * most &&
