@@ -471,9 +471,14 @@ NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, con
     const bool thin = !(whole > 1e-4f * bb * cc);
     if (!thin && u >= 0 && v >= 0 && w >= 0) return {{u / whole, v / whole, w / whole}, height * height / whole};
     const std::array<Point3f, 3> corners = {a, b, c};
-    const std::array<bool, 3> beyond = {thin || u < 0, thin || v < 0, thin || w < 0};
+    const std::array<float, 3> within = {u, v, w}, squared_sides = {bb + cc - 2 * bc, cc, bb};
     for (std::size_t corner = 0; corner < 3; ++corner) {
-        if (!beyond[corner]) continue;
+        if (!thin && within[corner] >= 0) continue;
+        // How far the query lies beyond the line of the opposite side, in the triangle's plane, tells most of those
+        // that are too far away.
+        const float squared_side = squared_sides[corner];
+        if (!thin && height * height * squared_side + within[corner] * within[corner] > least * whole * squared_side)
+            continue;
         const std::size_t i = (corner + 1) % 3, j = (corner + 2) % 3;
         const auto [along, squared] = closest_on_side(corners[i], corners[j]);
         if (!(squared < out.squared_distance)) continue;
@@ -494,8 +499,8 @@ void SurfaceIndex::try_around(std::uint32_t vertex, const Point3f& query, const 
         // The triangle is skipped if even its plane is farther away than the best so far.
         const float height = product(across, difference(positions[t[0]], query));
         if (height * height > best.squared_distance) continue;
-        const auto near = near_on_triangle(positions[t[0]], positions[t[1]], positions[t[2]], query,
-                                           std::numeric_limits<float>::infinity());
+        const auto near =
+            near_on_triangle(positions[t[0]], positions[t[1]], positions[t[2]], query, best.squared_distance);
         if (near.squared_distance < best.squared_distance) best = {triangle, near.shares, near.squared_distance};
     }
 }

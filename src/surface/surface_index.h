@@ -142,7 +142,8 @@ struct NearOnTriangle {
     std::array<float, 3> shares{};  // of the corners
     float squared_distance = std::numeric_limits<float>::infinity();
 };
-// Infinitely far if even the triangle's plane is farther away than `least`, squared.
+// Infinitely far if the triangle's plane, or the line of a side that the query lies beyond, is seen to be farther away
+// than `least`, squared.
 NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, const Point3f& third, const Point3f& query,
                                 float least);
 
