@@ -167,6 +167,8 @@ std::string comparison_table(const SequenceComparison& sums, const CompareOption
     if (options.texcoords && s.has_texcoords) {
         out += single("texture coordinates, RMS", s.texcoord_rms, 5);
         out += single("  elsewhere in the atlas, %", 100 * s.texcoord_elsewhere, 3);
+    } else if (options.texcoords && !options.points) {
+        out += "\nno texture coordinates to compare: not all meshes of both have them\n";
     }
     if (options.cloud) {
         out += fmt::format("\n  D1, D2 with peak {:.3f} mm ({})\n", s.peak_mm,

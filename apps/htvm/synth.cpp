@@ -322,6 +322,8 @@ void add_synth(CLI::App& app, Run& run) {
         if (options->live == !options->folder.empty())
             throw CLI::ValidationError("OUT_DIR",
                                        "or --live: give one of them, a folder to write to or standard output");
+        if (options->folder == "-")
+            throw CLI::ValidationError("OUT_DIR", "is a folder; for meshes on standard output give --live");
         if (options->live && !options->truth.empty())
             throw CLI::ValidationError("--truth", "goes with a folder of frames, not with --live");
         options->is_textured = texture->count() > 0;

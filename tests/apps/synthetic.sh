@@ -27,5 +27,7 @@ expect 1 "later_truth/marks has no frame 30; is it the truth of these originals?
     "$htvm" compare dance dance.htvm --only m2 --truth later_truth
 expect 1 "the tour has one person" "$htvm" synth two --people 2 --frames 1
 expect 2 "--motion" "$htvm" synth two --motion sleep
+expect 2 "give --live" "$htvm" synth - --frames 1
+expect 0 "no texture coordinates to compare" "$htvm" compare dance dance.htvm --only texcoords
 
 done_with "synthetic captures tell the truth"
