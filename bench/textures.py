@@ -1,23 +1,25 @@
 #!/usr/bin/env python3
-"""A textured capture as a stream beside what else it could be sent as: total bits, those of the pictures, and the rendered
-M3, against the textured capture.
+"""A textured capture as a stream beside what else it could be sent as: total bits, those of the pictures, and PSNR and SSIM
+of rendered, unlit pictures (M3), against the textured capture; and what the stream takes of the bits of Draco with AV1 at equal PSNR and at equal
+SSIM.
 
 usage: textures.py [options] HTVM CAPTURE
 
 - htvm: --texture-as picture at several qualities (or what --as says);
-- Draco (11 bits of positions, 12 of texture coordinates, 8 of normals, level 10) a frame with the capture's images
-  as AV1, as they came, by the same coder;
-- Draco with JPEG images of several qualities.
+- Draco, level 10, a frame, at several numbers of bits, with the capture's images as AV1, as they came, by the same coder;
+- the same with JPEG images of several qualities.
 
 Rates in Mbit/s at --fps. Draco is the programs draco_encoder and draco_decoder; JPEG is ffmpeg's.
   --as WORD            picture, captured (default picture)
   -q A,B,...           qualities of htvm (default 20,42,60)
-  --av1 A,B,...        --texture-quality of the images as they came (default 10,30,50,70)
+  --draco P/T/N,...    bits of positions, texture coordinates and normals; 0: none are sent (default 11/12/8)
+  --av1 A,B,...        --texture-quality of the images as they came, or 10@512, made smaller before (default 10,30,50,70)
   --jpeg A,B,...       ffmpeg's -q:v, from 2, the finest, to 31 (default 4,10)
   --frames N           (default 30)
   --fps N              (default 30)
   --with OPTIONS       for htvm encode, in one word
   --views N            sides that pictures are rendered from (default 3)
+  --every N            frames are measured that are so many apart (default 1)
 """
 import argparse
 import json
@@ -26,6 +28,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "../tests/second_decoder"))
+from compare import read_ply  # noqa: E402
 
 
 def run(*command):
@@ -36,7 +41,38 @@ def run(*command):
 
 
 def words(text):
-    return [float(word) if "." in word else int(word) for word in text.split(",")]
+    return [word for word in text.split(",") if word]
+
+
+class Point:
+    def __init__(self, name, bytes_of_all, bytes_of_pictures, quality, seconds):
+        self.name, (self.psnr, self.ssim) = name, quality
+        self.all, self.pictures = (8e-6 * count / seconds for count in (bytes_of_all, bytes_of_pictures))
+        print("| %s | %.3f | %.3f | %.2f | %.4f |" % (name, self.all, self.pictures, self.psnr, self.ssim), flush=True)
+
+
+def least(points, wanted, quality, rate):
+    """The least of these rates at which the quality is reached: of a point that does, or between two of which one does, on
+    the straight line of the rates' logarithms. Nothing if none does."""
+    reached = [rate(point) for point in points if quality(point) >= wanted]
+    for low in points:
+        for high in points:
+            if quality(low) < wanted <= quality(high) and rate(low) < rate(high):
+                share = (wanted - quality(low)) / (quality(high) - quality(low))
+                reached.append(rate(low) ** (1 - share) * rate(high) ** share)
+    return min(reached, default=None)
+
+
+def write_obj(mesh, path):
+    """Of a PLY, whose texture coordinates the program draco_encoder does not read."""
+    vertices, triangles = read_ply(mesh)
+    with open(path, "w") as file:
+        for x, y, z in zip(vertices["x"], vertices["y"], vertices["z"]):
+            file.write("v %.9g %.9g %.9g\n" % (x, y, z))
+        for s, t in zip(vertices["s"], vertices["t"]):
+            file.write("vt %.9g %.9g\n" % (s, t))
+        for corners in triangles:
+            file.write("f %s\n" % " ".join("%d/%d" % (corner + 1, corner + 1) for corner in corners))
 
 
 def main():
@@ -45,84 +81,115 @@ def main():
     parser.add_argument("capture")
     parser.add_argument("--as", dest="layout", default="picture")
     parser.add_argument("-q", default="20,42,60")
+    parser.add_argument("--draco", default="11/12/8")
     parser.add_argument("--av1", default="10,30,50,70")
     parser.add_argument("--jpeg", default="4,10")
     parser.add_argument("--frames", type=int, default=30)
     parser.add_argument("--fps", type=float, default=30)
     parser.add_argument("--with", dest="extra", default="")
     parser.add_argument("--views", type=int, default=3)
+    parser.add_argument("--every", type=int, default=1)
     given = parser.parse_args()
     htvm, capture, frames = given.htvm, given.capture, given.frames
     seconds = frames / given.fps
 
     def m3(decoded):
-        said = json.loads(run(htvm, "compare", capture, decoded, "--frames", frames, "--only", "m3", "--views",
+        said = json.loads(run(htvm, "compare", measured, decoded, "--frames", frames, "--only", "m3", "--views",
                               given.views, "--json"))
-        return said["sequence"]["m3_unlit"]["foreground_db"]
+        unlit = said["sequence"]["m3_unlit"]
+        return unlit["foreground_db"], unlit["ssim"]
 
-    def tell(name, bytes_of_all, bytes_of_pictures, decibel):
-        print("| %s | %.3f | %.3f | %.2f |" % (name, 8e-6 * bytes_of_all / seconds, 8e-6 * bytes_of_pictures / seconds,
-                                               decibel), flush=True)
+    def point(name, bytes_of_all, bytes_of_pictures, quality):
+        return Point(name, bytes_of_all, bytes_of_pictures, quality, seconds)
 
-    print("| | all, Mbit/s | of it pictures | M3, dB |\n|---|---|---|---|")
+    print("| | all, Mbit/s | of it pictures | M3, dB | SSIM |\n|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as work:
-        stream = os.path.join(work, "stream.htvm")
+        stream, measured = os.path.join(work, "stream.htvm"), os.path.join(work, "measured")
+        meshes = sorted(name for name in os.listdir(capture) if name.endswith((".drc", ".ply", ".obj")))[:frames]
+        images = [name for name in sorted(os.listdir(capture)) if name.endswith((".jpg", ".png", ".webp"))][:frames]
+        stems = [os.path.splitext(name)[0] for name in meshes]
+        # Frames are paired by their numbers.
+        os.mkdir(measured)
+        for name in os.listdir(capture):
+            if os.path.splitext(name)[0] in stems[:: given.every]:
+                shutil.copy(os.path.join(capture, name), measured)
 
         def info():
             said = json.loads(run(htvm, "info", stream, "--json"))
             return said["bytes"], said["pictures"]["bytes"]
 
         profile = ["--profile", "topology"] if given.layout == "captured" else []
+        decoded, ours = os.path.join(work, "decoded"), []
         for quality in words(given.q):
             run(htvm, "encode", capture, "--frames", frames, "--fps", given.fps, "--texture-as", given.layout, "-q",
                 quality, *profile, *given.extra.split(), "-o", stream)
-            tell("htvm -q %g" % quality, *info(), m3(stream))
+            run(htvm, "decode", stream, "-o", decoded)
+            ours.append(point("htvm -q %s" % quality, *info(), m3(decoded)))
+            shutil.rmtree(decoded)
 
         # The capture's meshes by Draco, of which a folder has one and an image each.
-        meshes = sorted(name for name in os.listdir(capture) if name.endswith((".drc", ".ply", ".obj")))[:frames]
-        images = [name for name in sorted(os.listdir(capture)) if name.endswith((".jpg", ".png", ".webp"))][:frames]
-        folder = os.path.join(work, "draco")
-        os.mkdir(folder)
-        draco = 0
-        for mesh in meshes:
+        draco = {bits: os.path.join(work, "draco" + bits.replace("/", "_")) for bits in words(given.draco)}
+        draco_bytes = dict.fromkeys(draco, 0)
+        for folder in draco.values():
+            os.mkdir(folder)
+        for mesh, stem in zip(meshes, stems):
             source = os.path.join(capture, mesh)
+            plain = os.path.join(work, "mesh.obj")
             if mesh.endswith(".drc"):
-                plain = os.path.join(work, "mesh.obj")
                 run("draco_decoder", "-i", source, "-o", plain)
-                source = plain
-            coded = os.path.join(folder, os.path.splitext(mesh)[0] + ".drc")
-            run("draco_encoder", "-i", source, "-o", coded, "-qp", 11, "-qt", 12, "-qn", 8, "-cl", 10)
-            draco += os.path.getsize(coded)
+            elif mesh.endswith(".ply"):
+                write_obj(source, plain)
+            else:
+                plain = source
+            for bits, folder in draco.items():
+                positions, coordinates, normals = bits.split("/")
+                coded = os.path.join(folder, stem + ".drc")
+                run("draco_encoder", "-i", plain, "-o", coded, "-qp", positions, "-qt", coordinates, "-cl", 10,
+                    *(["--skip", "NORMAL"] if normals == "0" else ["-qn", normals]))
+                draco_bytes[bits] += os.path.getsize(coded)
 
-        def with_images(name_of):
-            for mesh, image in zip(meshes, images):
-                shutil.copy(name_of(mesh, image), os.path.join(folder, os.path.splitext(mesh)[0] + ".png"))
-            return m3(folder)
+        # Each of the meshes with these pictures, in the frames' order.
+        def with_pictures(name, bytes_of_pictures, pictures):
+            out = []
+            for bits, folder in draco.items():
+                for stem, picture in zip(stems, pictures):
+                    shutil.copy(picture, os.path.join(folder, stem + ".png"))
+                out.append(point("Draco %s and %s" % (bits, name), draco_bytes[bits] + bytes_of_pictures,
+                                 bytes_of_pictures, m3(folder)))
+            return out
 
-        decoded = os.path.join(work, "decoded")
-        for quality in words(given.av1):
+        av1 = []
+        for word in words(given.av1):
+            quality, _, side = word.partition("@")
             run(htvm, "encode", capture, "--frames", frames, "--fps", given.fps, "--texture-as", "captured", "--profile",
-                "topology", "--keyint", 300, "-q", 0, "--texture-quality", quality, "-o", stream)
+                "topology", "--keyint", 300, "-q", 0, "--texture-quality", quality,
+                *(["--texture-size", side] if side else []), "-o", stream)
             run(htvm, "decode", stream, "-o", decoded)
-            pictures = info()[1]
-            shown = sorted(name for name in os.listdir(decoded) if name.endswith(".png"))
-            images_of = dict(zip(meshes, shown))
-            tell("Draco and AV1, quality %g" % quality, draco + pictures, pictures,
-                 with_images(lambda mesh, image: os.path.join(decoded, images_of[mesh])))
+            shown = [os.path.join(decoded, name) for name in sorted(os.listdir(decoded)) if name.endswith(".png")]
+            av1 += with_pictures("AV1, quality %s%s" % (quality, ", %s pixels" % side if side else ""), info()[1], shown)
             shutil.rmtree(decoded)
+        os.mkdir(decoded)
         for quality in words(given.jpeg):
-            total = 0
-            jpeg, png = os.path.join(work, "image.jpg"), os.path.join(work, "image.png")
-
-            def recoded(mesh, image):
-                nonlocal total
+            total, shown = 0, []
+            jpeg = os.path.join(work, "image.jpg")
+            for stem, image in zip(stems, images):
                 run("ffmpeg", "-y", "-loglevel", "error", "-i", os.path.join(capture, image), "-q:v", quality, jpeg)
                 total += os.path.getsize(jpeg)
-                run("ffmpeg", "-y", "-loglevel", "error", "-i", jpeg, png)
-                return png
+                shown.append(os.path.join(decoded, stem + ".png"))
+                run("ffmpeg", "-y", "-loglevel", "error", "-i", jpeg, shown[-1])
+            with_pictures("JPEG %s" % quality, total, shown)
 
-            decibel = with_images(recoded)
-            tell("Draco and JPEG %g" % quality, draco + total, total, decibel)
+    if not ours or not av1:
+        return
+    print("\n| shares of Draco with AV1 | all, at equal M3 | at equal SSIM | pictures, at equal M3 | at equal SSIM |"
+          "\n|---|---|---|---|---|")
+    for own in ours:
+        shares = []
+        for rate in (lambda of: of.all, lambda of: of.pictures):
+            for quality in (lambda of: of.psnr, lambda of: of.ssim):
+                theirs = least(av1, quality(own), quality, rate)
+                shares.append("not reached" if theirs is None else "%.3f" % (rate(own) / theirs))
+        print("| %s | %s |" % (own.name, " | ".join(shares)))
 
 
 if __name__ == "__main__":
