@@ -306,12 +306,21 @@ Result<void> Capture::find_poses() {
 
 // ---- Units ----------------------------------------------------------------------------------------------------------
 
+// As it is in the file.
+Result<std::optional<TexturedMesh>> Capture::read_next_file() {
+    const auto place = go_to_next_file();
+    if (!place) return std::optional<TexturedMesh>{};
+    auto mesh = textures().read(*place, texture_use(), mesh_options());
+    if (!mesh) return tl::unexpected(mesh.error());
+    return std::optional<TexturedMesh>{std::move(*mesh)};
+}
+
 // Reads the first mesh that can be read and has vertices, and with it the unit of all.
 Result<void> Capture::find_unit() {
     std::optional<Error> error;
     millimetres_per_unit_ = 1;
     for (std::size_t end = begin_ + frames_;;) {
-        auto mesh = pipe_ ? read_pipe() : read_file();
+        auto mesh = pipe_ ? read_pipe() : read_next_file();
         if (mesh && !*mesh) break;
         if (mesh) peeked_ = std::move(**mesh);
         if (mesh) peeked_at_ = *at_;
@@ -404,16 +413,23 @@ void Capture::tell_of_texture() const {
             "--texture-origin)");
 }
 
-// Colours at vertices in place of the texture, or none where that goes into the stream.
-Mesh Capture::as_encoded(TexturedMesh captured) {
-    textured_.reset();
-    if (!captured.texture) return std::move(captured.mesh);
-    const bool as_captured = keeps_pictures(options_) && options_.texture_as != "picture";
-    if (as_captured) captured.mesh.colours.clear();
-    textured_ = std::make_shared<const TexturedMesh>(std::move(captured));
-    if (as_captured) return textured_->mesh;
+Capture::Encodable Capture::as_encoded(TexturedMesh captured, PicturesOf pictures) {
+    if (!captured.texture) return {std::move(captured.mesh), nullptr};
+    if (pictures == PicturesOf::capture) captured.mesh.colours.clear();
+    Encodable out;
+    out.textured = std::make_shared<const TexturedMesh>(std::move(captured));
     // Tracking goes by the colours at vertices, where there are pictures too.
-    return with_vertex_colours(*textured_);
+    constexpr double texels = 2;
+    if (pictures == PicturesOf::capture)
+        out.mesh = out.textured->mesh;
+    else
+        out.mesh = with_vertex_colours(*out.textured, {}, pictures == PicturesOf::stream ? texels : 1);
+    return out;
+}
+
+Capture::PicturesOf Capture::pictures_of() const {
+    if (!keeps_pictures(options_)) return PicturesOf::nothing;
+    return options_.texture_as == "picture" ? PicturesOf::stream : PicturesOf::capture;
 }
 
 MeshFileOptions Capture::mesh_options() const {
@@ -422,22 +438,33 @@ MeshFileOptions Capture::mesh_options() const {
     return out;
 }
 
-Result<std::optional<TexturedMesh>> Capture::read_file() {
-    if (next_ == begin_ + frames_) return std::optional<TexturedMesh>{};
+std::optional<std::size_t> Capture::go_to_next_file() {
+    if (next_ == begin_ + frames_) return std::nullopt;
     const std::size_t place = next_++;
     const std::int64_t before = timestamp_us_;
     missing_ = place > options_.first ? static_cast<std::size_t>(places_[place] - places_[place - 1] - 1) : 0;
     at_ = place;
     timestamp_us_ = file_times_.empty() ? regular_time(places_[place]) : file_times_[place];
     before_us_ = before;
-    const bool begun = ahead_ && ahead_->mesh.valid() && ahead_->place == place;
-    auto mesh = peeked_ && place == peeked_at_ ? Result<TexturedMesh>(*std::exchange(peeked_, std::nullopt))
-                : begun                        ? ahead_->mesh.get()
-                                               : textures().read(place, texture_use(), mesh_options());
+    return place;
+}
+
+Result<std::optional<Capture::Encodable>> Capture::read_file() {
+    const auto next = go_to_next_file();
+    if (!next) return std::optional<Encodable>{};
+    const std::size_t place = *next;
+    const bool begun = ahead_ && ahead_->frame.valid() && ahead_->place == place;
+    const auto encodable = [&](Result<TexturedMesh> mesh) -> Result<Encodable> {
+        if (!mesh) return tl::unexpected(mesh.error());
+        return as_encoded(std::move(*mesh), pictures_of());
+    };
+    auto frame = peeked_ && place == peeked_at_ ? encodable(*std::exchange(peeked_, std::nullopt))
+                 : begun                        ? ahead_->frame.get()
+                                                : encodable(textures().read(place, texture_use(), mesh_options()));
     // Who takes a second frame will take a third.
     if (taken_ > 0) begin_to_read_next();
-    if (!mesh) return tl::unexpected(mesh.error());
-    return std::optional<TexturedMesh>{std::move(*mesh)};
+    if (!frame) return tl::unexpected(frame.error());
+    return std::optional<Encodable>{std::move(*frame)};
 }
 
 void Capture::begin_to_read_next() {
@@ -445,9 +472,13 @@ void Capture::begin_to_read_next() {
     if (last || (peeked_ && next_ == peeked_at_)) return;
     if (!ahead_) ahead_ = std::make_shared<Ahead>(Ahead{std::move(textures_), 0, {}});
     ahead_->place = next_;
-    ahead_->mesh =
-        std::async(std::launch::async, [&files = ahead_->files, place = next_, use = texture_use(),
-                                        options = mesh_options()] { return files.read(place, use, options); });
+    ahead_->frame = std::async(std::launch::async,
+                               [&files = ahead_->files, place = next_, use = texture_use(), options = mesh_options(),
+                                pictures = pictures_of()]() -> Result<Encodable> {
+                                   auto mesh = files.read(place, use, options);
+                                   if (!mesh) return tl::unexpected(mesh.error());
+                                   return as_encoded(std::move(*mesh), pictures);
+                               });
 }
 
 Result<std::optional<TexturedMesh>> Capture::read_pipe() {
@@ -492,24 +523,31 @@ Result<void> Capture::find_piped_time(std::size_t place, const std::string& time
 Result<std::optional<Mesh>> Capture::next() {
     if (options_.frames > 0 && taken_ >= options_.frames) return std::optional<Mesh>{};
     if (!pipe_) came_ = std::chrono::steady_clock::now();
-    auto captured = pipe_ ? read_pipe() : read_file();
-    if (!captured || *captured) ++taken_;
-    if (!captured) return tl::unexpected(captured.error());
-    if (!*captured) return std::optional<Mesh>{};
-    if (has_texture_ && !(*captured)->texture && (*captured)->mesh.colours.empty())
+    const auto of_pipe = [&]() -> Result<std::optional<Encodable>> {
+        auto mesh = read_pipe();
+        if (!mesh) return tl::unexpected(mesh.error());
+        if (!*mesh) return std::optional<Encodable>{};
+        return std::optional<Encodable>{as_encoded(std::move(**mesh), pictures_of())};
+    };
+    auto frame = pipe_ ? of_pipe() : read_file();
+    if (!frame || *frame) ++taken_;
+    if (!frame) return tl::unexpected(frame.error());
+    if (!*frame) return std::optional<Mesh>{};
+    if (has_texture_ && !(*frame)->textured && (*frame)->mesh.colours.empty())
         return fail(ErrorKind::bad_input, fmt::format("{}: there is no image for it, as there is for others; --texture "
                                                       "gives its place, --texture-as coordinates does without images",
                                                       name()));
-    return std::optional<Mesh>{as_encoded(std::move(**captured))};
+    textured_ = std::move((*frame)->textured);
+    return std::optional<Mesh>{std::move((*frame)->mesh)};
 }
 
 TextureFiles& Capture::textures() {
-    if (ahead_) ahead_->mesh = {};  // waits for what is being read
+    if (ahead_) ahead_->frame = {};  // waits for what is being read
     return ahead_ ? ahead_->files : textures_;
 }
 
 void Capture::rewind() {
-    if (ahead_) ahead_->mesh = {};
+    if (ahead_) ahead_->frame = {};
     at_.reset();
     next_ = begin_;
     taken_ = 0;
@@ -521,7 +559,11 @@ void Capture::restrict_to(std::size_t first, std::size_t frames) {
     rewind();
 }
 
-Mesh Capture::take_first() { return as_encoded(*std::exchange(peeked_, std::nullopt)); }
+Mesh Capture::take_first() {
+    auto frame = as_encoded(*std::exchange(peeked_, std::nullopt), pictures_of());
+    textured_ = std::move(frame.textured);
+    return std::move(frame.mesh);
+}
 
 const Pose* Capture::pose_at(std::size_t place) const {
     return poses_.empty() ? nullptr : &poses_[std::min(place, poses_.size() - 1)];

@@ -123,11 +123,22 @@ private:
     void tell_of_texture() const;
     TextureUse texture_use() const;
     TextureFiles& textures();
-    Result<std::optional<TexturedMesh>> read_file();
+    // A frame as it is encoded: with colours at vertices in place of the texture, or none where that goes into the
+    // stream. textured: as captured; null if there is no texture.
+    struct Encodable {
+        Mesh mesh;
+        std::shared_ptr<const TexturedMesh> textured;
+    };
+    // Which pictures the stream has: those of the capture, or of its own layout.
+    enum class PicturesOf { nothing, capture, stream };
+    PicturesOf pictures_of() const;
+    static Encodable as_encoded(TexturedMesh captured, PicturesOf pictures);
+    std::optional<std::size_t> go_to_next_file();  // its place; none behind the last one
+    Result<std::optional<TexturedMesh>> read_next_file();
+    Result<std::optional<Encodable>> read_file();
     void begin_to_read_next();
     MeshFileOptions mesh_options() const;
     Result<std::optional<TexturedMesh>> read_pipe();
-    Mesh as_encoded(TexturedMesh captured);
     Result<void> find_piped_time(std::size_t place, const std::string& timestamp);
     std::int64_t regular_time(std::uint64_t place) const;
     const Pose* pose_at(std::size_t place) const;
@@ -163,7 +174,7 @@ private:
     struct Ahead {
         TextureFiles files;
         std::size_t place = 0;
-        std::future<Result<TexturedMesh>> mesh;
+        std::future<Result<Encodable>> frame;
     };
     std::shared_ptr<Ahead> ahead_;  // a copy of a capture goes elsewhere, by restrict_to(), before it reads
 };

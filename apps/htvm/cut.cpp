@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -44,6 +45,15 @@ struct Cut {
     std::optional<Packet> header = {};  // in force
     std::deque<Packet> waiting = {};    // since the last frame at which decoding can start
     std::uint32_t start_number = 0;     // the number of that frame in the input
+    // Where meshes can start, pictures may not: a later such frame is where the part begins only if a key picture
+    // comes behind it, or none was in `waiting` anyway.
+    bool has_key = false;  // `waiting` has a key picture
+    struct LaterStart {
+        std::size_t place = 0;  // in `waiting`
+        std::uint32_t frame = 0, number = 0;
+    };
+    std::optional<LaterStart> later = {};
+    bool asked = false;  // the first frame asked for is in `waiting`; what comes behind it may decide where it begins
     bool started = false;
     bool pictures = false;  // the next picture can be decoded, as the part has those before
     Renumbering renumbering = {};
@@ -78,10 +88,15 @@ bool has_all(const Cut& cut) {
     return cut.started && options.frames > 0 && cut.last_number + 1 == options.first + options.frames;
 }
 
-// Whether no later frame needs anything before this one but the sequence header.
+// Whether no later frame needs anything before this one but the sequence header; what pictures need is another matter.
 bool can_start_here(const Cut& cut) {
     const auto& dependencies = cut.numbers.dependencies();
-    const auto needed = dependencies.closure(), kept = dependencies.kept();
+    const auto needed = dependencies.closure(), of_picture = dependencies.picture_closure();
+    auto kept = dependencies.kept();
+    std::erase_if(kept, [&](std::uint64_t place) {
+        const bool is_header = !needed.empty() && place == needed.front();
+        return !is_header && std::find(of_picture.begin(), of_picture.end(), place) != of_picture.end();
+    });
     constexpr std::size_t header_and_frame = 2;
     return needed.size() == header_and_frame && (kept.size() < header_and_frame || kept == needed);
 }
@@ -101,10 +116,30 @@ Result<void> start(Cut& cut) {
     return {};
 }
 
+// What comes behind a frame before the part has begun.
+void wait_with(Cut& cut, Packet packet) {
+    if (is_key_picture(packet)) {
+        if (cut.later && packet.frame == cut.later->frame) {
+            cut.waiting.erase(cut.waiting.begin(), cut.waiting.begin() + static_cast<std::ptrdiff_t>(cut.later->place));
+            cut.start_number = cut.later->number;
+            cut.later.reset();
+        }
+        cut.has_key = true;
+    }
+    cut.waiting.push_back(std::move(packet));
+}
+
 // False once the end of the part is reached.
 Result<bool> take(Cut& cut, Packet packet) {
+    if (cut.asked && !cut.started) {
+        const bool decides = packet.kind == PacketKind::texture;
+        if (decides) wait_with(cut, packet);
+        if (auto ok = start(cut); !ok) return tl::unexpected(ok.error());
+        if (decides) return true;
+    }
     cut.numbers.take(packet);
     cut.time.take(packet, cut.numbers.begins_sequence());
+    if (cut.numbers.begins_sequence()) cut.has_key = false, cut.later.reset();
     cut.output.add_bounds_of(packet);
     if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return true;
     if (packet.kind == PacketKind::sequence) {
@@ -115,7 +150,7 @@ Result<bool> take(Cut& cut, Packet packet) {
         if (cut.started)
             if (auto ok = write(cut, std::move(packet)); !ok) return tl::unexpected(ok.error());
         if (!cut.started && packet.kind != PacketKind::sequence && !cut.waiting.empty())
-            cut.waiting.push_back(std::move(packet));
+            wait_with(cut, std::move(packet));
         return true;
     }
     const auto number = cut.numbers.of(packet.frame);
@@ -126,7 +161,9 @@ Result<bool> take(Cut& cut, Packet packet) {
         if (auto ok = write(cut, std::move(packet)); !ok) return tl::unexpected(ok.error());
         return true;
     }
-    if (can_start_here(cut)) {
+    if (can_start_here(cut) && cut.has_key) {
+        cut.later = {cut.waiting.size(), packet.frame, number};
+    } else if (can_start_here(cut)) {
         cut.waiting.clear();
         cut.start_number = number;
     } else if (cut.waiting.empty()) {
@@ -135,6 +172,8 @@ Result<bool> take(Cut& cut, Packet packet) {
     cut.waiting.push_back(std::move(packet));
     if (is_before(cut, number)) return true;
     cut.first_asked = number;
+    cut.asked = true;
+    if (cut.later && cut.later->number == number) return true;
     if (auto ok = start(cut); !ok) return tl::unexpected(ok.error());
     return true;
 }
@@ -156,7 +195,14 @@ void skip_to_part(Cut& cut, StreamInput& input) {
     auto stream = SeekableStream::open(cut.options.input, cut.options.limits.max_packet_bytes);
     const auto index = stream ? stream->index_at(0) : std::nullopt;
     const auto* point = index && index->end() == stream->size() ? point_for(cut.options, index->index) : nullptr;
-    if (!point || point->back > 0) return;
+    if (!point) return;
+    // A part begins where nothing before is needed, of pictures neither.
+    const auto needs_more = [&](const AccessPoint& at) {
+        const auto picture = stream->picture_behind(index->begin + at.offset);
+        return at.back > 0 || (picture && !is_key_picture(picture->header));
+    };
+    while (needs_more(*point) && point != index->index.points.data()) --point;
+    if (point->back > 0) return;
     const auto first = stream->at(index->begin + point->offset);
     const auto header_place = stream->at(index->begin + index->index.sequences[0].offset);
     const auto front_place = stream->at(0);
@@ -199,6 +245,8 @@ Result<void> run_cut(const Options& options) {
         if (!more) return tl::unexpected(more.error());
         if (!*more) break;
     }
+    if (cut.asked && !cut.started)
+        if (auto ok = start(cut); !ok) return ok;
     if (auto fine = check_whole_up_to_part(cut, *input); !fine) return fine;
     if (!cut.started)
         return fail(ErrorKind::bad_input, cut.header

@@ -373,6 +373,8 @@ Result<void> set_texture(const EncodeOptions& options, const Capture& capture, E
     constexpr long least = 16;
     if (bake) {
         settings.texture.width = settings.texture.height = size > 0 ? size : picture_side_for(*first);
+        note(fmt::format("pictures have {0} x {0} pixels{1}", settings.texture.width,
+                         size > 0 ? "" : "; --texture-size sets others"));
     } else {
         const double scale = size > 0 ? static_cast<double>(size) / std::max(image.width, image.height) : 1;
         settings.texture.width = static_cast<int>(std::max(least, std::lround(scale * image.width)));

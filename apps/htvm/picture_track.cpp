@@ -40,8 +40,10 @@ std::optional<PictureCoder> coder_of_file(const std::vector<std::uint8_t>& bytes
 
 void add_texture_picture_options(CLI::App& command, TexturePictureOptions& options) {
     command
-        .add_option("--texture-size", options.size,
-                    "Pixels of the pictures' longer side (default: that of the capture's images)")
+        .add_option(
+            "--texture-size", options.size,
+            "Pixels of the pictures' longer side (default: that of the capture's images; with --texture-as picture "
+            "more if meshes show much of these)")
         ->check(CLI::Range(16, static_cast<int>(most_picture_side)))
         ->type_name("NUMBER")
         ->group(group);

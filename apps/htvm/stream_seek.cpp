@@ -65,6 +65,12 @@ std::optional<SeekableStream::Index> SeekableStream::index_at(std::uint64_t offs
     return Index{std::move(*index), place->end()};
 }
 
+std::optional<SeekableStream::Place> SeekableStream::picture_behind(std::uint64_t offset) {
+    const auto frame = at(offset);
+    const auto behind = frame ? at(frame->end()) : std::nullopt;
+    return behind && behind->header.kind == PacketKind::texture ? behind : std::nullopt;
+}
+
 namespace {
 
 // Goes from packet header to packet header.
@@ -91,13 +97,6 @@ struct FromIndex {
     std::uint64_t pictures = 0;  // from here up to the offset are the pictures that one there may need
 };
 
-// The picture behind the frame at this place; nothing if it has none.
-std::optional<SeekableStream::Place> picture_behind(SeekableStream& stream, std::uint64_t offset) {
-    const auto frame = stream.at(offset);
-    const auto behind = frame ? stream.at(frame->end()) : std::nullopt;
-    return behind && behind->header.kind == PacketKind::texture ? behind : std::nullopt;
-}
-
 std::optional<FromIndex> from_index(SeekableStream& stream, std::uint64_t frame) {
     std::uint64_t numbered = 0;  // frames of the parts before, each with an index of its own
     for (std::uint64_t offset = 0;;) {
@@ -116,8 +115,8 @@ std::optional<FromIndex> from_index(SeekableStream& stream, std::uint64_t frame)
         // Not every place to start has a key picture.
         out.pictures = out.offset;
         const auto* with_key = point;
-        for (auto picture = picture_behind(stream, out.pictures); picture && !is_key_picture(picture->header);
-             picture = picture_behind(stream, out.pictures)) {
+        for (auto picture = stream.picture_behind(out.pictures); picture && !is_key_picture(picture->header);
+             picture = stream.picture_behind(out.pictures)) {
             if (with_key == index->index.points.data() || with_key[-1].frame < sequence->first_frame) break;
             out.pictures = index->begin + (--with_key)->offset;
         }

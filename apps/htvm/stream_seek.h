@@ -27,6 +27,8 @@ public:
     };
     // The packet that begins there; nothing at the end of the file, or if none begins there.
     std::optional<Place> at(std::uint64_t offset);
+    // The picture behind the frame that lies there; nothing if it has none.
+    std::optional<Place> picture_behind(std::uint64_t offset);
     // The whole packet; nothing if it is damaged.
     std::optional<Packet> read(const Place& place);
     // The index at this place of the file, and where what it is about begins.

@@ -25,9 +25,9 @@ struct ColourSum {
 // The sums that a triangle adds to its corners.
 using CornerSums = std::array<ColourSum, 3>;
 
-// Points spread evenly over the triangle, about a texel apart, each with its share of the area and the level of the
-// image that is as fine as the points are.
-CornerSums sums_of(const Mesh& mesh, const Triangle& t, const ImagePyramid& texture) {
+// Points spread evenly over the triangle, `spacing` texels apart or a little less, each with its share of the area and
+// the level of the image that is as fine as the points are.
+CornerSums sums_of(const Mesh& mesh, const Triangle& t, const ImagePyramid& texture, double spacing) {
     constexpr int most_steps = 32;  // along a side: more texels than that are averaged beforehand
     const Vector2f &a = mesh.texcoords[t[0]], &b = mesh.texcoords[t[1]], &c = mesh.texcoords[t[2]];
     const auto texels = [&](const Vector2f& p, const Vector2f& q) {
@@ -35,7 +35,7 @@ CornerSums sums_of(const Mesh& mesh, const Triangle& t, const ImagePyramid& text
                           static_cast<double>(p[1] - q[1]) * texture.image().height);
     };
     const double longest = std::max({texels(a, b), texels(b, c), texels(c, a)});
-    const int steps = static_cast<int>(std::clamp(std::ceil(longest), 1.0, static_cast<double>(most_steps)));
+    const int steps = static_cast<int>(std::clamp(std::ceil(longest / spacing), 1.0, static_cast<double>(most_steps)));
     const std::size_t level = texture.level_for(longest / steps);
     // Triangles without an area count a little, so that each vertex of one has a colour.
     const double area = std::max(length(area_vector(std::span(mesh.positions), t)), 1e-12) / (steps * steps);
@@ -62,11 +62,11 @@ CornerSums sums_of(const Mesh& mesh, const Triangle& t, const ImagePyramid& text
     return out;
 }
 
-std::vector<ColourSum> sums_of_vertices(const Mesh& mesh, const Image& image, Threads threads) {
+std::vector<ColourSum> sums_of_vertices(const Mesh& mesh, const Image& image, Threads threads, double spacing) {
     const ImagePyramid texture(image);
     std::vector<CornerSums> of_triangles(mesh.triangles.size());
     parallel_for(mesh.triangles.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t t = begin; t < end; ++t) of_triangles[t] = sums_of(mesh, mesh.triangles[t], texture);
+        for (std::size_t t = begin; t < end; ++t) of_triangles[t] = sums_of(mesh, mesh.triangles[t], texture, spacing);
     });
     // In the order of the triangles, so that the result does not depend on the number of threads.
     std::vector<ColourSum> out(mesh.positions.size());
@@ -111,16 +111,16 @@ struct PlaceHash {
 
 }  // namespace
 
-std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, Threads threads) {
+std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, Threads threads, double spacing) {
     std::vector<Colour> out;
     out.reserve(mesh.positions.size());
-    for (const auto& sum : sums_of_vertices(mesh, image, threads)) out.push_back(mean_of(sum));
+    for (const auto& sum : sums_of_vertices(mesh, image, threads, spacing)) out.push_back(mean_of(sum));
     return out;
 }
 
-Mesh with_vertex_colours(const TexturedMesh& captured, Threads threads) {
+Mesh with_vertex_colours(const TexturedMesh& captured, Threads threads, double spacing) {
     const Mesh& mesh = captured.mesh;
-    const auto sums = sums_of_vertices(mesh, *captured.texture, threads);
+    const auto sums = sums_of_vertices(mesh, *captured.texture, threads, spacing);
     Mesh out;
     std::vector<ColourSum> merged;
     std::vector<std::uint32_t> new_of(mesh.positions.size());

@@ -505,8 +505,9 @@ int picture_side_for(const TexturedMesh& captured) {
     }
     constexpr double share = 0.5;  // of the picture that charts cover, and some foreshortening
     constexpr double step = 64, least = 256;
-    return static_cast<int>(
-        std::clamp(step * std::ceil(std::sqrt(texels / share) / step), least, 1.0 * largest_image_side));
+    const double side = std::max(captured.texture->width, captured.texture->height);
+    return static_cast<int>(std::clamp(std::max(step * std::ceil(std::sqrt(texels / share) / step), side), least,
+                                       1.0 * largest_image_side));
 }
 
 }  // namespace htvm

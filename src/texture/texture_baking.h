@@ -81,7 +81,8 @@ private:
 };
 
 // The side of square pictures in which charts have about as many texels a millimetre as the captured image: a multiple
-// of 64 from 256 to 4096. The mesh must have texture coordinates and its image.
+// of 64, or the image's longer side if that is more, as where it shows a face larger than the rest; 256 to 4096. The
+// mesh must have texture coordinates and its image.
 int picture_side_for(const TexturedMesh& captured);
 
 }  // namespace htvm

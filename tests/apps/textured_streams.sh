@@ -68,9 +68,11 @@ expect 0 "18 frames" "$htvm" join av1.htvm av1.htvm -o twice.htvm
 expect 0 "18 frames in 1 sequence, all sound, with an index, with 18 pictures" "$htvm" verify twice.htvm
 "$htvm" cut twice.htvm --first 9 -o second.htvm 2>/dev/null
 expect 0 "9 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify second.htvm
-# From the middle on there is none up to the next key picture.
-"$htvm" cut twice.htvm --first 4 -o middle.htvm 2>/dev/null
-expect 0 "14 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify middle.htvm
+# Frame 13 is an I-frame, but its picture needs those from the key picture of frame 9 on.
+expect 0 "from I-frame 9 on, which frame 14 needs" "$htvm" cut twice.htvm --first 14 -o middle.htvm
+expect 0 "9 frames in 1 sequence, all sound, with an index, with 9 pictures" "$htvm" verify middle.htvm
+"$htvm" cut - --first 14 -o piped.htvm <twice.htvm 2>/dev/null
+cmp -s middle.htvm piped.htvm || fail "a part of a pipe is another than that of a file"
 encode --texture-as captured --jobs 1 -o one.htvm
 encode --texture-as captured --jobs 2 -o two.htvm
 cmp -s one.htvm two.htvm || fail "the number of jobs changes the stream"

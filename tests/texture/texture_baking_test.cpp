@@ -247,7 +247,8 @@ TEST(TextureBaking, PicturesAreAsFineAsTheCapturedImage) {
     EXPECT_EQ(picture_side_for({square(2), slopes(512, 1)}), 768);
     auto small = square(2);
     for (auto& t : small.texcoords) t = {t[0] / 4, t[1] / 4};
-    EXPECT_EQ(picture_side_for({small, slopes(512, 1)}), 256);
+    EXPECT_EQ(picture_side_for({small, slopes(512, 1)}), 512);
+    EXPECT_EQ(picture_side_for({small, slopes(64, 1)}), 256);
 }
 
 }  // namespace
