@@ -91,6 +91,7 @@ std::vector<Packet> AudioTrack::rest() {
     if (!first_us_) return {};
     auto out = up_to(last_us_ + static_cast<std::int64_t>(time_.one_frame_us()), true);
     next_ = track_.packets.size();
+    if (!is_heard_) warn("none of the sound lies in the time of the frames, so the stream has none; see --audio-delay");
     return out;
 }
 
@@ -114,6 +115,7 @@ std::vector<Packet> AudioTrack::up_to(std::int64_t until_us, bool last) {
         audio.skip_begin = clamped(heard_from - begin, samples);
         audio.skip_end = clamped(end - heard_to, samples - audio.skip_begin);
         out.push_back(write_audio(audio, frame_, time_us(begins_[first])));
+        is_heard_ = true;
     }
     return out;
 }

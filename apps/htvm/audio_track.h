@@ -49,6 +49,7 @@ private:
     std::int64_t last_us_ = 0;              // of the last one
     std::uint32_t frame_ = 0;               // its number
     std::size_t next_ = 0;                  // of the packets
+    bool is_heard_ = false;                 // any was given out
 };
 
 }  // namespace htvm::app

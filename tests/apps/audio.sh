@@ -151,6 +151,9 @@ expect 1 "ffmpeg" "$htvm" encode walk --audio walk/skeleton.json -o x.htvm
 expect 1 "damaged" "$htvm" encode walk --audio short.opus -o x.htvm
 expect 1 "no such file" "$htvm" encode walk --audio nowhere.opus -o x.htvm
 expect 2 "--audio" "$htvm" encode walk --audio-delay 1 -o x.htvm
+for delay in 60 -60; do
+    expect 0 "none of the sound lies in the time of the frames" "$htvm" encode walk --audio bursts.wav --audio-delay $delay -o silent.htvm
+done
 [ -e x.htvm ] && fail "sound that cannot be read leaves a stream"
 
 expect 2 "--audio-bitrate" "$htvm" encode walk --audio "$clicks" --audio-bitrate 5 -o x.htvm
