@@ -88,7 +88,8 @@ std::vector<Packet> AudioTrack::before(const Packet& packet) {
 }
 
 std::vector<Packet> AudioTrack::rest() {
-    if (!first_us_) return {};
+    if (!first_us_ || is_over_) return {};
+    is_over_ = true;
     auto out = up_to(last_us_ + static_cast<std::int64_t>(time_.one_frame_us()), true);
     next_ = track_.packets.size();
     if (!is_heard_) warn("none of the sound lies in the time of the frames, so the stream has none; see --audio-delay");

@@ -44,12 +44,12 @@ private:
     OpusTrack track_;
     std::vector<std::uint64_t> begins_;  // of each packet: samples before it; and of all
     std::int64_t delay_us_ = 0;
-    RunningTime time_;                      // for how long a frame lasts
-    std::optional<std::int64_t> first_us_;  // of the first frame
-    std::int64_t last_us_ = 0;              // of the last one
-    std::uint32_t frame_ = 0;               // its number
-    std::size_t next_ = 0;                  // of the packets
-    bool is_heard_ = false;                 // any was given out
+    RunningTime time_;                         // for how long a frame lasts
+    std::optional<std::int64_t> first_us_;     // of the first frame
+    std::int64_t last_us_ = 0;                 // of the last one
+    std::uint32_t frame_ = 0;                  // its number
+    std::size_t next_ = 0;                     // of the packets
+    bool is_heard_ = false, is_over_ = false;  // any was given out; all was
 };
 
 }  // namespace htvm::app
