@@ -427,6 +427,13 @@ Capture::Encodable Capture::as_encoded(TexturedMesh captured, PicturesOf picture
     return out;
 }
 
+Result<Capture::Encodable> Capture::read(TextureFiles& files, std::size_t place, TextureUse use,
+                                         const MeshFileOptions& options, PicturesOf pictures) {
+    auto mesh = files.read(place, use, options);
+    if (!mesh) return tl::unexpected(mesh.error());
+    return as_encoded(std::move(*mesh), pictures);
+}
+
 Capture::PicturesOf Capture::pictures_of() const {
     if (!keeps_pictures(options_)) return PicturesOf::nothing;
     return options_.texture_as == "picture" ? PicturesOf::stream : PicturesOf::capture;
@@ -454,13 +461,9 @@ Result<std::optional<Capture::Encodable>> Capture::read_file() {
     if (!next) return std::optional<Encodable>{};
     const std::size_t place = *next;
     const bool begun = ahead_ && ahead_->frame.valid() && ahead_->place == place;
-    const auto encodable = [&](Result<TexturedMesh> mesh) -> Result<Encodable> {
-        if (!mesh) return tl::unexpected(mesh.error());
-        return as_encoded(std::move(*mesh), pictures_of());
-    };
-    auto frame = peeked_ && place == peeked_at_ ? encodable(*std::exchange(peeked_, std::nullopt))
+    auto frame = peeked_ && place == peeked_at_ ? as_encoded(*std::exchange(peeked_, std::nullopt), pictures_of())
                  : begun                        ? ahead_->frame.get()
-                                                : encodable(textures().read(place, texture_use(), mesh_options()));
+                                                : read(textures(), place, texture_use(), mesh_options(), pictures_of());
     // Who takes a second frame will take a third.
     if (taken_ > 0) begin_to_read_next();
     if (!frame) return tl::unexpected(frame.error());
@@ -474,11 +477,7 @@ void Capture::begin_to_read_next() {
     ahead_->place = next_;
     ahead_->frame = std::async(std::launch::async,
                                [&files = ahead_->files, place = next_, use = texture_use(), options = mesh_options(),
-                                pictures = pictures_of()]() -> Result<Encodable> {
-                                   auto mesh = files.read(place, use, options);
-                                   if (!mesh) return tl::unexpected(mesh.error());
-                                   return as_encoded(std::move(*mesh), pictures);
-                               });
+                                pictures = pictures_of()] { return read(files, place, use, options, pictures); });
 }
 
 Result<std::optional<TexturedMesh>> Capture::read_pipe() {

@@ -133,6 +133,9 @@ private:
     enum class PicturesOf { nothing, capture, stream };
     PicturesOf pictures_of() const;
     static Encodable as_encoded(TexturedMesh captured, PicturesOf pictures);
+    // From the files, on whichever thread.
+    static Result<Encodable> read(TextureFiles& files, std::size_t place, TextureUse use,
+                                  const MeshFileOptions& options, PicturesOf pictures);
     std::optional<std::size_t> go_to_next_file();  // its place; none behind the last one
     Result<std::optional<TexturedMesh>> read_next_file();
     Result<std::optional<Encodable>> read_file();

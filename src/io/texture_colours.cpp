@@ -111,10 +111,10 @@ struct PlaceHash {
 
 }  // namespace
 
-std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, Threads threads, double spacing) {
+std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, Threads threads) {
     std::vector<Colour> out;
     out.reserve(mesh.positions.size());
-    for (const auto& sum : sums_of_vertices(mesh, image, threads, spacing)) out.push_back(mean_of(sum));
+    for (const auto& sum : sums_of_vertices(mesh, image, threads, 1)) out.push_back(mean_of(sum));
     return out;
 }
 

@@ -13,14 +13,12 @@ namespace htvm {
 // that vertex among its triangle's (its barycentric share), so that what is finer than the mesh does not alias. Nothing
 // is read beyond the triangles, where the image shows other parts of the surface. A vertex without triangles has the
 // colour at its own coordinates. The mesh must have texture coordinates, and the image pixels.
-// spacing: of the points, in texels, > 0; 1 is exact, and 2 takes a quarter of the time, for colours that nobody sees:
-// some of what lies a texel beyond the triangles comes in.
-std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, internal::Threads threads = {},
-                                         double spacing = 1);
+std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, internal::Threads threads = {});
 
 // The mesh with these colours in place of the texture and its coordinates. Vertices at one place, of which a seam of
 // the texture needs one for each side, become one if their normals agree, with the mean of their colours by area;
-// triangles that had two corners there are dropped.
+// triangles that had two corners there are dropped. spacing: of the points, in texels, > 0; 1 is exact, and 2 takes a
+// quarter of the time, for colours that nobody sees: some of what lies a texel beyond the triangles comes in.
 Mesh with_vertex_colours(const TexturedMesh& captured, internal::Threads threads = {}, double spacing = 1);
 
 }  // namespace htvm
