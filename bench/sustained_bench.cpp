@@ -1,10 +1,12 @@
 // The tracked profile over 300 frames in a row, from memory, I-frames and patches counted: frames a second, and how
-// long single frames take. HTVM_BENCH_CAPTURE takes a folder of meshes instead of the synthetic person.
+// long single frames take; with one in flight, a push is of two halves of frames. HTVM_BENCH_CAPTURE takes a folder of
+// meshes instead of the synthetic person.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <utility>
 #include <vector>
 
 #include "captures.h"
@@ -23,6 +25,7 @@ void encode_sustained(benchmark::State& state) {
     options.colour_step = steps.colour_step;
     options.tracked.effort = static_cast<int>(state.range(0));
     options.threads = static_cast<unsigned>(state.range(1));
+    options.latency_frames = static_cast<int>(state.range(2));
     std::vector<double> times;
     double decoded = 0, bits = 0, intra = 0, patches = 0;
     for (auto _ : state) {
@@ -60,9 +63,10 @@ void encode_sustained(benchmark::State& state) {
 }
 
 void levels(benchmark::internal::Benchmark* benchmark) {
-    benchmark->ArgNames({"effort", "threads"});
+    benchmark->ArgNames({"effort", "threads", "in_flight"});
     for (const int effort : {1, 5, 9})
-        for (const int threads : {1, 2}) benchmark->Args({effort, threads});
+        for (const auto& [threads, in_flight] : {std::pair(1, 0), std::pair(2, 0), std::pair(2, 1)})
+            benchmark->Args({effort, threads, in_flight});
     benchmark->Iterations(1)->Unit(benchmark::kMillisecond)->UseRealTime();
 }
 

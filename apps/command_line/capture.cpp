@@ -74,7 +74,7 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
                 options.fps = *rate;
             },
             "Frames per second of the meshes: 25, 29.97 or 30000/1001 (default: the skeleton's rate, else by the\n"
-            "timestamps, else 30)")
+            "timestamps, or of standard input as its first PLY says in a comment 'fps 25', else 30)")
         ->type_name("RATE");
     command
         .add_option("--timestamps", options.timestamps,
@@ -281,6 +281,8 @@ Result<void> Capture::find_poses() {
         rate_ = {static_cast<std::uint32_t>(std::lround(track->fps * 1000)), 1000};
     } else if (times.size() > 1) {
         rate_ = rate_of(times);
+    } else if (!track) {
+        rate_is_told_ = false;
     }
     if (!track) return {};
     MeshClock clock;
@@ -395,8 +397,17 @@ void Capture::tell_of_texture() const {
             fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
                         "coordinates keeps its coordinates instead",
                         image, texture->width, texture->height));
-    } else if (mesh.texcoords.empty() || options_.texture.files == "none") {
-        return;
+    } else if (mesh.texcoords.empty()) {
+        const bool asked = options_.texture_as == "coordinates" || options_.texture.origin != TextureOrigin::by_format;
+        if (asked)
+            note(
+                "the meshes have no texture coordinates, so there is nothing to do for --texture-as or "
+                "--texture-origin");
+    } else if (options_.texture.files == "none") {
+        note(
+            "the texture coordinates are encoded, without an image, and keep I-frames from being simplified; meshes "
+            "that are "
+            "written without them take fewer bits");
     } else if (image.empty()) {
         note("the meshes have texture coordinates, but no image was found for them; --texture gives its place");
     } else if (options_.texture_as == "coordinates") {
@@ -489,10 +500,13 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
         auto piped = pipe_->next();
         if (!piped) return tl::unexpected(piped.error());
         if (!*piped) return std::optional<TexturedMesh>{};
-        auto& [mesh, place, timestamp, image, came] = **piped;
+        auto& [mesh, place, timestamp, image, per_second, came] = **piped;
         if (place < options_.first) continue;
         at_ = place;
         came_ = came;
+        // Of the first mesh, as sequence headers say it from then on.
+        if (!std::exchange(rate_is_told_, true))
+            if (const auto rate = parse_frame_rate(per_second)) rate_ = *rate;
         if (auto ok = find_piped_time(place, timestamp); !ok) return tl::unexpected(ok.error());
         if (auto ok = scale_positions(mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
         TextureReference said;

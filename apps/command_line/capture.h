@@ -153,6 +153,7 @@ private:
     FrameTimes listed_;                     // of --timestamps
     std::vector<std::int64_t> file_times_;  // microseconds, of each file, where they are not regular
     FrameRate rate_{30000, 1000};
+    bool rate_is_told_ = true;         // else the first mesh on standard input may say it
     double millimetres_per_unit_ = 0;  // 0: not known yet
     UpAxis up_ = UpAxis::unknown;
     double lowest_ = 0;

@@ -65,7 +65,7 @@ struct MeshPipe::State {
         if (interruption() != 0) return std::optional<PipedMesh>();  // in the middle of a mesh, perhaps
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) return std::optional<PipedMesh>();
-        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.texture(),
+        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.texture(), reader.fps(),
                                        std::chrono::steady_clock::now()});
     }
 

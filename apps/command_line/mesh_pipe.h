@@ -18,6 +18,7 @@ struct PipedMesh {
     std::size_t place = 0;                         // among all that came, dropped ones too
     std::string timestamp;                         // as its header says; empty: it does not
     std::string texture;                           // likewise: the image's name
+    std::string fps;                               // likewise: how many a second are to come
     std::chrono::steady_clock::time_point came{};  // when it was there in whole
 };
 

@@ -8,7 +8,6 @@
 #include "command_line/terminal.h"
 #include "io/mesh_file.h"
 #include "io/number_text.h"
-#include "io/output_file.h"
 #include "metrics/percentile.h"
 
 namespace htvm::app {
@@ -16,7 +15,7 @@ namespace {
 
 // How long a frame takes at each effort, against the usual one: docs/performance.md. Roughly is enough, since what is
 // learned of each frame corrects it.
-constexpr std::array<double, 10> shares = {0.45, 0.7, 0.75, 0.9, 0.95, 1, 1.3, 1.8, 2.2, 5};
+constexpr std::array<double, 10> shares = {0.45, 0.88, 0.94, 0.98, 0.99, 1, 1.6, 1.7, 1.8, 2.6};
 
 double share_of(int effort) { return shares[static_cast<std::size_t>(std::clamp(effort, 0, 9))]; }
 
@@ -29,7 +28,7 @@ int Deadline::effort(double waited) const {
         if (waited + usual_ * share_of(effort) <= room * milliseconds_) return effort;
     // Motion alone loses track sooner or later, which nobody mends. Where the machine never has time for more, a few
     // late frames are better than a picture that falls apart.
-    const auto alone = [](const TimedFrame& frame) { return frame.effort == 0; };
+    const auto alone = [](const TimedFrame& frame) { return frame.motion_alone(); };
     const bool for_long = frames_.size() >= most_alone &&
                           std::all_of(frames_.end() - static_cast<std::ptrdiff_t>(most_alone), frames_.end(), alone);
     return for_long ? std::min(1, most_) : 0;
@@ -53,8 +52,13 @@ std::size_t Deadline::late() const {
 }
 
 std::size_t Deadline::lowered() const {
+    return static_cast<std::size_t>(std::count_if(
+        frames_.begin(), frames_.end(), [&](const TimedFrame& frame) { return frame.effort < most_ && !frame.intra; }));
+}
+
+std::size_t Deadline::alone() const {
     return static_cast<std::size_t>(
-        std::count_if(frames_.begin(), frames_.end(), [&](const TimedFrame& frame) { return frame.effort < most_; }));
+        std::count_if(frames_.begin(), frames_.end(), [](const TimedFrame& frame) { return frame.motion_alone(); }));
 }
 
 Latency latency_of(const std::vector<TimedFrame>& frames) {
@@ -71,11 +75,9 @@ std::string deadline_summary(const Deadline& deadline) {
         fmt::format("latency of a frame {:.1f} ms in the median, {:.1f} ms in the 99th percentile, {:.1f} ms at most",
                     latency.median, latency.p99, latency.longest);
     if (!(deadline.milliseconds() > 0)) return out;
-    std::size_t alone = 0;
-    for (const auto& frame : deadline.frames()) alone += frame.effort == 0 ? 1 : 0;
     return out + fmt::format("; deadline {:g} ms: {} late, {} with less effort, {} of them as motion alone",
                              deadline.milliseconds(), counted(deadline.late(), "frame"),
-                             counted(deadline.lowered(), "frame"), alone);
+                             counted(deadline.lowered(), "frame"), deadline.alone());
 }
 
 nlohmann::json deadline_json(const Deadline& deadline) {
@@ -83,19 +85,34 @@ nlohmann::json deadline_json(const Deadline& deadline) {
     nlohmann::json out = {{"latency_ms", {{"p50", latency.median}, {"p99", latency.p99}, {"max", latency.longest}}}};
     if (!(deadline.milliseconds() > 0)) return out;
     std::array<std::size_t, 10> by_effort{};
-    for (const auto& frame : deadline.frames()) ++by_effort[static_cast<std::size_t>(frame.effort)];
+    std::size_t intra = 0;
+    for (const auto& frame : deadline.frames())
+        ++(frame.intra ? intra : by_effort[static_cast<std::size_t>(frame.effort)]);
     out["deadline_ms"] = deadline.milliseconds();
     out["late_frames"] = deadline.late();
     out["lowered_frames"] = deadline.lowered();
-    out["frames_by_effort"] = by_effort;
+    out["intra_frames"] = intra;
+    out["frames_by_effort"] = by_effort;  // the others
     return out;
 }
 
-Result<void> write_effort_log(const std::filesystem::path& path, const std::vector<TimedFrame>& frames) {
+std::string deadline_warning(const Deadline& deadline, bool may_drop) {
+    const auto frames = deadline.frames().size(), late = deadline.late();
+    if (late == 0 || 2 * late < frames) return {};
+    return fmt::format(
+        "{} of {} late: this machine is too slow for the deadline; a larger --deadline helps, a lower "
+        "-q{}, meshes of fewer vertices{}",
+        late, counted(frames, "frame") + (frames == 1 ? " was" : " were"), deadline.most() > 1 ? " or --effort" : "",
+        may_drop ? ", or --drop-late, which leaves frames out" : "");
+}
+
+Result<void> write_effort_log(OutputFile& file, const std::vector<TimedFrame>& frames) {
     std::string text = "frame,effort,waited_ms,took_ms\n";
     for (std::size_t i = 0; i < frames.size(); ++i)
         text += fmt::format("{},{},{:.3f},{:.3f}\n", i, frames[i].effort, frames[i].waited, frames[i].took);
-    return write_file(path, text);
+    if (auto written = file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}); !written)
+        return written;
+    return file.finish();
 }
 
 Result<std::vector<int>> read_effort_log(const std::filesystem::path& path) {
@@ -129,7 +146,15 @@ Result<std::vector<int>> read_effort_log(const std::filesystem::path& path) {
             return wrong(line, "an effort is 0 to 9");
         out.push_back(static_cast<int>(effort));
     }
+    if (out.empty()) return wrong(line + 1, "there is no frame");
     return out;
+}
+
+std::string too_few_efforts(const std::string& path, std::size_t efforts, const std::string& frames) {
+    return fmt::format(
+        "{} has the efforts of {}, but there are {}: repeat the run that wrote it, with the same frames "
+        "and options, or give --frames {}",
+        path, counted(efforts, "frame"), frames, efforts);
 }
 
 }  // namespace htvm::app

@@ -11,15 +11,18 @@
 #include <vector>
 
 #include "htvm/result.hpp"
+#include "io/output_file.h"
 
 namespace htvm::app {
 
 // One frame, as decided and as it went.
 struct TimedFrame {
-    int effort = 5;     // see Encoder::set_effort()
-    double waited = 0;  // milliseconds from when the mesh was there to when it was taken
-    double took = 0;    // milliseconds that it then took
+    int effort = 5;      // see Encoder::set_effort()
+    double waited = 0;   // milliseconds from when the mesh was there to when it was taken
+    double took = 0;     // milliseconds that it then took
+    bool intra = false;  // an I-frame, for which the same is sent at any effort
     double latency() const { return waited + took; }
+    bool motion_alone() const { return effort == 0 && !intra; }
 };
 
 // Takes the highest effort with which a frame will probably be out in time. Times are forecast from the last frames':
@@ -38,6 +41,7 @@ public:
     const std::vector<TimedFrame>& frames() const { return frames_; }
     std::size_t late() const;     // frames that were
     std::size_t lowered() const;  // frames that got less than was asked for
+    std::size_t alone() const;    // of these, those whose motion alone was coded
 
 private:
     double milliseconds_;
@@ -55,9 +59,14 @@ Latency latency_of(const std::vector<TimedFrame>& frames);
 // "latency 21 ms in the median, ...", and where there is a deadline, how many frames were late or got less effort.
 std::string deadline_summary(const Deadline& deadline);
 nlohmann::json deadline_json(const Deadline& deadline);
+// What helps where half of the frames were late, or more; empty if there is no need. may_drop: whether late meshes can
+// be dropped.
+std::string deadline_warning(const Deadline& deadline, bool may_drop);
 
 // A line per frame: its number, effort, waiting and time. Read back, the efforts alone count.
-Result<void> write_effort_log(const std::filesystem::path& path, const std::vector<TimedFrame>& frames);
+Result<void> write_effort_log(OutputFile& file, const std::vector<TimedFrame>& frames);
 Result<std::vector<int>> read_effort_log(const std::filesystem::path& path);
+// Why such a log does not do for so many frames, a number or "more".
+std::string too_few_efforts(const std::string& path, std::size_t efforts, const std::string& frames);
 
 }  // namespace htvm::app

@@ -40,7 +40,7 @@ struct Options {
     std::uint64_t first = 0;
     std::size_t frames = 0;
     unsigned threads = 0;
-    bool json = false;
+    bool images_given = false, json = false;
     DecoderOptions limits;
     HubTrust trust;
 };
@@ -51,6 +51,7 @@ struct Summary {
     std::size_t missing = 0;          // frames that are missing between others
     std::size_t damaged_packets = 0;  // codebooks and headers that could not be read
     std::size_t concealed_in_a_row = 0;
+    bool any_picture = false;                  // of a texture
     std::uint32_t due = 0;                     // the number of the frame expected next
     std::optional<std::int64_t> timestamp_us;  // of the previous frame
     double decode_seconds = 0;
@@ -333,6 +334,7 @@ Result<bool> decode_next(Decoding& d) {
     const auto packet = d.input.next();
     const bool picture = packet && packet->kind == PacketKind::texture;
     if (picture) d.textures.take(*packet);
+    d.summary.any_picture = d.summary.any_picture || picture;
     if (d.held && (!packet || picture || packet->kind == PacketKind::sequence || frame_type(packet->kind))) {
         if (auto ok = write_held(d); !ok) return tl::unexpected(ok.error());
         if (is_enough(d) || d.output.one_file()) return false;
@@ -399,6 +401,8 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
     if (summary.concealed > 0) frames += fmt::format(" ({} concealed)", summary.concealed);
     note(fmt::format("{} to {}, decoded at {:.1f} frames/s", frames,
                      options.output == "-" ? "standard output" : options.output, summary.frames_per_second()));
+    if (options.images_given && !summary.any_picture)
+        note("there are no pictures of a texture, so --images does nothing");
     const auto others = output.other_meshes();
     if (others > 0 && summary.written() > 0)
         warn(fmt::format(
@@ -575,7 +579,8 @@ void add_decode(CLI::App& app, Run& run) {
         "  htvm decode person.htvm --audio voice.wav\n"
         "  htvm decode - -o - < person.htvm | viewer --ply\n"
         "  htvm decode ws://localhost:8080/watch/person -o - | viewer --ply");
-    command->callback([options, &run] {
+    command->callback([options, command, &run] {
+        options->images_given = command->count("--images") > 0;
         if (options->output == "-" && options->json)
             throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the meshes; choose one");
         if (options->output.empty() && options->audio.empty())

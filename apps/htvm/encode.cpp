@@ -14,10 +14,12 @@
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "commands.h"
+#include "core/thread.h"
 #include "encode_jobs.h"
 #include "encode_pass.h"
 #include "htvm/running_time.hpp"
-#include "io/number_text.h"
+#include "io/output_file.h"
+#include "job_options.h"
 #include "line_rate.h"
 #include "live/hub_address.h"
 #include "rate_passes.h"
@@ -97,6 +99,10 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
             "the line did not take {} of {} in time, and they were not sent; a lower --bitrate or -q fits it", not_sent,
             counted(frames, "frame")));
     if (const auto strain = rate_warning(rate); !strain.empty()) warn(strain);
+    if (deadline)
+        if (const auto late = deadline_warning(*deadline, is_piped(options.capture) && !options.drop_late);
+            !late.empty())
+            warn(late);
     if (summary.without_triangles > 0)
         warn(fmt::format("{} of {} no triangles; see that the files hold meshes", summary.without_triangles,
                          counted(frames, "frame") + (summary.without_triangles == 1 ? " has" : " have")));
@@ -161,17 +167,23 @@ void note_bones(const EncodeOptions& options, const EncoderOptions& settings) {
         note("bone radii are calibrated on the first frame; a T-pose is best (see htvm calibrate)");
 }
 
+// How many groups a capture makes, of all jobs.
+std::string groups_text(const EncodeOptions& options, int key_interval, std::size_t frames) {
+    const auto made_of = counted(frames, "frame") + (frames == 1 ? " makes" : " make");
+    if (options.chunks > 1) return fmt::format("{} {}", made_of, counted(std::min(options.chunks, frames), "chunk"));
+    const auto of_group = frames_of_group(key_interval);
+    return fmt::format("{} {} of {}{}", made_of, counted((frames + of_group - 1) / of_group, "group"), of_group,
+                       of_group > static_cast<std::size_t>(key_interval)
+                           ? fmt::format(" (whole multiples of --keyint, of at least {})", least_of_group)
+                           : "");
+}
+
 // Each group of frames by an encoder of its own. A job that has nothing to do leaves no file.
 Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, const EncoderOptions& settings,
                               const std::optional<AudioTrack>& audio) {
-    const auto of_group = frames_of_group(settings.key_interval);
-    const auto groups = (capture.frames() + of_group - 1) / of_group;
-    const auto have =
-        fmt::format("{} make {} of {}{}", counted(capture.frames(), "frame"), counted(groups, "group"), of_group,
-                    of_group > static_cast<std::size_t>(settings.key_interval)
-                        ? fmt::format(" (whole multiples of --keyint, of at least {})", least_of_group)
-                        : "");
-    if (groups_of(options.job, groups).count() == 0) {
+    const auto groups = groups_of(options, settings.key_interval, capture.frames());
+    const auto have = groups_text(options, settings.key_interval, capture.frames());
+    if (groups.empty()) {
         std::error_code error;
         if (std::filesystem::is_regular_file(options.output, error))
             return fail(ErrorKind::bad_input, fmt::format("job {} of {} has nothing to do, as {}, but {} is there: "
@@ -181,14 +193,15 @@ Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, co
                          have));
         return {};
     }
-    if (options.jobs > groups) note(fmt::format("{}: as many jobs are enough", have));
+    if (options.jobs > groups.size()) note(fmt::format("{}: as many jobs are enough", have));
+    if (options.chunks > groups.size()) note(have);
     auto output = StreamOutput::open(options.output);
     if (!output) return tl::unexpected(output.error());
     if (audio) output->lay(*audio);
     note_bones(options, settings);
     Summary summary;
     RateReport rate(settings);
-    if (auto done = encode_groups(options, settings, capture, *output, summary, rate); !done)
+    if (auto done = encode_groups(options, settings, capture, groups, *output, summary, rate); !done)
         return may_be_live(options.output)
                    ? done
                    : fail(done.error().kind, fmt::format("{}; nothing is written", done.error().message));
@@ -199,6 +212,19 @@ Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, co
     return {};
 }
 
+// Of --repeat-efforts; empty without it.
+Result<std::vector<int>> efforts_to_repeat(const EncodeOptions& options, const Capture& capture) {
+    if (options.repeat_efforts.empty()) return std::vector<int>{};
+    auto efforts = read_effort_log(options.repeat_efforts);
+    if (!efforts) return efforts;
+    // Of a pipe nobody knows how many come, nor of files which of them can be read.
+    const bool all = !is_piped(options.capture) && options.on_bad_frame != "skip";
+    if (all && efforts->size() < capture.frames())
+        return fail(ErrorKind::bad_input,
+                    too_few_efforts(options.repeat_efforts, efforts->size(), std::to_string(capture.frames())));
+    return efforts;
+}
+
 // One run after another, until the bitrate is met.
 Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, EncoderOptions settings,
                               const std::optional<AudioTrack>& audio) {
@@ -206,11 +232,13 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
     // What went to a pipe cannot be taken back.
     const int most = options.encoding.passes == 0 && fewest == 2 && !may_be_live(options.output) ? most_passes : fewest;
     std::optional<RatePasses> passes;
-    std::vector<int> efforts;
-    if (!options.repeat_efforts.empty()) {
-        auto read = read_effort_log(options.repeat_efforts);
-        if (!read) return tl::unexpected(read.error());
-        efforts = std::move(*read);
+    const auto efforts = efforts_to_repeat(options, capture);
+    if (!efforts) return tl::unexpected(efforts.error());
+    std::optional<OutputFile> effort_log;
+    if (!options.effort_log.empty()) {
+        auto file = OutputFile::create(options.effort_log);
+        if (!file) return tl::unexpected(file.error());
+        effort_log.emplace(std::move(*file));
     }
     // Meshes and pictures share the rate.
     const auto of_all = settings;
@@ -229,7 +257,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         Summary summary;
         RateReport rate(of_all);
         Deadline deadline(options.deadline, settings.tracked.effort);
-        const bool timed = options.deadline > 0 || !options.effort_log.empty() || !efforts.empty() ||
+        const bool timed = options.deadline > 0 || !options.effort_log.empty() || !efforts->empty() ||
                            (is_piped(options.capture) && settings.profile == Profile::tracked);
         const bool writes = number >= fewest;
         {
@@ -249,7 +277,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
             if (!pictures) return tl::unexpected(pictures.error());
             if (*pictures) pass.pictures = &**pictures;
             if (timed) pass.deadline = &deadline;
-            pass.efforts = efforts;
+            pass.efforts = *efforts;
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
             if (hub) pass.wants_key_frame = [hub] { return hub->wants_key_frame(); };
             if (hub && rate.rate_controlled() && !options.publishing.fixed_bitrate)
@@ -275,8 +303,8 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (auto finished = output->finish(); !finished) return finished;
         report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped(), hub,
                timed ? &deadline : nullptr);
-        if (!options.effort_log.empty())
-            if (auto written = write_effort_log(options.effort_log, deadline.frames()); !written) return written;
+        if (effort_log)
+            if (auto written = write_effort_log(*effort_log, deadline.frames()); !written) return written;
         if (rate.dropped.empty()) return {};
         return fail(
             ErrorKind::limit,
@@ -284,35 +312,6 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
                         "--bitrate or a larger --buffer",
                         options.output, rate.dropped.size(), rate.costs.size()));
     }
-}
-
-Job parse_job(const std::string& text) {
-    const auto slash = text.find('/');
-    const auto number = parse_number(text.substr(0, slash));
-    const auto of = slash == std::string::npos ? std::nullopt : parse_number(text.substr(slash + 1));
-    const auto is_count = [](double x) { return x >= 1 && x <= 1e6 && x == std::floor(x); };
-    if (!number || !of || !is_count(*number) || !is_count(*of) || *number > *of)
-        throw CLI::ValidationError("--job", "'" + text + "' is not I/N: job I of N, from 1/N to N/N");
-    return {static_cast<std::size_t>(*number), static_cast<std::size_t>(*of)};
-}
-
-// What groups cannot do, as they do not know of each other.
-void check_jobs(const EncodeOptions& options, bool random_session) {
-    if (!options.in_groups()) return;
-    const char* flag = options.jobs > 0 ? "--jobs" : "--job";
-    if (is_piped(options.capture))
-        throw CLI::ValidationError(flag,
-                                   "takes frames from many places at once, which needs files, not standard input");
-    if (is_given(options.encoding, "rate.bits_per_second"))
-        throw CLI::ValidationError(flag,
-                                   "encodes groups of frames that do not know what the others take, so they cannot "
-                                   "share a --bitrate; -q and --target-error go with it");
-    if (!options.audio.file.empty() && options.job.of > 0)
-        throw CLI::ValidationError("--audio", "is for the whole: give it to the htvm join of the parts");
-    if (random_session && options.job.of > 0)
-        throw CLI::ValidationError("--session",
-                                   "is random, so the parts of several jobs would not be of one stream: give "
-                                   "all the same number");
 }
 
 // What can become of a capture's pictures.
@@ -334,10 +333,10 @@ void check_pictures(const EncodeOptions& options, const CLI::App& command) {
                                    "profiles give captured");
     if (options.capture.texture.files == "none")
         throw CLI::ValidationError("--texture", "none leaves no images for --texture-as " + as);
-    if (as == "picture" && options.in_groups())
+    if (as == "picture" && options.in_groups() && options.chunks == 1)
         throw CLI::ValidationError("--texture-as",
                                    "picture goes through the capture in one, as each frame's is drawn over the one "
-                                   "before; not with --jobs or --job");
+                                   "before; not with --jobs or --job, but with --chunks");
     const bool rate = is_given(options.encoding, "rate.bits_per_second");
     if (rate && as == "keep")
         throw CLI::ValidationError("--texture-as",
@@ -345,6 +344,23 @@ void check_pictures(const EncodeOptions& options, const CLI::App& command) {
                                    "captured codes them as video");
     if (rate && options.pictures.quality)
         throw CLI::ValidationError("--texture-quality", "follows from --bitrate; give one of the two");
+}
+
+// Whether somebody waits for each frame, so that a group's packets, which come with its last one, would be late.
+bool may_not_wait(const EncodeOptions& options) {
+    return live::looks_like_hub_address(options.output) || options.deadline > 0;
+}
+
+void check_waiting(const EncodeOptions& options) {
+    if (given_value(options.encoding, "tracked.group").value_or(0) > 1 && may_not_wait(options))
+        throw CLI::ValidationError("--group", options.deadline > 0
+                                                  ? "holds frames back, beyond any --deadline: give one of the two"
+                                                  : "holds frames back, which who watches live would wait for: it is "
+                                                    "for files, not for a hub");
+    if (given_value(options.encoding, "latency_frames").value_or(0) > 0 && options.deadline > 0)
+        throw CLI::ValidationError("--latency-frames",
+                                   "lets a frame wait for the next one, while --deadline counts the time until it is "
+                                   "coded: give one of them");
 }
 
 // What goes with the clock, frame after frame.
@@ -356,7 +372,9 @@ void check_pace(const EncodeOptions& options) {
     if (!flag) return;
     if (options.encoding.profile != "tracked")
         throw CLI::ValidationError(flag, "is for --profile tracked: the others have no efforts");
-    if (options.in_groups()) throw CLI::ValidationError(flag, "goes frame by frame, not with --jobs or --job");
+    if (options.in_groups())
+        throw CLI::ValidationError(
+            flag, std::string("goes frame by frame through the capture, not with ") + job_option(options));
     if (options.encoding.passes == 2)
         throw CLI::ValidationError(flag, "goes with one pass over the frames, not with --passes 2");
 }
@@ -396,16 +414,7 @@ Result<void> encode(const EncodeOptions& options) {
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
     if (auto set = set_texture(options, *capture, *settings); !set) return set;
-    // A group's packets come once its last frame is captured.
-    const bool live = live::looks_like_hub_address(options.output) || options.deadline > 0;
-    if (settings->tracked.group > 1 && live)
-        return fail(ErrorKind::bad_input,
-                    "--group holds frames back, which who watches live would wait for: it is for files, not for a hub");
-    if (settings->tracked.group == 0 && live) settings->tracked.group = 1;
-    if (settings->latency_frames > 0 && options.deadline > 0)
-        return fail(ErrorKind::bad_input,
-                    "--deadline counts the time until a frame is coded, and --latency-frames lets it "
-                    "wait for the next one: give one of them");
+    if (settings->tracked.group == 0 && may_not_wait(options)) settings->tracked.group = 1;
     // Nobody waits for the frames of a file.
     if (!is_given(options.encoding, "latency_frames") && !is_piped(options.capture) && !may_be_live(options.output) &&
         options.deadline == 0 && options.effort_log.empty())
@@ -477,25 +486,7 @@ void add_encode(CLI::App& app, Run& run) {
         ->type_name("FILE")
         ->group(pace)
         ->excludes("--deadline");
-    constexpr const char* jobs = "Many processors, many machines";
-    command
-        ->add_option(
-            "--jobs", options->jobs,
-            "Encode so many groups of frames at a time, each from one I-frame to the next (--keyint) by itself,\n"
-            "or, where --keyint is below ten, to the first I-frame that makes ten frames or more.\n"
-            "The stream is the same for any number, but not the one without --jobs, where what an encoder\n"
-            "has learned goes from group to group and I-frames may move. Not with --bitrate")
-        ->check(CLI::Range(1, 1024))
-        ->type_name("N")
-        ->group(jobs);
-    command
-        ->add_option_function<std::string>(
-            "--job", [options](const std::string& text) { options->job = parse_job(text); },
-            "Encode the Ith of N parts of the groups alone, on any machine. 'htvm join' of the parts, in order, gives\n"
-            "the stream of --jobs, byte by byte")
-        ->type_name("I/N")
-        ->excludes("--jobs")
-        ->group(jobs);
+    add_job_options(*command, *options);
     command->add_flag("--json", options->json, "Print sizes by frame and layer as JSON on standard output");
     command->add_flag_callback(
         "--help-options",
@@ -512,16 +503,15 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  htvm encode capture/ --jobs 8 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 --drop-late -o wss://hub.example/publish/person");
-    show_first(*command, {"--skeleton", "--output", "--fps", "--unit", "--height", "--texture", "--frames", "--first",
-                          "--quality", "--profile", "--bitrate", "--buffer", "--keyint", "--on-bad-frame", "--threads",
-                          "--jobs", "--json"});
+    show_first(*command,
+               {"--skeleton", "--output", "--fps",          "--unit",    "--height", "--texture", "--texture-as",
+                "--audio",    "--frames", "--first",        "--quality", "--effort", "--profile", "--bitrate",
+                "--buffer",   "--keyint", "--on-bad-frame", "--threads", "--chunks", "--jobs",    "--json"});
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();
         check_pictures(*options, *command);
         check_jobs(*options, !sessions.empty() && sessions[0] == "random");
-        if (live::looks_like_hub_address(options->output) && options->in_groups())
-            throw CLI::ValidationError("--jobs", "encodes groups of frames at once: for files, not for what is live");
         if (options->publishing.fixed_bitrate &&
             !(live::looks_like_hub_address(options->output) && is_given(options->encoding, "rate.bits_per_second")))
             throw CLI::ValidationError("--fixed-bitrate", "does nothing without a --bitrate and a hub to publish to");
@@ -533,10 +523,12 @@ void add_encode(CLI::App& app, Run& run) {
                                       : options->deadline > 0 ? WhileBusy::read_on
                                                               : WhileBusy::wait;
         check_pace(*options);
+        check_waiting(*options);
         if (options->encoding.passes == 2 && is_piped(options->capture))
             throw CLI::ValidationError(
                 "--passes",
                 "2 reads the capture twice, which standard input does not allow; give files, or --passes 1");
+        if (options->chunks == 0) options->chunks = internal::thread_count(0);
         run = [options] { return encode(*options); };
     });
 }

@@ -33,10 +33,11 @@ struct EncodeOptions {
     bool fill = false;                  // repeats the frame before in the place of missing ones
     bool json = false;
     bool keep_partial = true;  // of an encoding that ends early
-    std::size_t jobs = 0;      // at a time; 0: the capture is encoded as a whole
+    std::size_t chunks = 1;    // that the capture is cut into; 0: one per core
+    std::size_t jobs = 0;      // at a time; 0: not in groups from one I-frame to the next
     Job job;                   // of 0: all of the capture
-    // Whether the capture is encoded in groups that do not know of each other.
-    bool in_groups() const { return jobs > 0 || job.of > 0; }
+    // Whether the capture is encoded in groups of frames that do not know of each other.
+    bool in_groups() const { return chunks != 1 || jobs > 0 || job.of > 0; }
 };
 
 // Tells of it as the command does.

@@ -19,11 +19,6 @@
 namespace htvm::app {
 namespace {
 
-struct Group {
-    std::size_t number = 0;
-    std::size_t first = 0, frames = 0;  // of the capture
-};
-
 struct CodedGroup {
     std::vector<Packet> packets;
     Summary summary;
@@ -36,7 +31,7 @@ struct Work {
     EncoderOptions settings;
     const Mesh& first_mesh;
     const Pose* first_pose;
-    std::vector<Group> groups;
+    std::vector<Range> groups;
     std::size_t ahead;  // groups that may be finished or at work before the next one that is written
     Progress& progress;
     FrameWarnings warnings = {};
@@ -54,15 +49,15 @@ bool is_stopped(Work& work) {
     return work.failed.has_value();
 }
 
-std::string frames_text(const Group& group) {
-    return group.frames == 1 ? fmt::format("frame {}", group.first)
-                             : fmt::format("frames {} to {}", group.first, group.first + group.frames - 1);
+std::string frames_text(const Range& group) {
+    return group.count() == 1 ? fmt::format("frame {}", group.begin)
+                              : fmt::format("frames {} to {}", group.begin, group.end - 1);
 }
 
 // The frame before the group stands in for its first ones, if it has to.
-void find_stand_in(Pass& pass, const Group& group) {
-    if (group.first == 0 || (!pass.options.fill && pass.options.on_bad_frame != "repeat")) return;
-    pass.capture.restrict_to(group.first - 1, group.frames + 1);
+void find_stand_in(Pass& pass, const Range& group) {
+    if (group.begin == 0 || (!pass.options.fill && pass.options.on_bad_frame != "repeat")) return;
+    pass.capture.restrict_to(group.begin - 1, group.count() + 1);
     auto before = pass.capture.next();
     if (!before || !*before) return;
     pass.last = std::move(**before);
@@ -70,7 +65,7 @@ void find_stand_in(Pass& pass, const Group& group) {
     if (pass.pictures) pass.last_textured = pass.capture.textured();
 }
 
-Result<CodedGroup> code_group(Work& work, Capture& capture, const Group& group) {
+Result<CodedGroup> code_group(Work& work, Capture& capture, const Range& group) {
     auto encoder = Encoder::create(work.settings);
     if (!encoder) return tl::unexpected(encoder.error());
     if (auto begun = encoder->begin(work.first_mesh, work.first_pose); !begun) return tl::unexpected(begun.error());
@@ -98,7 +93,7 @@ Result<CodedGroup> code_group(Work& work, Capture& capture, const Group& group) 
     auto pictures = picture_track(work.options, capture, work.settings);
     if (!pictures) return tl::unexpected(pictures.error());
     if (*pictures) pass.pictures = &**pictures;
-    capture.restrict_to(group.first, group.frames);
+    capture.restrict_to(group.begin, group.count());
     find_stand_in(pass, group);
     if (auto done = encode_frames(pass); !done) return tl::unexpected(done.error());
     if (auto done = finish(pass); !done) return tl::unexpected(done.error());
@@ -163,12 +158,9 @@ Result<void> write_groups(Work& work, StreamOutput& output, Summary& summary, Ra
     return {};
 }
 
-std::vector<Group> groups_in(std::size_t frames, std::size_t of_each, const Job& job) {
-    const auto range = groups_of(job, (frames + of_each - 1) / of_each);
-    std::vector<Group> out;
-    for (auto number = range.begin; number < range.end; ++number)
-        out.push_back({number, number * of_each, std::min(of_each, frames - number * of_each)});
-    return out;
+// The Ith of so many parts of things in order, as even as possible.
+Range part_of(const Job& part, std::size_t things) {
+    return {(part.number - 1) * things / part.of, part.number * things / part.of};
 }
 
 }  // namespace
@@ -178,20 +170,30 @@ std::size_t frames_of_group(int key_interval) {
     return interval * ((least_of_group + interval - 1) / interval);
 }
 
-GroupRange groups_of(const Job& job, std::size_t groups) {
-    if (job.of == 0) return {0, groups};
-    return {(job.number - 1) * groups / job.of, job.number * groups / job.of};
+std::vector<Range> groups_of(const EncodeOptions& options, int key_interval, std::size_t frames) {
+    std::vector<Range> out;
+    if (options.chunks > 1) {
+        const auto chunks = std::min(options.chunks, frames);
+        for (std::size_t k = 1; k <= chunks; ++k) out.push_back(part_of({k, chunks}, frames));
+        return out;
+    }
+    const auto of_each = frames_of_group(key_interval);
+    const auto groups = (frames + of_each - 1) / of_each;
+    const auto [begin, end] = options.job.of > 0 ? part_of(options.job, groups) : Range{0, groups};
+    for (auto k = begin; k < end; ++k) out.push_back({k * of_each, std::min((k + 1) * of_each, frames)});
+    return out;
 }
 
 Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& settings, Capture& capture,
-                           StreamOutput& output, Summary& summary, RateReport& rate) {
+                           std::vector<Range> groups, StreamOutput& output, Summary& summary, RateReport& rate) {
     const auto start = std::chrono::steady_clock::now();
     const auto pose = capture.first_pose() ? std::optional(*capture.first_pose()) : std::nullopt;
     const auto mesh = capture.take_first();
-    auto groups = groups_in(capture.frames(), frames_of_group(settings.key_interval), options.job);
     std::size_t frames = 0;
-    for (const auto& group : groups) frames += group.frames;
-    const auto threads = std::min(std::max<std::size_t>(options.jobs, 1), groups.size());
+    for (const auto& group : groups) frames += group.count();
+    const auto of_machine = internal::thread_count(settings.threads);
+    const auto at_once = options.chunks > 1 ? of_machine : std::max<std::size_t>(options.jobs, 1);
+    const auto threads = std::min(at_once, groups.size());
     Progress progress("encoding", frames);
     Work work{.options = options,
               .settings = settings,
@@ -200,7 +202,7 @@ Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& s
               .groups = std::move(groups),
               .ahead = 2 * threads,
               .progress = progress};
-    work.settings.threads = std::max(1u, internal::thread_count(settings.threads) / static_cast<unsigned>(threads));
+    work.settings.threads = std::max(1u, of_machine / static_cast<unsigned>(threads));
     std::vector<std::thread> encoders;
     for (std::size_t k = 0; k < threads; ++k) encoders.emplace_back([&work, capture] { code_groups(work, capture); });
     auto done = write_groups(work, output, summary, rate);

@@ -1,10 +1,12 @@
 // A capture in groups of frames that are encoded without knowing of each other, by several encoders at a time or by
 // several machines. All begin with what follows from the capture's first frame, so that they write the same sequence
 // header, and each with an I-frame. So the stream depends neither on how many are encoded at a time nor on how they are
-// shared out: parts that are joined (StreamJoin) are the whole, byte by byte.
+// shared out: parts that are joined (StreamJoin) are the whole, byte by byte. Groups go from one I-frame to the next,
+// or are chunks, so many of the capture.
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "encode_pass.h"
 #include "stream_file.h"
@@ -16,17 +18,15 @@ namespace htvm::app {
 constexpr std::size_t least_of_group = 10, most_of_group = 60;
 std::size_t frames_of_group(int key_interval);
 
-struct GroupRange {
+struct Range {
     std::size_t begin = 0, end = 0;
     std::size_t count() const { return end - begin; }
-    bool operator==(const GroupRange&) const = default;
 };
-// The groups of a job, in order and as even as possible.
-GroupRange groups_of(const Job& job, std::size_t groups);
+// The frames of each group that so many make: of a job's groups alone, where there is one.
+std::vector<Range> groups_of(const EncodeOptions& options, int key_interval, std::size_t frames);
 
-// Encodes the groups of a job, or all, several at a time, and writes them in their order. Where one fails, the others
-// stop.
+// Encodes groups, several at a time, and writes them in their order. Where one fails, the others stop.
 Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& settings, Capture& capture,
-                           StreamOutput& output, Summary& summary, RateReport& rate);
+                           std::vector<Range> groups, StreamOutput& output, Summary& summary, RateReport& rate);
 
 }  // namespace htvm::app

@@ -83,7 +83,9 @@ double milliseconds_since(std::chrono::steady_clock::time_point then) {
 // How much is searched for the next frame, which has waited for so long.
 Result<int> choose_effort(Pass& pass, double waited) {
     const auto place = pass.deadline->frames().size();
-    const int effort = place < pass.efforts.size() ? pass.efforts[place] : pass.deadline->effort(waited);
+    if (!pass.efforts.empty() && place >= pass.efforts.size())
+        return fail(ErrorKind::bad_input, too_few_efforts(pass.options.repeat_efforts, pass.efforts.size(), "more"));
+    const int effort = pass.efforts.empty() ? pass.deadline->effort(waited) : pass.efforts[place];
     if (auto set = pass.encoder.set_effort(effort); !set) return tl::unexpected(set.error());
     return effort;
 }
@@ -93,8 +95,18 @@ enum class Coded { yes, dropped };
 
 // Under rate control a frame that does not fit is dropped, and the stream goes on without it; but not the first, as all
 // others need an I-frame before them.
-bool is_of_dropped(const Pass& pass, const Error& error) {
-    return error.kind == ErrorKind::limit && pass.rate.rate_controlled() && !pass.rate.costs.empty();
+bool is_of_rate(const Pass& pass, const Error& error) {
+    return error.kind == ErrorKind::limit && pass.rate.rate_controlled();
+}
+
+bool is_of_dropped(const Pass& pass, const Error& error) { return is_of_rate(pass, error) && !pass.rate.costs.empty(); }
+
+// The encoder knows only of the rate that it was given.
+std::string text_of(const Pass& pass, const Error& error) {
+    static_assert(share_of_meshes == 0.5);
+    return is_of_rate(pass, error) && pass.pictures
+               ? error.message + "; this is of the meshes, which have half of --bitrate, so give twice that rate"
+               : error.message;
 }
 
 void drop(Pass& pass, const std::string& frame, const Error& error) {
@@ -118,10 +130,12 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const bool dropped = !pushed && is_of_dropped(pass, pushed.error());
     if (!pushed && !dropped)
-        return fail(pushed.error().kind, fmt::format("{}: {}", pass.capture.name(), pushed.error().message));
+        return fail(pushed.error().kind, fmt::format("{}: {}", pass.capture.name(), text_of(pass, pushed.error())));
     if (summary.frames++ == 0) summary.first_us = timestamp_us;
     summary.last_us = timestamp_us;
     if (dropped) {
+        timed.took = milliseconds_since(start);
+        if (pass.deadline) pass.deadline->took(timed);
         drop(pass, pass.capture.name(), pushed.error());
         pass.step("dropped");
         return Coded::dropped;
@@ -130,6 +144,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
     if (pass.deadline) {
         timed.took = milliseconds_since(start);
+        timed.intra = pass.encoder.last_frame().type == FrameType::intra;
         pass.deadline->took(timed);
     }
     if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());
@@ -168,6 +183,7 @@ Result<void> take_bad(Pass& pass, const Error& error) {
     const auto& policy = pass.options.on_bad_frame;
     if (pass.is_stopped() || error.kind == ErrorKind::disk_full) return tl::unexpected(error);
     if (!pass.capture.survives_errors()) return tl::unexpected(error);
+    if (is_of_rate(pass, error)) return tl::unexpected(error);  // no frame is bad
     if (policy == "stop") return fail(error.kind, error.message + " (--on-bad-frame skip goes on without such frames)");
     const bool repeats = policy == "repeat" && pass.last;
     warn_of_frame(pass, FrameWarnings::bad,

@@ -295,10 +295,13 @@ Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Cap
     return out;
 }
 
-bool is_given(const EncodingOptions& options, std::string_view name) {
-    return std::any_of(options.given.begin(), options.given.end(),
-                       [&](const auto& given) { return given.first->name == name; });
+std::optional<double> given_value(const EncodingOptions& options, std::string_view name) {
+    const auto last = std::find_if(options.given.rbegin(), options.given.rend(),
+                                   [&](const auto& given) { return given.first->name == name; });
+    return last == options.given.rend() ? std::nullopt : std::optional(last->second);
 }
+
+bool is_given(const EncodingOptions& options, std::string_view name) { return given_value(options, name).has_value(); }
 
 std::string options_in_markdown() {
     std::string out =

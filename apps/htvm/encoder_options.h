@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,6 +44,8 @@ void check_together(const EncodingOptions& options);
 
 // Whether the user set this option of the library's list.
 bool is_given(const EncodingOptions& options, std::string_view name);
+// The value it was given, in the library's unit, or nothing.
+std::optional<double> given_value(const EncodingOptions& options, std::string_view name);
 
 // The library's options for a capture; reads the file of radii if one is given.
 Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture);

@@ -205,36 +205,66 @@ Result<void> add(AudioTotals& totals, const Packet& packet) {
     return {};
 }
 
+// Pictures of one coder and size.
+struct PictureKind {
+    PictureCoder coder{};
+    std::uint32_t width = 0, height = 0;
+    std::uint64_t pictures = 0;
+};
+
 // The pictures of the whole stream.
 struct StreamPictures {
+    static constexpr std::size_t most_kinds = 16;
     std::uint64_t pictures = 0, keys = 0, bytes = 0;
-    TexturePicture first = {};  // without its bytes
-    bool differ = false;        // in coder or size
+    std::vector<PictureKind> kinds = {};  // in the stream's order; those beyond the most are not listed
 };
 
 Result<void> add(StreamPictures& totals, const Packet& packet) {
     auto picture = read_texture_picture(packet);
     if (!picture)
         return picture.error().kind == ErrorKind::unsupported ? Result<void>() : tl::unexpected(picture.error());
-    picture->coded = {};
-    if (totals.pictures++ == 0) totals.first = *picture;
+    const auto known = std::find_if(totals.kinds.begin(), totals.kinds.end(), [&](const PictureKind& kind) {
+        return kind.coder == picture->coder && kind.width == picture->width && kind.height == picture->height;
+    });
+    if (known != totals.kinds.end())
+        ++known->pictures;
+    else if (totals.kinds.size() < StreamPictures::most_kinds)
+        totals.kinds.push_back({picture->coder, picture->width, picture->height, 1});
+    ++totals.pictures;
     totals.keys += is_key_picture(packet) ? 1 : 0;
     totals.bytes += packet.payload.size() + packet_overhead;
-    totals.differ = totals.differ || picture->coder != totals.first.coder || picture->width != totals.first.width ||
-                    picture->height != totals.first.height;
     return {};
 }
 
 nlohmann::json pictures_json(const StreamPictures& totals, double seconds) {
     if (totals.pictures == 0) return {};
-    return {{"coder", name_of(totals.first.coder)},
-            {"width", totals.first.width},
-            {"height", totals.first.height},
-            {"differ", totals.differ},
+    const auto& first = totals.kinds[0];
+    nlohmann::json kinds = nlohmann::json::array();
+    for (const auto& [coder, width, height, pictures] : totals.kinds)
+        kinds.push_back({{"coder", name_of(coder)}, {"width", width}, {"height", height}, {"pictures", pictures}});
+    return {{"coder", name_of(first.coder)},
+            {"width", first.width},
+            {"height", first.height},
+            {"differ", totals.kinds.size() > 1},
+            {"kinds", kinds},
             {"pictures", totals.pictures},
             {"key_pictures", totals.keys},
             {"bytes", totals.bytes},
             {"megabits_per_second", 8e-6 * static_cast<double>(totals.bytes) / seconds}};
+}
+
+// "AV1, 256 x 256 pixels, 9 pictures", and the same of others.
+std::string kinds_text(const StreamPictures& totals) {
+    std::string out;
+    std::uint64_t listed = 0;
+    for (const auto& [coder, width, height, pictures] : totals.kinds) {
+        out += fmt::format("{}{}, {} x {} pixels, {}", out.empty() ? "" : "; ", name_of(coder), width, height,
+                           counted(pictures, "picture"));
+        listed += pictures;
+    }
+    if (listed < totals.pictures) out += fmt::format("; {} of other sizes", totals.pictures - listed);
+    if (totals.kinds.size() > 1) out += fmt::format("; {} in all", totals.pictures);
+    return out;
 }
 
 nlohmann::json audio_json(const AudioTotals& totals) {
@@ -360,10 +390,8 @@ Result<void> info(const Options& options) {
             fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
                        audio.seconds(), audio.bytes);
         if (pictures.pictures > 0)
-            fmt::print("pictures: {}, {} x {} pixels{}, {}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n",
-                       name_of(pictures.first.coder), pictures.first.width, pictures.first.height,
-                       pictures.differ ? " and others" : "", counted(pictures.pictures, "picture"), pictures.keys,
-                       pictures.bytes, 8e-6 * static_cast<double>(pictures.bytes) / seconds);
+            fmt::print("pictures: {}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n", kinds_text(pictures),
+                       pictures.keys, pictures.bytes, 8e-6 * static_cast<double>(pictures.bytes) / seconds);
         if (patched.patched > 0)
             fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
                        counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);

@@ -206,6 +206,7 @@ Result<void> synthesise_live(const Options& options) {
         return begun + std::chrono::duration_cast<Clock::duration>(
                            std::chrono::duration<double>(static_cast<double>(k) / options.synth.fps));
     };
+    const auto fps = fmt::format("{}", options.synth.fps);
     std::size_t late = 0;
     for (std::int64_t k = 0; !options.counted || k < options.frames; ++k) {
         if (Clock::now() > due(k + 1)) {
@@ -216,7 +217,7 @@ Result<void> synthesise_live(const Options& options) {
         wait_until(due(k));
         if (interruption() != 0) break;
         const auto bytes =
-            write_ply(made.mesh, time_text(std::llround(1e6 * static_cast<double>(k) / options.synth.fps)));
+            write_ply(made.mesh, time_text(std::llround(1e6 * static_cast<double>(k) / options.synth.fps)), {}, fps);
         if (!bytes) return tl::unexpected(bytes.error());
         if (auto ok = write_standard_output(*bytes); !ok && interruption() == 0) return ok;
         progress.step(late > 0 ? fmt::format("{} left out, as there was no time for them", late) : "");

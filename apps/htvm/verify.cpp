@@ -55,11 +55,22 @@ struct Verification {
     PictureDecoder shown = picture_decoder();
     std::optional<std::uint32_t> last_picture = {};  // own number of its frame
     std::optional<std::string> lost_picture = {};    // why those up to the next key picture cannot be decoded
+    std::optional<std::uint32_t> bare = {};          // number of the first frame that should have a picture to show
 };
+
+// Frames that have texture coordinates and nothing to show there, though the stream says that it has pictures, up to
+// the one before number.
+void report_bare_frames(Verification& v, std::uint32_t number) {
+    if (!v.bare) return;
+    const auto first = *std::exchange(v.bare, std::nullopt);
+    v.problems.push_back(
+        {first, "the stream promises pictures, but there is none for its texture coordinates", number - 1});
+}
 
 void check_order(Verification& v, const Packet& packet, std::uint32_t number) {
     const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
     if (v.numbers.begins_sequence()) {
+        report_bare_frames(v, number);
         v.last_number.reset();
         v.droppable.clear();
         v.why.clear();
@@ -117,6 +128,8 @@ void check_audio(Verification& v, const Packet& packet, std::uint32_t number) {
 void check_picture(Verification& v, const Packet& packet, std::uint32_t number) {
     const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
     ++v.pictures;
+    if (v.bare == number) v.bare.reset();
+    report_bare_frames(v, number);
     if (!v.last_number || *v.last_number != number) problem("there is a picture of it, but not directly behind it");
     if (v.last_picture && packet.frame <= *v.last_picture) problem("it has a second picture");
     v.last_picture = packet.frame;
@@ -138,6 +151,9 @@ void check_decoding(Verification& v, const Packet& packet, std::uint32_t number)
     if (reference != v.why.end()) return add_lost_frame(v, packet, number, std::string(reference->second));
     if (is_frame && packet.reference != packet.frame && v.numbers.dependencies().closure().empty())
         return add_lost_frame(v, packet, number, fmt::format("frame {} is not there", v.numbers.of(packet.reference)));
+    if (decoded && *decoded && is_frame && !v.last_picture && !v.bare && !(*decoded)->mesh.texcoords.empty() &&
+        v.decoder.sequence()->texture.layout != TextureLayout::none)
+        v.bare = number;
     if (decoded) return;
     if (is_frame) v.why[packet.frame] = fmt::format("frame {} cannot be decoded", number);
     const auto kind = decoded.error().kind;
@@ -196,6 +212,7 @@ Result<void> run_verify(const Options& options) {
             if (frame_type(packet->kind)) progress.step();
         }
     }
+    if (v.last_number) report_bare_frames(v, *v.last_number + 1);
     if (input->damaged_bytes() > 0)
         v.problems.insert(  // the cause of others
             v.problems.begin(),

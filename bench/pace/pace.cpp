@@ -25,6 +25,7 @@ struct Options {
     std::size_t frames = 60, first = 0;
     double quality = 42, unit = 1;
     unsigned threads = 1;
+    int effort = 5, latency_frames = 0, vertices = 35000;
     bool each = false;
 };
 
@@ -42,8 +43,10 @@ double milliseconds() {
 std::vector<htvm::Mesh> read_capture(const Options& options) {
     std::vector<htvm::Mesh> out;
     if (options.capture == "synth") {
+        htvm::SynthOptions person;
+        person.vertices = options.vertices;
         for (std::size_t i = 0; i < options.frames; ++i)
-            out.push_back(htvm::synth_frame({}, static_cast<int>(options.first + i)).mesh);
+            out.push_back(htvm::synth_frame(person, static_cast<int>(options.first + i)).mesh);
         return out;
     }
     const auto files = htvm::find_sequence(options.capture);
@@ -85,6 +88,8 @@ int measure(const Options& options) {
     encoding.geometry_step = steps.geometry_step;
     encoding.colour_step = steps.colour_step;
     encoding.threads = options.threads;
+    encoding.tracked.effort = options.effort;
+    encoding.latency_frames = options.latency_frames;
     auto encoder = htvm::Encoder::create(encoding);
     if (!encoder) {
         fmt::print(stderr, "{}\n", encoder.error().message);
@@ -128,8 +133,12 @@ int main(int count, char** words) {
     app.add_option("--frames", options.frames, "At most so many")->capture_default_str();
     app.add_option("--first", options.first, "Skip so many")->capture_default_str();
     app.add_option("-q,--quality", options.quality)->capture_default_str();
+    app.add_option("--vertices", options.vertices, "Of the synthetic person")->capture_default_str();
     app.add_option("--unit", options.unit, "Millimetres per unit of the files")->capture_default_str();
     app.add_option("--threads", options.threads, "0: one per core")->capture_default_str();
+    app.add_option("--effort", options.effort, "0 to 9, as for htvm encode")->capture_default_str();
+    app.add_option("--latency-frames", options.latency_frames, "As for htvm encode: then a push is of the frame before")
+        ->capture_default_str();
     app.add_flag("--each", options.each, "Print each frame's kind, bytes and processor time");
     CLI11_PARSE(app, count, words);
     return measure(options);

@@ -53,8 +53,8 @@ enum class Denoising : std::uint8_t {
 
 // For Profile::tracked only; with other profiles, anything but the defaults is refused.
 struct TrackedOptions {
-    int effort = 5;  // how much is searched for a frame, 1 to 9: 1 takes the least time, 9 the fewest bits; up to 5
-                     // keeps up with a camera (docs/performance.md)
+    int effort = 5;  // how much is searched for a frame, 1 to 9: less is faster; more takes longer and, from 6 on,
+                     // fewer bits, as frames are then coded in groups, for files (docs/performance.md)
     TrackedReferences references = TrackedReferences::previous;
     int access_interval = 30;  // with `previous`: largest distance, in frames, between places where decoding can start
                                // for whoever has the I-frame and its patches: T-frames that refer to nothing else

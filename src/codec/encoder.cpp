@@ -358,20 +358,26 @@ Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* p
 Result<Candidate> choose_beside(State& state, FrameWork& work, bool force_intra, PushedFrame* next) {
     const auto bits = [&](const Candidate& candidate) { return bits_of(state, candidate); };
     if (!next) return choose_frame(work, state.control, bits, force_intra);
-    const bool may_be_tracked = state.configuration.tracked() && work.can_refer();
-    std::optional<NodeRegistration> registered;
-    if (may_be_tracked) registered = work.registered_nodes();
+    AssumedMotion assumed;
+    if (state.configuration.tracked()) {
+        if (work.can_refer()) assumed.nodes = work.registered_nodes();
+    } else if (!force_intra && !work.intra_is_due() && state.sequence.next_frame >= state.sequence.trial.next) {
+        assumed.bones = work.bone_motion().motion;
+    }
     std::optional<Result<Candidate>> chosen;
     std::vector<StageTime> stages;
     parallel_invoke(
         state.configuration.threads, [&] { chosen = choose_frame(work, state.control, bits, force_intra); },
         [&] {
-            next->ahead = work_ahead(state.configuration, state.sequence, registered ? &*registered : nullptr,
-                                     next->mesh, next->colours, next->pose, next->effort, stages);
+            next->ahead = work_ahead(state.configuration, state.sequence, assumed, next->mesh, next->colours,
+                                     next->pose, next->effort, stages);
         });
     state.stages.insert(state.stages.end(), stages.begin(), stages.end());
     const bool as_assumed = *chosen && (*chosen)->type == FrameType::tracked && work.is_as_first_registered();
     if (!as_assumed) next->ahead.registered.reset();
+    const bool by_bones =
+        *chosen && ((*chosen)->type == FrameType::enhanced || (*chosen)->type == FrameType::predicted);
+    if (!by_bones) next->ahead.bone_motion.reset();
     return std::move(*chosen);
 }
 

@@ -224,8 +224,9 @@ constexpr Option list[] = {
      .kind = OptionKind::whole_number,
      .least = 1,
      .most = 9,
-     .meaning =
-         "how much is searched for a frame: 1 takes the least time, 9 the fewest bits; up to 5 is for what is live",
+     .meaning = "how much is searched for a frame: less is faster; more takes longer and, from 6 on, fewer bits, as "
+                "T-frames are "
+                "then coded in groups, for files",
      .get = [](const EncoderOptions& o) -> double { return o.tracked.effort; },
      .set = [](EncoderOptions& o, double value) { o.tracked.effort = static_cast<int>(value); },
      .flag = "--effort"},

@@ -275,6 +275,7 @@ Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& st
     if (denoises(configuration)) options.denoise = filter_options(work);
     options.keeps_noise = configuration.options.tracked.group > 1;
     options.motion_alone = parts == TrackedParts::motion_alone;
+    options.target_samples = work.effort.target_samples;
     return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.registered_nodes(),
                                 before, work.sequence.nodes.targets, options, work.stages);
 }
@@ -289,6 +290,7 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
                            std::int64_t{since} < work.configuration.options.tracked.access_interval;
     auto encoded = encode_tracked(work, steps, parts, from_last ? &nodes.state : nullptr);
     if (!encoded) return tl::unexpected(encoded.error());
+    if (!from_last && parts == TrackedParts::all) work.coded_alone = *encoded;
     Candidate out;
     out.type = FrameType::tracked;
     out.reference = from_last ? *nodes.frame : reference.number;
@@ -378,6 +380,7 @@ Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, con
 }
 
 Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps) {
+    if (auto coded = std::exchange(work.coded_alone, std::nullopt)) return std::move(*coded);
     return encode_tracked(work, steps, TrackedParts::all, nullptr);
 }
 

@@ -46,6 +46,16 @@ SurfaceIndex surface_of(const Configuration& configuration, const LatticeMesh& m
     return out;
 }
 
+// before: of the bones in the frame before; empty after an I-frame.
+FrameMotion motion_of_bones(const Configuration& configuration, const ReferenceInUse& reference,
+                            const LatticeMesh& mesh, const CodedPose& pose, std::span<const RigidMotion> before,
+                            std::vector<StageTime>& stages) {
+    const MotionReference against{&reference.decoded.skinned, &reference.search, &configuration.header.skeleton.bones,
+                                  configuration.header.radii, before};
+    return find_frame_motion(mesh.positions, pose, against, registration_options(configuration.options),
+                             configuration.threads, stages);
+}
+
 // starts: but for the skeleton's.
 NodeRegistration register_frame(const Configuration& configuration, const ReferenceInUse& reference,
                                 const SurfaceIndex& surface, const CodedPose& pose, NodeStarts starts,
@@ -133,6 +143,7 @@ const SurfaceIndex& FrameWork::surface() {
 void FrameWork::take(AheadWork ahead) {
     surface_ = std::move(ahead.surface);
     registered_nodes_ = std::move(ahead.registered);
+    bone_motion_ = std::move(ahead.bone_motion);
 }
 
 namespace {
@@ -152,13 +163,8 @@ bool FrameWork::can_be_moved() const {
 }
 
 const FrameMotion& FrameWork::bone_motion() {
-    if (!bone_motion_) {
-        const auto& in_use = reference();
-        const MotionReference against{&in_use.decoded.skinned, &in_use.search, &configuration.header.skeleton.bones,
-                                      configuration.header.radii, sequence.bones.motion};
-        bone_motion_ = find_frame_motion(mesh.positions, pose, against, registration_options(configuration.options),
-                                         configuration.threads, stages);
-    }
+    if (!bone_motion_)
+        bone_motion_ = motion_of_bones(configuration, reference(), mesh, pose, sequence.bones.motion, stages);
     return *bone_motion_;
 }
 
@@ -204,6 +210,7 @@ bool FrameWork::follow_lost_limbs() {
                                                  deformation_options(configuration, effort), registered);
     registered_nodes_ = std::move(registered);
     followed_limbs_ = followed_limbs_ || any;
+    if (any) coded_alone.reset();
     clock.done("registration");
     return any;
 }
@@ -247,15 +254,19 @@ TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_e
     return out;
 }
 
-AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const NodeRegistration* registered,
+AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const AssumedMotion& assumed,
                      const LatticeMesh& next_mesh, const std::vector<Colour>& next_colours, const CodedPose& next_pose,
                      int effort, std::vector<StageTime>& stages) {
     AheadWork out;
+    if (assumed.bones && !next_mesh.positions.empty())
+        out.bone_motion =
+            motion_of_bones(configuration, *before.reference, next_mesh, next_pose, *assumed.bones, stages);
+    if (!configuration.tracked()) return out;
     out.surface = surface_of(configuration, next_mesh, next_colours, stages);
-    if (registered && !next_mesh.triangles.empty())
+    if (assumed.nodes && !next_mesh.triangles.empty())
         out.registered =
             register_frame(configuration, *before.reference, *out.surface, next_pose,
-                           {registered->motion, before.nodes.last, {}, {}}, tracking_effort(effort), stages);
+                           {assumed.nodes->motion, before.nodes.last, {}, {}}, tracking_effort(effort), stages);
     return out;
 }
 

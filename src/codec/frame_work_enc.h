@@ -148,6 +148,7 @@ struct TrackedWork {
 struct AheadWork {
     std::optional<SurfaceIndex> surface;
     std::optional<NodeRegistration> registered;  // as if the frame before had been a T-frame
+    std::optional<FrameMotion> bone_motion;      // as if it had been an EP- or P-frame
 };
 
 // What is derived from one frame, computed on first use and kept. Lengths are in lattice units.
@@ -170,6 +171,8 @@ public:
     const std::vector<Colour> colours;  // of its vertices where they are not coded, for tracking alone; or none
     const CodedPose pose;
     std::vector<StageTime>& stages;
+    std::optional<EncodedTrackedFrame> coded_alone;  // as a T-frame of the reference alone, if it was last coded so and
+                                                     // is registered as it was then: what a patch is planned on
 
     // Takes over what was found before; before anything else is asked for.
     void take(AheadWork ahead);
@@ -196,6 +199,8 @@ public:
     // may refer to it as well.
     bool can_be_moved() const;
     bool can_refer() const { return !configuration.intra_alone() && can_be_moved(); }
+    // Whether it must be an I-frame: nothing to refer to, or the longest key interval has passed.
+    bool intra_is_due() const { return !can_refer() || frames_since_intra() >= configuration.options.key_interval; }
     const AnimationFit& animation_fit();  // how well the motion of the bones alone represents the frame
     // The distance between a decoded mesh and the captured one, in both directions.
     SurfaceErrors errors_of(const LatticeMesh& decoded);
@@ -213,9 +218,15 @@ private:
     std::optional<AnimationFit> animation_fit_;
 };
 
-// The work of the next frame that can be done beside the coding of this one, if that becomes a T-frame whose nodes are
-// registered as here; registered: null if this one cannot become a T-frame. next_mesh as captured, on the lattice.
-AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const NodeRegistration* registered,
+// What is taken for granted of a frame whose next one's work goes beside its coding: that it becomes a T-frame, or an
+// EP- or P-frame, whose nodes or bones move so. None: it becomes something else.
+struct AssumedMotion {
+    std::optional<NodeRegistration> nodes;
+    std::optional<std::vector<RigidMotion>> bones;
+};
+
+// The work of the next frame that can be done beside the coding of this one. next_mesh as captured, on the lattice.
+AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const AssumedMotion& assumed,
                      const LatticeMesh& next_mesh, const std::vector<Colour>& next_colours, const CodedPose& next_pose,
                      int effort, std::vector<StageTime>& stages);
 

@@ -26,6 +26,14 @@ constexpr std::int32_t probability_of_log_odds(std::int32_t log_odds) {
     return (logistic_knots[knot] * (128 - part) + logistic_knots[knot + 1] * part) >> 7;
 }
 
+// The same for every log odds from -2047 to 2047: decoding asks once for each decision, and waits for the answer.
+inline constexpr auto probability_table = [] {
+    std::array<std::uint16_t, 4095> table{};
+    for (std::int32_t x = 0; x < 4095; ++x)
+        table[static_cast<std::size_t>(x)] = static_cast<std::uint16_t>(probability_of_log_odds(x - 2047));
+    return table;
+}();
+
 // The inverse of the above, indexed by probability / 16.
 inline constexpr auto log_odds_table = [] {
     std::array<std::int16_t, 4096> table{};
@@ -45,14 +53,14 @@ struct Mixer {
         equal.fill(static_cast<std::int32_t>(65536 * 5 / (4 * N)));
         return equal;
     }();
-    BinaryModel mixed;  // only carries the mixed probability to the coder
 };
 
-inline constexpr std::int32_t mixing_rate = 5;
+inline constexpr std::int32_t mixing_rate = 5, most_weight = 1 << 20;
 
 // Codes one decision; the models and the mixer adapt.
 template <class Coder, std::size_t N>
-bool code_mixed(Coder& coder, Mixer<N>& mixer, const std::array<BinaryModel*, N>& models, bool wanted) {
+[[gnu::always_inline]] inline bool code_mixed(Coder& coder, Mixer<N>& mixer, const std::array<BinaryModel*, N>& models,
+                                              bool wanted) {
     std::array<std::int32_t, N> votes;
     std::int64_t sum = 0;
     for (std::size_t i = 0; i < N; ++i) {
@@ -60,13 +68,16 @@ bool code_mixed(Coder& coder, Mixer<N>& mixer, const std::array<BinaryModel*, N>
         sum += std::int64_t{votes[i]} * mixer.weights[i];
     }
     const std::int32_t probability =
-        probability_of_log_odds(static_cast<std::int32_t>(std::clamp<std::int64_t>(sum >> 16, -2047, 2047)));
-    mixer.mixed = {static_cast<std::uint16_t>(std::clamp(probability, 48, 65535 - 48)), model_seen_limit};
-    const bool bit = coder.bit(mixer.mixed, wanted);
-    const std::int32_t error = (bit ? 65536 : 0) - probability;
+        probability_table[static_cast<std::size_t>(std::clamp<std::int64_t>(sum >> 16, -2047, 2047) + 2047)];
+    // Only carries the probability to the coder; what it learns is not used.
+    BinaryModel mixed{static_cast<std::uint16_t>(std::clamp(probability, 48, 65535 - 48)), model_seen_limit};
+    const bool bit = coder.bit(mixed, wanted);
+    const std::int32_t error = mixing_rate * ((bit ? 65536 : 0) - probability);  // below 2^19; a vote below 2^11
     for (std::size_t i = 0; i < N; ++i) {
-        const std::int32_t change = static_cast<std::int32_t>((std::int64_t{votes[i]} * error * mixing_rate) >> 18);
-        mixer.weights[i] = std::clamp(mixer.weights[i] + change, -(1 << 20), 1 << 20);
+        std::int32_t weight = mixer.weights[i] + ((votes[i] * error) >> 18);
+        if (static_cast<std::uint32_t>(weight + most_weight) > 2u * most_weight)  // seldom
+            weight = weight < 0 ? -most_weight : most_weight;
+        mixer.weights[i] = weight;
         models[i]->update(bit);
     }
     return bit;

@@ -15,6 +15,7 @@
 // differ.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -27,12 +28,12 @@ namespace htvm::internal {
 // never by less than 1/128: it learns a stationary source as fast as counting does, and follows one that drifts.
 struct BinaryModel {
     std::uint16_t one = 32768;
-    std::uint8_t seen = 0;
+    std::uint16_t seen = 0;  // not a byte: a compiler must assume that those may be a part of anything else
 
     void update(bool bit);
 };
 
-inline constexpr std::uint8_t model_seen_limit = 127;
+inline constexpr std::uint16_t model_seen_limit = 127;
 
 // 65536 / (n + 1.5) for n = 0 .. model_seen_limit.
 inline constexpr auto model_rates = [] {
@@ -41,13 +42,13 @@ inline constexpr auto model_rates = [] {
     return rates;
 }();
 
+// Towards 65535 or 0 by the rate's share, rounded down in either case. No product exceeds 32 bits.
 inline void BinaryModel::update(bool bit) {
-    const std::int32_t target = bit ? 65535 : 0;
-    const std::int32_t step = static_cast<std::int32_t>((std::int64_t{target - one} * model_rates[seen]) >> 16);
-    std::int32_t next = one + step;
-    if (next < 48) next = 48;
-    if (next > 65535 - 48) next = 65535 - 48;
-    one = static_cast<std::uint16_t>(next);
+    const std::uint32_t now = one, rate = model_rates[seen];
+    if (bit)
+        one = static_cast<std::uint16_t>(std::min<std::uint32_t>(now + (((65535u - now) * rate) >> 16), 65535u - 48));
+    else
+        one = static_cast<std::uint16_t>(std::max<std::uint32_t>(now - ((now * rate + 65535u) >> 16), 48u));
     if (seen < model_seen_limit) ++seen;
 }
 

@@ -413,7 +413,8 @@ Result<PlyAtStart> read_one(PlySource& source, const MeshLimits& limits) {
             if (c == '\n') break;
         }
     }
-    return PlyAtStart{std::move(mesh), header->timestamp, header->texture, static_cast<std::size_t>(source.consumed())};
+    return PlyAtStart{std::move(mesh), header->timestamp, header->texture, header->fps,
+                      static_cast<std::size_t>(source.consumed())};
 }
 
 }  // namespace
@@ -457,7 +458,7 @@ Result<std::optional<Mesh>> PlyStreamReader::next() {
         return tl::unexpected(*error_);
     }
     ++meshes_read_;
-    header_ = {std::move(read->timestamp), std::move(read->texture)};
+    header_ = {std::move(read->timestamp), std::move(read->texture), std::move(read->fps)};
     return std::optional<Mesh>(std::move(read->mesh));
 }
 

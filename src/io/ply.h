@@ -7,7 +7,8 @@
 // are not finite become 0; normals are not normalised. Triangle strips are refused (unsupported).
 //
 // A comment in the header may say when the frame was captured: "comment timestamp 1.25", in any form that parse_time()
-// reads (timestamps.h), and which image is the texture: "comment TextureFile NAME".
+// reads (timestamps.h), which image is the texture: "comment TextureFile NAME", and how many frames a second its camera
+// means to send: "comment fps 29.97".
 //
 // Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
 //
@@ -33,8 +34,8 @@ namespace htvm {
 
 struct PlyAtStart {
     Mesh mesh;
-    std::string timestamp, texture;  // what the header's comments say; empty: nothing
-    std::size_t bytes_consumed = 0;  // the position at which the next PLY may begin
+    std::string timestamp, texture, fps;  // what the header's comments say; empty: nothing
+    std::size_t bytes_consumed = 0;       // the position at which the next PLY may begin
 };
 
 // Reads the one PLY at the beginning of the bytes (leading white space is skipped); others may follow.
@@ -49,10 +50,10 @@ Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& lim
 Result<std::string> read_ply_timestamp(std::istream& stream);
 
 // Binary little-endian: float x y z, then, if the mesh has them, float nx ny nz, float s t, uchar red green blue; faces
-// as uchar, uint vertex_indices. timestamp and texture: for the comments; empty: none. Fails (bad_input) if check_mesh
-// does.
+// as uchar, uint vertex_indices. timestamp, texture and fps: for the comments; empty: none. Fails (bad_input) if
+// check_mesh does.
 Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view timestamp = {},
-                                            std::string_view texture = {});
+                                            std::string_view texture = {}, std::string_view fps = {});
 
 // Reads PLYs that follow one another in a stream. One mesh is held at a time, and the stream is not read past the end
 // of the mesh returned, so the meshes of a live stream are available as soon as they are complete.
@@ -67,12 +68,13 @@ public:
     const std::string& timestamp() const { return header_.timestamp; }
     // Likewise, what its header says of the texture; empty: nothing.
     const std::string& texture() const { return header_.texture; }
+    const std::string& fps() const { return header_.fps; }
 
 private:
     std::istream& stream_;
     MeshLimits limits_;
     struct {
-        std::string timestamp, texture;
+        std::string timestamp, texture, fps;
     } header_;
     std::size_t meshes_read_ = 0;
     std::optional<Error> error_;

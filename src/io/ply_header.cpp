@@ -138,6 +138,7 @@ Result<bool> read_ply_header_line(PlyHeader& header, std::string_view line) {
         header.timestamp = words[2];
         if (words.size() > 3) header.timestamp.append(" ").append(words[3]);  // its unit
     }
+    if (words.size() == 3 && words[0] == "comment" && words[1] == "fps") header.fps = words[2];
     if (words.size() > 2 && words[0] == "comment" && words[1] == "TextureFile") {
         const auto begin = static_cast<std::size_t>(words[2].data() - line.data());  // the name may hold spaces
         header.texture = line.substr(begin, line.find_last_not_of(" \t\r") + 1 - begin);

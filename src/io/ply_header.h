@@ -33,6 +33,7 @@ struct PlyHeader {
     std::vector<PlyElement> elements;
     std::string timestamp;  // what stands behind "comment timestamp"; empty: nothing does
     std::string texture;    // what stands behind "comment TextureFile", likewise
+    std::string fps;        // what stands behind "comment fps", likewise
 };
 
 // The longest header, from "ply" to "end_header", that a reader accepts, in bytes.

@@ -15,9 +15,10 @@ void put_floats(ByteWriter& out, const std::array<float, N>& values) {
     for (const float value : values) out.u32(std::bit_cast<std::uint32_t>(value));
 }
 
-std::string header_of(const Mesh& mesh, std::string_view timestamp, std::string_view texture) {
+std::string header_of(const Mesh& mesh, std::string_view timestamp, std::string_view texture, std::string_view fps) {
     std::string text = "ply\nformat binary_little_endian 1.0\n";
     if (!timestamp.empty()) text.append("comment timestamp ").append(timestamp).append("\n");
+    if (!fps.empty()) text.append("comment fps ").append(fps).append("\n");
     if (!texture.empty()) text.append("comment TextureFile ").append(texture).append("\n");
     text += "element vertex " + std::to_string(mesh.positions.size());
     text += "\nproperty float x\nproperty float y\nproperty float z\n";
@@ -30,10 +31,11 @@ std::string header_of(const Mesh& mesh, std::string_view timestamp, std::string_
 
 }  // namespace
 
-Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view timestamp, std::string_view texture) {
+Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view timestamp, std::string_view texture,
+                                            std::string_view fps) {
     if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
     ByteWriter out;
-    for (const char c : header_of(mesh, timestamp, texture)) out.u8(static_cast<std::uint8_t>(c));
+    for (const char c : header_of(mesh, timestamp, texture, fps)) out.u8(static_cast<std::uint8_t>(c));
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
         put_floats(out, mesh.positions[v]);
         if (!mesh.normals.empty()) put_floats(out, mesh.normals[v]);

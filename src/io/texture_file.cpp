@@ -70,6 +70,22 @@ Result<TextureReference> with_materials(const fs::path& mesh, const TextureRefer
     return out;
 }
 
+std::string lower_case(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    return text;
+}
+
+// Of a file whose name is not even that of an image.
+Error with_what_is_taken(Error error, const fs::path& path) {
+    const bool is_image =
+        std::ranges::find(image_extensions, lower_case(path.extension().string())) != std::end(image_extensions);
+    if (is_image) return error;
+    error.message += ", or, where it has a picture for each mesh, as a video:";
+    for (const char* extension : video_extensions) error.message += std::string(" ") + extension;
+    return error;
+}
+
 // An image beside the mesh that is called like it.
 std::optional<fs::path> image_beside(const fs::path& mesh) {
     std::error_code error;
@@ -303,7 +319,7 @@ Result<TextureFiles::ReadImage> TextureFiles::read_image_of(const Found& found, 
     }
     auto image = found.bytes ? read_image(*found.bytes) : read_image_file(found.path);
     if (!image && found.bytes) return fail_at(mesh, image.error().kind, found.name + ": " + image.error().message);
-    if (!image) return tl::unexpected(image.error());
+    if (!image) return tl::unexpected(with_what_is_taken(image.error(), found.path));
     out.image = std::make_shared<const Image>(std::move(*image));
     if (options_.keep_files) out.file = std::make_shared<const std::vector<std::uint8_t>>(std::move(file));
     kept_turned_.reset();

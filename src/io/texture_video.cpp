@@ -136,8 +136,7 @@ bool is_video_file_name(const fs::path& path) {
     auto extension = path.extension().string();
     for (char& c : extension)
         if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-    constexpr std::array<std::string_view, 8> known = {".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".mpg", ".y4m"};
-    return std::find(known.begin(), known.end(), extension) != known.end();
+    return std::ranges::find(video_extensions, extension) != std::end(video_extensions);
 }
 
 Result<TextureVideo> TextureVideo::open(const fs::path& path, const std::string& ffmpeg) {

@@ -15,6 +15,9 @@
 
 namespace htvm {
 
+inline constexpr const char* video_extensions[] = {".mp4",  ".m4v", ".mov", ".mkv",
+                                                   ".webm", ".avi", ".mpg", ".y4m"};  // lower case
+
 // Whether a file with this name is taken for a video.
 bool is_video_file_name(const std::filesystem::path& path);
 

@@ -398,13 +398,11 @@ SurfacePoint SurfaceIndex::closest(const Point3f& query) const {
 void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
     around = triangles_around(positions.size(), triangles);
     find_fans();
-    triangle_normals.reserve(triangles.size());
     std::vector<Vector3d> sums(positions.size(), Vector3d{});
     double area = 0;
     for (const auto& t : triangles) {
         const Vector3d across = area_vector(std::span<const Point3f>(positions), t);
         area += length(across) / 2;
-        triangle_normals.push_back(to_floats(normalised(across)));
         for (const auto v : t) sums[v] = sums[v] + across;
     }
     normals.reserve(positions.size());
@@ -430,13 +428,14 @@ void SurfaceIndex::find_fans() {
     fans_.resize(around.triangles.size());
     std::vector<std::uint32_t> next(around.first.begin(), around.first.end() - 1);
     for (const auto& t : triangles)
-        for (std::size_t i = 0; i < 3; ++i) fans_[next[t[i]]++] = t[(i + 1) % 3];
+        for (std::size_t i = 0; i < 3; ++i) fans_[next[t[i]]++] = {t[(i + 1) % 3], t[(i + 2) % 3]};
 }
 
 // The closest point so far.
 struct SurfaceIndex::Best {
     std::uint32_t triangle = none;
-    std::array<float, 3> shares{};
+    Triangle corners{};             // in the order in which they were tried
+    std::array<float, 3> shares{};  // of these
     float squared_distance = std::numeric_limits<float>::infinity();
 };
 
@@ -456,7 +455,7 @@ std::pair<float, float> closest_on_side(const Point3f& a, const Point3f& b) {
 }  // namespace
 
 NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, const Point3f& third, const Point3f& query,
-                                float least) {
+                                float least, const Facing* facing) {
     // Seen from the query.
     const Point3f a = difference(first, query), b = difference(second, query), c = difference(third, query);
     const Point3f ab = difference(b, a), ac = difference(c, a);
@@ -465,6 +464,13 @@ NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, con
     const float whole = product(across, across), height = product(across, a);
     NearOnTriangle out;
     if (height * height > least * whole) return out;
+    if (facing) {
+        const float along = product(across, facing->normal), agreement = facing->agreement;
+        const float wanted = agreement * agreement * whole;
+        const bool agrees =
+            agreement > 0 ? along > 0 && along * along >= wanted : along >= 0 || along * along <= wanted;
+        if (!agrees || !(whole > 0)) return out;
+    }
     const float bb = product(ab, ab), bc = product(ab, ac), cc = product(ac, ac);
     const float from_b = -product(a, ab), from_c = -product(a, ac);
     const float v = cc * from_b - bc * from_c, w = bb * from_c - bc * from_b, u = whole - v - w;
@@ -489,27 +495,22 @@ NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, con
     return out;
 }
 
-// Tries the triangles around a vertex; those that face away from `normal`, if there is one, are left out.
-void SurfaceIndex::try_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement,
-                              Best& best) const {
-    for (const auto triangle : around.of(vertex)) {
-        const Point3f& across = triangle_normals[triangle];
-        if (normal && (product(across, *normal) < agreement || across == Point3f{})) continue;
-        const auto& t = triangles[triangle];
-        // The triangle is skipped if even its plane is farther away than the best so far.
-        const float height = product(across, difference(positions[t[0]], query));
-        if (height * height > best.squared_distance) continue;
-        const auto near =
-            near_on_triangle(positions[t[0]], positions[t[1]], positions[t[2]], query, best.squared_distance);
-        if (near.squared_distance < best.squared_distance) best = {triangle, near.shares, near.squared_distance};
+// Tries the triangles around a vertex.
+void SurfaceIndex::try_around(std::uint32_t vertex, const Point3f& query, const Facing* facing, Best& best) const {
+    const Point3f& own = positions[vertex];
+    for (auto place = around.first[vertex]; place < around.first[vertex + std::size_t{1}]; ++place) {
+        const auto [next, last] = fans_[place];
+        const auto near = near_on_triangle(own, positions[next], positions[last], query, best.squared_distance, facing);
+        if (near.squared_distance < best.squared_distance)
+            best = {around.triangles[place], {vertex, next, last}, near.shares, near.squared_distance};
     }
 }
 
 Neighbour SurfaceIndex::nearest_along(const Point3f& query, std::uint32_t from) const {
     // On a closed surface the corners after a vertex are all its neighbours.
-    return internal::nearest_along(positions, query, from, [&](std::uint32_t vertex) {
-        return std::span(fans_).subspan(around.first[vertex],
-                                        around.first[vertex + std::size_t{1}] - around.first[vertex]);
+    return internal::nearest_along(positions, query, from, [&](std::uint32_t vertex, const auto& visit) {
+        for (auto place = around.first[vertex]; place < around.first[vertex + std::size_t{1}]; ++place)
+            visit(fans_[place].next);
     });
 }
 
@@ -530,8 +531,8 @@ OrientedMatch SurfaceIndex::nearest_facing(const Point3f& query, const Point3f& 
 }
 
 // The closest point of the triangles around a vertex; from where it lies on their rim, they go on beyond.
-SurfaceIndex::Best SurfaceIndex::closest_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal,
-                                                float agreement) const {
+SurfaceIndex::Best SurfaceIndex::closest_around(std::uint32_t vertex, const Point3f& query,
+                                                const Facing* facing) const {
     constexpr std::size_t most_tried = 12;  // number of vertices after which a walk is given up as not worth its time
     Best best;
     std::array<std::uint32_t, most_tried> tried{};
@@ -540,18 +541,28 @@ SurfaceIndex::Best SurfaceIndex::closest_around(std::uint32_t vertex, const Poin
         const auto end = tried.begin() + static_cast<std::ptrdiff_t>(count);
         if (count == most_tried || std::find(tried.begin(), end, at) != end) return;
         tried[count++] = at;
-        try_around(at, query, normal, agreement, best);
+        try_around(at, query, facing, best);
     };
     try_at(vertex);
     for (auto last = none; best.triangle != last;) {
         last = best.triangle;
         const auto shares = best.shares;
+        const auto corners = best.corners;
         for (std::size_t i = 0; i < 3; ++i)
             if (shares[i] == 0)
                 for (const std::size_t corner : {(i + 1) % 3, (i + 2) % 3})
-                    if (shares[corner] > 0) try_at(triangles[last][corner]);
+                    if (shares[corner] > 0) try_at(corners[corner]);
     }
     return best;
+}
+
+// The shares in the order of the triangle's corners.
+std::array<float, 3> SurfaceIndex::in_order(const Best& best) const {
+    std::array<float, 3> out{};
+    const auto& t = triangles[best.triangle];
+    for (std::size_t i = 0; i < 3; ++i)
+        out[i] = best.shares[(i + (t[0] == best.corners[0] ? 0 : t[1] == best.corners[0] ? 2 : 1)) % 3];
+    return out;
 }
 
 SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
@@ -559,13 +570,14 @@ SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& n
     const auto match = nearest_facing(query, normal, within, guess);
     if (!match.found) return {};
     guess = match.index;
+    const Facing facing{normal, within.agreement};
     Best best;
     if (within.along)
-        best = closest_around(match.index, query, &normal, within.agreement);
+        best = closest_around(match.index, query, &facing);
     else
-        try_around(match.index, query, &normal, within.agreement, best);
+        try_around(match.index, query, &facing, best);
     if (best.triangle == none) return {};
-    return surface_point(*this, best.triangle, best.shares, best.squared_distance);
+    return surface_point(*this, best.triangle, in_order(best), best.squared_distance);
 }
 
 SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std::uint32_t& guess) const {
@@ -574,9 +586,9 @@ SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std
     const auto match = nearest_facing(query, {}, {.reach = reach + longest_side * fine_gap, .agreement = -2}, guess);
     if (!match.found) return {};
     guess = match.index;
-    const auto best = closest_around(match.index, query, nullptr, 0);
+    const auto best = closest_around(match.index, query, nullptr);
     if (best.triangle == none || best.squared_distance > reach * reach) return {};
-    return surface_point(*this, best.triangle, best.shares, best.squared_distance);
+    return surface_point(*this, best.triangle, in_order(best), best.squared_distance);
 }
 
 std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<const Point3f> queries,

@@ -39,7 +39,7 @@ struct Neighbour {
 };
 
 // The nearest of the points that are reached from one beside it to the next, beginning at `from`, as long as the
-// distance shrinks. beside: gives the indices of the points beside one.
+// distance shrinks. beside: calls its second argument with the index of each point beside its first.
 template <class Beside>
 Neighbour nearest_along(std::span<const Point3f> points, const Point3f& query, std::uint32_t from,
                         const Beside& beside) {
@@ -51,10 +51,10 @@ Neighbour nearest_along(std::span<const Point3f> points, const Point3f& query, s
     Neighbour best{from, squared_distance(from)};
     for (auto last = std::numeric_limits<std::uint32_t>::max(); last != best.index;) {
         last = best.index;
-        for (const auto next : beside(last)) {
+        beside(last, [&](std::uint32_t next) {
             const float d = squared_distance(next);
             if (d < best.squared_distance) best = {next, d};
-        }
+        });
     }
     return best;
 }
@@ -142,10 +142,15 @@ struct NearOnTriangle {
     std::array<float, 3> shares{};  // of the corners
     float squared_distance = std::numeric_limits<float>::infinity();
 };
+// How a triangle must face: the least dot product of its normal with this one, of unit length.
+struct Facing {
+    Point3f normal{};
+    float agreement = 0;
+};
 // Infinitely far if the triangle's plane, or the line of a side that the query lies beyond, is seen to be farther away
-// than `least`, squared.
+// than `least`, squared; or if it faces otherwise than it must, if there is something that it must.
 NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, const Point3f& third, const Point3f& query,
-                                float least);
+                                float least, const Facing* facing = nullptr);
 
 struct FacingReach {
     float reach = 30;         // in the unit of the positions: nothing farther away is found
@@ -217,26 +222,30 @@ public:
     std::vector<Triangle> triangles;
     std::vector<Colour> colours;  // one per vertex, or none
     // For searches by direction; empty if there are none:
-    TrianglesAround around;                 // each vertex
-    std::vector<Point3f> normals;           // one per vertex, unit length; zero where no triangle has an area
-    std::vector<Point3f> triangle_normals;  // likewise
-    std::vector<std::uint32_t> samples;     // every n-th vertex, for far searches and for matching back from the target
-                                            // to the reference
-    float fine_gap = 0, coarse_gap = 0;     // approximate spacing of the vertices and of the samples
-    OrientedPoints fine;                    // contains all vertices
-    OrientedPoints coarse;                  // contains the samples; indices found are indices of samples
+    TrianglesAround around;              // each vertex
+    std::vector<Point3f> normals;        // one per vertex, unit length; zero where no triangle has an area
+    std::vector<std::uint32_t> samples;  // every n-th vertex, for far searches and for matching back from the target
+                                         // to the reference
+    float fine_gap = 0, coarse_gap = 0;  // approximate spacing of the vertices and of the samples
+    OrientedPoints fine;                 // contains all vertices
+    OrientedPoints coarse;               // contains the samples; indices found are indices of samples
 
 private:
     struct Anywhere;
     struct Best;
     void find_directions(const SurfaceIndexOptions& options);
     void find_fans();
-    Best closest_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement) const;
-    void try_around(std::uint32_t vertex, const Point3f& query, const Point3f* normal, float agreement,
-                    Best& best) const;
+    Best closest_around(std::uint32_t vertex, const Point3f& query, const Facing* facing) const;
+    void try_around(std::uint32_t vertex, const Point3f& query, const Facing* facing, Best& best) const;
+    std::array<float, 3> in_order(const Best& best) const;
     const Anywhere& anywhere() const;
 
-    std::vector<std::uint32_t> fans_;  // of the triangles around each vertex, as in `around`, the corner after it
+    // Of each triangle around a vertex, as in `around`, the corners after it: they lie together, where the triangles
+    // themselves lie all over the memory.
+    struct Fan {
+        std::uint32_t next = 0, last = 0;
+    };
+    std::vector<Fan> fans_;
 
     struct OnDemand;
     std::unique_ptr<OnDemand> on_demand_;

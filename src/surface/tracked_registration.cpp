@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <mutex>
+#include <optional>
 
 #include "core/parallel.h"
 
@@ -123,18 +125,18 @@ std::vector<std::uint32_t> spread_samples(const HandleWeights& weights, std::siz
 
 // Which samples are beside each other: every vertex belongs to the sample that is the fewest edges away, and samples
 // whose vertices share an edge are neighbours.
-SamplesBeside samples_beside(const DeformableMesh& mesh) {
+SamplesBeside samples_beside(const DeformableMesh& mesh, const DeformationLevel& level) {
     constexpr auto none = std::numeric_limits<std::uint32_t>::max();
     std::vector<std::uint32_t> sample_of(mesh.positions.size(), none), reached;
-    for (std::uint32_t i = 0; i < mesh.samples.size(); ++i) {
-        sample_of[mesh.samples[i]] = i;
-        reached.push_back(mesh.samples[i]);
+    for (std::uint32_t i = 0; i < level.samples.size(); ++i) {
+        sample_of[mesh.samples[level.samples[i]]] = i;
+        reached.push_back(mesh.samples[level.samples[i]]);
     }
     for (std::size_t i = 0; i < reached.size(); ++i)
         for (const auto t : mesh.around.of(reached[i]))
             for (const auto v : mesh.triangles[t])
                 if (sample_of[v] == none) sample_of[v] = sample_of[reached[i]], reached.push_back(v);
-    std::vector<std::vector<std::uint32_t>> beside(mesh.samples.size());
+    std::vector<std::vector<std::uint32_t>> beside(level.samples.size());
     const auto join = [&](std::uint32_t a, std::uint32_t b) {
         if (a == b || a == none || b == none) return;
         auto& list = beside[a];
@@ -316,7 +318,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         mesh.sample_normals.push_back(normals[v]);
         mesh.fine.blends.push_back(mesh.blends[v]);
     }
-    mesh.beside = samples_beside(mesh);
+    mesh.fine.beside = samples_beside(mesh, mesh.fine);
     mesh.sample_textures = textures_of_samples(mesh, colours);
     for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
     mesh.fine.pairs = std::move(pairs);
@@ -325,6 +327,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         mesh.coarse.samples.push_back(i);
         mesh.coarse.blends.push_back(over_groups(mesh.fine.blends[i], mesh.groups));
     }
+    mesh.coarse.beside = samples_beside(mesh, mesh.coarse);
     find_blocks(mesh.fine.blends, mesh.fine.pairs, handles.size(), mesh.fine.pattern);
     find_blocks(mesh.coarse.blends, mesh.coarse.pairs, mesh.coarse.centre.size(), mesh.coarse.pattern);
     return mesh;
@@ -332,9 +335,10 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
 
 namespace {
 
-using Eigen::Matrix3d, Eigen::Vector3d;
+using Eigen::Matrix3d, Eigen::Matrix3f, Eigen::Vector3d, Eigen::Vector3f;
 
 Vector3d vector_of(const Point3f& p) { return {p[0], p[1], p[2]}; }
+Vector3f floats_of(const Point3f& p) { return {p[0], p[1], p[2]}; }
 Point3f point_of(const Vector3d& v) {
     return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
 }
@@ -380,23 +384,24 @@ Moved move_samples(const Stage& stage, Threads threads) {
     return out;
 }
 
-// A sample, and the plane of the target that it should lie in.
+// A sample, and the plane of the target that it should lie in. Distances between points that are matched are small, so
+// floats do for what is summed over the matches; where the handles are, and the step that they make, is in doubles.
 struct Match {
     std::uint32_t sample = 0;
     std::uint32_t vertex = 0;            // in the target
     float weight = 0;                    // 0: no match
     float gap = 0;                       // spacing of the points that were searched
-    Vector3d normal = Vector3d::Zero();  // the mean of the two normals, or zero: measured along it, points of the same
+    Vector3f normal = Vector3f::Zero();  // the mean of the two normals, or zero: measured along it, points of the same
                                          // round surface are not apart
-    double across = 0;                   // how far the target lies from the reference along the normal,
-    Vector3d along = Vector3d::Zero();   // and how far the vertex lies from the sample along the surface
+    float across = 0;                    // how far the target lies from the reference along the normal,
+    Vector3f along = Vector3f::Zero();   // and how far the vertex lies from the sample along the surface
 };
 
 Match match_of(const Moved& moved, std::uint32_t sample, const SurfaceIndex& target, std::uint32_t vertex, float gap) {
     Match out{sample, vertex, 0, gap};
-    const Vector3d apart = vector_of(target.positions[vertex]) - vector_of(moved.points[sample]);
-    const Vector3d sum = vector_of(target.normals[vertex]) + vector_of(moved.normals[sample]);
-    const double length = sum.norm();
+    const Vector3f apart = floats_of(target.positions[vertex]) - floats_of(moved.points[sample]);
+    const Vector3f sum = floats_of(target.normals[vertex]) + floats_of(moved.normals[sample]);
+    const float length = sum.norm();
     if (length > 0) out.normal = sum / length;
     out.across = out.normal.dot(apart);
     out.along = apart - out.across * out.normal;
@@ -450,49 +455,93 @@ FromReference nearest_around(const DeformableMesh& mesh, std::span<const Point3f
     return out;
 }
 
+// The moved samples in a grid, made once a search among all of them is needed.
+class MovedGrid {
+public:
+    MovedGrid(const Moved& moved, float cell) : moved_(moved), cell_(cell) {}
+    const OrientedPoints& points() const {
+        std::call_once(once_, [&] { points_.emplace(moved_.points, moved_.normals, cell_); });
+        return *points_;
+    }
+
+private:
+    const Moved& moved_;
+    float cell_;
+    mutable std::once_flag once_;
+    mutable std::optional<OrientedPoints> points_;
+};
+
 // Matches in both directions: from each sample to the target, and from each of the target's samples to the nearest
 // moved sample, or to the triangles around that.
-std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, const SurfaceIndex& target,
-                                const Round& round, float cell, const DeformationOptions& options, Guesses& guesses) {
+//
+// A search goes from vertex to vertex, or from sample to sample, as long as the distance shrinks, beginning with what
+// the last round found; on the target, in the first round, with what the neighbouring search found. (Among the samples
+// that took 4 to 6 % more bits.) Where it ends far from the point, or faces elsewhere, the search is among all.
+std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLevel& level, const Moved& moved,
+                                const SurfaceIndex& target, const Round& round, float cell,
+                                const DeformationOptions& options, Guesses& guesses) {
+    constexpr float begins_near = 4;  // spacings: from farther away it is not worth going
     const std::size_t skip = round.every * (round.far ? 2 : 1);
     const std::size_t forward = moved.points.size() / round.every, back = target.samples.size() / skip;
     const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
-    const OrientedPoints reference(moved.points, moved.normals, cell);
+    const MovedGrid reference(moved, cell);
     const float gap = round.far ? target.coarse_gap : target.fine_gap;
     guesses.forward.resize(forward, OrientedPoints::no_point);
     guesses.back.resize(back, OrientedPoints::no_point);
     std::vector<Match> out(forward + back);
+    const auto agrees = [&](const Point3f& a, const Point3f& b) {
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= agreement;
+    };
+    const auto is_near = [&](const Point3f& a, const Point3f& b, float spacing) {
+        const Point3f apart = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+        return apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2] <= spacing * spacing;
+    };
+    // Among the samples of the target.
+    const auto nearest_far = [&](const Point3f& point, const Point3f& normal, std::uint32_t guess) {
+        std::uint32_t beside = OrientedPoints::no_point;
+        if (guess != OrientedPoints::no_point) {
+            if (is_near(target.positions[guess], point, begins_near * gap)) {
+                const auto near = target.nearest_along(point, guess);
+                const auto most = std::min(reach, gap);
+                if (near.squared_distance <= most * most && agrees(target.normals[near.index], normal))
+                    return OrientedMatch{near.index, near.squared_distance, true};
+            }
+            beside = static_cast<std::uint32_t>(std::size_t{guess} * target.samples.size() / target.positions.size());
+        }
+        auto match = target.coarse.nearest(point, normal, reach, agreement, beside);
+        if (match.found) match.index = target.samples[match.index];
+        return match;
+    };
     const auto go_forward = [&](std::size_t i, std::uint32_t last) {
         const std::size_t sample = i * round.every;
         std::uint32_t& guess = guesses.forward[i];
         const auto from = guess == OrientedPoints::no_point ? last : guess;
-        const auto match =
-            round.far ? target.coarse.nearest(moved.points[sample], moved.normals[sample], reach, agreement, from)
-                      : target.nearest_facing(moved.points[sample], moved.normals[sample],
-                                              {.reach = reach, .agreement = agreement, .along = true}, from);
+        const auto match = round.far
+                               ? nearest_far(moved.points[sample], moved.normals[sample], from)
+                               : target.nearest_facing(moved.points[sample], moved.normals[sample],
+                                                       {.reach = reach, .agreement = agreement, .along = true}, from);
         if (!match.found) return guess;
         guess = match.index;
-        const auto vertex = round.far ? target.samples[match.index] : match.index;
-        out[i] = match_of(moved, static_cast<std::uint32_t>(sample), target, vertex, gap);
+        out[i] = match_of(moved, static_cast<std::uint32_t>(sample), target, match.index, gap);
         out[i].weight = match_weight(match.squared_distance, round);
         return guess;
     };
-    // From sample to sample, beginning with the last round's, as long as the distance shrinks; where that ends far from
-    // the point or faces elsewhere, among all.
-    const bool along = !round.far && round.every == 1 && !mesh.beside.first.empty();
+    const float spacing =
+        mesh.sample_gap * std::sqrt(static_cast<float>(mesh.samples.size()) /
+                                    static_cast<float>(std::max<std::size_t>(moved.points.size(), 1)));
     const auto nearest_sample = [&](const Point3f& point, const Point3f& normal, std::uint32_t guess,
                                     std::uint32_t last) {
-        if (along && guess != OrientedPoints::no_point) {
-            const auto near =
-                nearest_along(moved.points, point, guess, [&](std::uint32_t sample) { return mesh.beside.of(sample); });
-            const auto most = std::min(reach, mesh.sample_gap);
-            const auto& n = moved.normals[near.index];
-            if (near.squared_distance <= most * most &&
-                n[0] * normal[0] + n[1] * normal[1] + n[2] * normal[2] >= agreement)
+        if (guess != OrientedPoints::no_point && is_near(moved.points[guess], point, begins_near * spacing)) {
+            const auto near = nearest_along(moved.points, point, guess, [&](std::uint32_t sample, const auto& visit) {
+                for (const auto next : level.beside.of(sample)) visit(next);
+            });
+            const auto most = std::min(reach, spacing);
+            if (near.squared_distance <= most * most && agrees(moved.normals[near.index], normal))
                 return OrientedMatch{near.index, near.squared_distance, true};
             guess = near.index;
         }
-        return reference.nearest(point, normal, reach, agreement, guess == OrientedPoints::no_point ? last : guess);
+        return reference.points().nearest(point, normal, reach, agreement,
+                                          guess == OrientedPoints::no_point ? last : guess);
     };
     const auto go_back = [&](std::size_t i, std::uint32_t last) {
         const std::uint32_t vertex = target.samples[i * skip];
@@ -507,7 +556,7 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const Moved& moved, 
             const auto near = nearest_around(mesh, moved.vertices, mesh.samples[match.index], target.positions[vertex]);
             if (near.squared_distance < match.squared_distance) {
                 squared_distance = static_cast<double>(near.squared_distance);
-                there.across = there.normal.dot(vector_of(near.apart));
+                there.across = there.normal.dot(floats_of(near.apart));
             }
         }
         there.weight = match_weight(squared_distance, round);
@@ -539,21 +588,20 @@ Eigen::Matrix<double, 3, 6> lever(const Vector3d& point, const Vector3d& centre)
 
 // The sum over all matches of one sample: the quadratic form of its distances, and its gradient.
 struct Pull {
-    Matrix3d metric = Matrix3d::Zero();
-    Vector3d force = Vector3d::Zero();
+    Matrix3f metric = Matrix3f::Zero();
+    Vector3f force = Vector3f::Zero();
 };
 
 // For the samples in [begin, end).
-std::vector<Pull> sum_pulls(const std::vector<Match>& matches, double point_share, std::size_t begin, std::size_t end) {
+std::vector<Pull> sum_pulls(const std::vector<Match>& matches, float point_share, std::size_t begin, std::size_t end) {
     std::vector<Pull> pulls(end - begin);
     for (const Match& match : matches) {
         if (match.sample < begin || match.sample >= end) continue;
-        const Vector3d& normal = match.normal;
+        const Vector3f& normal = match.normal;
         // Samples have gaps between them, so only a distance along the surface beyond the gap counts as an error.
-        const Vector3d& along = match.along;
-        const double weight = static_cast<double>(match.weight);
-        const double slide = along.norm();
-        const double share = slide > match.gap ? weight * point_share * (1 - match.gap / slide) : 0;
+        const Vector3f& along = match.along;
+        const float weight = match.weight, slide = along.norm();
+        const float share = slide > match.gap ? weight * point_share * (1 - match.gap / slide) : 0;
         Pull& pull = pulls[match.sample - begin];
         pull.metric.noalias() += (weight - share) * normal * normal.transpose();
         pull.metric.diagonal().array() += share;
@@ -656,8 +704,8 @@ std::vector<Pull> colour_pulls(const Stage& stage, const std::vector<Match>& mat
         const double weight = static_cast<double>(match.weight * texture.trust) * colour_trust(left, variance) * unit *
                               std::min(options.colour_weight / variance, 1 / steepness);
         Pull& pull = pulls[match.sample];
-        pull.metric.noalias() += weight * slope.transpose() * slope;
-        pull.force.noalias() += weight * slope.transpose() * left;
+        pull.metric += (weight * slope.transpose() * slope).cast<float>();
+        pull.force += (weight * slope.transpose() * left).cast<float>();
     }
     return pulls;
 }
@@ -672,14 +720,16 @@ Matrix3d cross_matrix(const Vector3d& r) {
 // matrix of 6 x 6, as its rows from the diagonal on; padded for vectors. A sample's is found once, however many pairs
 // of handles move it; what it does to a handle that turns about its own centre follows from the sum over all samples
 // (about_centres()).
-using AboutOrigin = std::array<double, 24>;
+using AboutOrigin = std::array<float, 24>;
 
-AboutOrigin about_origin(const Vector3d& point, const Pull& pull) {
+AboutOrigin about_origin(const Vector3f& point, const Pull& pull) {
     const auto& m = pull.metric;
-    Matrix3d turn_shift;  // cross matrix of the point * metric
-    for (int column = 0; column < 3; ++column) turn_shift.col(column) = point.cross(Vector3d(m.col(column)));
+    Matrix3f turn_shift;  // cross matrix of the point * metric
+    const float x = point.x(), y = point.y(), z = point.z();
+    for (int column = 0; column < 3; ++column)
+        turn_shift.col(column) << y * m(2, column) - z * m(1, column), z * m(0, column) - x * m(2, column),
+            x * m(1, column) - y * m(0, column);
     const auto& b = turn_shift;
-    const double x = point.x(), y = point.y(), z = point.z();
     // -turn_shift * cross matrix of the point
     return {b(0, 2) * y - b(0, 1) * z,
             b(0, 0) * z - b(0, 2) * x,
@@ -707,18 +757,20 @@ AboutOrigin about_origin(const Vector3d& point, const Pull& pull) {
             0};
 }
 
-void add_scaled(AboutOrigin& to, const AboutOrigin& from, double scale) {
+void add_scaled(AboutOrigin& to, const AboutOrigin& from, float scale) {
     for (std::size_t i = 0; i < to.size(); ++i) to[i] += scale * from[i];
 }
+
+using Vector6f = Eigen::Matrix<float, 6, 1>;
 
 // The sums over samples, by handle and by pair of handles, each sample with the product of its weights.
 struct PullSums {
     std::vector<AboutOrigin> diagonal, above;
-    std::vector<Vector6> right;
+    std::vector<Vector6f> right;
     void clear(const BlockPattern& pattern) {
         diagonal.assign(pattern.handles, {});
         above.assign(pattern.place.size(), {});
-        right.assign(pattern.handles, Vector6::Zero());
+        right.assign(pattern.handles, Vector6f::Zero());
     }
     PullSums& operator+=(const PullSums& other) {
         for (std::size_t i = 0; i < diagonal.size(); ++i) add_scaled(diagonal[i], other.diagonal[i], 1);
@@ -730,17 +782,19 @@ struct PullSums {
 
 // A sample moves with the turn and shift of handle k by weight_k (turn x point + shift). point: where it lies now, seen
 // from the origin; the few millimetres by which its handles would take it elsewhere are neglected as levers.
-void add_pull(const SampleBlend& blend, const Vector3d& point, const Pull& pull, PullSums& sums) {
+void add_pull(const SampleBlend& blend, const Vector3f& point, const Pull& pull, PullSums& sums) {
     const auto form = about_origin(point, pull);
-    Vector6 force;
-    force << point.cross(pull.force), pull.force;
+    const Vector3f& f = pull.force;
+    Vector6f force;
+    force << point.y() * f.z() - point.z() * f.y(), point.z() * f.x() - point.x() * f.z(),
+        point.x() * f.y() - point.y() * f.x(), f;
     std::size_t slot = 0;
     for (std::size_t a = 0; a < blend.count; ++a) {
-        const double weight = static_cast<double>(blend.weight[a]);
+        const float weight = blend.weight[a];
         add_scaled(sums.diagonal[blend.handle[a]], form, weight * weight);
         sums.right[blend.handle[a]] += weight * force;
         for (std::size_t b = a + 1; b < blend.count; ++b)
-            add_scaled(sums.above[blend.block[slot++]], form, weight * static_cast<double>(blend.weight[b]));
+            add_scaled(sums.above[blend.block[slot++]], form, weight * blend.weight[b]);
     }
 }
 
@@ -761,8 +815,8 @@ void set_system(const BlockPattern& pattern, const PullSums& sums, const std::ve
                 BlockSystem& system) {
     for (std::size_t h = 0; h < centres.size(); ++h) {
         system.diagonal[h] = about_centres(sums.diagonal[h], centres[h], centres[h]);
-        system.right[h] = sums.right[h];
-        system.right[h].head<3>() -= centres[h].cross(Vector3d(sums.right[h].tail<3>()));
+        system.right[h] = sums.right[h].cast<double>();
+        system.right[h].head<3>() -= centres[h].cross(Vector3d(system.right[h].tail<3>()));
     }
     for (std::size_t i = 0; i < pattern.place.size(); ++i)
         system.above[i] =
@@ -832,7 +886,7 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
                       const DeformationOptions& options) {
     Moved moved = move_samples(stage, options.threads);
     if (round.surfaces) moved.vertices = deform(stage.mesh, stage.motion, options.threads);
-    const auto matches = find_matches(stage.mesh, moved, target, round, cell, options, memory.guesses);
+    const auto matches = find_matches(stage.mesh, stage.level, moved, target, round, cell, options, memory.guesses);
     std::vector<Pull> of_colours;
     if (round.colours) of_colours = colour_pulls(stage, matches, moved, target, options);
     std::vector<Vector3d> centres(stage.centre.size());
@@ -844,14 +898,15 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
         auto& sums = memory.sums[half];
         sums.clear(stage.level.pattern);
         const std::size_t begin = half * stage.rest.size() / 2, end = (half + 1) * stage.rest.size() / 2;
-        auto pulls = sum_pulls(matches, round.point_share, begin, end);
+        auto pulls = sum_pulls(matches, static_cast<float>(round.point_share), begin, end);
         for (std::size_t i = begin; i < end && !of_colours.empty(); ++i) {
             pulls[i - begin].metric += of_colours[i].metric;
             pulls[i - begin].force += of_colours[i].force;
         }
         for (std::size_t i = begin; i < end; ++i)
             if (pulls[i - begin].metric.trace() > 0)
-                add_pull(stage.level.blends[i], vector_of(moved.points[i]) - origin, pulls[i - begin], sums);
+                add_pull(stage.level.blends[i], (vector_of(moved.points[i]) - origin).cast<float>(), pulls[i - begin],
+                         sums);
     };
     parallel_invoke(
         options.threads, [&] { add_half(1); }, [&] { add_half(0); });
@@ -1128,7 +1183,8 @@ double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target,
     const std::size_t every = mesh.samples.size() + target.samples.size() < 2000 ? 1 : 4;
     const Round round{.reach = reach, .stiffness = 0, .point_share = 0, .gap = 0, .far = false, .every = every};
     Guesses guesses;
-    const auto matches = find_matches(mesh, moved, target, round, static_cast<float>(reach / 2), options, guesses);
+    const auto matches =
+        find_matches(mesh, mesh.fine, moved, target, round, static_cast<float>(reach / 2), options, guesses);
     double near = 0;
     for (const Match& match : matches) {
         const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);

@@ -97,10 +97,19 @@ struct SampleBlend {
 // How a vertex follows its handles; the blocks are not filled in.
 SampleBlend blend_of(const VertexWeights& weights);
 
+// For each sample those that are beside it on the surface, in compressed rows.
+struct SamplesBeside {
+    std::vector<std::uint32_t> first, samples;
+    std::span<const std::uint32_t> of(std::size_t sample) const {
+        return std::span(samples).subspan(first[sample], first[sample + 1] - first[sample]);
+    }
+};
+
 // One level of handles, and the samples they move.
 struct DeformationLevel {
     std::vector<std::uint32_t> samples;  // indices into the mesh's samples
     std::vector<SampleBlend> blends;     // one per sample
+    SamplesBeside beside;                // each of them, among them
     std::vector<std::uint32_t> centre;   // the handle of the finer level at the centre of each group; on the finest
                                          // level 0, 1, 2, ...
     std::vector<HandlePair> pairs;
@@ -115,14 +124,6 @@ struct SampleTexture {
     float unevenness = 0;  // mean square of their distances from it, levels^2
 };
 
-// For each sample those that are beside it on the surface, in compressed rows.
-struct SamplesBeside {
-    std::vector<std::uint32_t> first, samples;
-    std::span<const std::uint32_t> of(std::size_t sample) const {
-        return std::span(samples).subspan(first[sample], first[sample + 1] - first[sample]);
-    }
-};
-
 // A reference mesh prepared for deformation; built once per I-frame.
 struct DeformableMesh {
     std::vector<Point3f> positions;
@@ -132,7 +133,6 @@ struct DeformableMesh {
     std::vector<SampleBlend> blends;       // the same, one per vertex
     std::vector<Eigen::Vector3d> handles;  // positions of the handles
     std::vector<std::uint32_t> samples;    // indices of vertices
-    SamplesBeside beside;
     std::vector<Point3f> sample_normals;
     std::vector<SampleTexture> sample_textures;  // one per sample, or none if nothing is textured
     float sample_gap = 0;                        // approximate spacing of neighbouring samples

@@ -146,6 +146,14 @@ has_times ntsc.htvm 0 33 67 100 133 167
 expect 0 "29.97 frames/s" "$htvm" info ntsc.htvm
 expect 2 "write it as 30, 29.97 or 30000/1001" "$htvm" encode capture --fps 30/0 -o x.htvm
 
+# On standard input the first mesh may say the rate; --fps has the last word.
+"$htvm" synth --live --fps 12.5 --frames 3 --vertices 300 2>/dev/null >live.ply
+for rate in 12.5: 10:--fps=10; do
+    "$htvm" encode - ${rate#*:} -o live.htvm --quiet <live.ply
+    expect 0 "live.htvm: ${rate%:*} frames/s" "$htvm" info live.htvm
+done
+has_times live.htvm 0 100 200
+
 # Meshes that come faster than they are encoded are dropped where that is asked for; the others keep their times.
 for k in $(seq 10); do cat capture/*.ply; done >burst.ply
 "$htvm" encode - --drop-late --json -o burst.htvm <burst.ply >burst.json 2>said || fail "--drop-late: $(tail -1 said)"
@@ -168,7 +176,21 @@ sed -i 's/^7,[0-9]*,/7,1,/' efforts.csv
 cmp again_1.htvm again_2.htvm || fail "the same efforts give other bytes"
 expect 1 "this is no effort log" "$htvm" encode capture --repeat-efforts times.csv -o x.htvm
 expect 2 "is for --profile tracked" "$htvm" encode capture --profile topology --deadline 50 -o x.htvm
-expect 1 "give one of them" "$htvm" encode capture --latency-frames 1 --deadline 50 -o x.htvm
+expect 2 "give one of them" "$htvm" encode capture --latency-frames 1 --deadline 50 -o x.htvm
+expect 2 "--group: holds frames back, beyond any --deadline: give one of the two" "$htvm" encode capture --group 4 --deadline 50 -o x.htvm
+expect 2 "it is for files, not for a hub" "$htvm" encode capture --group 4 -o ws://localhost:1/publish/x
+expect 0 "6 of 6 frames were late: this machine is too slow for the deadline" "$htvm" encode capture --deadline 1 -o x.htvm
+# The first one is an I-frame, whatever its effort: never motion alone.
+"$htvm" encode capture --keyint 1 --deadline 1 --json -o x.htvm 2>&1 | grep -q '"lowered_frames": 0' || fail "I-frames count as lowered"
+head -4 efforts.csv >few.csv
+expect 1 "few.csv has the efforts of 3 frames, but there are 6: repeat the run that wrote it" \
+    "$htvm" encode capture --repeat-efforts few.csv -o x.htvm
+expect 0 "3 frames" "$htvm" encode capture --repeat-efforts few.csv --frames 3 -o x.htvm
+expect 1 "few.csv has the efforts of 3 frames, but there are more" \
+    bash -c "cat capture/*.ply | '$htvm' encode - --repeat-efforts few.csv -o x.htvm"
+rm x.htvm
+expect 1 "nowhere/log.csv cannot be written" "$htvm" encode capture --effort-log nowhere/log.csv -o x.htvm
+[ ! -e x.htvm ] || fail "the log's place is looked at after encoding"
 expect 2 "--deadline" "$htvm" encode capture --jobs 2 --deadline 50 -o x.htvm
 expect 2 "--deadline" "$htvm" encode capture --repeat-efforts efforts.csv --deadline 50 -o x.htvm
 

@@ -232,6 +232,7 @@ cmp -s whole.csv gap.csv || { echo "FAILED: a missing file changes what others a
 
 # Help: the everyday options first, all on demand; the exit codes.
 expect 0 "--skeleton" "$htvm" encode --help
+for flag in --texture-as --audio --effort; do expect 0 " $flag " "$htvm" encode --help; done
 expect 0 "--help-all shows" "$htvm" help encode
 expect 0 "--still-below" "$htvm" encode --help-all
 "$htvm" encode --help | grep -q -- "--still-below" && fail "the short help shows what few need"

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 namespace htvm::app {
 namespace {
@@ -40,7 +41,7 @@ TEST(Deadline, WithoutOneNothingIsLateOrLowered) {
 TEST(Deadline, AFrameThatWouldBeLateGetsLess) {
     auto deadline = after(20, 30, 60);
     EXPECT_EQ(deadline.effort(0), 5);
-    const int hurried = deadline.effort(28);
+    const int hurried = deadline.effort(26);
     EXPECT_LT(hurried, 5);
     EXPECT_GT(hurried, 0);
     EXPECT_EQ(deadline.effort(58), 0);
@@ -69,6 +70,33 @@ TEST(Deadline, MotionAloneIsNotCodedForever) {
     EXPECT_GT(deadline.late(), 0u);
 }
 
+TEST(Deadline, AnIFrameIsNeverMotionAloneNorLessThanWasAskedFor) {
+    Deadline deadline(50, 5);
+    deadline.took({.effort = 0, .waited = 0, .took = 20, .intra = true});
+    deadline.took({.effort = 0, .waited = 0, .took = 20});
+    deadline.took({.effort = 3, .waited = 0, .took = 20});
+    EXPECT_EQ(deadline.alone(), 1u);
+    EXPECT_EQ(deadline.lowered(), 2u);
+    const auto json = deadline_json(deadline);
+    EXPECT_EQ(json["intra_frames"], 1);
+    EXPECT_EQ(json["frames_by_effort"], (std::vector<int>{1, 0, 0, 1, 0, 0, 0, 0, 0, 0}));
+}
+
+TEST(Deadline, WhereHalfOfTheFramesAreLateAWarningSaysWhatHelps) {
+    Deadline deadline(50, 5);
+    for (const double took : {20.0, 30.0, 60.0}) deadline.took({5, 0, took});
+    EXPECT_EQ(deadline_warning(deadline, true), "");
+    deadline.took({0, 0, 60.0});
+    EXPECT_EQ(deadline_warning(deadline, true),
+              "2 of 4 frames were late: this machine is too slow for the deadline; a larger --deadline helps, a lower "
+              "-q or --effort, meshes of fewer vertices, or --drop-late, which leaves frames out");
+    Deadline least(50, 1);
+    least.took({1, 0, 60.0});
+    EXPECT_EQ(deadline_warning(least, false),
+              "1 of 1 frame was late: this machine is too slow for the deadline; a larger --deadline helps, a lower "
+              "-q, meshes of fewer vertices");
+}
+
 TEST(Deadline, TellsTheMedianTheNinetyNinthPercentileAndTheLongest) {
     std::vector<TimedFrame> frames;
     for (int i = 1; i <= 100; ++i) frames.push_back({5, 1.0 * i, 1.0 * i});
@@ -90,7 +118,8 @@ protected:
 };
 
 TEST_F(EffortLog, GivesTheEffortsBack) {
-    ASSERT_TRUE(write_effort_log(path, {{5, 0, 40}, {0, 12.5, 20}, {9, 1, 2}}));
+    auto file = OutputFile::create(path);
+    ASSERT_TRUE(write_effort_log(*file, {{5, 0, 40}, {0, 12.5, 20}, {9, 1, 2}}));
     EXPECT_EQ(*read_effort_log(path), (std::vector<int>{5, 0, 9}));
 }
 
@@ -108,6 +137,8 @@ TEST_F(EffortLog, ThatIsNoneIsRefusedWithItsLine) {
     }
     write("frame,effort\n0\n");
     EXPECT_EQ(error(), ", line 2: there is no effort" + what);
+    write("frame,effort\n");
+    EXPECT_EQ(error(), ", line 2: there is no frame" + what);
 }
 
 }  // namespace

@@ -22,6 +22,20 @@ expect() {
     fi
 }
 
+# interrupted STREAM COMMAND...: the command, which would write kept.htvm, a copy of STREAM, ends at once and leaves it so.
+interrupted() {
+    local stream=$1 process code
+    shift
+    "$@" 2>said &
+    process=$!
+    sleep 0.3
+    kill -s INT $process
+    wait $process
+    code=$?
+    [ $code -eq 130 ] && grep -q "interrupted; nothing is written" said || fail "interrupted, $* exits with $code: $(cat said)"
+    cmp -s "$stream" kept.htvm && [ ! -e kept.htvm.partial ] || fail "interrupted, $* leaves something"
+}
+
 # done_with WHAT: the end of a test.
 done_with() {
     [ $failures -eq 0 ] && echo "$1"

@@ -78,6 +78,38 @@ encode --texture-as captured --jobs 2 -o two.htvm
 cmp -s one.htvm two.htvm || fail "the number of jobs changes the stream"
 expect 0 "with 9 pictures" "$htvm" verify one.htvm
 
+# Joined from pictures of two coders, or of none where they are promised.
+expect 0 "pictures: AV1, 256 x 256 pixels, 9 pictures; VP9, 256 x 256 pixels, 9 pictures; 18 in all, 2 of them key" \
+    bash -c "'$htvm' join av1.htvm vp9.htvm -o mixed.htvm --quiet && '$htvm' info mixed.htvm"
+[ "$(json mixed.htvm '["kinds"][1]["coder"]')" = VP9 ] || fail "info --json has not both coders"
+expect 0 "18 frames in 1 sequence, all sound, with an index, with 18 pictures" "$htvm" verify mixed.htvm
+# without STREAM FROM TO: the stream but for those of its pictures.
+without() {
+    python3 - "$@" <<'PYTHON'
+import struct, sys
+data, first, end = open(sys.argv[1], "rb").read(), int(sys.argv[2]), int(sys.argv[3])
+at, pictures, out = 0, 0, b""
+while at < len(data):
+    size = 36 + struct.unpack("<I", data[at + 24 : at + 28])[0]
+    picture = data[at + 4] == 12
+    if not (picture and first <= pictures < end):
+        out += data[at : at + size]
+    pictures += picture
+    at += size
+open("without.htvm", "wb").write(out)
+PYTHON
+}
+without av1.htvm 0 99
+expect 3 "frames 0 to 8: the stream promises pictures, but there is none for its texture coordinates" "$htvm" verify without.htvm
+without kept.htvm 0 2
+expect 3 "frames 0 to 1: the stream promises pictures" "$htvm" verify without.htvm
+"$htvm" encode walk --texture-as coordinates -o coordinates.htvm --quiet
+expect 0 "all sound" "$htvm" verify coordinates.htvm
+
+# What has no effect is said.
+expect 0 "there are no pictures of a texture, so --images does nothing" "$htvm" decode coordinates.htvm --images jpeg -o none
+expect 0 "the texture coordinates are encoded, without an image" "$htvm" encode walk --texture none -o none.htvm
+
 # A damaged picture costs no frame.
 python3 - av1.htvm damaged.htvm <<'PYTHON'
 import struct, sys
@@ -102,6 +134,9 @@ import sys
 sys.exit(not float(sys.argv[1]) <= 5.2)
 PYTHON
 
+expect 5 "of the meshes, which have half of --bitrate, so give twice that rate" \
+    "$htvm" encode walk --texture-as picture --bitrate 0.004 -o never.htvm
+
 # What does not go together is said.
 no() { expect 2 "$1" "$htvm" encode walk -o never.htvm "${@:2}"; }
 no "add --profile topology" --texture-as captured
@@ -112,6 +147,7 @@ no "keep leaves image files as large as they are" --profile topology --texture-a
 no "follows from --bitrate" --profile topology --texture-as captured --bitrate 2 --texture-quality 5
 no "leaves no images" --profile topology --texture-as captured --texture none
 "$htvm" synth plain --frames 2 --vertices 200 >/dev/null 2>&1
+expect 0 "nothing to do for --texture-as or --texture-origin" "$htvm" encode plain --texture-as coordinates -o plain.htvm
 expect 1 "no texture" "$htvm" encode plain --profile topology --texture-as captured -o never.htvm
 [ ! -e never.htvm ] || fail "something was written"
 

@@ -61,7 +61,8 @@ small=(--width 60 --height 40 --elevation 0 --up y --quiet)
 head -c 60 skin.png >cut.png
 expect 1 "cut.png: the PNG image is damaged or cut off" "$htvm" still square.obj --texture cut.png -o x.png
 expect 1 "--texture: there is no file or folder gone.png" "$htvm" still square.obj --texture gone.png -o x.png
-expect 1 "square.obj: this is no PNG, JPEG or WebP image; save it as one of them" "$htvm" still square.obj --texture square.obj -o x.png
+expect 1 "square.obj: this is no PNG, JPEG or WebP image; save it as one of them, or, where it has a picture for each mesh, as a video: .mp4 .m4v .mov .mkv .webm .avi .mpg .y4m" \
+    "$htvm" still square.obj --texture square.obj -o x.png
 mkdir some && grep '^[vf]' square.obj | tee some/a_1.obj >some/a_2.obj && cp skin.png some/a_1.png
 expect 1 "some/a_2.obj: there is no image for it, as there is for others" "$htvm" encode some -o x.htvm
 expect 0 "1 bad frame left out" "$htvm" encode some --on-bad-frame skip -o x.htvm

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
+#include <random>
 
 #include "codec/height_field.h"
 #include "codec/tracked/captured_surface_enc.h"
@@ -18,16 +19,30 @@ using test::surface_of;
 
 double bowl(double x, double y) { return -(x * x + y * y) / 4000; }
 
-TrackedTargets targets_of(const LatticeMesh& reference, const LatticeMesh& captured, double reach = 500,
-                          Threads threads = {}) {
+TrackedTargets targets_of(const LatticeMesh& reference, const LatticeMesh& captured, const TargetSearch& how = {}) {
     const auto normals = vertex_normals(reference.positions, reference.triangles);
     return find_tracked_targets({reference.positions, normals, reference.triangles, reference.colours}, captured,
-                                surface_of(captured), reach, threads);
+                                surface_of(captured), how);
 }
 
 TEST(TrackedTargets, are_the_distance_along_the_normal) {
     const auto captured = height_field(40, 30, [](double, double) { return 24; });
-    for (const auto d : targets_of(height_field(10, 100, flat), captured).displacement) EXPECT_EQ(d, 24);
+    for (const auto samples : {TargetSamples::middles, TargetSamples::three})
+        for (const auto d : targets_of(height_field(10, 100, flat), captured, {.samples = samples}).displacement)
+            EXPECT_EQ(d, 24);
+}
+
+TEST(TrackedTargets, are_nearer_to_a_noisy_surface_s_mean_with_more_samples) {
+    auto captured = height_field(100, 20, flat);
+    std::mt19937 random(1);
+    for (auto& p : captured.positions) p.z += static_cast<std::int32_t>(random() % 61) - 30;
+    const auto reference = height_field(20, 100, flat);
+    const auto squares = [&](TargetSamples samples) {
+        double sum = 0;
+        for (const double d : targets_of(reference, captured, {.samples = samples}).displacement) sum += d * d;
+        return sum;
+    };
+    EXPECT_LT(squares(TargetSamples::three), 0.9 * squares(TargetSamples::middles));
 }
 
 TEST(TrackedTargets, lay_the_triangles_of_a_coarse_mesh_on_a_bent_surface_not_only_its_vertices) {
@@ -49,7 +64,7 @@ TEST(TrackedTargets, beyond_what_a_field_can_code_are_clamped_to_it) {
     const auto reference = height_field(4, 100, flat);
     for (const int side : {1, -1}) {
         const auto captured = height_field(4, 100, [&](double, double) { return side * (field_limit + 5000.0); });
-        const auto targets = targets_of(reference, captured, 2.0 * field_limit);
+        const auto targets = targets_of(reference, captured, {.reach = 2.0 * field_limit});
         EXPECT_EQ(targets.displacement, std::vector<std::int32_t>(25, side * field_limit));
         const auto hierarchy = build_vertex_hierarchy(reference.positions, reference.triangles).value();
         const auto coded = encode_field(hierarchy, targets.displacement, 1);
@@ -61,7 +76,7 @@ TEST(TrackedTargets, beyond_what_a_field_can_code_are_clamped_to_it) {
 TEST(TrackedTargets, are_taken_from_neighbours_where_nothing_is_in_reach) {
     auto captured = height_field(40, 30, [](double, double) { return 16; });
     std::erase_if(captured.triangles, [&](const Triangle& t) { return captured.positions[t[0]].x > 200; });
-    const auto targets = targets_of(height_field(10, 100, flat), captured, 60);
+    const auto targets = targets_of(height_field(10, 100, flat), captured, {.reach = 60});
     for (const auto d : targets.displacement) EXPECT_NEAR(d, 16, 2);
 }
 
@@ -84,8 +99,8 @@ TEST(TrackedTargets, ask_for_the_colours_that_are_there_whatever_the_sampling) {
 TEST(TrackedTargets, are_the_same_for_any_number_of_threads) {
     const auto captured = height_field(64, 25, bowl);
     const auto reference = height_field(20, 80, flat);
-    EXPECT_EQ(targets_of(reference, captured, 500).displacement,
-              targets_of(reference, captured, 500, ThreadPool(3)).displacement);
+    EXPECT_EQ(targets_of(reference, captured).displacement,
+              targets_of(reference, captured, {.threads = ThreadPool(3)}).displacement);
 }
 
 TEST(TrackedTargets, of_nothing_are_nothing) {

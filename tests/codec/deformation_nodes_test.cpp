@@ -191,25 +191,40 @@ TEST(DeformationNodes, AnyTrianglesWillDo) {
     }
 }
 
-TEST(DeformationNodes, TheNearestNodesAreThoseThatDijkstraFinds) {
-    // On a line with uneven steps, distances are differences.
+// On a line, distances are differences.
+void expect_nearest_on_a_line(std::int32_t least_step, std::int32_t most_step, std::int32_t spacing) {
     std::mt19937 random(3);
     Strip mesh;
     std::int32_t x = 0;
     for (std::uint32_t v = 0; v < 300; ++v) {
-        mesh.positions.push_back({x += 1 + static_cast<std::int32_t>(random() % 20), 0, 0});
+        x += least_step + static_cast<std::int32_t>(random() % static_cast<unsigned>(most_step - least_step + 1));
+        mesh.positions.push_back({x, 0, 0});
         if (v > 0) mesh.triangles.push_back({v - 1, v, v});
     }
-    const auto nodes = nodes_of(mesh, 60);
+    const auto nodes = nodes_of(mesh, spacing);
     expect_sound(mesh, nodes);
+    ASSERT_GT(nodes.vertex.size(), near_nodes);
     for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
-        auto distance = [&](std::size_t n) {
-            return std::abs(mesh.positions[v].x - mesh.positions[nodes.vertex[n]].x);
-        };
+        std::vector<NearNode> all;
         for (std::size_t n = 0; n < nodes.vertex.size(); ++n)
-            EXPECT_GE(distance(n), distance(nodes.handle_of_vertex[v]));
-        EXPECT_LE(distance(nodes.handle_of_vertex[v]), 60);
+            all.push_back(
+                {static_cast<std::uint32_t>(std::abs(mesh.positions[v].x - mesh.positions[nodes.vertex[n]].x)),
+                 static_cast<std::uint16_t>(n)});
+        std::sort(all.begin(), all.end());
+        ASSERT_EQ(nodes.near[v].count, near_nodes);
+        for (std::size_t k = 0; k < near_nodes; ++k) EXPECT_EQ(nodes.near[v].near[k], all[k]) << v;
+        EXPECT_EQ(nodes.handle_of_vertex[v], all[0].node);
+        EXPECT_LE(all[0].distance, static_cast<std::uint32_t>(spacing));
     }
+}
+
+TEST(DeformationNodes, TheNearestNodesAreTheNearestAlongTheMesh) {
+    expect_nearest_on_a_line(1, 20, 60);
+    expect_nearest_on_a_line(7, 7, 14);  // ties everywhere
+}
+TEST(DeformationNodes, TheNearestNodesAreSoWhereManyVerticesLieAtOnePlace) { expect_nearest_on_a_line(0, 2, 9); }
+TEST(DeformationNodes, TheNearestNodesAreSoWhereStepsAreTooUnevenForABucketEach) {
+    expect_nearest_on_a_line(0, 30'000, 60'000);
 }
 
 // The columns from `begin` to before `end` of a strip taken out, and put back behind the others.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <string_view>
 
 #include "codec/moving_sequences.h"
 #include "codec/patched_sequences.h"
@@ -75,9 +76,31 @@ TEST(Latency, LeavesARateAsItIs) {
 }
 
 TEST(Latency, LeavesOtherProfilesAsTheyAre) {
+    for (const auto profile : {Profile::topology, Profile::paper})
+        for (const auto choice : {FrameChoice::fixed, FrameChoice::cheaper, FrameChoice::rate_distortion}) {
+            auto options = default_options(profile);
+            options.topology.frame_choice = choice;
+            options.key_interval = 5;
+            const auto plain = stream(walking(8), options, 0, 1);
+            EXPECT_EQ(stream(walking(8), options, 1, 1), plain);
+            EXPECT_EQ(stream(walking(8), options, 1, 2), plain);
+        }
+}
+
+TEST(Latency, BringsTheMotionOfTheNextFramesBonesForward) {
+    auto options = default_options(Profile::paper);
+    options.topology.frame_choice = FrameChoice::fixed;
+    options.latency_frames = 1;
+    auto encoder = *Encoder::create(options);
     const auto sequence = walking(4);
-    const auto options = default_options(Profile::topology);
-    EXPECT_EQ(stream(sequence, options, 1, 2), stream(sequence, options, 0, 1));
+    std::vector<std::size_t> registrations;
+    for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+        ASSERT_TRUE(encoder.push(sequence.frames[i].mesh, nullptr, static_cast<std::int64_t>(33333 * i)));
+        registrations.push_back(static_cast<std::size_t>(std::ranges::count_if(
+            encoder.stage_times(), [](const auto& stage) { return std::string_view(stage.stage) == "registration"; })));
+    }
+    // The second push codes the I-frame; the third its first EP-frame, and registers the frame behind that one, too.
+    EXPECT_EQ(registrations, (std::vector<std::size_t>{0, 0, 2, 1}));
 }
 
 TEST(Latency, LetsOneFrameWait) {

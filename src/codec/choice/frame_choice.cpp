@@ -30,10 +30,6 @@ FrameSteps steps_of_quality(const Configuration& configuration, double quality) 
     return steps_of(configuration, steps);
 }
 
-bool is_due(const FrameWork& work) {
-    return !work.can_refer() || work.frames_since_intra() >= work.configuration.options.key_interval;
-}
-
 // The shortest key interval has passed: an I-frame is allowed if it saves bits.
 bool may_be_intra(const FrameWork& work) {
     return work.frames_since_intra() >= work.configuration.options.least_key_interval;
@@ -289,10 +285,9 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
     const SurfacePatchSearch search(tracked.mesh, work.reference().decoded.tracked->mesh.positions, work.mesh,
                                     work.surface(), patch_options(work, steps));
     measuring.done("patch");
-    const std::array<double, 2> ways = {lost, 0.0};
-    for (int way = 0; way < std::min<int>(work.effort.patches, ways.size()); ++way) {
+    for (const double region_lost : {lost, 0.0}) {
         StageClock clock(work.stages);
-        const auto found = search.find(ways[static_cast<std::size_t>(way)]);
+        const auto found = search.find(region_lost);
         clock.done("patch");
         if (!found) continue;
         auto coded = code_patched(work, steps, tracked, *found);
@@ -346,7 +341,7 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     const bool may_be_patched =
         !due && work.configuration.options.tracked.patch_share > 0 && reference.decoded.mesh().texcoords.empty();
     if (lost) {
-        const bool limbs_moved = work.effort.follows_limbs && work.follow_lost_limbs();
+        const bool limbs_moved = work.follow_lost_limbs();
         if (may_be_patched) {
             auto coded = code_for_patches(work, steps);
             if (!coded) return tl::unexpected(coded.error());
@@ -383,8 +378,8 @@ Result<Candidate> choose(FrameWork& work, const FrameSteps& steps, bool force_in
     const auto choice = options.topology.frame_choice;
     if (!work.carries_surface()) return code_lone_intra(work, steps);
     if (options.profile == Profile::tracked && work.can_refer())
-        return choose_tracked(work, steps, force_intra || is_due(work));
-    if (force_intra || is_due(work) || is_scene_change(work)) {
+        return choose_tracked(work, steps, force_intra || work.intra_is_due());
+    if (force_intra || work.intra_is_due() || is_scene_change(work)) {
         if (options.profile != Profile::tracked && choice == FrameChoice::rate_distortion)
             return code_measured_intra(work, steps);
         return work.configuration.intra_alone() ? code_lone_intra(work, steps)
@@ -404,7 +399,7 @@ Result<Candidate> choose(FrameWork& work, const FrameSteps& steps, bool force_in
 }
 
 FrameType expected_type(const FrameWork& work, bool force_intra) {
-    if (force_intra || is_due(work)) return FrameType::intra;
+    if (force_intra || work.intra_is_due()) return FrameType::intra;
     return work.configuration.tracked() ? FrameType::tracked : FrameType::enhanced;
 }
 

@@ -13,19 +13,6 @@
 namespace htvm::internal {
 namespace {
 
-Result<std::vector<LatticePoint>> decode_positions(const FramePayloadView& payload, const EnhancedFrameContext& context,
-                                                   std::span<const LatticePoint> predicted,
-                                                   std::span<const std::uint32_t> reference_of) {
-    const auto residuals =
-        decode_residuals(payload.of(Layer::geometry), reference_of.size(), *context.geometry_codebook);
-    if (!residuals) return tl::unexpected(residuals.error());
-    std::vector<LatticePoint> out;
-    out.reserve(residuals->size());
-    for (std::size_t k = 0; k < residuals->size(); ++k)
-        out.push_back(add_residual(predicted[reference_of[k]], (*residuals)[k]));
-    return out;
-}
-
 Result<std::vector<Colour>> decode_colours(const FramePayloadView& payload, const EnhancedFrameContext& context,
                                            std::span<const std::uint32_t> reference_of) {
     const auto residuals = decode_residuals(payload.of(Layer::colour), reference_of.size(), *context.colour_codebook);
@@ -144,16 +131,29 @@ Result<DecodedEnhancedFrame> decode_enhanced_frame(const FramePayloadView& paylo
         coded_bones = std::move(*coded);
         eligible = vertices_of_coded_bones(reference, coded_bones);
     }
-    const auto residuals_of =
-        decode_mapping(payload.of(Layer::mapping), payload.header.vertices, reference.mapping_prior, eligible);
+    // Neither of the two layers needs the other to be read.
+    Result<std::vector<std::uint32_t>> residuals_of;
+    Result<std::vector<ResidualVector>> residuals;
+    std::vector<LatticePoint> predicted;
+    parallel_invoke(
+        context.threads,
+        [&] {
+            residuals_of =
+                decode_mapping(payload.of(Layer::mapping), payload.header.vertices, reference.mapping_prior, eligible);
+        },
+        [&] {
+            residuals =
+                decode_residuals(payload.of(Layer::geometry), payload.header.vertices, *context.geometry_codebook);
+            predicted = predict_positions(reference, out.transforms, {});
+        });
     if (!residuals_of) return tl::unexpected(residuals_of.error());
     const auto reference_of = references_of_residuals(*residuals_of, payload.header.vertices);
     if (reference_of.size() != payload.header.vertices)
         return fail(ErrorKind::corrupt_stream, "EP-frame: it has vertices, but its bones no reference vertex");
-    auto predicted = predict_positions(reference, out.transforms, context.threads);
-    auto positions = decode_positions(payload, context, predicted, reference_of);
-    if (!positions) return tl::unexpected(positions.error());
-    out.mesh.positions = std::move(*positions);
+    if (!residuals) return tl::unexpected(residuals.error());
+    out.mesh.positions.reserve(residuals->size());
+    for (std::size_t k = 0; k < residuals->size(); ++k)
+        out.mesh.positions.push_back(add_residual(predicted[reference_of[k]], (*residuals)[k]));
 
     Result<std::vector<Triangle>> triangles;
     Result<void> attributes;

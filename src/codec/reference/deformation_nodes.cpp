@@ -145,22 +145,27 @@ Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triang
 
     Graph graph;
     graph.first.reserve(positions.size() + 1);
-    graph.steps.reserve(3 * triangles.size() + links.size());
+    // Whether a vertex was seen already cannot be foreseen: each is written, and what follows overwrites it if it was.
+    graph.steps.resize(6 * triangles.size() + links.size() + 1);
     const auto around = triangles_around(positions.size(), triangles);
     std::vector<std::uint32_t> seen(positions.size(), unreached);
+    std::size_t count = 0;
     auto link = links.begin();
     for (std::uint32_t v = 0; v < positions.size(); ++v) {
-        graph.first.push_back(static_cast<std::uint32_t>(graph.steps.size()));
+        graph.first.push_back(static_cast<std::uint32_t>(count));
         seen[v] = v;
         const auto step_to = [&](std::uint32_t u) {
-            if (seen[u] == v) return;
+            graph.steps[count].vertex = u;
+            count += seen[u] != v;
             seen[u] = v;
-            graph.steps.push_back({u, integer_root(squared_distance(positions[v], positions[u]))});
         };
         for (const auto t : around.of(v))
             for (const auto u : triangles[t]) step_to(u);
         for (; link != links.end() && link->first == v; ++link) step_to(link->second);
+        for (std::size_t i = graph.first.back(); i < count; ++i)
+            graph.steps[i].length = integer_root(squared_distance(positions[v], positions[graph.steps[i].vertex]));
     }
+    graph.steps.resize(count);
     graph.first.push_back(static_cast<std::uint32_t>(graph.steps.size()));
     return graph;
 }
@@ -199,6 +204,21 @@ void reach_from(const Graph& graph, CoverQueue& queue, Distance spacing, Cover& 
     }
 }
 
+// Those of the first so many vertices that are one step from a vertex of some kind, ascending. Ways lead back as they
+// lead there, so it is enough to look around these, which are few.
+template <class IsOfKind>
+std::vector<std::uint32_t> around(const Graph& graph, std::size_t count, const IsOfKind& is_of_kind) {
+    std::vector<std::uint32_t> out;
+    if (count == 0) return out;
+    for (std::uint32_t v = 0; v + 1 < graph.first.size(); ++v)
+        if (is_of_kind(v))
+            for (const Step& step : graph.from(v))
+                if (step.vertex < count) out.push_back(step.vertex);
+    std::sort(out.begin(), out.end());
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    return out;
+}
+
 // Starts with what kept nodes reach; what they do not reach of the vertices that stay and of the patch is for others.
 void cover_by_kept(const Graph& graph, const KeptNodes& kept, Distance spacing, Cover& cover) {
     for (std::size_t v = 0; v < kept.near.size(); ++v) {
@@ -206,12 +226,9 @@ void cover_by_kept(const Graph& graph, const KeptNodes& kept, Distance spacing, 
         if (kept.near[v].count > 0 && nearest.distance <= spacing) cover.distance[v] = nearest.distance;
     }
     CoverQueue queue;
-    for (std::uint32_t v = 0; v < kept.near.size(); ++v) {
-        const auto steps = graph.from(v);
-        const bool at_rim = std::any_of(steps.begin(), steps.end(),
-                                        [&](const Step& step) { return cover.distance[step.vertex] == unreached; });
-        if (at_rim && cover.distance[v] != unreached) queue.emplace_back(cover.distance[v], v);
-    }
+    for (const std::uint32_t v :
+         around(graph, kept.near.size(), [&](std::uint32_t u) { return cover.distance[u] == unreached; }))
+        if (cover.distance[v] != unreached) queue.emplace_back(cover.distance[v], v);
     std::make_heap(queue.begin(), queue.end(), std::greater<>());
     reach_from(graph, queue, spacing, cover);
 }
@@ -235,57 +252,95 @@ bool cover_all(const Graph& graph, const KeptNodes& kept, Distance spacing, std:
     return true;
 }
 
-// Enters a node if it is one of the nearest, or nearer than known; returns whether it was.
-bool enter(NearNodes& list, NearNode candidate) {
-    if (list.count == near_nodes && list.near[near_nodes - 1] <= candidate) return false;
-    std::size_t place = 0;
-    while (place < list.count && list.near[place].node != candidate.node) ++place;
-    if (place < list.count && list.near[place] <= candidate) return false;
-    if (place == list.count && list.count < near_nodes) ++list.count;
-    place = std::min<std::size_t>(place, near_nodes - 1);
-    for (; place > 0 && candidate < list.near[place - 1]; --place) list.near[place] = list.near[place - 1];
-    list.near[place] = candidate;
+// A node and how far it is, as a number in the order of NearNode.
+using NodeKey = std::uint64_t;
+constexpr int key_node_bits = 16;
+constexpr NodeKey no_key = std::numeric_limits<NodeKey>::max();
+NodeKey key_of(const NearNode& near) { return NodeKey{near.distance} << key_node_bits | near.node; }
+Distance distance_of(NodeKey key) { return static_cast<Distance>(key >> key_node_bits); }
+NearNode near_of(NodeKey key) { return {distance_of(key), static_cast<std::uint16_t>(key)}; }
+
+// The nearest nodes of a vertex, ascending, then no_key.
+using NodeKeys = std::array<NodeKey, near_nodes>;
+
+// Enters a node if it is one of the nearest, or nearer than known; returns whether it was. Which place it takes cannot
+// be foreseen, so nothing here branches on it.
+bool enter(NodeKeys& list, NodeKey candidate) {
+    if (list.back() <= candidate) return false;
+    std::size_t end = near_nodes - 1;  // the one that goes: the same node, or else the farthest
+    for (std::size_t k = 0; k < near_nodes; ++k)
+        end = static_cast<std::uint16_t>(list[k]) == static_cast<std::uint16_t>(candidate) ? k : end;
+    if (list[end] <= candidate) return false;
+    for (std::size_t k = near_nodes - 1; k > 0; --k)
+        list[k] = k <= end ? std::min(list[k], std::max(list[k - 1], candidate)) : list[k];
+    list[0] = std::min(list[0], candidate);
     return true;
 }
 
 struct Visit {
+    NodeKey key = 0;
     std::uint32_t vertex = 0;
-    NearNode near;
 };
 
-// A queue by distance, then by node, for Dijkstra's algorithm, which never asks for less than it got last (Ahuja,
-// Mehlhorn, Orlin, Tarjan: Faster algorithms for the shortest path problem, 1990). Visits wait in a bucket by the
-// highest bit in which they differ from the last one taken, and move to lower buckets as their turn approaches. The
+// A queue for Dijkstra's algorithm, in buckets by distance (Dial 1969). A visit leads to another one of its bucket only
+// over a step that is shorter than a bucket is wide, as between vertices at the same place. Visits of vertices with
+// such steps come first, by distance, then by node; those of all others, which is most, may then come in any order. The
 // node is part of the order because a vertex would otherwise be visited again for every lower node at the same
 // distance.
-class RadixQueue {
+class BucketQueue {
 public:
+    // reach: how far apart the distances in the queue can be.
+    BucketQueue(const Graph& graph, Distance reach)
+        : width_bits_(std::max(0, static_cast<int>(std::bit_width(reach)) - most_bucket_bits)),
+          has_short_steps_(graph.first.size() - 1),
+          buckets_(std::bit_ceil((std::size_t{reach} >> width_bits_) + 2)) {
+        for (std::uint32_t v = 0; v < has_short_steps_.size(); ++v)
+            for (const Step& step : graph.from(v))
+                if (step.length >> width_bits_ == 0) has_short_steps_[v] = true;
+    }
     bool empty() const { return size_ == 0; }
     void push(const Visit& visit) {
-        waiting_[static_cast<std::size_t>(std::bit_width(key(visit) ^ last_))].push_back(visit);
         ++size_;
+        const Distance bucket = distance_of(visit.key) >> width_bits_;
+        if (bucket == now_)
+            push_first(visit);
+        else
+            buckets_[bucket & (buckets_.size() - 1)].push_back(visit);
     }
     Visit pop() {
-        if (waiting_[0].empty()) refill();
-        const Visit visit = waiting_[0].back();
-        waiting_[0].pop_back();
+        if (first_.empty() && others_.empty()) next_bucket();
         --size_;
+        auto& from = first_.empty() ? others_ : first_;
+        if (!first_.empty()) std::pop_heap(first_.begin(), first_.end(), later);
+        const Visit visit = from.back();
+        from.pop_back();
         return visit;
     }
 
 private:
-    static std::uint64_t key(const Visit& visit) { return std::uint64_t{visit.near.distance} << 16 | visit.near.node; }
-    void refill() {
-        std::size_t bit = 1;
-        while (waiting_[bit].empty()) ++bit;
-        last_ = std::numeric_limits<std::uint64_t>::max();
-        for (const Visit& visit : waiting_[bit]) last_ = std::min(last_, key(visit));
-        for (const Visit& visit : waiting_[bit])
-            waiting_[static_cast<std::size_t>(std::bit_width(key(visit) ^ last_))].push_back(visit);
-        waiting_[bit].clear();
+    static constexpr int most_bucket_bits = 10;
+    static bool later(const Visit& a, const Visit& b) { return a.key > b.key; }
+    void push_first(const Visit& visit) {
+        first_.push_back(visit);
+        std::push_heap(first_.begin(), first_.end(), later);
     }
-    std::array<std::vector<Visit>, 49> waiting_;
-    std::uint64_t last_ = 0;
+    void next_bucket() {
+        do {
+            ++now_;
+        } while (buckets_[now_ & (buckets_.size() - 1)].empty());
+        auto& bucket = buckets_[now_ & (buckets_.size() - 1)];
+        for (const Visit& visit : bucket)
+            if (has_short_steps_[visit.vertex])
+                push_first(visit);
+            else
+                others_.push_back(visit);
+        bucket.clear();
+    }
+    int width_bits_;
+    std::vector<std::uint8_t> has_short_steps_;  // by vertex
+    std::vector<std::vector<Visit>> buckets_;    // a ring
+    std::vector<Visit> first_, others_;          // of the bucket whose turn it is; the first are a heap
+    Distance now_ = unreached;                   // its number; before the first, so that the next is 0
     std::size_t size_ = 0;
 };
 
@@ -294,29 +349,42 @@ private:
 // vertices that know them meet others that know too few.
 std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::uint32_t>& nodes,
                                      const KeptNodes& kept) {
-    std::vector<NearNodes> lists = kept.near;
-    lists.resize(graph.first.size() - 1);
-    RadixQueue queue;
-    for (std::uint32_t v = 0; v < kept.near.size(); ++v) {
-        const auto steps = graph.from(v);
-        const bool at_rim = std::any_of(steps.begin(), steps.end(),
-                                        [&](const Step& step) { return lists[step.vertex].count < near_nodes; });
-        for (std::size_t k = 0; at_rim && k < lists[v].count; ++k) queue.push({v, lists[v].near[k]});
-    }
-    auto reach = [&](std::uint32_t vertex, NearNode near) {
-        if (enter(lists[vertex], near)) queue.push({vertex, near});
-    };
-    for (std::size_t n = kept.vertex.size(); n < nodes.size(); ++n) reach(nodes[n], {0, static_cast<std::uint16_t>(n)});
+    constexpr auto none = [] {
+        NodeKeys keys{};
+        keys.fill(no_key);
+        return keys;
+    }();
+    std::vector<NodeKeys> lists(graph.first.size() - 1, none);
+    for (std::size_t v = 0; v < kept.near.size(); ++v)
+        for (std::size_t k = 0; k < kept.near[v].count; ++k) lists[v][k] = key_of(kept.near[v].near[k]);
+    std::vector<Visit> starts;
+    const auto knows_too_few = [&](std::uint32_t v) { return lists[v].back() == no_key; };
+    for (const std::uint32_t v : around(graph, kept.near.size(), knows_too_few))
+        for (std::size_t k = 0; k < kept.near[v].count; ++k) starts.push_back({lists[v][k], v});
+    for (std::size_t n = kept.vertex.size(); n < nodes.size(); ++n)
+        if (enter(lists[nodes[n]], n)) starts.push_back({n, nodes[n]});
+
+    Distance reach = 0;
+    for (const Step& step : graph.steps) reach = std::max(reach, step.length);
+    for (const Visit& start : starts) reach = std::max(reach, distance_of(start.key));
+    BucketQueue queue(graph, reach);
+    for (const Visit& start : starts) queue.push(start);
     while (!queue.empty()) {
         const Visit visit = queue.pop();
-        const NearNodes& list = lists[visit.vertex];
-        const auto end = list.near.begin() + list.count;
-        if (std::find(list.near.begin(), end, visit.near) == end) continue;
-        for (const Step& step : graph.from(visit.vertex))
-            if (visit.near.distance <= unreached / 2)
-                reach(step.vertex, {visit.near.distance + step.length, visit.near.node});
+        const NodeKeys& list = lists[visit.vertex];
+        bool listed = false;
+        for (const NodeKey key : list) listed |= key == visit.key;
+        if (!listed || distance_of(visit.key) > unreached / 2) continue;
+        for (const Step& step : graph.from(visit.vertex)) {
+            const NodeKey there = visit.key + (NodeKey{step.length} << key_node_bits);
+            if (enter(lists[step.vertex], there)) queue.push({there, step.vertex});
+        }
     }
-    return lists;
+    std::vector<NearNodes> out(lists.size());
+    for (std::size_t v = 0; v < lists.size(); ++v)
+        for (; out[v].count < near_nodes && lists[v][out[v].count] != no_key; ++out[v].count)
+            out[v].near[out[v].count] = near_of(lists[v][out[v].count]);
+    return out;
 }
 
 // Sumner's weights, (1 - distance / distance of the next node)^2, normalised to sum to one; the rounding remainder goes
@@ -334,19 +402,22 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
         share[k] = nearness * nearness;
         sum += share[k];
     }
-    std::array<std::pair<std::int32_t, std::uint16_t>, handles_per_vertex> entries{};  // negated weight, node
-    std::int32_t rest = 1 << weight_bits;
+    // By descending weight, then by node: as one number, the weight by what it lacks of all.
+    constexpr std::uint32_t all = 1u << weight_bits;
+    std::array<std::uint32_t, handles_per_vertex> entries;
+    entries.fill(all << 16);
+    std::uint32_t rest = all;
     for (std::size_t k = 1; k < count; ++k) {
-        const auto weight = sum == 0 ? 0 : static_cast<std::int32_t>((share[k] << weight_bits) / sum);
-        entries[k] = {-weight, list.near[k].node};
+        const auto weight = sum == 0 ? 0 : static_cast<std::uint32_t>((share[k] << weight_bits) / sum);
+        entries[k] = (all - weight) << 16 | list.near[k].node;
         rest -= weight;
     }
-    entries[0] = {-rest, list.near[0].node};
+    entries[0] = (all - rest) << 16 | list.near[0].node;
     std::sort(entries.begin(), entries.end());
     VertexWeights out;
-    for (std::size_t k = 0; k < handles_per_vertex && entries[k].first < 0; ++k) {
-        out.handle[k] = entries[k].second;
-        out.weight[k] = static_cast<std::uint16_t>(-entries[k].first);
+    for (std::size_t k = 0; k < handles_per_vertex && entries[k] >> 16 < all; ++k) {
+        out.handle[k] = static_cast<std::uint16_t>(entries[k]);
+        out.weight[k] = static_cast<std::uint16_t>(all - (entries[k] >> 16));
     }
     return out;
 }

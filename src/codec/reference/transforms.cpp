@@ -43,7 +43,8 @@ QuantisedRotation quantise_rotation(const std::array<double, 4>& quaternion) {
 namespace {
 
 // A sum of weighted vectors, in 2^-(matrix_bits + weight_bits) lattice units. The weights sum to 2^12, so sums of
-// turned vectors stay below sqrt(3) * 2^25 * 2^36, and those of moved points below 2^63.
+// turned vectors stay below sqrt(3) * 2^25 * 2^36. A transform's offset is below 5 * 2^48, and a point that a matrix
+// turns below 2 * 2^48, so that those of moved points stay below 7 * 2^60.
 using WeightedSum = std::array<std::int64_t, 3>;
 
 void add_turned(WeightedSum& sum, std::int64_t weight, const RotationMatrix& m, LatticePoint v) {
@@ -71,19 +72,36 @@ LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint
             within_lattice(std::int64_t{turned.z} + pivot.z + shift.z)};
 }
 
-LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, std::span<const RotationMatrix> rotation,
-                          std::span<const LatticePoint> pivots, std::span<const QuantisedTransform> transforms) {
-    WeightedSum sum{};
-    for (std::size_t i = 0; i < handles_per_vertex && weights.weight[i] > 0; ++i) {
-        const auto handle = weights.handle[i];
-        const LatticePoint pivot = pivots[handle], to = pivot + transforms[handle].shift;
-        add_turned(sum, weights.weight[i], rotation[handle], point - pivot);
-        const std::int64_t scale = std::int64_t{weights.weight[i]} << matrix_bits;
-        sum[0] += scale * to.x;
-        sum[1] += scale * to.y;
-        sum[2] += scale * to.z;
+std::vector<PointMove> point_moves(std::span<const QuantisedTransform> transforms,
+                                   std::span<const LatticePoint> pivots) {
+    std::vector<PointMove> out;
+    out.reserve(transforms.size());
+    for (std::size_t i = 0; i < transforms.size(); ++i) {
+        const auto m = rotation_matrix(transforms[i].rotation);
+        const LatticePoint pivot = pivots[i], to = pivot + transforms[i].shift;
+        const auto offset = [&](std::size_t row, std::int32_t moved) {
+            return (std::int64_t{moved} << matrix_bits) -
+                   (m[row] * pivot.x + m[row + 1] * pivot.y + m[row + 2] * pivot.z);
+        };
+        out.push_back({m, {offset(0, to.x), offset(3, to.y), offset(6, to.z)}});
     }
-    return {within_lattice(rounded(sum[0])), within_lattice(rounded(sum[1])), within_lattice(rounded(sum[2]))};
+    return out;
+}
+
+// The handles' matrices and offsets are blended first, which takes fewer products than to blend the places.
+LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, std::span<const PointMove> moves) {
+    RotationMatrix m{};
+    WeightedSum offset{};
+    for (std::size_t i = 0; i < handles_per_vertex && weights.weight[i] > 0; ++i) {
+        const std::int64_t weight = weights.weight[i];
+        const PointMove& move = moves[weights.handle[i]];
+        for (std::size_t k = 0; k < m.size(); ++k) m[k] += weight * move.rotation[k];
+        for (std::size_t c = 0; c < offset.size(); ++c) offset[c] += weight * move.offset[c];
+    }
+    const auto along = [&](std::size_t row, std::int64_t start) {
+        return within_lattice(rounded(start + m[row] * point.x + m[row + 1] * point.y + m[row + 2] * point.z));
+    };
+    return {along(0, offset[0]), along(3, offset[1]), along(6, offset[2])};
 }
 
 LatticePoint blended_turn(LatticePoint vector, const VertexWeights& weights, std::span<const RotationMatrix> rotation) {

@@ -49,10 +49,18 @@ std::vector<RotationMatrix> rotation_matrices(std::span<const QuantisedTransform
 // One point moved by one transform; the result is clamped to the lattice.
 LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift);
 
-// The weighted mean of the places where a point's handles move it, rounded once and clamped to the lattice. rotations,
-// pivots and transforms: one per handle.
-LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, std::span<const RotationMatrix> rotation,
-                          std::span<const LatticePoint> pivots, std::span<const QuantisedTransform> transforms);
+// A transform as it moves any point: R point + offset, the latter in units of 2^-matrix_bits.
+struct PointMove {
+    RotationMatrix rotation;
+    std::array<std::int64_t, 3> offset;
+};
+// pivots: one per transform.
+std::vector<PointMove> point_moves(std::span<const QuantisedTransform> transforms,
+                                   std::span<const LatticePoint> pivots);
+
+// The weighted mean of the places where a point's handles move it, rounded once and clamped to the lattice. moves: one
+// per handle.
+LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, std::span<const PointMove> moves);
 
 // A vector turned by its handles, blended in the same way.
 LatticePoint blended_turn(LatticePoint vector, const VertexWeights& weights, std::span<const RotationMatrix> rotation);

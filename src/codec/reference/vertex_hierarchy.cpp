@@ -37,17 +37,20 @@ Layer layer_of_vertices(std::span<const LatticePoint> positions, std::span<const
     std::vector<std::uint32_t> seen(n, no_node);
     layer.first_neighbour.assign(1, 0);
     layer.first_neighbour.reserve(n + 1);
-    layer.neighbours.reserve(triangles.size() * 3 + n);
+    // As in join(). Of the two corners that a triangle adds, a closed mesh has seen one.
+    layer.neighbours.resize(triangles.size() * 6 + 1);
+    std::size_t count = 0;
     for (std::uint32_t v = 0; v < n; ++v) {
         seen[v] = v;
         for (const std::uint32_t t : around.of(v))
             for (const std::uint32_t u : triangles[t]) {
-                if (seen[u] == v) continue;
+                layer.neighbours[count] = u;
+                count += seen[u] != v;
                 seen[u] = v;
-                layer.neighbours.push_back(u);
             }
-        layer.first_neighbour.push_back(static_cast<std::uint32_t>(layer.neighbours.size()));
+        layer.first_neighbour.push_back(static_cast<std::uint32_t>(count));
     }
+    layer.neighbours.resize(count);
     return layer;
 }
 
@@ -91,12 +94,11 @@ std::vector<std::uint32_t> match(const Layer& layer) {
         std::uint32_t best = no_node;
         double least = 0;
         for (const std::uint32_t u : layer.around(v)) {
-            if (partner[u] != no_node) continue;
             const Vector3d apart = layer.centre[u] - layer.centre[v];
             const double score = (dot(apart, apart) + 1.0) * layer.vertices[u];
-            if (best != no_node && score >= least) continue;
-            best = u;
-            least = score;
+            const bool better = (partner[u] == no_node) & ((best == no_node) | (score < least));
+            best = better ? u : best;
+            least = better ? score : least;
         }
         if (best == no_node) continue;
         partner[v] = best;
@@ -146,24 +148,27 @@ Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, Hierarc
         const double scale = u == no_node ? 0.0 : std::sqrt(1.0 / a + 1.0 / b) * (1 << split_scale_bits);
         level.split_scale.push_back(static_cast<std::uint16_t>(scale + 0.5));
     }
+    // Whether a node was seen already cannot be foreseen, so each is written, and what follows overwrites it if it was.
     std::vector<std::uint32_t> seen(level.size(), no_node);
     coarse.first_neighbour.reserve(level.size() + 1);
     coarse.first_neighbour.assign(1, 0);
-    coarse.neighbours.reserve(fine.neighbours.size() * 5 / 8);
+    coarse.neighbours.resize(fine.neighbours.size() + 1);
+    std::size_t count = 0;
     for (std::uint32_t p = 0; p < level.size(); ++p) {
         seen[p] = p;
-        const std::size_t full = coarse.neighbours.size() + hierarchy_row_limit;
+        const std::size_t full = count + hierarchy_row_limit;
         for (const std::uint32_t child : {level.first[p], level.second[p]}) {
             if (child == no_node) continue;
             for (const std::uint32_t u : fine.around(child)) {
                 const std::uint32_t q = parent[u];
-                if (seen[q] == p || coarse.neighbours.size() == full) continue;
+                coarse.neighbours[count] = q;
+                count += seen[q] != p && count != full;
                 seen[q] = p;
-                coarse.neighbours.push_back(q);
             }
         }
-        coarse.first_neighbour.push_back(static_cast<std::uint32_t>(coarse.neighbours.size()));
+        coarse.first_neighbour.push_back(static_cast<std::uint32_t>(count));
     }
+    coarse.neighbours.resize(count);
     return coarse;
 }
 

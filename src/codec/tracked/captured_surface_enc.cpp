@@ -66,22 +66,54 @@ void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::s
     samples.normals.push_back(to_floats(normalised(normal)));
 }
 
-// The samples at which the captured surface is examined: the moved reference's vertices, then the centres of its
+// Where within a triangle samples lie, and how much of its area each stands for. Both rules integrate the square of a
+// linear function exactly.
+struct InnerSample {
+    std::array<double, 3> shares{};  // of the corners
+    double weight = 0;
+};
+struct SampleRule {
+    double corner_weight = 0;  // of the vertices, per triangle
+    std::span<const InnerSample> inner;
+};
+
+SampleRule rule_of(TargetSamples samples) {
+    static constexpr std::array<InnerSample, 1> middle = {{{{1.0 / 3, 1.0 / 3, 1.0 / 3}, 3.0 / 4}}};
+    static constexpr std::array<InnerSample, 3> three = {{{{2.0 / 3, 1.0 / 6, 1.0 / 6}, 1.0 / 3},
+                                                          {{1.0 / 6, 2.0 / 3, 1.0 / 6}, 1.0 / 3},
+                                                          {{1.0 / 6, 1.0 / 6, 2.0 / 3}, 1.0 / 3}}};
+    if (samples == TargetSamples::middles) return {1.0 / 12, middle};
+    return {0, three};
+}
+
+// The samples at which the captured surface is examined: the moved reference's vertices, then those within each of its
 // triangles.
-SurfaceSamples samples_of(const MovedReference& moved) {
-    SurfaceSamples out{points_of(moved.positions), points_of(moved.normals)};
-    out.points.reserve(moved.positions.size() + moved.triangles.size());
-    out.normals.reserve(out.points.capacity());
-    for (const auto& t : moved.triangles) add_middle(out, out.points, out.normals, t);
+SurfaceSamples samples_of(const MovedReference& moved, const SampleRule& rule) {
+    SurfaceSamples out;
+    const auto count = moved.positions.size() + rule.inner.size() * moved.triangles.size();
+    out.points.reserve(count);
+    out.normals.reserve(count);
+    out.points = points_of(moved.positions);
+    out.normals = points_of(moved.normals);
+    for (const auto& t : moved.triangles)
+        for (const auto& sample : rule.inner) {
+            Vector3d point{}, normal{};
+            for (std::size_t i = 0; i < 3; ++i) {
+                point = point + to_vector(moved.positions[t[i]]) * sample.shares[i];
+                normal = normal + moved.normals[t[i]] * sample.shares[i];
+            }
+            out.points.push_back(to_floats(point));
+            out.normals.push_back(to_floats(normalised(normal)));
+        }
     return out;
 }
 
 // Finds the function on the mesh, linear within each triangle, that is nearest to the values at the samples: least
-// squares by conjugate gradients, with the weights that integrate squares exactly (a twelfth of a triangle's area at
-// each corner, three quarters at its centre).
+// squares by conjugate gradients, with the weights that integrate squares exactly.
 struct SurfaceFit {
     std::span<const Triangle> triangles;
-    std::vector<double> corner_weight, middle_weight;  // zero if the sample has no value
+    SampleRule rule;
+    std::vector<double> corner_weight, inner_weight;  // zero if the sample has no value
     std::vector<double> diagonal;
 
     // Two functions at a time, which takes vector instructions no longer than one.
@@ -90,22 +122,29 @@ struct SurfaceFit {
     std::array<std::vector<double>, 2> fitted(const std::vector<Both>& seen) const;
 };
 
-SurfaceFit make_surface_fit(const MovedReference& moved, const std::vector<SurfacePoint>& targets) {
-    const std::size_t vertices = moved.positions.size();
+SurfaceFit make_surface_fit(const MovedReference& moved, const SampleRule& rule,
+                            const std::vector<SurfacePoint>& targets) {
+    const std::size_t vertices = moved.positions.size(), inner = rule.inner.size();
     SurfaceFit out;
     out.triangles = moved.triangles;
+    out.rule = rule;
     out.corner_weight.assign(vertices, 0);
-    out.middle_weight.assign(moved.triangles.size(), 0);
+    out.inner_weight.assign(inner * moved.triangles.size(), 0);
     for (std::size_t t = 0; t < moved.triangles.size(); ++t) {
         const auto& corners = moved.triangles[t];
         const double area = length(area_vector(moved.positions, corners)) / 2;
         for (const auto v : corners)
-            if (targets[v].found()) out.corner_weight[v] += area / 12;
-        if (targets[vertices + t].found()) out.middle_weight[t] = area * 3 / 4;
+            if (targets[v].found()) out.corner_weight[v] += area * rule.corner_weight;
+        for (std::size_t k = 0; k < inner; ++k)
+            if (targets[vertices + inner * t + k].found())
+                out.inner_weight[inner * t + k] = area * rule.inner[k].weight;
     }
     out.diagonal = out.corner_weight;
     for (std::size_t t = 0; t < moved.triangles.size(); ++t)
-        for (const auto v : moved.triangles[t]) out.diagonal[v] += out.middle_weight[t] / 9;
+        for (std::size_t k = 0; k < inner; ++k)
+            for (std::size_t i = 0; i < 3; ++i)
+                out.diagonal[moved.triangles[t][i]] +=
+                    out.inner_weight[inner * t + k] * rule.inner[k].shares[i] * rule.inner[k].shares[i];
     return out;
 }
 
@@ -113,29 +152,35 @@ std::vector<SurfaceFit::Both> SurfaceFit::times(const std::vector<Both>& x) cons
     std::vector<Both> out(x.size());
     for (std::size_t v = 0; v < x.size(); ++v)
         for (std::size_t i = 0; i < 2; ++i) out[v][i] = corner_weight[v] * x[v][i];
-    for (std::size_t t = 0; t < triangles.size(); ++t) {
-        const auto& [a, b, c] = triangles[t];
-        Both share{};
-        for (std::size_t i = 0; i < 2; ++i) share[i] = middle_weight[t] * (x[a][i] + x[b][i] + x[c][i]) / 9;
-        for (std::size_t i = 0; i < 2; ++i) out[a][i] += share[i];
-        for (std::size_t i = 0; i < 2; ++i) out[b][i] += share[i];
-        for (std::size_t i = 0; i < 2; ++i) out[c][i] += share[i];
-    }
+    const double* weight = inner_weight.data();
+    for (const auto& [a, b, c] : triangles)
+        for (const auto& sample : rule.inner) {
+            const auto& s = sample.shares;
+            Both value{};
+            for (std::size_t i = 0; i < 2; ++i) value[i] = *weight * (s[0] * x[a][i] + s[1] * x[b][i] + s[2] * x[c][i]);
+            for (std::size_t i = 0; i < 2; ++i) out[a][i] += s[0] * value[i];
+            for (std::size_t i = 0; i < 2; ++i) out[b][i] += s[1] * value[i];
+            for (std::size_t i = 0; i < 2; ++i) out[c][i] += s[2] * value[i];
+            ++weight;
+        }
     return out;
 }
 
 std::array<std::vector<double>, 2> SurfaceFit::fitted(const std::vector<Both>& seen) const {
-    constexpr int rounds = 6;
+    constexpr int rounds = 4;  // two more change the bytes by nothing that can be told from chance
     const std::size_t vertices = diagonal.size();
     std::vector<Both> x(vertices), residual(vertices);
     for (std::size_t v = 0; v < vertices; ++v)
         for (std::size_t i = 0; i < 2; ++i) {
-            x[v][i] = corner_weight[v] > 0 ? seen[v][i] : 0;
+            x[v][i] = seen[v][i];  // zero if there is none
             residual[v][i] = corner_weight[v] * seen[v][i];
         }
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-        for (const auto v : triangles[t])
-            for (std::size_t i = 0; i < 2; ++i) residual[v][i] += middle_weight[t] * seen[vertices + t][i] / 3;
+    const std::size_t inner = rule.inner.size();
+    for (std::size_t place = 0; place < inner_weight.size(); ++place)
+        for (std::size_t corner = 0; corner < 3; ++corner)
+            for (std::size_t i = 0; i < 2; ++i)
+                residual[triangles[place / inner][corner]][i] +=
+                    inner_weight[place] * rule.inner[place % inner].shares[corner] * seen[vertices + place][i];
     const auto product = times(x);
     std::vector<Both> direction(vertices);
     Both product_before{};
@@ -193,8 +238,9 @@ std::vector<double> distances(const SurfaceSamples& samples, const std::vector<S
 }
 
 // The colour of the surface at each sample minus that of the reference there: a list of levels per component.
-std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const LatticeMesh& captured,
-                                                  const std::vector<SurfacePoint>& targets, Threads threads) {
+std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const SampleRule& rule,
+                                                  const LatticeMesh& captured, const std::vector<SurfacePoint>& targets,
+                                                  Threads threads) {
     std::array<std::vector<double>, 3> out;
     for (auto& component : out) component.assign(targets.size(), 0);
     const std::size_t vertices = moved.positions.size();
@@ -208,7 +254,10 @@ std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, c
             if (i < vertices) {
                 level -= moved.colours[i][c];
             } else {
-                for (const auto v : moved.triangles[i - vertices]) level -= moved.colours[v][c] / 3.0;
+                const auto& corners = moved.triangles[(i - vertices) / rule.inner.size()];
+                const auto& shares = rule.inner[(i - vertices) % rule.inner.size()].shares;
+                for (std::size_t corner = 0; corner < 3; ++corner)
+                    level -= shares[corner] * moved.colours[corners[corner]][c];
             }
             out[c][i] = level;
         }
@@ -235,15 +284,18 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
 }
 
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const SurfaceIndex& surface, double reach, Threads threads) {
-    const auto samples = samples_of(moved);
+                                    const SurfaceIndex& surface, const TargetSearch& how) {
+    const auto& threads = how.threads;
+    const auto rule = rule_of(how.samples);
+    const auto samples = samples_of(moved, rule);
     const auto targets = closest_facing(surface, samples.points, samples.normals,
-                                        {.reach = static_cast<float>(reach), .along = true}, threads);
-    const auto fit = make_surface_fit(moved, targets);
+                                        {.reach = static_cast<float>(how.reach), .along = true}, threads);
+    const auto fit = make_surface_fit(moved, rule, targets);
     std::vector<std::vector<double>> seen(1);
     seen[0] = distances(samples, targets);
     if (!moved.colours.empty())
-        for (auto& component : colour_changes(moved, captured, targets, threads)) seen.push_back(std::move(component));
+        for (auto& component : colour_changes(moved, rule, captured, targets, threads))
+            seen.push_back(std::move(component));
     parallel_for((seen.size() + 1) / 2, threads, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t pair = begin; pair < end; ++pair) {
             const bool two = 2 * pair + 1 < seen.size();
@@ -438,7 +490,7 @@ void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const Surfac
                     const SimplifiedReferenceOptions& options) {
     const auto normals = vertex_normals(mesh.positions, mesh.triangles);
     const auto targets = find_tracked_targets({mesh.positions, normals, mesh.triangles, mesh.colours}, captured,
-                                              surface, options.reach, options.threads);
+                                              surface, {.reach = options.reach, .threads = options.threads});
     mesh.positions = displaced(mesh.positions, normals, targets.displacement);
     if (!mesh.colours.empty()) mesh.colours = recoloured(mesh.colours, targets.colours);
 }

@@ -32,11 +32,20 @@ struct TrackedTargets {
     std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty if the reference has no colours
 };
 
-// captured: the mesh that `surface` was made from. reach: lattice units; vertices without a surface within it take the
-// values of their neighbours. The fit is least squares over the whole surface, not only at the vertices: on a round
-// limb, the vertices of a coarse reference must lie outside, so that its triangles lie half outside and half inside.
+// From where in each triangle the surface is looked for, beside the vertices.
+enum class TargetSamples : std::uint8_t { middles, three };
+
+struct TargetSearch {
+    double reach = 480;  // lattice units; vertices without a surface within it take the values of their neighbours
+    TargetSamples samples = TargetSamples::middles;
+    Threads threads = {};
+};
+
+// captured: the mesh that `surface` was made from. The fit is least squares over the whole surface, not only at the
+// vertices: on a round limb, the vertices of a coarse reference must lie outside, so that its triangles lie half
+// outside and half inside.
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const SurfaceIndex& surface, double reach, Threads threads);
+                                    const SurfaceIndex& surface, const TargetSearch& how);
 
 // The RMS distance of samples of a surface from another one, in each cube of space.
 struct CubeErrors {

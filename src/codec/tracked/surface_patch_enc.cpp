@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <utility>
@@ -43,16 +44,33 @@ class Sides {
 public:
     Sides(std::span<const LatticePoint> positions, std::span<const Triangle> triangles)
         : triangles_(triangles), twin_(3 * triangles.size(), none) {
-        // The sides that leave each vertex, ascending, in compressed rows.
-        std::vector<std::uint32_t> first(positions.size() + 1, 0), leaving(twin_.size());
-        for (std::uint32_t s = 0; s < twin_.size(); ++s) ++first[from(s) + std::size_t{1}];
+        // The sides that leave each vertex, ascending, in compressed rows, with where they lead.
+        struct Leaving {
+            std::uint32_t side = 0, to = 0;
+        };
+        std::vector<std::uint32_t> first(positions.size() + 1, 0);
+        std::vector<Leaving> leaving(twin_.size());
+        for (const auto& t : triangles)
+            for (const auto v : t) ++first[v + std::size_t{1}];
         for (std::size_t v = 0; v < positions.size(); ++v) first[v + 1] += first[v];
         std::vector<std::uint32_t> next_free(first.begin(), first.end() - 1);
-        for (std::uint32_t s = 0; s < twin_.size(); ++s) leaving[next_free[from(s)]++] = s;
+        for (std::uint32_t t = 0, s = 0; t < triangles.size(); ++t)
+            for (std::size_t i = 0; i < 3; ++i, ++s)
+                leaving[next_free[triangles[t][i]]++] = {s, triangles[t][(i + 1) % 3]};
+        const auto row = [&](std::uint32_t v) {
+            return std::span(leaving).subspan(first[v], first[v + std::size_t{1}] - first[v]);
+        };
         const auto find = [&](std::uint32_t a, std::uint32_t b, std::vector<std::uint32_t>& found) {
             found.clear();
-            for (auto i = first[a]; i < first[a + std::size_t{1}]; ++i)
-                if (to(leaving[i]) == b) found.push_back(leaving[i]);
+            for (const auto& side : row(a))
+                if (side.to == b) found.push_back(side.side);
+        };
+        // The side from a to b, if there is one alone.
+        const auto only = [&](std::uint32_t a, std::uint32_t b) {
+            std::uint32_t found = none, count = 0;
+            for (const auto& side : row(a))
+                if (side.to == b) found = side.side, ++count;
+            return count == 1 ? found : none;
         };
         const auto agreement = [&](std::uint32_t a, std::uint32_t b) {
             return dot(normal_of(positions, triangles[a / 3]), normal_of(positions, triangles[b / 3]));
@@ -61,12 +79,13 @@ public:
         for (std::uint32_t s = 0; s < twin_.size(); ++s) {
             if (from(s) == to(s)) twin_[s] = s;  // of a triangle that names a vertex twice: never a border
             if (twin_[s] != none) continue;
-            find(from(s), to(s), along);
-            find(to(s), from(s), against);
-            if (along.size() == 1 && against.size() == 1) {
-                twin_[s] = against[0], twin_[against[0]] = s;
+            const auto other = only(to(s), from(s));
+            if (other != none && only(from(s), to(s)) == s) {
+                twin_[s] = other, twin_[other] = s;
                 continue;
             }
+            find(from(s), to(s), along);
+            find(to(s), from(s), against);
             for (std::size_t pairs = std::min(along.size(), against.size()); pairs > 0; --pairs) {
                 double best = -2;
                 std::size_t a = 0, b = 0;
@@ -137,7 +156,9 @@ std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std:
             if (least <= how.enough * how.enough) continue;
             const auto any = surface.closest_within(points[i], static_cast<float>(how.reach), guess);
             if (!any.found() || static_cast<double>(any.squared_distance) >= least) continue;
-            const auto facing = dot(to_vector(surface.triangle_normals[any.triangle]), to_vector(normals[i]));
+            const auto across =
+                normalised(area_vector(std::span<const Point3f>(surface.positions), surface.triangles[any.triangle]));
+            const auto facing = dot(across, to_vector(normals[i]));
             if (facing >= how.agreement) out[i] = any;
         }
     });
@@ -218,17 +239,20 @@ void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, c
     std::vector<bool> uncovered(mesh.positions.size());
     for (std::size_t v = 0; v < uncovered.size(); ++v)
         uncovered[v] = !capture.on_decoded[v].found() || distance_to(capture.on_decoded[v], 0) > options.lost;
+    std::vector<Triangle> there;
+    std::copy_if(mesh.triangles.begin(), mesh.triangles.end(), std::back_inserter(there),
+                 [&](const Triangle& t) { return uncovered[t[0]] || uncovered[t[1]] || uncovered[t[2]]; });
     DisjointSets regions(uncovered.size());
     std::vector<double> area(uncovered.size(), 0);
-    for (const auto& t : mesh.triangles)
+    for (const auto& t : there)
         for (std::size_t i = 0; i < 3; ++i)
             if (uncovered[t[i]] && uncovered[t[(i + 1) % 3]]) regions.join(t[i], t[(i + 1) % 3]);
-    for (const auto& t : mesh.triangles) {
+    for (const auto& t : there) {
         const double third = area_of(mesh.positions, t) / 3;
         for (const auto v : t)
             if (uncovered[v]) area[regions.of(v)] += third;
     }
-    for (const auto& t : mesh.triangles)
+    for (const auto& t : there)
         for (const auto from : t)
             for (const auto to : t)
                 if (uncovered[from] && !uncovered[to] && area[regions.of(from)] > options.speck * options.speck)

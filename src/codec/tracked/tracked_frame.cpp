@@ -144,12 +144,11 @@ Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::in
 
 std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
                                          std::span<const QuantisedTransform> transforms, Threads threads) {
-    const auto rotation = rotation_matrices(transforms);
+    const auto moves = point_moves(transforms, reference.graph.pivots);
     std::vector<LatticePoint> out(reference.mesh.positions.size());
     parallel_for(out.size(), threads, 8192, [&](std::size_t begin, std::size_t end) {
         for (std::size_t v = begin; v < end; ++v)
-            out[v] = blended_move(reference.mesh.positions[v], reference.nodes.weights[v], rotation,
-                                  reference.graph.pivots, transforms);
+            out[v] = blended_move(reference.mesh.positions[v], reference.nodes.weights[v], moves);
     });
     return out;
 }

@@ -175,8 +175,9 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
         targets.displacement.resize(moved.size());
         if (!reference.mesh.colours.empty()) targets.colours.resize(3 * moved.size());
     } else {
-        targets = find_tracked_targets({moved, normals, triangles, reference.mesh.colours}, mesh, surface,
-                                       options.reach, options.threads);
+        targets = find_tracked_targets(
+            {moved, normals, triangles, reference.mesh.colours}, mesh, surface,
+            {.reach = options.reach, .samples = options.target_samples, .threads = options.threads});
     }
     clock.done("targets");
     if (options.denoise) {

@@ -34,6 +34,7 @@ struct TrackedFrameOptions {
     std::optional<TargetFilterOptions> denoise;  // filters the targets over time
     const RemovedNoise* noise = nullptr;         // else: what to take off them
     bool keeps_noise = false;                    // whether to tell what filtering took off
+    TargetSamples target_samples = TargetSamples::middles;
     bool motion_alone = false;  // displacement and colours stay as predicted: the smallest frame possible
     Threads threads = {};
 };

@@ -2,6 +2,7 @@
 // that paid at their place: docs/performance.md has what each level takes and gives.
 #pragma once
 
+#include "codec/tracked/captured_surface_enc.h"
 #include "surface/tracked_registration.h"
 
 namespace htvm::internal {
@@ -11,12 +12,11 @@ inline constexpr int usual_effort = 5, most_effort = 9;
 struct TrackingEffort {
     double samples = 1;     // registration's samples, relative to DeformationOptions'
     int coarse_rounds = 6;  // see DeformationOptions, as what follows
-    int fine_rounds = 4;
+    int fine_rounds = 3;
     int surface_rounds = 3;
-    int solver_iterations = 40;
-    bool follows_limbs = true;         // where tracking is lost, other starts are registered, too
-    bool always_other_starts = false;  // they are for every frame, lost or not
-    int patches = 2;                   // how many ways of patching a lost frame are tried before it becomes an I-frame
+    int solver_iterations = 25;
+    TargetSamples target_samples = TargetSamples::middles;  // see TargetSearch
+    bool always_other_starts = false;  // other starts are registered for every frame, not for lost ones alone
     int group = 1;                     // TrackedOptions::group where that is not given
     bool motion_alone = false;  // nothing but the motion of the nodes is coded, nor is it judged how well it fits
 };

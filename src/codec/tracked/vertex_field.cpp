@@ -1,5 +1,7 @@
 #include "codec/tracked/vertex_field.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "codec/tracked/vertex_field_walk.h"
@@ -19,18 +21,26 @@ std::int64_t root_step(std::uint32_t step, std::size_t vertex_count) {
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(step / root));
 }
 
-void predict_splits(const HierarchyLevel& level, std::span<const std::int32_t> means,
-                    std::vector<std::int32_t>& splits) {
-    splits.assign(level.size(), 0);
+namespace {
+
+// The difference of each node's two children as the slopes of `means` (by node of this level) say, of N components side
+// by side: most of the time goes into the walk over the neighbours.
+template <std::size_t N>
+void predict_splits(const HierarchyLevel& level, const std::array<std::span<const std::int32_t>, N>& means,
+                    const std::array<std::span<std::int32_t>, N>& splits) {
+    constexpr std::int64_t most = std::int64_t{2} * most_mean;
     for (std::size_t p = 0; p < level.size(); ++p) {
-        if (level.second[p] == no_node) continue;
-        std::int64_t sum = 0;
-        for (std::uint32_t i = level.first_neighbour[p]; i < level.first_neighbour[p + 1]; ++i)
-            sum += std::int64_t{level.slopes[i]} * (means[level.neighbours[i]] - means[p]);
-        splits[p] = static_cast<std::int32_t>(
-            std::clamp<std::int64_t>(sum >> slope_bits, -std::int64_t{2} * most_mean, std::int64_t{2} * most_mean));
+        std::array<std::int64_t, N> sum{};
+        if (level.second[p] != no_node)
+            for (std::uint32_t i = level.first_neighbour[p]; i < level.first_neighbour[p + 1]; ++i)
+                for (std::size_t c = 0; c < N; ++c)
+                    sum[c] += std::int64_t{level.slopes[i]} * (means[c][level.neighbours[i]] - means[c][p]);
+        for (std::size_t c = 0; c < N; ++c)
+            splits[c][p] = static_cast<std::int32_t>(std::clamp(sum[c] >> slope_bits, -most, most));
     }
 }
+
+}  // namespace
 
 void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means,
                  std::span<const std::int32_t> predicted, std::uint32_t step, std::span<const std::int32_t> rests,
@@ -54,10 +64,12 @@ namespace {
 // over what is above it.
 void pass_down(const HierarchyLevel& coarser, std::span<const std::uint8_t> own, std::span<const std::uint8_t> above,
                std::vector<std::uint8_t>& below) {
-    for (std::size_t p = 0; p < coarser.size(); ++p) {
-        const bool single = coarser.second[p] == no_node;
-        below[coarser.first[p]] = single ? above[p] : own[p];
-        if (!single) below[coarser.second[p]] = own[p];
+    const std::span<const std::uint32_t> first = coarser.first, second = coarser.second;
+    const std::span<std::uint8_t> out = below;
+    for (std::size_t p = 0; p < first.size(); ++p) {
+        const bool single = second[p] == no_node;
+        out[first[p]] = single ? above[p] : own[p];
+        if (!single) out[second[p]] = own[p];
     }
 }
 
@@ -90,10 +102,28 @@ FieldWalk::FieldWalk(const VertexHierarchy& mesh, const FieldSteps& steps, std::
 }
 
 void FieldWalk::begin_level(std::size_t k, std::size_t c) {
+    FieldPlane& plane = components[c].plane;
+    predict_splits<1>(hierarchy.levels[k], {plane.mean[k + 1]}, {plane.slope[k]});
+    prepare_level(k, c);
+}
+
+void FieldWalk::begin_level(std::size_t k) {
+    const bool all = std::all_of(components.begin(), components.end(), [](const auto& c) { return c.step != 0; });
+    if (components.size() != 3 || !all) {
+        for (std::size_t c = 0; c < components.size(); ++c)
+            if (components[c].step != 0) begin_level(k, c);
+        return;
+    }
+    FieldPlane &a = components[0].plane, &b = components[1].plane, &c = components[2].plane;
+    predict_splits<3>(hierarchy.levels[k], {a.mean[k + 1], b.mean[k + 1], c.mean[k + 1]},
+                      {a.slope[k], b.slope[k], c.slope[k]});
+    for (std::size_t i = 0; i < components.size(); ++i) prepare_level(k, i);
+}
+
+void FieldWalk::prepare_level(std::size_t k, std::size_t c) {
     const HierarchyLevel& level = hierarchy.levels[k];
     ComponentWalk& component = components[c];
     component.active.resize(level.size());
-    predict_splits(level, component.plane.mean[k + 1], component.plane.slope[k]);
     LevelPrediction& prediction = component.prediction;
     prediction.now = component.plane.slope[k];
     if (!component.before) return;
@@ -203,14 +233,15 @@ struct FieldReader {
 void read_field(FieldWalk& walk, FieldReader& reader) {
     for (auto& component : walk.components)
         if (component.step != 0) code_root(reader, component, walk.hierarchy.vertex_count, 0);
-    for (std::size_t k = walk.hierarchy.levels.size(); k-- > 0;)
+    for (std::size_t k = walk.hierarchy.levels.size(); k-- > 0;) {
+        walk.begin_level(k);
         for (std::size_t c = 0; c < walk.components.size(); ++c) {
             if (walk.components[c].step == 0) continue;
-            walk.begin_level(k, c);
             const LevelMode mode = code_mode(reader, walk, walk.components[c].last, {});
             if (mode.coded) code_level(reader, walk, k, c, mode, [](auto, auto, auto, const auto&) { return 0; });
             walk.end_level(k, c, mode);
         }
+    }
 }
 
 }  // namespace

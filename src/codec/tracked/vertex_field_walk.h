@@ -80,11 +80,9 @@ inline std::array<BinaryModel*, 2> more(SplitModels& m, const C& c, std::size_t 
 
 inline constexpr std::int32_t most_split = 1 << 30;  // of a quantised difference's magnitude
 
-// Codes one quantised difference. Coder::bit(BinaryModel&, bool) and raw(std::uint32_t, int) put what is wanted into
-// the stream, or, decoding, ignore it, and return what the stream says.
+// Codes the sign and the magnitude of a quantised difference that is not zero.
 template <class Coder>
-std::int32_t code_split(Coder& coder, SplitModels& m, const SplitContext& c, std::int32_t wanted) {
-    if (!code_mixed(coder, m.nonzero_mixer[c.level], split_detail::nonzero(m, c), wanted != 0)) return 0;
+std::int32_t code_nonzero(Coder& coder, SplitModels& m, const SplitContext& c, std::int32_t wanted) {
     const bool negative = code_mixed(coder, m.sign_mixer, split_detail::negative(m, c), wanted < 0);
     const auto rest = static_cast<std::uint32_t>(std::max(std::abs(wanted), 1) - 1);
     std::uint32_t coded = 0;
@@ -103,6 +101,16 @@ std::int32_t code_split(Coder& coder, SplitModels& m, const SplitContext& c, std
     }
     const auto magnitude = static_cast<std::int32_t>(std::min(coded, static_cast<std::uint32_t>(most_split) - 1)) + 1;
     return negative ? -magnitude : magnitude;
+}
+
+// Codes one quantised difference. Coder::bit(BinaryModel&, bool) and raw(std::uint32_t, int) put what is wanted into
+// the stream, or, decoding, ignore it, and return what the stream says. Most are zero, so that this is done where it is
+// called, and what follows elsewhere.
+template <class Coder>
+[[gnu::always_inline]] inline std::int32_t code_split(Coder& coder, SplitModels& m, const SplitContext& c,
+                                                      std::int32_t wanted) {
+    if (!code_mixed(coder, m.nonzero_mixer[c.level], split_detail::nonzero(m, c), wanted != 0)) return 0;
+    return code_nonzero(coder, m, c, wanted);
 }
 
 inline constexpr int field_bits = 8;  // of the fraction of means, differences and steps
@@ -126,10 +134,6 @@ inline std::int64_t split_step(std::uint32_t step, std::uint32_t scale) {
 
 // The quantisation step of the mean of all: the whole mesh's error as one vertex's.
 std::int64_t root_step(std::uint32_t step, std::size_t vertex_count);
-
-// The difference of each node's two children: as the slopes of `means` (by node of this level) say.
-void predict_splits(const HierarchyLevel& level, std::span<const std::int32_t> means,
-                    std::vector<std::int32_t>& splits);
 
 // The differences of one level and component, ready to be coded.
 struct LevelPrediction {
@@ -181,11 +185,19 @@ inline std::uint8_t magnitude_of(std::int32_t rest) {
 }
 
 // How much a node adds to the activity round its neighbours: by what is above it until its difference is coded.
-inline std::uint8_t activity_above(std::uint8_t above) { return std::min<std::uint8_t>(above, 4); }
-inline std::uint8_t activity_coded(std::uint8_t own) { return static_cast<std::uint8_t>(2 * std::min<int>(own, 4)); }
+constexpr std::uint8_t activity_above(std::uint8_t above) { return std::min<std::uint8_t>(above, 4); }
+constexpr std::uint8_t activity_coded(std::uint8_t own) { return static_cast<std::uint8_t>(2 * std::min<int>(own, 4)); }
 
-// active: what each node adds to the activity.
-inline SplitContext split_context(const HierarchyLevel& level, std::size_t k, std::size_t node,
+// The class of a sum of activities: exact up to 8, then by sixths.
+inline constexpr auto activity_classes = [] {
+    std::array<std::uint8_t, hierarchy_row_limit * activity_coded(255) + 1> classes{};
+    for (std::size_t a = 0; a < classes.size(); ++a)
+        classes[a] = static_cast<std::uint8_t>(a < 8 ? a : std::min(8 + (a - 8) / 6, SplitContext::activities - 1));
+    return classes;
+}();
+
+// around: the node's neighbours. active: what each node adds to the activity.
+inline SplitContext split_context(std::size_t k, std::size_t node, std::span<const std::uint32_t> around,
                                   const LevelMagnitudes& magnitudes, std::span<const std::uint8_t> active,
                                   std::int32_t predicted, std::int64_t step) {
     SplitContext c;
@@ -193,9 +205,8 @@ inline SplitContext split_context(const HierarchyLevel& level, std::size_t k, st
     c.level = std::min(k, SplitContext::levels - 1);
     c.up = three(magnitudes.above[node]);
     std::size_t activity = 0;
-    for (std::uint32_t i = level.first_neighbour[node]; i < level.first_neighbour[node + 1]; ++i)
-        activity += active[level.neighbours[i]];
-    c.activity = activity < 8 ? activity : std::min<std::size_t>(8 + (activity - 8) / 6, SplitContext::activities - 1);
+    for (const std::uint32_t neighbour : around) activity += active[neighbour];
+    c.activity = activity_classes[activity];
     if (!magnitudes.before.empty()) c.before = three(magnitudes.before[node]);
     if (!magnitudes.other.empty()) {
         c.other = three(static_cast<std::size_t>(std::abs(magnitudes.other[node])));
@@ -203,8 +214,11 @@ inline SplitContext split_context(const HierarchyLevel& level, std::size_t k, st
     }
     if (!magnitudes.third.empty()) c.third = three(static_cast<std::size_t>(std::abs(magnitudes.third[node])));
     // The bits of 8 * |predicted| / step, without dividing.
-    const std::int64_t steep = 8 * std::abs(std::int64_t{predicted});
-    while (c.steep < SplitContext::steeps - 1 && steep >= step << c.steep) ++c.steep;
+    const auto steep = static_cast<std::uint64_t>(8 * std::abs(std::int64_t{predicted}));
+    const auto unit = static_cast<std::uint64_t>(step);
+    const int bits = static_cast<int>(std::bit_width(steep)) - static_cast<int>(std::bit_width(unit));
+    if (bits >= 0)
+        c.steep = std::min(static_cast<std::size_t>(bits) + (steep >= unit << bits), SplitContext::steeps - 1);
     c.slope = c.steep == 0 ? 0 : predicted > 0 ? 1 : 2;
     return c;
 }
@@ -235,8 +249,12 @@ struct FieldWalk {
     std::vector<ComponentWalk> components;
 
     void begin_level(std::size_t k, std::size_t c);                       // predicts its differences
+    void begin_level(std::size_t k);                                      // of all components, which is faster
     void end_level(std::size_t k, std::size_t c, const LevelMode& mode);  // sets the means of the finer level
     LevelMagnitudes magnitudes(std::size_t k, std::size_t c) const;
+
+private:
+    void prepare_level(std::size_t k, std::size_t c);
 };
 
 // Codes the differences of one level and component into its rests and magnitudes. choose(node, predicted, step,
@@ -247,15 +265,21 @@ void code_level(Coder& coder, FieldWalk& walk, std::size_t k, std::size_t c, con
     const HierarchyLevel& level = walk.hierarchy.levels[k];
     ComponentWalk& component = walk.components[c];
     component.prediction.choose(mode);
-    const std::span<const std::int32_t> chosen = component.prediction.chosen;
     const LevelMagnitudes magnitudes = walk.magnitudes(k, c);
+    // Bytes are written here, which could be part of anything that is not a copy.
+    const std::span<const std::int32_t> chosen = component.prediction.chosen;
     const std::span<std::uint8_t> own = component.plane.magnitude[k], active = component.active;
     const std::span<std::int32_t> rests = component.rests[k];
-    for (std::size_t p = 0; p < level.size(); ++p) active[p] = activity_above(magnitudes.above[p]);
-    for (std::size_t p = 0; p < level.size(); ++p) {
-        if (level.second[p] != no_node) {
-            const std::int64_t unit = split_step(component.step, level.split_scale[p]);
-            const SplitContext context = split_context(level, k, p, magnitudes, active, chosen[p], unit);
+    const std::span<const std::uint32_t> second = level.second, first_neighbour = level.first_neighbour,
+                                         neighbours = level.neighbours;
+    const std::span<const std::uint16_t> split_scale = level.split_scale;
+    const std::uint32_t step = component.step;
+    for (std::size_t p = 0; p < second.size(); ++p) active[p] = activity_above(magnitudes.above[p]);
+    for (std::size_t p = 0; p < second.size(); ++p) {
+        if (second[p] != no_node) {
+            const std::int64_t unit = split_step(step, split_scale[p]);
+            const auto around = neighbours.subspan(first_neighbour[p], first_neighbour[p + 1] - first_neighbour[p]);
+            const SplitContext context = split_context(k, p, around, magnitudes, active, chosen[p], unit);
             rests[p] = code_split(coder, component.models, context, choose(p, chosen[p], unit, context));
             own[p] = magnitude_of(rests[p]);
         }
