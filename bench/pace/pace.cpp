@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +22,7 @@
 namespace {
 
 struct Options {
-    std::string capture;
+    std::string capture, profile = "tracked";
     std::size_t frames = 60, first = 0;
     double quality = 42, unit = 1;
     unsigned threads = 1;
@@ -40,13 +41,20 @@ double milliseconds() {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-std::vector<htvm::Mesh> read_capture(const Options& options) {
-    std::vector<htvm::Mesh> out;
+struct Captured {
+    htvm::Mesh mesh;
+    std::optional<htvm::Pose> pose;
+};
+
+std::vector<Captured> read_capture(const Options& options) {
+    std::vector<Captured> out;
     if (options.capture == "synth") {
         htvm::SynthOptions person;
         person.vertices = options.vertices;
-        for (std::size_t i = 0; i < options.frames; ++i)
-            out.push_back(htvm::synth_frame(person, static_cast<int>(options.first + i)).mesh);
+        for (std::size_t i = 0; i < options.frames; ++i) {
+            auto frame = htvm::synth_frame(person, static_cast<int>(options.first + i));
+            out.push_back({std::move(frame.mesh), std::move(frame.pose)});
+        }
         return out;
     }
     const auto files = htvm::find_sequence(options.capture);
@@ -62,7 +70,7 @@ std::vector<htvm::Mesh> read_capture(const Options& options) {
             fmt::print(stderr, "{}\n", mesh.error().message);
             return {};
         }
-        out.push_back(std::move(*mesh));
+        out.push_back({std::move(*mesh), std::nullopt});
     }
     return out;
 }
@@ -81,9 +89,11 @@ void print(const std::string& what, const Sums& sums) {
 }
 
 int measure(const Options& options) {
-    const auto meshes = read_capture(options);
-    if (meshes.empty()) return 1;
-    htvm::EncoderOptions encoding;
+    const auto frames = read_capture(options);
+    if (frames.empty()) return 1;
+    const bool tracked = options.profile == "tracked";
+    auto encoding = htvm::default_options(tracked ? htvm::Profile::tracked : htvm::Profile::topology);
+    if (!tracked && frames[0].pose) encoding.skeleton = htvm::synth_skeleton();
     const auto steps = htvm::quality_steps(options.quality);
     encoding.geometry_step = steps.geometry_step;
     encoding.colour_step = steps.colour_step;
@@ -97,9 +107,10 @@ int measure(const Options& options) {
     }
     Sums all;
     std::map<std::string, Sums> kinds;
-    for (std::size_t i = 0; i < meshes.size(); ++i) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
         const double real = milliseconds(), processor = processor_milliseconds();
-        const auto done = encoder->push(meshes[i], nullptr, static_cast<std::int64_t>(33333 * i));
+        const auto done = encoder->push(frames[i].mesh, encoding.skeleton.bones.empty() ? nullptr : &*frames[i].pose,
+                                        static_cast<std::int64_t>(33333 * i));
         const double took = milliseconds() - real, took_processor = processor_milliseconds() - processor;
         if (!done) {
             fmt::print(stderr, "frame {}: {}\n", i, done.error().message);
@@ -135,6 +146,9 @@ int main(int count, char** words) {
     app.add_option("-q,--quality", options.quality)->capture_default_str();
     app.add_option("--vertices", options.vertices, "Of the synthetic person")->capture_default_str();
     app.add_option("--unit", options.unit, "Millimetres per unit of the files")->capture_default_str();
+    app.add_option("--profile", options.profile, "tracked or topology, whose skeleton is the synthetic person's own")
+        ->check(CLI::IsMember({"tracked", "topology"}))
+        ->capture_default_str();
     app.add_option("--threads", options.threads, "0: one per core")->capture_default_str();
     app.add_option("--effort", options.effort, "0 to 9, as for htvm encode")->capture_default_str();
     app.add_option("--latency-frames", options.latency_frames, "As for htvm encode: then a push is of the frame before")

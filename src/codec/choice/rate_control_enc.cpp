@@ -203,12 +203,17 @@ double RateController::planned_bits(std::size_t frame, double correction) const 
                : bits * std::exp2(planned_surprise_ + model_.slope * correction);
 }
 
-// The correction with which the rest of the sequence spends the remaining bits.
+// The correction with which the rest of the sequence spends the remaining bits. The last frames make up only for what
+// would leave the whole sequence off by more than a hundredth: few as they are, their quality would jump.
 double RateController::remaining_correction() const {
     const auto& rest = rest_[frames_];
-    const double left = per_frame_ * static_cast<double>(plan_.size()) - total_bits_ - rest[0];
     if (!(rest[1] > 0)) return correction_;
-    const double ratio = std::clamp(left / rest[1], 1e-3, 1e3);
+    const double left = per_frame_ * static_cast<double>(plan_.size()) - total_bits_ - rest[0];
+    const double expected = rest[1] * std::exp2(planned_surprise_ + model_.slope * correction_);
+    const double tolerated = frames_ + 10 <= plan_.size() ? 0 : 0.01 * per_frame_ * static_cast<double>(plan_.size());
+    const double amiss = left - expected;
+    const double wanted = expected + amiss - std::clamp(amiss, -tolerated, tolerated);
+    const double ratio = std::clamp(wanted / rest[1], 1e-3, 1e3);
     const double range = options_.highest_quality - options_.lowest_quality;
     return std::clamp((std::log2(ratio) - planned_surprise_) / model_.slope, -range, range);
 }
@@ -273,7 +278,7 @@ void RateController::coded(const FrameCost& frame) {
     ++frames_;
     calls_ = 0;
     hurries_ = std::max(0, hurries_ - 1);
-    if (frames_ + 10 <= plan_.size()) correct_plan(rate);
+    if (frames_ < plan_.size()) correct_plan(rate);
 }
 
 void RateController::correct_plan(RateClass rate) {
