@@ -5,7 +5,7 @@
 //   while (auto packet = encoder->pull()) send(htvm::write_packet(*packet));
 //   encoder->finish();                                    // then pull the rest
 //
-// With EncoderOptions::latency_frames a push queues the packets of the frame before. Where T-frames are coded in groups
+// With EncoderOptions::latency_frames a push queues the packets of a frame before. Where T-frames are coded in groups
 // (TrackedOptions::group), frames are held until their group is whole: a push may queue the packets of none, or of
 // several. Memory is bounded by a few frames, whatever the length of the sequence.
 #pragma once
@@ -61,7 +61,7 @@ public:
     // pushed, such as the lattice's origin, the subject's size and the bones' radii. So encoders of different parts of
     // a capture write the same sequence header, and their streams can be joined to one sequence. Errors as of push().
     Result<void> begin(const Mesh& first, const Pose* pose);
-    // Codes one frame; with EncoderOptions::latency_frames the one before, of which any error is then. pose: for the
+    // Codes one frame; with EncoderOptions::latency_frames one before, of which any error is then. pose: for the
     // skeleton of the options; null if the tracker lost it, and then the last one is kept. Timestamps must ascend.
     // After an error the frame is not part of the stream, and the next may be pushed. Under rate control, a frame that
     // does not fit the buffer even at the lowest quality is a limit error.

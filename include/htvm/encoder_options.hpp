@@ -115,8 +115,8 @@ struct EncoderOptions {
                                  // (they are tuned for adults, 1100 to 2500 mm); 0: measured on the first mesh
     unsigned threads = 0;        // that work at the same time; 0: one per core. The bytes are the same for any number
     TaskRunner runner;           // provides the threads; empty: the encoder has a pool of its own
-    int latency_frames = 0;  // 0, or 1: a frame is coded once the next one is there, so that work of both goes side by
-                             // side; with two threads or more it takes less time. The bytes are the same
+    int latency_frames = 0;  // 0 to 2: a frame is coded once so many more are there, so that work of all goes side by
+                             // side: 1 for two threads or more, 2 for more. The bytes are the same
     std::uint32_t fps_numerator = 30, fps_denominator = 1;  // frames per second, for players
     std::uint32_t unit_micrometres = 1000;  // the capture's own unit, kept so that a decoder can restore it
     // A live publisher sets it to a new random number each time it starts, so that viewers do not mistake its packets

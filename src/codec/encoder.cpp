@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <iterator>
 #include <new>
 #include <stdexcept>
 #include <utility>
@@ -17,8 +18,8 @@
 #include "codec/frame_group_enc.h"
 #include "codec/frame_kinds.h"
 #include "codec/frame_work_enc.h"
+#include "codec/frames_in_flight_enc.h"
 #include "codec/stream/sequence.h"
-#include "core/parallel.h"
 #include "htvm/decoder.hpp"
 
 namespace htvm {
@@ -33,17 +34,6 @@ struct Output {
     std::uint64_t stream_bytes = 0;
     std::vector<IndexEntry> index;
     std::uint32_t header_sent = 0;  // number of the frame with which the sequence header was last sent
-};
-
-// A frame on the lattice, that is coded now or waits for the next one, with what was found of it meanwhile.
-struct PushedFrame {
-    LatticeMesh mesh;
-    std::vector<Colour> colours;  // of its vertices where they are not coded
-    CodedPose pose;
-    std::int64_t timestamp_us = 0;
-    bool force_intra = false;
-    int effort = usual_effort;
-    AheadWork ahead = {};
 };
 
 // A mesh as the decoder shows it.
@@ -65,9 +55,9 @@ struct Encoder::State {
     int effort = usual_effort;  // for the next frame
     Output output;
     std::optional<std::int64_t> last_timestamp;
-    std::optional<PushedFrame> waiting;  // the last one, with EncoderOptions::latency_frames
-    std::vector<HeldFrame> held;         // T-frames of the group that is not whole yet
-    std::optional<GroupAnchor> anchor;   // what the next group may refer to; none: the reference alone
+    std::vector<PushedFrame> waiting;   // the last ones, in their order, with EncoderOptions::latency_frames
+    std::vector<HeldFrame> held;        // T-frames of the group that is not whole yet
+    std::optional<GroupAnchor> anchor;  // what the next group may refer to; none: the reference alone
     // Of the frames whose packets the last call queued; if it queued none, of the last one before.
     std::vector<EncodedFrame> coded;
     std::vector<ShownMesh> decoded;
@@ -353,41 +343,14 @@ Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* p
     return out;
 }
 
-// Chooses the frame; beside that, does what can be done of the next one, if there is one. What was found under another
-// assumption than what became of this frame is not kept: the bytes are those of one frame after the other.
-Result<Candidate> choose_beside(State& state, FrameWork& work, bool force_intra, PushedFrame* next) {
-    const auto bits = [&](const Candidate& candidate) { return bits_of(state, candidate); };
-    if (!next) return choose_frame(work, state.control, bits, force_intra);
-    AssumedMotion assumed;
-    if (state.configuration.tracked()) {
-        if (work.can_refer()) assumed.nodes = work.registered_nodes();
-    } else if (!force_intra && !work.intra_is_due() && state.sequence.next_frame >= state.sequence.trial.next) {
-        assumed.bones = work.bone_motion().motion;
-    }
-    std::optional<Result<Candidate>> chosen;
-    std::vector<StageTime> stages;
-    parallel_invoke(
-        state.configuration.threads, [&] { chosen = choose_frame(work, state.control, bits, force_intra); },
-        [&] {
-            next->ahead = work_ahead(state.configuration, state.sequence, assumed, next->mesh, next->colours,
-                                     next->pose, next->effort, stages);
-        });
-    state.stages.insert(state.stages.end(), stages.begin(), stages.end());
-    const bool as_assumed = *chosen && (*chosen)->type == FrameType::tracked && work.is_as_first_registered();
-    if (!as_assumed) next->ahead.registered.reset();
-    const bool by_bones =
-        *chosen && ((*chosen)->type == FrameType::enhanced || (*chosen)->type == FrameType::predicted);
-    if (!by_bones) next->ahead.bone_motion.reset();
-    return std::move(*chosen);
-}
-
-// next: pushed behind it, or null.
-Result<void> code_frame_of(State& state, PushedFrame frame, PushedFrame* next) {
+Result<void> code_frame_of(State& state, PushedFrame frame) {
     const auto timestamp_us = frame.timestamp_us;
     FrameWork work(state.configuration, state.sequence, frame.effort, std::move(frame.mesh), std::move(frame.colours),
                    std::move(frame.pose), state.stages);
     work.take(std::move(frame.ahead));
-    auto chosen = choose_beside(state, work, frame.force_intra, next);
+    const auto bits = [&](const Candidate& candidate) { return bits_of(state, candidate); };
+    auto chosen = choose_beside(work, frame.force_intra, enhanced_steps(state.configuration), state.waiting,
+                                [&] { return choose_frame(work, state.control, bits, frame.force_intra); });
     if (!chosen) return tl::unexpected(chosen.error());
     const FrameCost cost{rate_type(*chosen), chosen->quality, bits_of(state, *chosen), chosen->renewed};
     StageClock derivation(state.stages);
@@ -415,19 +378,25 @@ Result<void> code_frame_of(State& state, PushedFrame frame, PushedFrame* next) {
     return {};
 }
 
+Result<void> code_first_waiting(State& state) {
+    auto frame = std::move(state.waiting.front());
+    state.waiting.erase(state.waiting.begin());
+    return code_frame_of(state, std::move(frame));
+}
+
 Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
     auto frame = put_on_lattice(state, mesh, pose);
     if (!frame) return tl::unexpected(frame.error());
     frame->timestamp_us = timestamp_us;
     frame->force_intra = force_intra;
-    if (state.configuration.options.latency_frames == 0) return code_frame_of(state, std::move(*frame), nullptr);
+    if (state.configuration.options.latency_frames == 0) return code_frame_of(state, std::move(*frame));
     state.configured = true;
     state.last_timestamp = timestamp_us;
-    auto before = std::exchange(state.waiting, std::nullopt);
-    if (!before) state.coded_none = true;
-    auto coded = before ? code_frame_of(state, std::move(*before), &*frame) : Result<void>();
-    state.waiting = std::move(*frame);
-    return coded;
+    state.waiting.push_back(std::move(*frame));
+    if (state.waiting.size() > static_cast<std::size_t>(state.configuration.options.latency_frames))
+        return code_first_waiting(state);
+    state.coded_none = true;
+    return {};
 }
 
 // Marks where a frame's packets begin in the queue. If the frame fails, packets queued since are removed and the
@@ -503,7 +472,7 @@ Encoder::~Encoder() = default;
 
 Result<void> Encoder::begin(const Mesh& first, const Pose* pose) try {
     auto& state = *state_;
-    if (state.begun || state.waiting) return fail(ErrorKind::bad_input, "the first frame was pushed already");
+    if (state.begun || !state.waiting.empty()) return fail(ErrorKind::bad_input, "the first frame was pushed already");
     auto done = configure(state, first, pose);
     state.configured = done.has_value();
     return done;
@@ -554,26 +523,30 @@ Result<void> Encoder::set_effort(int effort) {
 
 Result<void> Encoder::finish() {
     auto& state = *state_;
-    if (state.finished || (!state.begun && !state.waiting)) return {};
+    if (state.finished || (!state.begun && state.waiting.empty())) return {};
     state.stages.clear();
-    const auto before = queued(state);
-    const auto code_the_rest = [&]() -> Result<void> {
-        Outcome outcome;
-        if (auto last = std::exchange(state.waiting, std::nullopt)) {
-            if (auto coded = code_frame_of(state, std::move(*last), nullptr); !coded) return coded;
-            if (state.held.empty()) return {};
-            if (!state.coded_none) outcome = {std::move(state.coded), std::move(state.decoded), std::nullopt};
-        }
-        if (auto sent = send_held(state, state.held, outcome); !sent) return sent;
-        state.held.clear();
-        commit(state, std::move(outcome));
-        return {};
-    };
-    auto done = guarded(code_the_rest);
-    if (!done) {
-        take_back(state, before);
-        return done;
+    Outcome all;
+    auto done = Result<void>();
+    // One after the other, so that an error in one leaves those before it as they are.
+    while (done && !state.waiting.empty()) {
+        const auto before = queued(state);
+        done = guarded([&]() -> Result<void> {
+            if (auto coded = code_first_waiting(state); !coded) return coded;
+            if (state.coded_none) return {};
+            std::ranges::move(state.coded, std::back_inserter(all.coded));
+            std::ranges::move(state.decoded, std::back_inserter(all.decoded));
+            return {};
+        });
+        if (!done) take_back(state, before);
     }
+    if (done) {
+        const auto before = queued(state);
+        done = guarded([&] { return send_held(state, state.held, all); });
+        if (done) state.held.clear();
+        if (!done) take_back(state, before);
+    }
+    commit(state, std::move(all));
+    if (!done) return done;
     if (!state.begun) return {};
     state.finished = true;
     try {
@@ -601,7 +574,7 @@ std::optional<Packet> Encoder::pull() {
 std::span<const EncodedFrame> Encoder::coded_frames() const {
     return state_->coded_none ? std::span<const EncodedFrame>() : state_->coded;
 }
-std::size_t Encoder::held_frames() const { return state_->held.size() + (state_->waiting ? 1 : 0); }
+std::size_t Encoder::held_frames() const { return state_->held.size() + state_->waiting.size(); }
 
 const FrameInfo& Encoder::last_frame() const {
     static const FrameInfo none;

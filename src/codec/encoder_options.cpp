@@ -87,10 +87,10 @@ constexpr Option list[] = {
      .kind = OptionKind::whole_number,
      .unit = "frames",
      .least = 0,
-     .most = 1,
+     .most = 2,
      .meaning =
-         "frames that wait, 0 or 1: with 1 a frame is coded once the next one is there, and work of both goes side by "
-         "side on several threads; the bytes do not depend on it",
+         "frames that wait, 0 to 2: a frame is coded once so many more are there, and work of all goes side by side on "
+         "several threads; the bytes do not depend on it",
      .get = [](const EncoderOptions& o) -> double { return o.latency_frames; },
      .set = [](EncoderOptions& o, double value) { o.latency_frames = static_cast<int>(value); },
      .flag = "--latency-frames"},

@@ -61,15 +61,16 @@ LatticeMesh simplified(FrameWork& work, const FrameSteps& steps) {
     return out;
 }
 
-EnhancedFrameOptions enhanced_options(const FrameWork& work, const FrameSteps& steps) {
-    const auto& options = work.configuration.options;
+EnhancedFrameOptions enhanced_options(const Configuration& configuration, const ReferenceInUse& reference,
+                                      const FrameSteps& steps) {
+    const auto& options = configuration.options;
     EnhancedFrameOptions out;
-    out.geometry.step = step_for_reference(work.reference().intra.edge, steps.geometry);
+    out.geometry.step = step_for_reference(reference.intra.edge, steps.geometry);
     out.colour.step = steps.colour;
     const double ratio = static_cast<double>(steps.geometry) / out.geometry.step;
     out.geometry.lambda = options.lambda * ratio * ratio;
     out.colour.lambda = options.lambda;
-    out.geometry.threads = out.colour.threads = out.threads = work.configuration.threads;
+    out.geometry.threads = out.colour.threads = out.threads = configuration.threads;
     out.reference_choice =
         options.topology.reference_vertices == ReferenceVertices::bone ? ReferenceChoice::bone : ReferenceChoice::any;
     out.merge_duplicates = options.topology.merge_duplicates;
@@ -90,17 +91,19 @@ void send_codebook(std::uint32_t frame, std::uint8_t purpose, CodebookInUse& use
     packets.push_back(std::move(packet));
 }
 
-EnhancedFrameSource source_of(FrameWork& work) {
-    const auto& motion = work.bone_motion();
+EnhancedFrameSource whole_frame(const LatticeMesh& mesh, const FrameMotion& motion, const ReferenceInUse& reference) {
     EnhancedFrameSource out;
-    out.mesh = &work.mesh;
+    out.mesh = &mesh;
     out.bone_of_vertex = motion.bone_of_vertex;
     out.motion = &motion;
-    out.reference = &work.reference().decoded.skinned;
-    out.search = &work.reference().search;
-    out.source_vertices = count(work.mesh.positions.size());
-    out.source_triangles = count(work.mesh.triangles.size());
+    out.reference = &reference.decoded.skinned;
+    out.search = &reference.search;
+    out.source_vertices = count(mesh.positions.size());
+    out.source_triangles = count(mesh.triangles.size());
     return out;
+}
+EnhancedFrameSource whole_frame(FrameWork& work) {
+    return whole_frame(work.mesh, work.bone_motion(), work.reference());
 }
 
 // Compares whole EP-frames with the cheapest since the I-frame: see intra_is_paid_for() in choice/frame_choice.cpp.
@@ -109,12 +112,17 @@ void count_bytes(BoneHistory& history, double bytes) {
     history.excess_bytes += bytes - history.least_bytes;
 }
 
-Candidate code_residuals(FrameWork& work, const EnhancedFrameSource& source, const FrameSteps& steps) {
+Candidate code_residuals(FrameWork& work, const EnhancedFrameSource& source, QuantisedFrame quantised,
+                         const FrameSteps& steps) {
     Candidate out;
     out.type = FrameType::enhanced;
     out.reference = work.reference().decoded.number;
     auto& history = out.bones.emplace(work.sequence.bones);
-    auto encoded = encode_enhanced_frame(source, history.codebooks, enhanced_options(work, steps), work.stages);
+    const auto before = std::exchange(history.codebooks, quantised.codebooks);
+    history.codebooks.geometry.sent = before.geometry.sent;
+    history.codebooks.colour.sent = before.colour.sent;
+    auto encoded = encode_enhanced_frame(source, std::move(quantised),
+                                         enhanced_options(work.configuration, work.reference(), steps), work.stages);
     history.motion = work.bone_motion().motion;
     send_codebook(work.sequence.next_frame, codebook_for_geometry, history.codebooks.geometry, out.packets);
     send_codebook(work.sequence.next_frame, codebook_for_colour, history.codebooks.colour, out.packets);
@@ -131,12 +139,15 @@ Candidate code_moving_part(FrameWork& work, const FrameSteps& steps, const std::
     const auto part = cut_moving_part(work.mesh, work.bone_motion().bone_of_vertex, work.reference().decoded.skinned,
                                       fit, coded_bones, stray_in_edges * work.reference().intra.edge);
     clock.done("cutting");
-    auto source = source_of(work);
+    auto source = whole_frame(work);
     source.mesh = &part.mesh;
     source.bone_of_vertex = part.bone_of_vertex;
     source.nearest = part.nearest;
     source.coded_bones = coded_bones;
-    return code_residuals(work, source, steps);
+    auto quantised =
+        quantise_enhanced_frame(source, work.sequence.bones.codebooks,
+                                enhanced_options(work.configuration, work.reference(), steps), work.stages);
+    return code_residuals(work, source, std::move(quantised), steps);
 }
 
 struct Charts {
@@ -250,7 +261,9 @@ Result<Candidate> code_predicted(FrameWork& work) {
 }
 
 Result<Candidate> code_enhanced(FrameWork& work, const FrameSteps& steps) {
-    auto out = code_residuals(work, source_of(work), steps);
+    auto quantised = std::exchange(work.quantised, std::nullopt);
+    if (!quantised || quantised->steps != steps) quantised = quantise_whole(work, steps);
+    auto out = code_residuals(work, whole_frame(work), std::move(quantised->frame), steps);
     count_bytes(*out.bones, static_cast<double>(out.bytes()));
     return out;
 }
@@ -356,6 +369,18 @@ SimplifiedReferenceOptions simplification_options(const Configuration& configura
 
 Result<Candidate> code_frame(FrameType type, FrameWork& work, const FrameSteps& steps) {
     return frame_coders[static_cast<std::size_t>(type)](work, steps);
+}
+
+QuantisedWork quantise_whole(const Configuration& configuration, const ReferenceInUse& reference,
+                             const LatticeMesh& mesh, const FrameMotion& motion, const Codebooks& before,
+                             const FrameSteps& steps, std::vector<StageTime>& stages) {
+    return {steps, quantise_enhanced_frame(whole_frame(mesh, motion, reference), before,
+                                           enhanced_options(configuration, reference, steps), stages)};
+}
+
+QuantisedWork quantise_whole(FrameWork& work, const FrameSteps& steps) {
+    return quantise_whole(work.configuration, work.reference(), work.mesh, work.bone_motion(),
+                          work.sequence.bones.codebooks, steps, work.stages);
 }
 
 Result<Candidate> code_lone_intra(FrameWork& work, const FrameSteps& steps) {

@@ -14,6 +14,13 @@ namespace htvm::internal {
 // same attributes as the frame.
 Result<Candidate> code_frame(FrameType type, FrameWork& work, const FrameSteps& steps);
 
+// The first half of coding a whole EP-frame. The second takes it from FrameWork::quantised where that is of its steps.
+// motion: of its bones. before: the codebooks that the frame before leaves.
+QuantisedWork quantise_whole(const Configuration& configuration, const ReferenceInUse& reference,
+                             const LatticeMesh& mesh, const FrameMotion& motion, const Codebooks& before,
+                             const FrameSteps& steps, std::vector<StageTime>& stages);
+QuantisedWork quantise_whole(FrameWork& work, const FrameSteps& steps);
+
 // How T-frames are coded at these steps.
 TrackedFrameOptions tracked_frame_options(const Configuration& configuration, const FrameSteps& steps);
 

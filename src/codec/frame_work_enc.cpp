@@ -35,7 +35,8 @@ std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration
     return out;
 }
 
-// colours: of the mesh where it has none of its own, or none.
+}  // namespace
+
 SurfaceIndex surface_of(const Configuration& configuration, const LatticeMesh& mesh, const std::vector<Colour>& colours,
                         std::vector<StageTime>& stages) {
     StageClock clock(stages);
@@ -46,7 +47,6 @@ SurfaceIndex surface_of(const Configuration& configuration, const LatticeMesh& m
     return out;
 }
 
-// before: of the bones in the frame before; empty after an I-frame.
 FrameMotion motion_of_bones(const Configuration& configuration, const ReferenceInUse& reference,
                             const LatticeMesh& mesh, const CodedPose& pose, std::span<const RigidMotion> before,
                             std::vector<StageTime>& stages) {
@@ -56,7 +56,6 @@ FrameMotion motion_of_bones(const Configuration& configuration, const ReferenceI
                              configuration.threads, stages);
 }
 
-// starts: but for the skeleton's.
 NodeRegistration register_frame(const Configuration& configuration, const ReferenceInUse& reference,
                                 const SurfaceIndex& surface, const CodedPose& pose, NodeStarts starts,
                                 const TrackingEffort& effort, std::vector<StageTime>& stages) {
@@ -67,8 +66,6 @@ NodeRegistration register_frame(const Configuration& configuration, const Refere
     clock.done("registration");
     return out;
 }
-
-}  // namespace
 
 std::size_t Candidate::bytes() const {
     std::size_t sum = 0;
@@ -126,10 +123,6 @@ Result<Sequence> advance(const Configuration& configuration, const Sequence& bef
     return out;
 }
 
-bool FrameWork::carries_surface() const {
-    return configuration.tracked() ? !mesh.triangles.empty() : !mesh.positions.empty();
-}
-
 double FrameWork::edge() {
     if (!edge_) edge_ = mean_edge(mesh.positions, mesh.triangles);
     return *edge_;
@@ -144,9 +137,14 @@ void FrameWork::take(AheadWork ahead) {
     surface_ = std::move(ahead.surface);
     registered_nodes_ = std::move(ahead.registered);
     bone_motion_ = std::move(ahead.bone_motion);
+    quantised = std::move(ahead.quantised);
 }
 
 namespace {
+
+bool carries_surface(const Configuration& configuration, const LatticeMesh& captured) {
+    return configuration.tracked() ? !captured.triangles.empty() : !captured.positions.empty();
+}
 
 bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
     return a.colours.empty() == b.colours.empty() && a.normals.empty() == b.normals.empty() &&
@@ -155,11 +153,14 @@ bool same_attributes(const LatticeMesh& a, const LatticeMesh& b) {
 
 }  // namespace
 
-bool FrameWork::can_be_moved() const {
+bool FrameWork::carries_surface() const { return internal::carries_surface(configuration, mesh); }
+
+bool can_be_moved(const Configuration& configuration, const Sequence& sequence, const LatticeMesh& captured) {
     if (!sequence.reference) return false;
-    const auto& decoded = reference().decoded;
+    const auto& decoded = sequence.reference->decoded;
     const bool derived = configuration.tracked() ? decoded.tracked.has_value() : decoded.has_bones;
-    return derived && !decoded.mesh().positions.empty() && carries_surface() && same_attributes(mesh, decoded.mesh());
+    return derived && !decoded.mesh().positions.empty() && carries_surface(configuration, captured) &&
+           same_attributes(captured, decoded.mesh());
 }
 
 const FrameMotion& FrameWork::bone_motion() {
@@ -251,22 +252,6 @@ TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_e
     options.threads = configuration.threads;
     auto out = measure_tracked_fit(captured, decoded, intra_squared, options);
     clock.done("fit of the tracking");
-    return out;
-}
-
-AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const AssumedMotion& assumed,
-                     const LatticeMesh& next_mesh, const std::vector<Colour>& next_colours, const CodedPose& next_pose,
-                     int effort, std::vector<StageTime>& stages) {
-    AheadWork out;
-    if (assumed.bones && !next_mesh.positions.empty())
-        out.bone_motion =
-            motion_of_bones(configuration, *before.reference, next_mesh, next_pose, *assumed.bones, stages);
-    if (!configuration.tracked()) return out;
-    out.surface = surface_of(configuration, next_mesh, next_colours, stages);
-    if (assumed.nodes && !next_mesh.triangles.empty())
-        out.registered =
-            register_frame(configuration, *before.reference, *out.surface, next_pose,
-                           {assumed.nodes->motion, before.nodes.last, {}, {}}, tracking_effort(effort), stages);
     return out;
 }
 

@@ -40,6 +40,7 @@ struct Configuration {
 struct FrameSteps {
     std::int32_t geometry = 32;  // lattice units
     std::int32_t colour = 6;     // levels
+    bool operator==(const FrameSteps&) const = default;
 };
 
 // What the encoder knows about an I-frame and the decoder does not.
@@ -144,12 +145,22 @@ struct TrackedWork {
     NodeRegistration registered;
 };
 
-// What of a frame's work does not need the frame before to be coded.
+// A whole frame's vertices as an EP-frame at these steps.
+struct QuantisedWork {
+    FrameSteps steps;
+    QuantisedFrame frame;
+};
+
+// What of a frame's work does not need the frame before to be coded: frames_in_flight_enc.h.
 struct AheadWork {
     std::optional<SurfaceIndex> surface;
     std::optional<NodeRegistration> registered;  // as if the frame before had been a T-frame
     std::optional<FrameMotion> bone_motion;      // as if it had been an EP- or P-frame
+    std::optional<QuantisedWork> quantised;      // as if it had been an EP-frame
 };
+
+// Whether the bones or nodes of the reference can move it to this captured frame, by what both have.
+bool can_be_moved(const Configuration& configuration, const Sequence& sequence, const LatticeMesh& captured);
 
 // What is derived from one frame, computed on first use and kept. Lengths are in lattice units.
 class FrameWork {
@@ -174,6 +185,8 @@ public:
     std::optional<EncodedTrackedFrame> coded_alone;  // as a T-frame of the reference alone, if it was last coded so and
                                                      // is registered as it was then: what a patch is planned on
 
+    std::optional<QuantisedWork> quantised;  // as an EP-frame, until it is coded as one
+
     // Takes over what was found before; before anything else is asked for.
     void take(AheadWork ahead);
 
@@ -195,9 +208,8 @@ public:
     bool follow_lost_limbs();
     // Whether registered_nodes() is as it was first found.
     bool is_as_first_registered() const { return registered_nodes_ && !followed_limbs_; }
-    // Whether the bones or nodes of the reference can move it to this frame, by what both have; and whether the frame
-    // may refer to it as well.
-    bool can_be_moved() const;
+    // Whether the frame can be the reference, moved; and whether it may refer to it as well.
+    bool can_be_moved() const { return internal::can_be_moved(configuration, sequence, mesh); }
     bool can_refer() const { return !configuration.intra_alone() && can_be_moved(); }
     // Whether it must be an I-frame: nothing to refer to, or the longest key interval has passed.
     bool intra_is_due() const { return !can_refer() || frames_since_intra() >= configuration.options.key_interval; }
@@ -218,17 +230,16 @@ private:
     std::optional<AnimationFit> animation_fit_;
 };
 
-// What is taken for granted of a frame whose next one's work goes beside its coding: that it becomes a T-frame, or an
-// EP- or P-frame, whose nodes or bones move so. None: it becomes something else.
-struct AssumedMotion {
-    std::optional<NodeRegistration> nodes;
-    std::optional<std::vector<RigidMotion>> bones;
-};
-
-// The work of the next frame that can be done beside the coding of this one. next_mesh as captured, on the lattice.
-AheadWork work_ahead(const Configuration& configuration, const Sequence& before, const AssumedMotion& assumed,
-                     const LatticeMesh& next_mesh, const std::vector<Colour>& next_colours, const CodedPose& next_pose,
-                     int effort, std::vector<StageTime>& stages);
+// What FrameWork finds, by itself. colours: of the mesh where it has none of its own, or none. before: the motion of
+// the bones in the frame before; empty after an I-frame. starts: but for the skeleton's.
+SurfaceIndex surface_of(const Configuration& configuration, const LatticeMesh& mesh, const std::vector<Colour>& colours,
+                        std::vector<StageTime>& stages);
+FrameMotion motion_of_bones(const Configuration& configuration, const ReferenceInUse& reference,
+                            const LatticeMesh& mesh, const CodedPose& pose, std::span<const RigidMotion> before,
+                            std::vector<StageTime>& stages);
+NodeRegistration register_frame(const Configuration& configuration, const ReferenceInUse& reference,
+                                const SurfaceIndex& surface, const CodedPose& pose, NodeStarts starts,
+                                const TrackingEffort& effort, std::vector<StageTime>& stages);
 
 // Side of the cubes of space by which it is judged whether a region is lost, lattice units.
 double region_side(const Configuration& configuration);

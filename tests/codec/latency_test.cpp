@@ -51,6 +51,7 @@ void expect_the_same_stream(const TestSequence& sequence, const Change& change =
     const auto plain = stream(sequence, options, 0, 1);
     EXPECT_EQ(stream(sequence, options, 1, 1), plain);
     EXPECT_EQ(stream(sequence, options, 1, 3), plain);
+    EXPECT_EQ(stream(sequence, options, 2, 3), plain);
 }
 
 TEST(Latency, LeavesTrackedFramesAsTheyAre) { expect_the_same_stream(walking(8)); }
@@ -63,6 +64,7 @@ TEST(Latency, LeavesPatchesAndWhatFollowsThemAsTheyAre) {
     auto options = patched_options();
     const auto plain = stream(horned_ball(6), options, 0, 1);
     EXPECT_EQ(stream(horned_ball(6), options, 1, 2), plain);
+    EXPECT_EQ(stream(horned_ball(6), options, 2, 2), plain);
     const auto is_patched = [](const std::vector<std::uint8_t>& packet) { return packet[4] == 11; };
     EXPECT_TRUE(std::any_of(plain.begin(), plain.end(), is_patched));
 }
@@ -84,23 +86,68 @@ TEST(Latency, LeavesOtherProfilesAsTheyAre) {
             const auto plain = stream(walking(8), options, 0, 1);
             EXPECT_EQ(stream(walking(8), options, 1, 1), plain);
             EXPECT_EQ(stream(walking(8), options, 1, 2), plain);
+            EXPECT_EQ(stream(walking(8), options, 2, 1), plain);
+            EXPECT_EQ(stream(walking(8), options, 2, 3), plain);
         }
 }
 
-TEST(Latency, BringsTheMotionOfTheNextFramesBonesForward) {
+// How often each push goes through a stage.
+std::vector<std::size_t> times_of(std::string_view stage, const TestSequence& sequence, const EncoderOptions& options) {
+    auto encoder = *Encoder::create(options);
+    std::vector<std::size_t> out;
+    for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+        EXPECT_TRUE(encoder.push(sequence.frames[i].mesh, nullptr, static_cast<std::int64_t>(33333 * i)));
+        out.push_back(static_cast<std::size_t>(std::ranges::count_if(
+            encoder.stage_times(), [&](const auto& time) { return std::string_view(time.stage) == stage; })));
+    }
+    return out;
+}
+
+using Times = std::vector<std::size_t>;
+
+TEST(Latency, BringsTheFirstHalfOfTheNextEnhancedFrameForward) {
     auto options = default_options(Profile::paper);
     options.topology.frame_choice = FrameChoice::fixed;
     options.latency_frames = 1;
-    auto encoder = *Encoder::create(options);
+    // The second push codes the I-frame; the third its first EP-frame, and half of the frame behind that one, too; the
+    // fourth the other half, and the first half of the next.
+    EXPECT_EQ(times_of("registration", walking(4), options), (Times{0, 0, 2, 1}));
+    EXPECT_EQ(times_of("quantisation", walking(4), options), (Times{0, 0, 2, 1}));
+    EXPECT_EQ(times_of("connectivity and entropy coding", walking(4), options), (Times{0, 0, 1, 1}));
+}
+
+TEST(Latency, OfTwoFramesFindsTheMotionOfOneBesideTheVerticesOfTheOther) {
+    auto options = default_options(Profile::paper);
+    options.topology.frame_choice = FrameChoice::fixed;
+    options.latency_frames = 2;
+    // The fourth push codes the first EP-frame and half of the second, and finds the motion of the third.
+    EXPECT_EQ(times_of("registration", walking(6), options), (Times{0, 0, 0, 3, 1, 1}));
+    EXPECT_EQ(times_of("quantisation", walking(6), options), (Times{0, 0, 0, 2, 1, 1}));
+}
+
+TEST(Latency, OfTwoFramesBuildsSearchStructuresTwoFramesAhead) {
+    auto options = default_options(Profile::tracked);
+    options.latency_frames = 2;
+    EXPECT_EQ(times_of("search structures", walking(5), options), (Times{0, 0, 3, 1, 1}));
+    EXPECT_EQ(times_of("registration", walking(5), options), (Times{0, 0, 0, 2, 1}));
+}
+
+TEST(Latency, LetsTwoFramesWait) {
     const auto sequence = walking(4);
-    std::vector<std::size_t> registrations;
+    auto options = default_options(Profile::tracked);
+    options.latency_frames = 2;
+    auto encoder = *Encoder::create(options);
+    std::vector<std::size_t> coded, held;
     for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
         ASSERT_TRUE(encoder.push(sequence.frames[i].mesh, nullptr, static_cast<std::int64_t>(33333 * i)));
-        registrations.push_back(static_cast<std::size_t>(std::ranges::count_if(
-            encoder.stage_times(), [](const auto& stage) { return std::string_view(stage.stage) == "registration"; })));
+        coded.push_back(encoder.coded_frames().size());
+        held.push_back(encoder.held_frames());
     }
-    // The second push codes the I-frame; the third its first EP-frame, and registers the frame behind that one, too.
-    EXPECT_EQ(registrations, (std::vector<std::size_t>{0, 0, 2, 1}));
+    EXPECT_EQ(coded, (Times{0, 0, 1, 1}));
+    EXPECT_EQ(held, (Times{1, 2, 2, 2}));
+    ASSERT_TRUE(encoder.finish());
+    EXPECT_EQ(encoder.coded_frames().size(), 2u);
+    EXPECT_EQ(encoder.held_frames(), 0u);
 }
 
 TEST(Latency, LetsOneFrameWait) {

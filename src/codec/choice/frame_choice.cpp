@@ -502,6 +502,15 @@ FrameType rate_type(const Candidate& candidate) {
     return candidate.stands_in || bare ? FrameType::predicted : candidate.type;
 }
 
+std::optional<FrameSteps> enhanced_steps(const Configuration& configuration) {
+    const auto& options = configuration.options;
+    const auto choice = options.topology.frame_choice;
+    const bool whole = (choice == FrameChoice::fixed || choice == FrameChoice::cheaper) &&
+                       !(options.topology.still_below > 0) && !configuration.tracked();
+    if (!whole || options.rate.bits_per_second > 0 || options.rate.target_error > 0) return std::nullopt;
+    return steps_of(configuration, {options.geometry_step, options.colour_step});
+}
+
 Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra) {
     if (control.rate) return code_within_buffer(work, *control.rate, bits_of, force_intra);
     if (control.error) return code_to_error(work, *control.error, force_intra);

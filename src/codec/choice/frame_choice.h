@@ -25,6 +25,9 @@ using BitsOf = std::function<double(const Candidate&)>;
 // buffer even at the lowest quality.
 Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra);
 
+// The steps at which the next EP-frame's whole surface is quantised first, if that follows from the options alone.
+std::optional<FrameSteps> enhanced_steps(const Configuration& configuration);
+
 // The kind that the rate controller takes a candidate for: a stand-in's size does not depend on quality, like that of a
 // P-frame.
 FrameType rate_type(const Candidate& candidate);

@@ -87,13 +87,6 @@ ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex
 
 namespace {
 
-// The data of the frame's vertices in the order E^ord, one entry per residual.
-struct OrderedResiduals {
-    ResidualOrder order;
-    QuantisedResiduals geometry, colour;
-    LatticeMesh decoded;  // its vertices only
-};
-
 std::vector<ResidualVector> position_residuals(const LatticeMesh& mesh, std::span<const LatticePoint> predicted,
                                                const ResidualOrder& order) {
     std::vector<ResidualVector> out;
@@ -149,7 +142,7 @@ QuantisedResiduals quantise_with(CodebookInUse& use, std::span<const ResidualVec
 
 // The decoder's sum: predicted vertices and reference attributes plus quantised residuals.
 LatticeMesh decode_vertices(const LatticeMesh& mesh, const ReferenceMesh& reference,
-                            std::span<const LatticePoint> predicted, const OrderedResiduals& residuals) {
+                            std::span<const LatticePoint> predicted, const QuantisedFrame& residuals) {
     LatticeMesh out;
     const auto& order = residuals.order;
     for (std::size_t k = 0; k < order.vertex.size(); ++k) {
@@ -159,26 +152,6 @@ LatticeMesh decode_vertices(const LatticeMesh& mesh, const ReferenceMesh& refere
         if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[order.vertex[k]]);
         if (!mesh.texcoords.empty()) out.texcoords.push_back(mesh.texcoords[order.vertex[k]]);
     }
-    return out;
-}
-
-// Residuals against the predicted mesh, quantised, and the values they decode to.
-OrderedResiduals quantise_residuals(const EnhancedFrameSource& source, std::span<const std::uint8_t> eligible,
-                                    Codebooks& codebooks, const EnhancedFrameOptions& options, StageClock& clock) {
-    const auto& mesh = *source.mesh;
-    const auto& reference = *source.reference;
-    const auto& predicted = source.motion->predicted;
-    const auto reference_of_vertex = find_reference_vertices(
-        reference, *source.search, predicted, source.motion->transforms, mesh.positions, source.bone_of_vertex,
-        source.nearest, eligible, options.reference_choice, options.threads);
-    OrderedResiduals out;
-    out.order = order_residuals(reference_of_vertex, predicted.size());
-    clock.done("reference vertices");
-    out.geometry = quantise_with(codebooks.geometry, position_residuals(mesh, predicted, out.order), options.geometry);
-    if (!reference.mesh.colours.empty())
-        out.colour = quantise_with(codebooks.colour, colour_residuals(mesh, reference.mesh, out.order), options.colour);
-    out.decoded = decode_vertices(mesh, reference, predicted, out);
-    clock.done("quantisation");
     return out;
 }
 
@@ -193,8 +166,7 @@ std::vector<Value> selected(const std::vector<Value>& values, const std::vector<
 
 // Removes the residuals of merged vertices before any layer is coded, so that they cost nothing in any layer. Returns
 // the triangles in the numbering of E^ord.
-std::vector<Triangle> remove_duplicates(OrderedResiduals& residuals, const std::vector<Triangle>& triangles,
-                                        bool merge) {
+std::vector<Triangle> remove_duplicates(QuantisedFrame& residuals, const std::vector<Triangle>& triangles, bool merge) {
     auto& order = residuals.order;
     const auto merging = merge ? find_duplicates(residuals.decoded) : no_duplicates(order.vertex.size());
     Merging of_source;  // from the numbering of the captured mesh
@@ -214,17 +186,16 @@ std::vector<Triangle> remove_duplicates(OrderedResiduals& residuals, const std::
 }
 
 // Codes the layers that do not need connectivity.
-void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrameSource& source,
-                          std::span<const std::uint8_t> eligible, const Codebooks& codebooks, FramePayload& payload) {
+void encode_vertex_layers(const QuantisedFrame& residuals, const EnhancedFrameSource& source, FramePayload& payload) {
     const auto& reference = *source.reference;
     const auto& transforms = source.motion->transforms;
     std::vector<std::uint32_t> residuals_of(reference.mesh.positions.size(), 0);
     for (const auto r : residuals.order.reference) ++residuals_of[r];
     payload.set(Layer::transforms, encode_transforms(transforms));
-    payload.set(Layer::mapping, encode_mapping(residuals_of, reference.mapping_prior, eligible));
-    payload.set(Layer::geometry, encode_residuals(residuals.geometry, *codebooks.geometry.codebook));
+    payload.set(Layer::mapping, encode_mapping(residuals_of, reference.mapping_prior, residuals.eligible));
+    payload.set(Layer::geometry, encode_residuals(residuals.geometry, *residuals.codebooks.geometry.codebook));
     if (!reference.mesh.colours.empty())
-        payload.set(Layer::colour, encode_residuals(residuals.colour, *codebooks.colour.codebook));
+        payload.set(Layer::colour, encode_residuals(residuals.colour, *residuals.codebooks.colour.codebook));
     if (!reference.mesh.normals.empty()) {
         const auto turned = selected(predict_normals(reference, transforms), residuals.order.reference);
         payload.set(Layer::normals, encode_attribute_values(residuals.decoded.normals, turned));
@@ -237,14 +208,35 @@ void encode_vertex_layers(const OrderedResiduals& residuals, const EnhancedFrame
 
 }  // namespace
 
-EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
+QuantisedFrame quantise_enhanced_frame(const EnhancedFrameSource& source, Codebooks codebooks,
+                                       const EnhancedFrameOptions& options, std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    const auto& mesh = *source.mesh;
+    const auto& reference = *source.reference;
+    const auto& predicted = source.motion->predicted;
+    QuantisedFrame out;
+    if (!source.coded_bones.empty()) out.eligible = vertices_of_coded_bones(reference, source.coded_bones);
+    const auto reference_of_vertex = find_reference_vertices(
+        reference, *source.search, predicted, source.motion->transforms, mesh.positions, source.bone_of_vertex,
+        source.nearest, out.eligible, options.reference_choice, options.threads);
+    out.order = order_residuals(reference_of_vertex, predicted.size());
+    clock.done("reference vertices");
+    out.codebooks = std::move(codebooks);
+    out.geometry =
+        quantise_with(out.codebooks.geometry, position_residuals(mesh, predicted, out.order), options.geometry);
+    if (!reference.mesh.colours.empty())
+        out.colour =
+            quantise_with(out.codebooks.colour, colour_residuals(mesh, reference.mesh, out.order), options.colour);
+    out.decoded = decode_vertices(mesh, reference, predicted, out);
+    clock.done("quantisation");
+    return out;
+}
+
+EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, QuantisedFrame residuals,
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);
     const auto& reference = *source.reference;
     const Threads threads = options.threads;
-    std::vector<std::uint8_t> eligible;
-    if (!source.coded_bones.empty()) eligible = vertices_of_coded_bones(reference, source.coded_bones);
-    auto residuals = quantise_residuals(source, eligible, codebooks, options, clock);
     const auto triangles = remove_duplicates(residuals, source.mesh->triangles, options.merge_duplicates);
     clock.done("duplicates");
 
@@ -253,7 +245,7 @@ EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Co
     parallel_invoke(
         threads,
         [&] { connectivity = encode_mtfan(residuals.decoded.positions, triangles, options.nearest_vertices, threads); },
-        [&] { encode_vertex_layers(residuals, source, eligible, codebooks, out.payload); });
+        [&] { encode_vertex_layers(residuals, source, out.payload); });
     clock.done("connectivity and entropy coding");
 
     out.payload.set(Layer::fans, std::move(connectivity.fans));
@@ -263,8 +255,8 @@ EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Co
     header.source_triangles = source.source_triangles;
     header.vertices = static_cast<std::uint32_t>(residuals.decoded.positions.size());
     header.triangles = static_cast<std::uint32_t>(connectivity.triangles.size());
-    header.geometry_codebook = codebooks.geometry.number;
-    header.colour_codebook = codebooks.colour.number;
+    header.geometry_codebook = residuals.codebooks.geometry.number;
+    header.colour_codebook = residuals.codebooks.colour.number;
     out.mesh = std::move(residuals.decoded);
     out.mesh.triangles = std::move(connectivity.triangles);
     out.distance_order_counts = std::move(connectivity.distance_order_counts);

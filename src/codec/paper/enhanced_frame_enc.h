@@ -53,9 +53,24 @@ struct EnhancedFrameSource {
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
 };
 
-// In: the codebooks before the frame. Out: as the frame uses them.
 struct Codebooks {
     CodebookInUse geometry, colour;
+};
+
+// E^ord: the frame's vertices by ascending reference vertex; vertices with the same one keep their order. It follows
+// from geometry, not from connectivity, so the mapping layer needs only counts to tell where each residual belongs.
+struct ResidualOrder {
+    std::vector<std::uint32_t> vertex;     // index in the frame, one per residual
+    std::vector<std::uint32_t> reference;  // its reference vertex
+};
+
+// A frame's vertices, quantised, in the order E^ord: one entry per residual.
+struct QuantisedFrame {
+    ResidualOrder order;
+    QuantisedResiduals geometry, colour;
+    LatticeMesh decoded;                 // its vertices only
+    std::vector<std::uint8_t> eligible;  // one per reference vertex: whether residuals may refer to it; empty: all
+    Codebooks codebooks;                 // as the frame uses them
 };
 
 struct EncodedEnhancedFrame {
@@ -64,9 +79,12 @@ struct EncodedEnhancedFrame {
     std::vector<std::uint32_t> distance_order_counts;
 };
 
-// The mesh must have the same attributes as the reference, and the reference at least one eligible vertex. stages:
-// times are added to it.
-EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, Codebooks& codebooks,
+// The two halves of an EP-frame's coding, about equally long. The mesh must have the same attributes as the reference,
+// and the reference at least one eligible vertex. codebooks: as the frame before left them. stages: times are added to
+// it.
+QuantisedFrame quantise_enhanced_frame(const EnhancedFrameSource& source, Codebooks codebooks,
+                                       const EnhancedFrameOptions& options, std::vector<StageTime>& stages);
+EncodedEnhancedFrame encode_enhanced_frame(const EnhancedFrameSource& source, QuantisedFrame quantised,
                                            const EnhancedFrameOptions& options, std::vector<StageTime>& stages);
 
 // The first two steps, available separately for tests.
@@ -81,12 +99,6 @@ std::vector<std::uint32_t> find_reference_vertices(
     std::span<const BoneIndex> bone_of_vertex, std::span<const std::uint32_t> nearest,
     std::span<const std::uint8_t> eligible, ReferenceChoice choice, Threads threads);
 
-// E^ord: the frame's vertices by ascending reference vertex; vertices with the same one keep their order. It follows
-// from geometry, not from connectivity, so the mapping layer needs only counts to tell where each residual belongs.
-struct ResidualOrder {
-    std::vector<std::uint32_t> vertex;     // index in the frame, one per residual
-    std::vector<std::uint32_t> reference;  // its reference vertex
-};
 ResidualOrder order_residuals(std::span<const std::uint32_t> reference_of_vertex, std::size_t references);
 
 }  // namespace htvm::internal
