@@ -897,8 +897,8 @@ struct SurfacePatchSearch::Measured {
     const LatticeMesh &decoded, &captured;
     const SurfaceIndex& surface;
     SurfacePatchOptions options;
-    Sides sides;
-    Capture capture;
+    std::optional<Sides> sides;
+    std::optional<Capture> capture;
     std::vector<double> error;          // of each vertex of the tracked mesh
     std::vector<double> error_around;   // RMS in its cube of space
     std::vector<double> edge;           // mean length of the sides at it
@@ -907,6 +907,7 @@ struct SurfacePatchSearch::Measured {
 
     Measured(const LatticeMesh& tracked, std::span<const LatticePoint> rest, const LatticeMesh& mesh,
              const SurfaceIndex& index, const SurfacePatchOptions& wanted);
+    void measure_sides();  // edge and area
 };
 
 namespace {
@@ -942,26 +943,32 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
 SurfacePatchSearch::Measured::Measured(const LatticeMesh& tracked, std::span<const LatticePoint> rest,
                                        const LatticeMesh& mesh, const SurfaceIndex& index,
                                        const SurfacePatchOptions& wanted)
-    : decoded(tracked),
-      captured(mesh),
-      surface(index),
-      options(wanted),
-      sides(tracked.positions, tracked.triangles),
-      capture(make_capture(mesh, index, wanted)) {
-    const double mean = mean_edge(decoded.positions, decoded.triangles);
-    const SurfaceIndex shown(points_of(decoded.positions), decoded.triangles,
-                             {.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
-    capture.on_decoded = closest_on_same_side(shown, capture.points, capture.normals,
-                                              {options.reach, options.lost / 2, 0.2, options.threads});
-    error = errors_of(decoded, shown, capture, options);
-    error_around = errors_around(shown.positions, error, capture, options);
+    : decoded(tracked), captured(mesh), surface(index), options(wanted) {
+    std::optional<SurfaceIndex> shown;
+    const auto look_at_tracked = [&] {
+        sides.emplace(decoded.positions, decoded.triangles);
+        const double mean = mean_edge(decoded.positions, decoded.triangles);
+        shown.emplace(
+            points_of(decoded.positions), decoded.triangles,
+            SurfaceIndexOptions{.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
+        bad_shape = distorted(decoded, rest, *sides, options);
+        measure_sides();
+    };
+    parallel_invoke(
+        options.threads, [&] { capture.emplace(make_capture(mesh, index, wanted)); }, look_at_tracked);
+    capture->on_decoded = closest_on_same_side(*shown, capture->points, capture->normals,
+                                               {options.reach, options.lost / 2, 0.2, options.threads});
+    error = errors_of(decoded, *shown, *capture, options);
+    error_around = errors_around(shown->positions, error, *capture, options);
     rims.assign(decoded.positions.size(), false);
-    add_rims_of_uncovered(capture, decoded, options, rims);
-    bad_shape = distorted(decoded, rest, sides, options);
+    add_rims_of_uncovered(*capture, decoded, options, rims);
+}
+
+void SurfacePatchSearch::Measured::measure_sides() {
     edge.assign(decoded.positions.size(), 0);
     std::vector<double> count(edge.size(), 0);
-    for (std::uint32_t s = 0; s < sides.count(); ++s) {
-        const auto a = sides.from(s), b = sides.to(s);
+    for (std::uint32_t s = 0; s < sides->count(); ++s) {
+        const auto a = sides->from(s), b = sides->to(s);
         const double size = length(to_vector(decoded.positions[b]) - to_vector(decoded.positions[a]));
         for (const auto v : {a, b}) edge[v] += size, count[v] += 1;
     }
@@ -984,18 +991,18 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(double region_lost) const {
     const auto& m = *measured_;
     const auto& options = m.options;
     const std::size_t vertices = m.decoded.positions.size();
-    auto removed = find_lost(m.decoded, m.sides, {m.error, m.error_around, m.rims, m.bad_shape}, region_lost, options);
+    auto removed = find_lost(m.decoded, *m.sides, {m.error, m.error_around, m.rims, m.bad_shape}, region_lost, options);
     if (std::find(removed.begin(), removed.end(), true) == removed.end()) return std::nullopt;
     for (int attempt = 0; attempt < options.attempts; ++attempt) {
-        tidy(removed, m.decoded, m.sides, options);
-        const auto stays = remainder_of(m.decoded, m.sides, removed);
+        tidy(removed, m.decoded, *m.sides, options);
+        const auto stays = remainder_of(m.decoded, *m.sides, removed);
         double area = 0;
         for (const auto& t : stays.triangles) area += area_of(m.decoded.positions, t);
         if (m.area - area > options.most_share * m.area) return std::nullopt;
-        const auto outside = outside_of(stays, m.decoded, removed, m.edge, m.capture, options);
+        const auto outside = outside_of(stays, m.decoded, removed, m.edge, *m.capture, options);
         const auto piece =
-            simplified_piece(cut_piece(outside, m.capture, options), m.captured, m.surface, options.simplification);
-        auto join = Joiner(m.decoded, m.sides, stays, piece, m.edge, m.capture, options).run();
+            simplified_piece(cut_piece(outside, *m.capture, options), m.captured, m.surface, options.simplification);
+        auto join = Joiner(m.decoded, *m.sides, stays, piece, m.edge, *m.capture, options).run();
         if (join.unclear.empty()) {
             SurfacePatch out;
             out.removed = std::move(removed);
