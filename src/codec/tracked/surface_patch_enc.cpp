@@ -377,12 +377,15 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
     constexpr int rounds = 12, smoothing = 3;
     constexpr double most_gone = 0.6;
     const std::size_t vertices = removed.size();
+    std::vector<double> area_of_triangle;
+    for (const auto& t : decoded.triangles) area_of_triangle.push_back(area_of(decoded.positions, t));
     for (int round = 0; round < rounds; ++round) {
         std::vector<std::uint32_t> kept(vertices, 0), gone(vertices, 0), lost_corners(vertices, 0),
             corners(vertices, 0);
-        std::vector<Triangle> triangles;
+        std::vector<std::uint32_t> staying;
         DisjointSets parts(vertices);
-        for (const auto& t : decoded.triangles) {
+        for (std::uint32_t index = 0; index < decoded.triangles.size(); ++index) {
+            const auto& t = decoded.triangles[index];
             const bool stays = !removed[t[0]] && !removed[t[1]] && !removed[t[2]];
             for (std::size_t i = 0; i < 3; ++i) {
                 ++(stays ? kept : gone)[t[i]];
@@ -392,12 +395,13 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
                 }
                 parts.join(t[i], stays ? t[(i + 1) % 3] : t[i]);
             }
-            if (stays) triangles.push_back(t);
+            if (stays) staying.push_back(index);
         }
         std::vector<double> area(vertices, 0);
         std::vector<bool> opened(vertices, false);
-        for (const auto& t : triangles) {
-            area[parts.of(t[0])] += area_of(decoded.positions, t);
+        for (const auto index : staying) {
+            const auto& t = decoded.triangles[index];
+            area[parts.of(t[0])] += area_of_triangle[index];
             for (const auto v : t)
                 if (gone[v] > 0) opened[parts.of(v)] = true;
         }
@@ -421,7 +425,7 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
             if (kept[v] == 0 || borders[v] > 1 || notch || island) more.push_back(v);
         }
         for (const auto v : more) removed[v] = true;
-        if (more.empty() && round >= smoothing) return;
+        if (more.empty()) return;  // nor will a later round find any, which looks for no more than this one
     }
 }
 
