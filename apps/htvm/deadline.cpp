@@ -24,8 +24,9 @@ double share_of(int effort) { return shares[static_cast<std::size_t>(std::clamp(
 int Deadline::effort(double waited) const {
     constexpr double room = 0.9;  // of the deadline, as forecasts are off
     if (!(milliseconds_ > 0)) return most_;
+    const double usually = usual();
     for (int effort = most_; effort > 0; --effort)
-        if (waited + usual_ * share_of(effort) <= room * milliseconds_) return effort;
+        if (waited + usually * share_of(effort) <= room * milliseconds_) return effort;
     // Motion alone loses track sooner or later, which nobody mends. Where the machine never has time for more, a few
     // late frames are better than a picture that falls apart.
     const auto alone = [](const TimedFrame& frame) { return frame.motion_alone(); };
@@ -34,15 +35,23 @@ int Deadline::effort(double waited) const {
     return for_long ? std::min(1, most_) : 0;
 }
 
+double Deadline::usual() const {
+    if (usual_.empty()) return 0;
+    auto ascending = usual_;
+    std::sort(ascending.begin(), ascending.end());
+    return percentile(ascending, 50);
+}
+
 void Deadline::took(const TimedFrame& frame) {
-    // Of the first frame, an I-frame, nothing follows for others. A frame that took unusually long, as one with a patch
-    // does, says little of the next; what frames commonly take is followed within a few.
-    constexpr double newest = 0.25, unusual = 2;
-    const bool first = frames_.empty();
+    // The median counts: a frame that takes several times as long, as one with a patch does, says nothing of the next,
+    // nor does an I-frame; what frames commonly take is followed within a few. Motion alone takes longer where tracking
+    // is lost, and then a frame with more effort is what is needed: it only tells that there is more time.
+    constexpr std::size_t last = 9;
     frames_.push_back(frame);
-    if (first) return;
-    const double usual = frame.took / share_of(frame.effort);
-    usual_ = usual_ == 0 ? usual : usual_ + newest * (std::min(usual, unusual * usual_) - usual_);
+    const double would_have = frame.took / share_of(frame.effort);
+    if (frame.intra || frames_.size() == 1 || (frame.motion_alone() && would_have > usual())) return;
+    if (usual_.size() == last) usual_.erase(usual_.begin());
+    usual_.push_back(would_have);
 }
 
 std::size_t Deadline::late() const {

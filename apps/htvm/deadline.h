@@ -44,9 +44,11 @@ public:
     std::size_t alone() const;    // of these, those whose motion alone was coded
 
 private:
+    double usual() const;  // their median; 0: not known yet
+
     double milliseconds_;
     int most_;
-    double usual_ = 0;  // milliseconds that a frame takes at the usual effort, of the last ones; 0: not known yet
+    std::vector<double> usual_;  // milliseconds that each of the last frames would have taken at the usual effort
     std::vector<TimedFrame> frames_;
 };
 

@@ -399,8 +399,8 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     return {};
 }
 
-// Marks where a frame's packets begin in the queue. If the frame fails, packets queued since are removed and the
-// sequence stays as it was.
+// Marks where a frame's packets begin in the queue. If the frame fails, packets queued since are removed, the sequence
+// stays as it was, and frames that wait are no longer behind it.
 struct Queued {
     std::size_t packets, index;
     std::uint64_t stream_bytes;
@@ -420,6 +420,7 @@ void take_back(State& state, const Queued& before) {
     output.stream_bytes = before.stream_bytes;
     output.header_sent = before.header_sent;
     state.held.erase(state.held.begin() + static_cast<std::ptrdiff_t>(before.held), state.held.end());
+    for (auto& frame : state.waiting) frame.ahead = {};
 }
 
 RateControlOptions rate_options(const EncoderOptions& options) {
@@ -526,25 +527,31 @@ Result<void> Encoder::finish() {
     if (state.finished || (!state.begun && state.waiting.empty())) return {};
     state.stages.clear();
     Outcome all;
-    auto done = Result<void>();
+    const auto add = [&](std::vector<EncodedFrame>& coded, std::vector<ShownMesh>& decoded) {
+        std::ranges::move(coded, std::back_inserter(all.coded));
+        std::ranges::move(decoded, std::back_inserter(all.decoded));
+    };
     // One after the other, so that an error in one leaves those before it as they are.
-    while (done && !state.waiting.empty()) {
+    auto done = Result<void>();
+    const auto code = [&](const auto& work) {
         const auto before = queued(state);
-        done = guarded([&]() -> Result<void> {
-            if (auto coded = code_first_waiting(state); !coded) return coded;
-            if (state.coded_none) return {};
-            std::ranges::move(state.coded, std::back_inserter(all.coded));
-            std::ranges::move(state.decoded, std::back_inserter(all.decoded));
+        done = guarded(work);
+        if (!done) take_back(state, before);
+    };
+    while (done && !state.waiting.empty())
+        code([&]() -> Result<void> {
+            auto coded = code_first_waiting(state);
+            if (coded && !state.coded_none) add(state.coded, state.decoded);
+            return coded;
+        });
+    if (done)
+        code([&]() -> Result<void> {
+            Outcome rest;
+            if (auto sent = send_held(state, state.held, rest); !sent) return sent;
+            add(rest.coded, rest.decoded);
+            state.held.clear();
             return {};
         });
-        if (!done) take_back(state, before);
-    }
-    if (done) {
-        const auto before = queued(state);
-        done = guarded([&] { return send_held(state, state.held, all); });
-        if (done) state.held.clear();
-        if (!done) take_back(state, before);
-    }
     commit(state, std::move(all));
     if (!done) return done;
     if (!state.begun) return {};

@@ -3,13 +3,11 @@
 . "$(dirname "$0")/expect.sh"
 
 "$htvm" synth capture --frames 6 --vertices 600 --quiet
-# times STREAM: of its frames, in milliseconds.
-times() { "$htvm" info "$1" --json | awk -F'[:,]' '/"timestamp_us"/ { printf "%d ", ($2 + 500) / 1000 }'; }
 # has_times STREAM TIMES...
 has_times() {
     local stream=$1
     shift
-    [ "$(times "$stream")" = "$* " ] || fail "$stream has frames at $(times "$stream")ms, not at $* ms"
+    [ "$(times "$stream" 1000)" = "$* " ] || fail "$stream has frames at $(times "$stream" 1000)ms, not at $* ms"
 }
 
 # A frame that cannot be read.
@@ -159,14 +157,14 @@ for k in $(seq 10); do cat capture/*.ply; done >burst.ply
 "$htvm" encode - --drop-late --json -o burst.htvm <burst.ply >burst.json 2>said || fail "--drop-late: $(tail -1 said)"
 grep -q "of 60 frames came faster than they were encoded, and were dropped" said || fail "late frames are not told"
 late=$(awk -F'[:,]' '/"late_frames"/ { print $2 }' burst.json)
-[ $(($(times burst.htvm | wc -w) + late)) -eq 60 ] || fail "$late frames are late, and $(times burst.htvm | wc -w) in the stream"
-[ "$(times burst.htvm | awk '{ print $NF }')" = 1967 ] || fail "late frames change the times of others"
+[ $(($(times burst.htvm 1000 | wc -w) + late)) -eq 60 ] || fail "$late frames are late, and $(times burst.htvm 1000 | wc -w) in the stream"
+[ "$(times burst.htvm 1000 | awk '{ print $NF }')" = 1967 ] || fail "late frames change the times of others"
 expect 2 "--drop-late" "$htvm" encode capture --drop-late -o x.htvm
 
 # A deadline costs effort, not frames, and what was decided can be repeated.
 "$htvm" encode - --deadline 1 --effort-log efforts.csv --json -o hurried.htvm <burst.ply >hurried.json 2>said ||
     fail "--deadline: $(tail -1 said)"
-[ "$(times hurried.htvm | wc -w)" -eq 60 ] || fail "a deadline leaves frames out"
+[ "$(times hurried.htvm 1000 | wc -w)" -eq 60 ] || fail "a deadline leaves frames out"
 grep -q '"lowered_frames": [1-9]' hurried.json || fail "a deadline of a millisecond costs no effort"
 [ "$(wc -l <efforts.csv)" -eq 61 ] || fail "the log has not a line per frame"
 expect 0 "deadline 5000 ms: 0 frames late, 0 frames with less effort" "$htvm" encode capture --deadline 5000 -o x.htvm

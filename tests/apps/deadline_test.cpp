@@ -54,9 +54,31 @@ TEST(Deadline, AMachineThatIsTooSlowKeepsUpWithLess) {
     EXPECT_LT(deadline.lowered(), deadline.frames().size());
 }
 
-TEST(Deadline, AFrameThatTookUnusuallyLongHardlyCountsForTheNext) {
-    auto deadline = after(20, 20, 66);
-    deadline.took({5, 0, 200});
+TEST(Deadline, FramesThatTakeUnusuallyLongDoNotCountForTheNext) {
+    auto deadline = after(20, 20, 23);  // the median frame is just in time
+    for (const bool patched : {true, false, true, false, false, true}) deadline.took({5, 0, patched ? 200.0 : 20.0});
+    deadline.took({.effort = 5, .waited = 0, .took = 300, .intra = true});
+    EXPECT_EQ(deadline.effort(0), 5);
+}
+
+TEST(Deadline, WhatFramesCommonlyTakeIsFollowedWithinFive) {
+    auto deadline = after(20, 20, 30);
+    for (int i = 0; i < 5; ++i) deadline.took({5, 0, 40});
+    EXPECT_EQ(deadline.effort(0), 0);
+    for (int i = 0; i < 5; ++i) deadline.took({5, 0, 20});
+    EXPECT_EQ(deadline.effort(0), 5);
+}
+
+TEST(Deadline, MotionAloneThatTakesLongKeepsNoFrameBehindItFromMore) {
+    auto deadline = after(20, 20, 30);
+    for (int i = 0; i < 9; ++i) deadline.took({0, 40, 25});
+    EXPECT_EQ(deadline.effort(0), 5);
+}
+
+TEST(Deadline, MotionAloneTellsOfAMachineThatBecomesFaster) {
+    auto deadline = after(20, 60, 40);
+    EXPECT_LE(deadline.effort(0), 1);
+    for (int i = 0; i < 9; ++i) deadline.took({0, 0, 10});
     EXPECT_EQ(deadline.effort(0), 5);
 }
 

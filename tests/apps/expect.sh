@@ -22,6 +22,11 @@ expect() {
     fi
 }
 
+# times STREAM MICROSECONDS: when its frames are shown, in so many microseconds each.
+times() {
+    "$htvm" info "$1" --json | awk -F'[:,]' -v unit="$2" '/"timestamp_us"/ { printf "%d ", ($2 + 500) / unit }'
+}
+
 # interrupted STREAM COMMAND...: the command, which would write kept.htvm, a copy of STREAM, ends at once and leaves it so.
 interrupted() {
     local stream=$1 process code

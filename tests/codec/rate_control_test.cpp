@@ -189,6 +189,21 @@ TEST(RateControl, AFirstPassBringsTheTotalWithinTwoPercent) {
             }
 }
 
+TEST(RateControl, AnIntraFrameThatComesEarlyNearTheEndIsMadeUpFor) {
+    const Capture capture{.intra_times = 8, .frames = 100};
+    const RateControlOptions options{.buffer_seconds = 2};
+    RateController rate(options, first_pass_of(capture));  // with I-frames at 0, 30, 60 and 90
+    double bits = 0;
+    for (int f = 0; f < capture.frames; ++f) {
+        const bool intra = f == 88 || (f % 30 == 0 && f != 90);
+        const auto type = intra ? FrameType::intra : FrameType::enhanced;
+        const double quality = rate.quality(type), own = size_of(capture, f, type, quality, 1);
+        rate.coded({type, quality, own});
+        bits += own;
+    }
+    EXPECT_NEAR(bits / target_of(capture, options), 1, 0.02);
+}
+
 TEST(RatePlan, IsOneQualityWhereTheBufferAllows) {
     const auto costs = first_pass_of({});
     const auto plan = plan_qualities(costs, {}, 0.04);
