@@ -95,17 +95,19 @@ std::string in_words(const CLI::App& app, const CLI::Error& error) {
 
 // What was wrong with the command line, what may have been meant, and where to read on.
 std::string usage_message(const CLI::App* app, const CLI::Error& error) {
-    std::string command = app->get_name(), meant;
+    std::string command = app->get_name(), meant, help = "--help";
     for (const auto& word : app->remaining())
         if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*app));
     for (const auto* named : app->get_subcommands()) {
         command += " " + named->get_name();
+        // The everyday help may lack the very option that was wrong.
+        if (named->get_option_no_throw("--help-all")) help = "--help-all";
         for (const auto& word : named->remaining())
             if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*named));
     }
     const std::string hint = meant.empty() ? "" : fmt::format("did you mean {}? ", meant);
-    return fmt::format("{}: error: {}; {}'{} --help' tells more\n", app->get_name(), in_words(*app, error), hint,
-                       command);
+    return fmt::format("{}: error: {}; {}'{} {}' tells more\n", app->get_name(), in_words(*app, error), hint, command,
+                       help);
 }
 
 // Output that is still buffered may fail to arrive: a full disk must not look like success.

@@ -109,10 +109,11 @@ std::string deadline_warning(const Deadline& deadline, bool may_drop) {
     const auto frames = deadline.frames().size(), late = deadline.late();
     if (late == 0 || 2 * late < frames) return {};
     return fmt::format(
-        "{} of {} late: this machine is too slow for the deadline; a larger --deadline helps, a lower "
+        "{} of {} late: this machine is too slow for the deadline{}; a larger --deadline helps, a lower "
         "-q{}, meshes of fewer vertices{}",
-        late, counted(frames, "frame") + (frames == 1 ? " was" : " were"), deadline.most() > 1 ? " or --effort" : "",
-        may_drop ? ", or --drop-late, which leaves frames out" : "");
+        late, counted(frames, "frame") + (frames == 1 ? " was" : " were"),
+        may_drop ? ", or the meshes came faster than a camera's, as from a file" : "",
+        deadline.most() > 1 ? " or --effort" : "", may_drop ? ", or --drop-late, which leaves frames out" : "");
 }
 
 Result<void> write_effort_log(OutputFile& file, const std::vector<TimedFrame>& frames) {

@@ -86,6 +86,8 @@ std::string help_of(const Option& option) {
                fmt::format(" ({}, or random; default: random where the output is no file, else 0)", range_text(option));
     if (option.kind == OptionKind::on_or_off) return (option.flag_off ? "Do without " : "") + meaning_text(option);
     auto text = capitalised(meaning_text(option));
+    if (&option == find_option("latency_frames"))
+        return text + fmt::format(" ({}; default 1 for files, else 0)", range_text(option));
     if (&option == find_option("rate.bits_per_second"))
         text +=
             ". A warning says how many frames have the lowest quality, have their motion alone, or were dropped, "
@@ -320,10 +322,11 @@ std::string options_in_markdown() {
             if (*option.flag_unit) flag += fmt::format(", {}", option.flag_unit);
             Option listed = option;
             listed.flag_factor = 1;  // in the library's unit
-            const bool drawn = &option == find_option("session");
+            std::string here;
+            if (&option == find_option("session")) here = "; `htvm encode`: random where the output is no file";
+            if (&option == find_option("latency_frames")) here = "; `htvm encode`: 1 for files";
             out += fmt::format("| `{}` | {} | {} | {}{} | {} |\n", option.name, flag, range_text(option),
-                               default_text(listed), drawn ? "; `htvm encode`: random where the output is no file" : "",
-                               meaning_text(option));
+                               default_text(listed), here, meaning_text(option));
         }
     }
     out +=

@@ -110,7 +110,8 @@ TEST(Deadline, WhereHalfOfTheFramesAreLateAWarningSaysWhatHelps) {
     EXPECT_EQ(deadline_warning(deadline, true), "");
     deadline.took({0, 0, 60.0});
     EXPECT_EQ(deadline_warning(deadline, true),
-              "2 of 4 frames were late: this machine is too slow for the deadline; a larger --deadline helps, a lower "
+              "2 of 4 frames were late: this machine is too slow for the deadline, or the meshes came faster than a "
+              "camera's, as from a file; a larger --deadline helps, a lower "
               "-q or --effort, meshes of fewer vertices, or --drop-late, which leaves frames out");
     Deadline least(50, 1);
     least.took({1, 0, 60.0});
