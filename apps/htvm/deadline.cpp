@@ -39,13 +39,14 @@ double Deadline::usual() const {
     if (usual_.empty()) return 0;
     auto ascending = usual_;
     std::sort(ascending.begin(), ascending.end());
-    return percentile(ascending, 50);
+    return percentile(ascending, 70);
 }
 
 void Deadline::took(const TimedFrame& frame) {
-    // The median counts: a frame that takes several times as long, as one with a patch does, says nothing of the next,
-    // nor does an I-frame; what frames commonly take is followed within a few. Motion alone takes longer where tracking
-    // is lost, and then a frame with more effort is what is needed: it only tells that there is more time.
+    // Two of nine take longer than what counts: a frame that takes several times as long, as one with a patch does,
+    // says nothing of the next, nor does an I-frame; what frames commonly take is followed within a few. Motion alone
+    // takes longer where tracking is lost, and then a frame with more effort is what is needed: it only tells that
+    // there is more time.
     constexpr std::size_t last = 9;
     frames_.push_back(frame);
     const double would_have = frame.took / share_of(frame.effort);

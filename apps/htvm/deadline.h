@@ -44,7 +44,7 @@ public:
     std::size_t alone() const;    // of these, those whose motion alone was coded
 
 private:
-    double usual() const;  // their median; 0: not known yet
+    double usual() const;  // what seven of nine of them do not exceed; 0: not known yet
 
     double milliseconds_;
     int most_;
