@@ -406,8 +406,7 @@ void Capture::tell_of_texture() const {
     } else if (options_.texture.files == "none") {
         note(
             "the texture coordinates are encoded, without an image, and keep I-frames from being simplified; meshes "
-            "that are "
-            "written without them take fewer bits");
+            "that are written without them take fewer bits");
     } else if (image.empty()) {
         note("the meshes have texture coordinates, but no image was found for them; --texture gives its place");
     } else if (options_.texture_as == "coordinates") {

@@ -77,22 +77,27 @@ std::string default_text(const Option& option) {
     return out;
 }
 
+// What `htvm encode` takes in place of the library's default, and where; empty: nothing else.
+std::string own_default(const Option& option) {
+    if (&option == find_option("session")) return "random where the output is no file";
+    if (&option == find_option("latency_frames")) return "1 for files";
+    return "";
+}
+
 std::string help_of(const Option& option) {
     if (&option == find_option("topology.merge_duplicates"))
         return "Vertices that decode to the same point and attributes are merged by default, and triangles that "
                "collapse are dropped; with this, the decoded set of triangles is exactly the input's";
-    if (&option == find_option("session"))
-        return capitalised(meaning_text(option)) +
-               fmt::format(" ({}, or random; default: random where the output is no file, else 0)", range_text(option));
     if (option.kind == OptionKind::on_or_off) return (option.flag_off ? "Do without " : "") + meaning_text(option);
     auto text = capitalised(meaning_text(option));
-    if (&option == find_option("latency_frames"))
-        return text + fmt::format(" ({}; default 1 for files, else 0)", range_text(option));
     if (&option == find_option("rate.bits_per_second"))
         text +=
             ". A warning says how many frames have the lowest quality, have their motion alone, or were dropped, "
             "for which the exit code is 5";
-    return fmt::format("{} ({}; default {})", text, range_text(as_flag(option)), default_text(option));
+    const std::string own = own_default(option);
+    return fmt::format("{} ({}{}; default {}{})", text, range_text(as_flag(option)),
+                       &option == find_option("session") ? ", or random" : "", own.empty() ? "" : own + ", else ",
+                       default_text(option));
 }
 
 void add_option(CLI::App& command, EncodingOptions& options, const Option& option) {
@@ -322,11 +327,10 @@ std::string options_in_markdown() {
             if (*option.flag_unit) flag += fmt::format(", {}", option.flag_unit);
             Option listed = option;
             listed.flag_factor = 1;  // in the library's unit
-            std::string here;
-            if (&option == find_option("session")) here = "; `htvm encode`: random where the output is no file";
-            if (&option == find_option("latency_frames")) here = "; `htvm encode`: 1 for files";
-            out += fmt::format("| `{}` | {} | {} | {}{} | {} |\n", option.name, flag, range_text(option),
-                               default_text(listed), here, meaning_text(option));
+            const std::string own = own_default(option);
+            out +=
+                fmt::format("| `{}` | {} | {} | {}{} | {} |\n", option.name, flag, range_text(option),
+                            default_text(listed), own.empty() ? "" : "; `htvm encode`: " + own, meaning_text(option));
         }
     }
     out +=

@@ -23,6 +23,11 @@ FrameSteps steps_of(const Configuration& configuration, const QualitySteps& step
             static_cast<std::int32_t>(std::lround(steps.colour_step))};
 }
 
+// The steps of the options, where neither a rate nor an error decides.
+FrameSteps steps_asked_for(const Configuration& configuration) {
+    return steps_of(configuration, {configuration.options.geometry_step, configuration.options.colour_step});
+}
+
 // For quality that is derived, which means the same for every subject, whatever its size.
 FrameSteps steps_of_quality(const Configuration& configuration, double quality) {
     auto steps = quality_steps(quality);
@@ -508,14 +513,13 @@ std::optional<FrameSteps> enhanced_steps(const Configuration& configuration) {
     const bool whole = (choice == FrameChoice::fixed || choice == FrameChoice::cheaper) &&
                        !(options.topology.still_below > 0) && !configuration.tracked();
     if (!whole || options.rate.bits_per_second > 0 || options.rate.target_error > 0) return std::nullopt;
-    return steps_of(configuration, {options.geometry_step, options.colour_step});
+    return steps_asked_for(configuration);
 }
 
 Result<Candidate> choose_frame(FrameWork& work, QualityControl& control, const BitsOf& bits_of, bool force_intra) {
     if (control.rate) return code_within_buffer(work, *control.rate, bits_of, force_intra);
     if (control.error) return code_to_error(work, *control.error, force_intra);
-    const auto& options = work.configuration.options;
-    return choose(work, steps_of(work.configuration, {options.geometry_step, options.colour_step}), force_intra);
+    return choose(work, steps_asked_for(work.configuration), force_intra);
 }
 
 }  // namespace htvm::internal
