@@ -234,7 +234,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     facts.chart_scale = charts->scale;
     if (referred_to) facts.colours = work.colours_at(out.decoded);
     clock.done("intra coding");
-    if (tracked && referred_to && out.referred) facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
+    if (tracked && referred_to && out.referred) facts.fit = work.tracked_fit(out.decoded, facts.edge, {}, {});
     facts.vertices = out.decoded.positions.size();
     if (renewed) {
         const auto& before = work.reference().intra;
@@ -318,6 +318,7 @@ Result<Candidate> code_tracked(FrameWork& work, const FrameSteps& steps, Tracked
     out.shares = encoded->runs.shares;
     out.steps = steps;
     out.noise = std::move(encoded->noise);
+    out.near = std::move(encoded->near);
     auto& history = out.nodes.emplace();
     history.frame = work.sequence.next_frame;
     history.access = from_last ? nodes.access : history.frame;
@@ -454,7 +455,7 @@ Result<std::optional<Candidate>> code_patched(FrameWork& work, const FrameSteps&
     facts.edge = work.edge();
     facts.colours = work.colours_at(out.decoded);
     clock.done("patch coding");
-    facts.fit = work.tracked_fit(out.decoded, facts.edge, {});
+    facts.fit = work.tracked_fit(out.decoded, facts.edge, {}, {});
     return std::optional(std::move(out));
 }
 

@@ -241,7 +241,7 @@ SurfaceErrors FrameWork::errors_of(const LatticeMesh& decoded) {
 }
 
 TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_edge,
-                                  std::span<const double> intra_squared) {
+                                  std::span<const std::uint32_t> near, std::span<const double> intra_squared) {
     constexpr double stray_in_edges = 2, reach = 25;  // in mean edges; mm on an adult
     const auto& captured = surface();
     StageClock clock(stages);
@@ -250,7 +250,7 @@ TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_e
     options.reach = std::max(reach * configuration.adult_millimetre, options.stray);
     options.region = region_side(configuration);
     options.threads = configuration.threads;
-    auto out = measure_tracked_fit(captured, decoded, intra_squared, options);
+    auto out = measure_tracked_fit(captured, decoded, near, intra_squared, options);
     clock.done("fit of the tracking");
     return out;
 }

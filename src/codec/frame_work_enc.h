@@ -108,10 +108,11 @@ struct Candidate {
     LayerBytes shares;            // T: its layers' of its bytes, which its packet does not tell
     FrameSteps steps;             // T: the steps asked for
     RemovedNoise noise;           // T that is to be coded again in a group: what filtering took off
-    bool renewal = false;         // I: whether it was made of the tracked mesh, not of the capture
-    double renewed = 0;           // TP: the share of its vertices that are new
-    double quality = 50;          // the quality setting used, under rate or error control
-    bool stands_in = false;       // a P- or T-frame of motion alone, because nothing better fits the buffer
+    std::vector<std::uint32_t> near;  // T: of each vertex, the captured vertex beside it
+    bool renewal = false;             // I: whether it was made of the tracked mesh, not of the capture
+    double renewed = 0;               // TP: the share of its vertices that are new
+    double quality = 50;              // the quality setting used, under rate or error control
+    bool stands_in = false;           // a P- or T-frame of motion alone, because nothing better fits the buffer
     // What it leaves for the sequence; one of the first three is set.
     std::optional<IntraFacts> intra;     // I, TP; used only if it is referred to
     std::optional<BoneHistory> bones;    // P, EP
@@ -216,8 +217,9 @@ public:
     const AnimationFit& animation_fit();  // how well the motion of the bones alone represents the frame
     // The distance between a decoded mesh and the captured one, in both directions.
     SurfaceErrors errors_of(const LatticeMesh& decoded);
-    // Whether a tracked mesh still represents the captured one. intra_squared: see measure_tracked_fit().
-    TrackedFit tracked_fit(const LatticeMesh& decoded, double reference_edge, std::span<const double> intra_squared);
+    // Whether a tracked mesh still represents the captured one. near, intra_squared: see measure_tracked_fit().
+    TrackedFit tracked_fit(const LatticeMesh& decoded, double reference_edge, std::span<const std::uint32_t> near,
+                           std::span<const double> intra_squared);
     // Of a frame that was registered. Nothing else may be asked for afterwards.
     TrackedWork give_up();
 

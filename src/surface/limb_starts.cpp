@@ -156,9 +156,9 @@ bool all_lie_on(const DeformableMesh& mesh, const SurfaceIndex& target, std::spa
         const auto& n = mesh.sample_normals[i];
         const Vector3d point = motions[handle](Vector3d(p[0], p[1], p[2]));
         const Vector3d normal = motions[handle].rotation * Vector3d(n[0], n[1], n[2]);
-        const auto found =
-            target.fine.nearest(to_floats({point.x(), point.y(), point.z()}),
-                                to_floats({normal.x(), normal.y(), normal.z()}), static_cast<float>(reach), 0.2F);
+        const auto found = target.nearest_facing(
+            to_floats({point.x(), point.y(), point.z()}), to_floats({normal.x(), normal.y(), normal.z()}),
+            {.reach = static_cast<float>(reach), .agreement = 0.2F}, OrientedPoints::no_point);
         sum[handle] += found.found ? std::sqrt(static_cast<double>(found.squared_distance)) : reach;
         ++count[handle];
     }

@@ -73,6 +73,11 @@ std::int32_t floor_of(float x) {
 
 float product(const Point3f& a, const Point3f& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
+float squared_distance_of(const Point3f& a, const Point3f& b) {
+    const Point3f apart = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return product(apart, apart);
+}
+
 }  // namespace
 
 OrientedPoints::OrientedPoints(std::span<const Point3f> points, std::span<const Point3f> normals, float cell)
@@ -341,9 +346,16 @@ void SurfaceIndex::Anywhere::spread_over_long_triangles() {
 }
 
 struct SurfaceIndex::OnDemand {
-    std::once_flag once;
+    std::once_flag once, grid_once;
     std::unique_ptr<const Anywhere> anywhere;
+    std::unique_ptr<const OrientedPoints> grid;
 };
+
+const OrientedPoints& SurfaceIndex::grid() const {
+    std::call_once(on_demand_->grid_once,
+                   [&] { on_demand_->grid = std::make_unique<OrientedPoints>(positions, normals, cell_); });
+    return *on_demand_->grid;
+}
 
 const SurfaceIndex::Anywhere& SurfaceIndex::anywhere() const {
     std::call_once(on_demand_->once, [&] { on_demand_->anywhere = std::make_unique<Anywhere>(*this); });
@@ -396,8 +408,8 @@ SurfacePoint SurfaceIndex::closest(const Point3f& query) const {
 // ---- Surfaces: facing the same way
 
 void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
+    cell_ = options.cell;
     around = triangles_around(positions.size(), triangles);
-    find_fans();
     std::vector<Vector3d> sums(positions.size(), Vector3d{});
     double area = 0;
     for (const auto& t : triangles) {
@@ -407,35 +419,32 @@ void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
     }
     normals.reserve(positions.size());
     for (const auto& sum : sums) normals.push_back(to_floats(normalised(sum)));
-    const std::size_t count = std::min(options.samples, positions.size());
-    std::vector<Point3f> chosen_points(count), chosen_normals(count);
-    samples.resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        samples[i] = static_cast<std::uint32_t>(i * positions.size() / count);
-        chosen_points[i] = positions[samples[i]];
-        chosen_normals[i] = normals[samples[i]];
-    }
-    // Samples are spaced more widely than vertices, by the square root of the ratio of their numbers.
-    const float wider = count == 0 ? 1.0f : std::sqrt(static_cast<float>(positions.size()) / static_cast<float>(count));
-    parallel_invoke(
-        options.threads, [&] { coarse = OrientedPoints(chosen_points, chosen_normals, options.cell * wider); },
-        [&] { fine = OrientedPoints(positions, normals, options.cell); });
     fine_gap = gap_of(area, positions.size());
+    const std::size_t count = std::min(options.samples, positions.size());
     coarse_gap = gap_of(area, count);
-}
-
-void SurfaceIndex::find_fans() {
-    fans_.resize(around.triangles.size());
-    std::vector<std::uint32_t> next(around.first.begin(), around.first.end() - 1);
-    for (const auto& t : triangles)
-        for (std::size_t i = 0; i < 3; ++i) fans_[next[t[i]]++] = {t[(i + 1) % 3], t[(i + 2) % 3]};
+    const auto index_samples = [&] {
+        std::vector<Point3f> chosen_points(count), chosen_normals(count);
+        samples.resize(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            samples[i] = static_cast<std::uint32_t>(i * positions.size() / count);
+            chosen_points[i] = positions[samples[i]];
+            chosen_normals[i] = normals[samples[i]];
+        }
+        // Samples are spaced more widely than vertices, by the square root of the ratio of their numbers.
+        const float wider =
+            count == 0 ? 1.0f : std::sqrt(static_cast<float>(positions.size()) / static_cast<float>(count));
+        coarse = OrientedPoints(chosen_points, chosen_normals, options.cell * wider);
+    };
+    parallel_invoke(options.threads, index_samples,
+                    [&] { fans_ = VertexFans(positions, normals, triangles, around, options.threads); });
 }
 
 // The closest point so far.
 struct SurfaceIndex::Best {
-    std::uint32_t triangle = none;
+    std::uint32_t side = none;      // three times the triangle's index, and which of its corners was tried first
     Triangle corners{};             // in the order in which they were tried
     std::array<float, 3> shares{};  // of these
+    Point3f point{};
     float squared_distance = std::numeric_limits<float>::infinity();
 };
 
@@ -497,37 +506,60 @@ NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, con
 
 // Tries the triangles around a vertex.
 void SurfaceIndex::try_around(std::uint32_t vertex, const Point3f& query, const Facing* facing, Best& best) const {
-    const Point3f& own = positions[vertex];
-    for (auto place = around.first[vertex]; place < around.first[vertex + std::size_t{1}]; ++place) {
-        const auto [next, last] = fans_[place];
-        const auto near = near_on_triangle(own, positions[next], positions[last], query, best.squared_distance, facing);
-        if (near.squared_distance < best.squared_distance)
-            best = {around.triangles[place], {vertex, next, last}, near.shares, near.squared_distance};
+    const auto& fan = fans_[vertex];
+    const auto try_side = [&](std::uint32_t side, const Triangle& corners, const Point3f& b, const Point3f& c,
+                              const Facing* must) {
+        const auto near = near_on_triangle(fan.own, b, c, query, best.squared_distance, must);
+        if (!(near.squared_distance < best.squared_distance)) return;
+        best = {side, corners, near.shares, {}, near.squared_distance};
+        for (std::size_t i = 0; i < 3; ++i)
+            best.point[i] = near.shares[0] * fan.own[i] + near.shares[1] * b[i] + near.shares[2] * c[i];
+    };
+    if (fan.regular()) {
+        const auto near = fans_.nearest(vertex, query, facing);
+        if (!(near.squared_distance < best.squared_distance)) return;
+        const std::size_t lane = near.lane, next = (lane + 1) % VertexFan::lanes;
+        try_side(fan.side[lane], {vertex, fan.neighbour[lane], fan.neighbour[next]}, fan.place(lane), fan.place(next),
+                 nullptr);
+        return;
+    }
+    for (const auto triangle : around.of(vertex)) {
+        const auto& t = triangles[triangle];
+        const std::uint32_t at = t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2;
+        const auto b = t[(at + 1) % 3], c = t[(at + 2) % 3];
+        try_side(3 * triangle + at, {vertex, b, c}, positions[b], positions[c], facing);
     }
 }
 
 Neighbour SurfaceIndex::nearest_along(const Point3f& query, std::uint32_t from) const {
-    // On a closed surface the corners after a vertex are all its neighbours.
-    return internal::nearest_along(positions, query, from, [&](std::uint32_t vertex, const auto& visit) {
-        for (auto place = around.first[vertex]; place < around.first[vertex + std::size_t{1}]; ++place)
-            visit(fans_[place].next);
-    });
+    Neighbour best{from, squared_distance_of(fans_[from].own, query)};
+    for (;;) {
+        const auto walk = fans_.walk(query, best.index, best.squared_distance);
+        best = {walk.vertex, squared_distance_of(fans_[walk.vertex].own, query)};
+        if (walk.ended) return best;
+        const auto here = best.index;
+        for (const auto t : around.of(here))
+            for (const auto beside : triangles[t])
+                if (const float squared = squared_distance_of(positions[beside], query);
+                    squared < best.squared_distance)
+                    best = {beside, squared};
+        if (best.index == here) return best;
+    }
 }
 
 OrientedMatch SurfaceIndex::nearest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
                                            std::uint32_t guess) const {
     constexpr float near = 4, as_near_as_can_be = 1;  // spacings of the vertices
     if (within.along && guess < positions.size()) {
-        const Point3f apart = difference(positions[guess], query);
-        if (product(apart, apart) < near * near * fine_gap * fine_gap) {
+        if (squared_distance_of(fans_[guess].own, query) < near * near * fine_gap * fine_gap) {
             const auto found = nearest_along(query, guess);
             const float most = std::min(within.reach, as_near_as_can_be * fine_gap);
-            if (found.squared_distance <= most * most && product(normals[found.index], normal) >= within.agreement)
+            if (found.squared_distance <= most * most && product(fans_[found.index].normal, normal) >= within.agreement)
                 return {found.index, found.squared_distance, true};
             guess = found.index;
         }
     }
-    return fine.nearest(query, normal, within.reach, within.agreement, guess);
+    return grid().nearest(query, normal, within.reach, within.agreement, guess);
 }
 
 // The closest point of the triangles around a vertex; from where it lies on their rim, they go on beyond.
@@ -544,8 +576,8 @@ SurfaceIndex::Best SurfaceIndex::closest_around(std::uint32_t vertex, const Poin
         try_around(at, query, facing, best);
     };
     try_at(vertex);
-    for (auto last = none; best.triangle != last;) {
-        last = best.triangle;
+    for (auto last = none; best.side != last;) {
+        last = best.side;
         const auto shares = best.shares;
         const auto corners = best.corners;
         for (std::size_t i = 0; i < 3; ++i)
@@ -556,12 +588,11 @@ SurfaceIndex::Best SurfaceIndex::closest_around(std::uint32_t vertex, const Poin
     return best;
 }
 
-// The shares in the order of the triangle's corners.
-std::array<float, 3> SurfaceIndex::in_order(const Best& best) const {
-    std::array<float, 3> out{};
-    const auto& t = triangles[best.triangle];
-    for (std::size_t i = 0; i < 3; ++i)
-        out[i] = best.shares[(i + (t[0] == best.corners[0] ? 0 : t[1] == best.corners[0] ? 2 : 1)) % 3];
+// With the shares in the order of the triangle's corners.
+SurfacePoint SurfaceIndex::found(const Best& best) const {
+    if (best.side == none) return {};
+    SurfacePoint out{best.side / 3, {}, best.point, best.squared_distance};
+    for (std::size_t i = 0; i < 3; ++i) out.shares[(best.side + i) % 3] = best.shares[i];
     return out;
 }
 
@@ -576,31 +607,35 @@ SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& n
         best = closest_around(match.index, query, &facing);
     else
         try_around(match.index, query, &facing, best);
-    if (best.triangle == none) return {};
-    return surface_point(*this, best.triangle, in_order(best), best.squared_distance);
+    return found(best);
 }
 
-SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std::uint32_t& guess) const {
+SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std::uint32_t& guess, bool along) const {
     // The corners of a triangle within reach may be farther away.
     constexpr float longest_side = 4;  // spacings of the vertices
-    const auto match = nearest_facing(query, {}, {.reach = reach + longest_side * fine_gap, .agreement = -2}, guess);
+    const auto match =
+        nearest_facing(query, {}, {.reach = reach + longest_side * fine_gap, .agreement = -2, .along = along}, guess);
     if (!match.found) return {};
     guess = match.index;
     const auto best = closest_around(match.index, query, nullptr);
-    if (best.triangle == none || best.squared_distance > reach * reach) return {};
-    return surface_point(*this, best.triangle, in_order(best), best.squared_distance);
+    return best.squared_distance > reach * reach ? SurfacePoint{} : found(best);
 }
 
 std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<const Point3f> queries,
-                                         std::span<const Point3f> normals, const FacingReach& within, Threads threads) {
+                                         std::span<const Point3f> normals, const FacingReach& within, Threads threads,
+                                         std::span<std::uint32_t> guesses) {
     std::vector<SurfacePoint> out(queries.size());
     // Guesses may decide what is found, so they must not depend on how the threads cut the range.
-    constexpr std::size_t in_a_row = 512;
+    constexpr std::size_t in_a_row = 512, ahead = 6;
     parallel_for((queries.size() + in_a_row - 1) / in_a_row, threads, 2, [&](std::size_t begin, std::size_t end) {
         for (std::size_t row = begin; row < end; ++row) {
-            std::uint32_t guess = OrientedPoints::no_point;
-            for (std::size_t i = row * in_a_row; i < std::min(queries.size(), (row + 1) * in_a_row); ++i)
-                out[i] = surface.closest_facing(queries[i], normals[i], within, guess);
+            std::uint32_t last = OrientedPoints::no_point;
+            for (std::size_t i = row * in_a_row; i < std::min(queries.size(), (row + 1) * in_a_row); ++i) {
+                if (i + ahead < guesses.size()) surface.expect(guesses[i + ahead]);
+                if (!guesses.empty() && guesses[i] != OrientedPoints::no_point) last = guesses[i];
+                out[i] = surface.closest_facing(queries[i], normals[i], within, last);
+                if (!guesses.empty()) guesses[i] = last;
+            }
         }
     });
     return out;

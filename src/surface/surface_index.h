@@ -19,6 +19,7 @@
 #include "core/geometry.h"
 #include "core/thread.h"
 #include "htvm/mesh.hpp"
+#include "surface/vertex_fans.h"
 
 namespace htvm::internal {
 
@@ -142,11 +143,6 @@ struct NearOnTriangle {
     std::array<float, 3> shares{};  // of the corners
     float squared_distance = std::numeric_limits<float>::infinity();
 };
-// How a triangle must face: the least dot product of its normal with this one, of unit length.
-struct Facing {
-    Point3f normal{};
-    float agreement = 0;
-};
 // Infinitely far if the triangle's plane, or the line of a side that the query lies beyond, is seen to be farther away
 // than `least`, squared; or if it faces otherwise than it must, if there is something that it must.
 NearOnTriangle near_on_triangle(const Point3f& first, const Point3f& second, const Point3f& third, const Point3f& query,
@@ -209,14 +205,17 @@ public:
 
     // As OrientedPoints::nearest() among all vertices, but with `within.along`, if `guess` is near, the vertex is
     // looked for along the surface from there, and is taken if it faces the right way and lies no farther than its
-    // neighbours.
+    // neighbours. The first search that is not along the surface makes the grid.
     OrientedMatch nearest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
                                  std::uint32_t guess) const;
 
     // The closest point of the surface near the query, however it faces: on the triangles around the nearest vertex
     // within reach, then around their corners, as long as the distance shrinks. Finds less than closest() does under
-    // long triangles, and is faster. Needs options.cell > 0. guess: as of closest_facing().
-    SurfacePoint closest_within(const Point3f& query, float reach, std::uint32_t& guess) const;
+    // long triangles, and is faster. Needs options.cell > 0. guess, along: as of closest_facing().
+    SurfacePoint closest_within(const Point3f& query, float reach, std::uint32_t& guess, bool along = false) const;
+
+    // Says that a search will soon begin at this vertex: VertexFans::expect().
+    void expect(std::uint32_t vertex) const { fans_.expect(vertex); }
 
     std::vector<Point3f> positions;  // of the mesh's vertices
     std::vector<Triangle> triangles;
@@ -227,33 +226,31 @@ public:
     std::vector<std::uint32_t> samples;  // every n-th vertex, for far searches and for matching back from the target
                                          // to the reference
     float fine_gap = 0, coarse_gap = 0;  // approximate spacing of the vertices and of the samples
-    OrientedPoints fine;                 // contains all vertices
     OrientedPoints coarse;               // contains the samples; indices found are indices of samples
 
 private:
     struct Anywhere;
     struct Best;
     void find_directions(const SurfaceIndexOptions& options);
-    void find_fans();
     Best closest_around(std::uint32_t vertex, const Point3f& query, const Facing* facing) const;
     void try_around(std::uint32_t vertex, const Point3f& query, const Facing* facing, Best& best) const;
-    std::array<float, 3> in_order(const Best& best) const;
+    SurfacePoint found(const Best& best) const;
     const Anywhere& anywhere() const;
+    const OrientedPoints& grid() const;  // of all vertices
 
-    // Of each triangle around a vertex, as in `around`, the corners after it: they lie together, where the triangles
-    // themselves lie all over the memory.
-    struct Fan {
-        std::uint32_t next = 0, last = 0;
-    };
-    std::vector<Fan> fans_;
+    VertexFans fans_;
+    float cell_ = 0;
 
     struct OnDemand;
     std::unique_ptr<OnDemand> on_demand_;
 };
 
-// closest_facing() for many queries; neighbouring queries should mostly follow each other. normals: one per query.
+// closest_facing() for many queries. normals: one per query. guesses: a vertex that may be near, one per query, which
+// is set to the vertex found; or none, if neighbouring queries mostly follow each other. Where a query has no guess, or
+// OrientedPoints::no_point, what the query before it found is the guess.
 std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<const Point3f> queries,
-                                         std::span<const Point3f> normals, const FacingReach& within, Threads threads);
+                                         std::span<const Point3f> normals, const FacingReach& within, Threads threads,
+                                         std::span<std::uint32_t> guesses = {});
 
 // The approximate spacing of `count` points spread over the surface.
 float point_gap(std::span<const Point3f> positions, std::span<const Triangle> triangles, std::size_t count);

@@ -123,10 +123,9 @@ std::vector<std::uint32_t> spread_samples(const HandleWeights& weights, std::siz
     return out;
 }
 
-// Which samples are beside each other: every vertex belongs to the sample that is the fewest edges away, and samples
-// whose vertices share an edge are neighbours.
-SamplesBeside samples_beside(const DeformableMesh& mesh, const DeformationLevel& level) {
-    constexpr auto none = std::numeric_limits<std::uint32_t>::max();
+// Of each vertex, the sample that is the fewest edges away; no_point where none can be reached.
+std::vector<std::uint32_t> samples_of_vertices(const DeformableMesh& mesh, const DeformationLevel& level) {
+    constexpr auto none = OrientedPoints::no_point;
     std::vector<std::uint32_t> sample_of(mesh.positions.size(), none), reached;
     for (std::uint32_t i = 0; i < level.samples.size(); ++i) {
         sample_of[mesh.samples[level.samples[i]]] = i;
@@ -136,6 +135,13 @@ SamplesBeside samples_beside(const DeformableMesh& mesh, const DeformationLevel&
         for (const auto t : mesh.around.of(reached[i]))
             for (const auto v : mesh.triangles[t])
                 if (sample_of[v] == none) sample_of[v] = sample_of[reached[i]], reached.push_back(v);
+    return sample_of;
+}
+
+// Which samples are beside each other: those whose vertices share an edge.
+SamplesBeside samples_beside(const DeformableMesh& mesh, const DeformationLevel& level,
+                             std::span<const std::uint32_t> sample_of) {
+    constexpr auto none = OrientedPoints::no_point;
     std::vector<std::vector<std::uint32_t>> beside(level.samples.size());
     const auto join = [&](std::uint32_t a, std::uint32_t b) {
         if (a == b || a == none || b == none) return;
@@ -318,7 +324,8 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         mesh.sample_normals.push_back(normals[v]);
         mesh.fine.blends.push_back(mesh.blends[v]);
     }
-    mesh.fine.beside = samples_beside(mesh, mesh.fine);
+    mesh.sample_of = samples_of_vertices(mesh, mesh.fine);
+    mesh.fine.beside = samples_beside(mesh, mesh.fine, mesh.sample_of);
     mesh.sample_textures = textures_of_samples(mesh, colours);
     for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
     mesh.fine.pairs = std::move(pairs);
@@ -327,7 +334,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         mesh.coarse.samples.push_back(i);
         mesh.coarse.blends.push_back(over_groups(mesh.fine.blends[i], mesh.groups));
     }
-    mesh.coarse.beside = samples_beside(mesh, mesh.coarse);
+    mesh.coarse.beside = samples_beside(mesh, mesh.coarse, samples_of_vertices(mesh, mesh.coarse));
     find_blocks(mesh.fine.blends, mesh.fine.pairs, handles.size(), mesh.fine.pattern);
     find_blocks(mesh.coarse.blends, mesh.coarse.pairs, mesh.coarse.centre.size(), mesh.coarse.pattern);
     return mesh;
@@ -568,8 +575,11 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
     parallel_for(slices, options.threads, 4, [&](std::size_t begin, std::size_t end) {
         for (std::size_t slice = begin; slice < end; ++slice) {
             std::uint32_t last = OrientedPoints::no_point;
-            for (std::size_t i = slice * forward / slices; i < (slice + 1) * forward / slices; ++i)
+            constexpr std::size_t ahead = 6;
+            for (std::size_t i = slice * forward / slices; i < (slice + 1) * forward / slices; ++i) {
+                if (i + ahead < forward) target.expect(guesses.forward[i + ahead]);
                 last = go_forward(i, last);
+            }
             last = OrientedPoints::no_point;
             for (std::size_t i = slice * back / slices; i < (slice + 1) * back / slices; ++i) last = go_back(i, last);
         }
@@ -1035,7 +1045,12 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
         round.surfaces = i + options.surface_rounds >= options.fine_rounds;
         weight = run_round(fine, target, round, cell, memory, options).weight;
     }
-    if (form && options.fine_rounds > 0) *form = form_of(mesh.fine.pattern, std::move(memory.system), weight);
+    if (form && options.fine_rounds > 0) {
+        *form = form_of(mesh.fine.pattern, std::move(memory.system), weight);
+        form->matches = mesh.sample_of;
+        for (auto& match : form->matches)
+            match = match < memory.guesses.forward.size() ? memory.guesses.forward[match] : OrientedPoints::no_point;
+    }
     return fine.motion;
 }
 
@@ -1121,7 +1136,8 @@ double error_of(const LimbSamples& samples, const Moved& moved, const SurfaceInd
     double sum = 0;
     std::uint32_t guess = OrientedPoints::no_point;
     for (const auto i : samples.forward) {
-        const auto match = target.fine.nearest(moved.points[i], moved.normals[i], far, facing, guess);
+        const auto match =
+            target.nearest_facing(moved.points[i], moved.normals[i], {.reach = far, .agreement = facing}, guess);
         if (match.found) guess = match.index;
         sum += match.found ? distance(i, match.index) : reach;
     }

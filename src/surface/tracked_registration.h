@@ -133,6 +133,8 @@ struct DeformableMesh {
     std::vector<SampleBlend> blends;       // the same, one per vertex
     std::vector<Eigen::Vector3d> handles;  // positions of the handles
     std::vector<std::uint32_t> samples;    // indices of vertices
+    std::vector<std::uint32_t> sample_of;  // for each vertex, the sample that is the fewest edges away, or
+                                           // OrientedPoints::no_point
     std::vector<Point3f> sample_normals;
     std::vector<SampleTexture> sample_textures;  // one per sample, or none if nothing is textured
     float sample_gap = 0;                        // approximate spacing of neighbouring samples
@@ -162,6 +164,9 @@ struct DeformationForm {
     std::vector<Matrix6> diagonal;  // one per handle; none if nothing could be registered
     std::vector<Block> above;       // ascending by row, then column
     double weight = 0;              // of all matches together
+    // Of each vertex, the vertex of the target that the sample nearest to it was matched to last, or
+    // OrientedPoints::no_point.
+    std::vector<std::uint32_t> matches;
 };
 
 // The motions reference -> frame, one per handle, that align the reference with the target. Begins at `start` (one per

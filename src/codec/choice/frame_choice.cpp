@@ -337,10 +337,10 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
-    const auto fit_of = [&](const LatticeMesh& decoded) {
-        return work.tracked_fit(decoded, reference.intra.edge, reference.intra.fit.squared);
+    const auto fit_of = [&](const LatticeMesh& decoded, std::span<const std::uint32_t> near) {
+        return work.tracked_fit(decoded, reference.intra.edge, near, reference.intra.fit.squared);
     };
-    auto fit = fit_of(tracked->decoded);
+    auto fit = fit_of(tracked->decoded, tracked->near);
     bool lost = lost_track(work, fit);
     std::optional<EncodedTrackedFrame> for_patches;  // which tells whether limbs were found, too
     const bool may_be_patched =
@@ -352,10 +352,10 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
             if (!coded) return tl::unexpected(coded.error());
             for_patches.emplace(std::move(*coded));
         }
-        if (limbs_moved && (!for_patches || !lost_track(work, fit_of(for_patches->mesh)))) {
+        if (limbs_moved && (!for_patches || !lost_track(work, fit_of(for_patches->mesh, for_patches->near)))) {
             tracked = code_frame(FrameType::tracked, work, steps);
             if (!tracked) return tracked;
-            fit = fit_of(tracked->decoded);
+            fit = fit_of(tracked->decoded, tracked->near);
             lost = lost_track(work, fit);
         }
     }

@@ -225,6 +225,25 @@ std::array<std::vector<double>, 2> SurfaceFit::fitted(const std::vector<Both>& s
     return out;
 }
 
+// What of the surface is nearest to each sample: first to the vertices, then to what lies within the triangles,
+// beginning where their first corners were found. near: a captured vertex that may be beside each vertex; set to those
+// that are.
+std::vector<SurfacePoint> targets_of(const SurfaceSamples& samples, std::span<const Triangle> triangles,
+                                     const SurfaceIndex& surface, const TargetSearch& how,
+                                     std::span<std::uint32_t> near) {
+    const FacingReach within{.reach = static_cast<float>(how.reach), .along = true};
+    const auto points = std::span(samples.points), normals = std::span(samples.normals);
+    auto out =
+        closest_facing(surface, points.first(near.size()), normals.first(near.size()), within, how.threads, near);
+    std::vector<std::uint32_t> near_inner(points.size() - near.size());
+    const std::size_t in_triangle = triangles.empty() ? 1 : near_inner.size() / triangles.size();
+    for (std::size_t i = 0; i < near_inner.size(); ++i) near_inner[i] = near[triangles[i / in_triangle][0]];
+    const auto inner = closest_facing(surface, points.subspan(near.size()), normals.subspan(near.size()), within,
+                                      how.threads, near_inner);
+    out.insert(out.end(), inner.begin(), inner.end());
+    return out;
+}
+
 // The distance of each sample from the surface along its normal, in lattice units.
 std::vector<double> distances(const SurfaceSamples& samples, const std::vector<SurfacePoint>& targets) {
     std::vector<double> out(targets.size(), 0);
@@ -284,12 +303,14 @@ SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions&
 }
 
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const SurfaceIndex& surface, const TargetSearch& how) {
+                                    const SurfaceIndex& surface, const TargetSearch& how,
+                                    std::vector<std::uint32_t> near) {
     const auto& threads = how.threads;
     const auto rule = rule_of(how.samples);
     const auto samples = samples_of(moved, rule);
-    const auto targets = closest_facing(surface, samples.points, samples.normals,
-                                        {.reach = static_cast<float>(how.reach), .along = true}, threads);
+    const std::size_t vertices = moved.positions.size();
+    near.resize(vertices, OrientedPoints::no_point);
+    const auto targets = targets_of(samples, moved.triangles, surface, how, near);
     const auto fit = make_surface_fit(moved, rule, targets);
     std::vector<std::vector<double>> seen(1);
     seen[0] = distances(samples, targets);
@@ -308,7 +329,7 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
         }
     });
     TrackedTargets out;
-    const std::size_t vertices = moved.positions.size();
+    out.near = std::move(near);
     out.displacement.resize(vertices);
     // A field cannot code more than this: 16 mm on the finest lattice. The surface then lags behind by the rest.
     constexpr double most = field_limit;
@@ -371,17 +392,33 @@ CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double>
 
 namespace {
 
-// Every n-th vertex, and the centre of every n-th triangle.
-SurfaceSamples sparse_samples_of(std::span<const Point3f> points, std::span<const Point3f> normals,
-                                 std::span<const Triangle> triangles) {
-    constexpr std::size_t wanted = 2000;  // of each
-    SurfaceSamples out;
-    for (std::size_t v = 0, every = 1 + points.size() / wanted; v < points.size(); v += every) {
-        out.points.push_back(points[v]);
-        out.normals.push_back(normals[v]);
+// Every n-th vertex, and the centre of every n-th triangle; of each the vertex that it is, or a corner.
+struct SparseSamples {
+    SurfaceSamples samples;
+    std::vector<std::uint32_t> vertex;
+    // What is known of these vertices; no_point where nothing is.
+    std::vector<std::uint32_t> at_vertices(std::span<const std::uint32_t> known) const {
+        std::vector<std::uint32_t> out(vertex.size(), OrientedPoints::no_point);
+        for (std::size_t i = 0; i < out.size() && !known.empty(); ++i) out[i] = known[vertex[i]];
+        return out;
     }
-    for (std::size_t t = 0, every = 1 + triangles.size() / wanted; t < triangles.size(); t += every)
-        add_middle(out, points, normals, triangles[t]);
+};
+
+SparseSamples sparse_samples_of(const SurfaceIndex& surface) {
+    constexpr std::size_t wanted = 2000;  // of each
+    const auto& points = surface.positions;
+    const auto& triangles = surface.triangles;
+    SparseSamples out;
+    for (std::uint32_t v = 0, every = static_cast<std::uint32_t>(1 + points.size() / wanted); v < points.size();
+         v += every) {
+        out.samples.points.push_back(points[v]);
+        out.samples.normals.push_back(surface.normals[v]);
+        out.vertex.push_back(v);
+    }
+    for (std::size_t t = 0, every = 1 + triangles.size() / wanted; t < triangles.size(); t += every) {
+        add_middle(out.samples, points, surface.normals, triangles[t]);
+        out.vertex.push_back(triangles[t][0]);
+    }
     return out;
 }
 
@@ -403,29 +440,38 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
             {}};
 }
 
-// The captured surface is so fine that searching the triangles around the nearest vertex suffices; its normals tell the
-// two sides of, say, a sleeve apart.
-std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, const SurfaceIndex& captured,
-                                         const TrackedFitOptions& options) {
+// The captured surface's normals tell the two sides of, say, a sleeve apart. near: of each sample a captured vertex
+// that may be beside it.
+std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, std::vector<std::uint32_t> near,
+                                         const SurfaceIndex& captured, const TrackedFitOptions& options) {
     const auto found = closest_facing(captured, decoded.points, decoded.normals,
-                                      {.reach = static_cast<float>(options.reach), .agreement = 0}, options.threads);
+                                      {.reach = static_cast<float>(options.reach), .agreement = 0, .along = true},
+                                      options.threads, near);
     std::vector<double> squared(found.size(), options.reach * options.reach);
     for (std::size_t i = 0; i < found.size(); ++i)
         if (found[i].found()) squared[i] = static_cast<double>(found[i].squared_distance);
     return squared;
 }
 
-TrackedFit fit_of_captured(const SurfaceSamples& captured, const SurfaceIndex& decoded,
-                           const TrackedFitOptions& options) {
+// near: of each sample a decoded vertex that may be beside it.
+TrackedFit fit_of_captured(const SurfaceSamples& captured, std::span<const std::uint32_t> near,
+                           const SurfaceIndex& decoded, const TrackedFitOptions& options) {
     const auto reach = static_cast<float>(options.reach);
     std::vector<double> squared(captured.points.size(), options.reach * options.reach);
-    parallel_for(squared.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t guess = OrientedPoints::no_point;
-        for (std::size_t i = begin; i < end; ++i) {
-            const auto found = decoded.closest_within(captured.points[i], reach, guess);
-            if (found.found()) squared[i] = std::min(squared[i], static_cast<double>(found.squared_distance));
-        }
-    });
+    // Guesses may decide what is found, so they must not depend on how the threads cut the range.
+    constexpr std::size_t in_a_row = 256;
+    parallel_for((squared.size() + in_a_row - 1) / in_a_row, options.threads, 2,
+                 [&](std::size_t begin, std::size_t end) {
+                     for (std::size_t row = begin; row < end; ++row) {
+                         std::uint32_t guess = OrientedPoints::no_point;
+                         for (std::size_t i = row * in_a_row; i < std::min(squared.size(), (row + 1) * in_a_row); ++i) {
+                             if (near[i] != OrientedPoints::no_point) guess = near[i];
+                             const auto found = decoded.closest_within(captured.points[i], reach, guess, true);
+                             if (found.found())
+                                 squared[i] = std::min(squared[i], static_cast<double>(found.squared_distance));
+                         }
+                     }
+                 });
     return summed_up(captured.points, squared, options);
 }
 
@@ -438,19 +484,22 @@ TrackedFit least_of(TrackedFit fit, const TrackedFit& before) {
 }
 
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
-                               std::span<const double> intra_squared, const TrackedFitOptions& options) {
+                               std::span<const std::uint32_t> near, std::span<const double> intra_squared,
+                               const TrackedFitOptions& options) {
     const double edge = mean_edge(decoded.positions, decoded.triangles, 8);
     const SurfaceIndex index(
         points_of(decoded.positions), decoded.triangles,
         {.cell = static_cast<float>(std::max(2 * edge, options.reach / 24)), .threads = options.threads});
-    const auto forth =
-        fit_of_captured(sparse_samples_of(captured.positions, captured.normals, captured.triangles), index, options);
-    const auto samples = sparse_samples_of(index.positions, index.normals, index.triangles);
-    auto squared = distances_of_decoded(samples, captured, options);
+    std::vector<std::uint32_t> beside(captured.positions.size(), OrientedPoints::no_point);
+    for (std::uint32_t v = 0; v < near.size(); ++v)
+        if (near[v] != OrientedPoints::no_point) beside[near[v]] = v;
+    const auto of_captured = sparse_samples_of(captured), of_decoded = sparse_samples_of(index);
+    const auto forth = fit_of_captured(of_captured.samples, of_captured.at_vertices(beside), index, options);
+    auto squared = distances_of_decoded(of_decoded.samples, of_decoded.at_vertices(near), captured, options);
     std::vector<double> more(squared.size(), 0);
     if (intra_squared.size() == squared.size())
         for (std::size_t i = 0; i < squared.size(); ++i) more[i] = std::max(0.0, squared[i] - intra_squared[i]);
-    const auto back = summed_up(samples.points, more, options);
+    const auto back = summed_up(of_decoded.samples.points, more, options);
     return {std::max(forth.rms, back.rms), std::max(forth.stray_share, back.stray_share),
             std::max(forth.worst_region, back.worst_region), std::move(squared)};
 }

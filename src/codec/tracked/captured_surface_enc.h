@@ -28,6 +28,7 @@ struct MovedReference {
 };
 
 struct TrackedTargets {
+    std::vector<std::uint32_t> near;  // of each vertex, the captured vertex beside it, or OrientedPoints::no_point
     std::vector<std::int32_t> displacement;  // one per vertex, in lattice units along its normal
     std::vector<std::int32_t> colours;       // three per vertex, levels to add; empty if the reference has no colours
 };
@@ -41,11 +42,13 @@ struct TargetSearch {
     Threads threads = {};
 };
 
-// captured: the mesh that `surface` was made from. The fit is least squares over the whole surface, not only at the
+// captured: the mesh that `surface` was made from. near: of each vertex a captured vertex that may be beside it, or
+// OrientedPoints::no_point; or nothing. The fit is least squares over the whole surface, not only at the
 // vertices: on a round limb, the vertices of a coarse reference must lie outside, so that its triangles lie half
 // outside and half inside.
 TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
-                                    const SurfaceIndex& surface, const TargetSearch& how);
+                                    const SurfaceIndex& surface, const TargetSearch& how,
+                                    std::vector<std::uint32_t> near = {});
 
 // The RMS distance of samples of a surface from another one, in each cube of space.
 struct CubeErrors {
@@ -75,11 +78,12 @@ struct TrackedFitOptions {
     Threads threads = {};
 };
 
-// captured: index of the captured mesh. intra_squared: `squared` of the I-frame whose connectivity `decoded` has, or
-// empty for the I-frame itself. Errors that the I-frame had at a sample do not count against the frame, since the
-// search misses some long triangles, as those of a sole.
+// captured: index of the captured mesh. near: TrackedTargets::near of the frame's targets, or nothing. intra_squared:
+// `squared` of the I-frame whose connectivity `decoded` has, or empty for the I-frame itself. Errors that the I-frame
+// had at a sample do not count against the frame, since the search misses some long triangles, as those of a sole.
 TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
-                               std::span<const double> intra_squared, const TrackedFitOptions& options);
+                               std::span<const std::uint32_t> near, std::span<const double> intra_squared,
+                               const TrackedFitOptions& options);
 
 // Of the fits of a reference and of the one that it follows, what frames may not exceed: what tracking leaves must not
 // become the measure of what may be left.

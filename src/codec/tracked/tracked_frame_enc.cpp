@@ -177,7 +177,9 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     } else {
         targets = find_tracked_targets(
             {moved, normals, triangles, reference.mesh.colours}, mesh, surface,
-            {.reach = options.reach, .samples = options.target_samples, .threads = options.threads});
+            {.reach = options.reach, .samples = options.target_samples, .threads = options.threads},
+            registered.form.matches);
+        out.near = std::move(targets.near);
     }
     clock.done("targets");
     if (options.denoise) {

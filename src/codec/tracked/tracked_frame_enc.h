@@ -78,8 +78,9 @@ struct EncodedTrackedFrame {
     TrackedRuns runs;
     LatticeMesh mesh;  // the mesh that the decoder will have
     TrackedState state;
-    TargetHistory targets;  // empty without filtering
-    RemovedNoise noise;     // empty unless it was to be told
+    TargetHistory targets;            // empty without filtering
+    RemovedNoise noise;               // empty unless it was to be told
+    std::vector<std::uint32_t> near;  // of each vertex, the captured vertex beside it: TrackedTargets::near
 };
 
 // mesh: as captured; surface: its index, see captured_surface(). registered: to this surface. before: state of the
