@@ -35,6 +35,14 @@ int Deadline::effort(double waited) const {
     return for_long ? std::min(1, most_) : 0;
 }
 
+bool Deadline::may_repair(double so_far) const {
+    if (!(milliseconds_ > 0) || unrepaired_ >= most_left_lost) return true;
+    if (repairs_.empty()) return so_far < milliseconds_;  // the first tells how long they take
+    auto ascending = repairs_;
+    std::sort(ascending.begin(), ascending.end());
+    return so_far + percentile(ascending, 50) <= milliseconds_;
+}
+
 double Deadline::usual() const {
     if (usual_.empty()) return 0;
     auto ascending = usual_;
@@ -49,6 +57,12 @@ void Deadline::took(const TimedFrame& frame) {
     // there is more time.
     constexpr std::size_t last = 9;
     frames_.push_back(frame);
+    if (frame.left_lost) ++unrepaired_;
+    if (frame.repaired > 0) {
+        unrepaired_ = 0;
+        if (repairs_.size() == last) repairs_.erase(repairs_.begin());
+        repairs_.push_back(frame.repaired);
+    }
     const double would_have = frame.took / share_of(frame.effort);
     if (frame.intra || frames_.size() == 1 || (frame.motion_alone() && would_have > usual())) return;
     if (usual_.size() == last) usual_.erase(usual_.begin());
@@ -71,6 +85,11 @@ std::size_t Deadline::alone() const {
         std::count_if(frames_.begin(), frames_.end(), [](const TimedFrame& frame) { return frame.motion_alone(); }));
 }
 
+std::size_t Deadline::left_lost() const {
+    return static_cast<std::size_t>(
+        std::count_if(frames_.begin(), frames_.end(), [](const TimedFrame& frame) { return frame.left_lost; }));
+}
+
 Latency latency_of(const std::vector<TimedFrame>& frames) {
     std::vector<double> all;
     for (const auto& frame : frames) all.push_back(frame.latency());
@@ -85,9 +104,10 @@ std::string deadline_summary(const Deadline& deadline) {
         fmt::format("latency of a frame {:.1f} ms in the median, {:.1f} ms in the 99th percentile, {:.1f} ms at most",
                     latency.median, latency.p99, latency.longest);
     if (!(deadline.milliseconds() > 0)) return out;
-    return out + fmt::format("; deadline {:g} ms: {} late, {} with less effort, {} of them as motion alone",
-                             deadline.milliseconds(), counted(deadline.late(), "frame"),
-                             counted(deadline.lowered(), "frame"), deadline.alone());
+    return out +
+           fmt::format("; deadline {:g} ms: {} late, {} with less effort, {} of them as motion alone, {} not repaired",
+                       deadline.milliseconds(), counted(deadline.late(), "frame"), counted(deadline.lowered(), "frame"),
+                       deadline.alone(), deadline.left_lost());
 }
 
 nlohmann::json deadline_json(const Deadline& deadline) {
@@ -102,6 +122,7 @@ nlohmann::json deadline_json(const Deadline& deadline) {
     out["late_frames"] = deadline.late();
     out["lowered_frames"] = deadline.lowered();
     out["intra_frames"] = intra;
+    out["unrepaired_frames"] = deadline.left_lost();
     out["frames_by_effort"] = by_effort;  // the others
     return out;
 }
@@ -118,19 +139,20 @@ std::string deadline_warning(const Deadline& deadline, bool may_drop) {
 }
 
 Result<void> write_effort_log(OutputFile& file, const std::vector<TimedFrame>& frames) {
-    std::string text = "frame,effort,waited_ms,took_ms\n";
+    std::string text = "frame,effort,waited_ms,took_ms,repaired\n";
     for (std::size_t i = 0; i < frames.size(); ++i)
-        text += fmt::format("{},{},{:.3f},{:.3f}\n", i, frames[i].effort, frames[i].waited, frames[i].took);
+        text += fmt::format("{},{},{:.3f},{:.3f},{}\n", i, frames[i].effort, frames[i].waited, frames[i].took,
+                            frames[i].left_lost ? 0 : 1);
     if (auto written = file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}); !written)
         return written;
     return file.finish();
 }
 
-Result<std::vector<int>> read_effort_log(const std::filesystem::path& path) {
+Result<std::vector<LoggedFrame>> read_effort_log(const std::filesystem::path& path) {
     const auto bytes = read_file(path);
     if (!bytes) return tl::unexpected(bytes.error());
     const std::string text(bytes->begin(), bytes->end());
-    std::vector<int> out;
+    std::vector<LoggedFrame> out;
     const auto wrong = [&](std::size_t line, const char* what) {
         return fail(ErrorKind::bad_input,
                     fmt::format("{}, line {}: {} (an effort log, as --effort-log writes it, has a "
@@ -155,7 +177,10 @@ Result<std::vector<int>> read_effort_log(const std::filesystem::path& path) {
         if (frame != static_cast<double>(out.size())) return wrong(line, "frames are not numbered from 0 on");
         if (!(effort >= 0 && effort <= 9) || effort != static_cast<int>(effort))
             return wrong(line, "an effort is 0 to 9");
-        out.push_back(static_cast<int>(effort));
+        const auto commas = std::count(row.begin(), row.end(), ',');
+        const auto repaired = commas < 4 ? "1" : row.substr(row.rfind(',') + 1);
+        if (repaired != "0" && repaired != "1") return wrong(line, "whether it was repaired is 0 or 1");
+        out.push_back({static_cast<int>(effort), repaired == "1"});
     }
     if (out.empty()) return wrong(line + 1, "there is no frame");
     return out;

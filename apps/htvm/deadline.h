@@ -17,10 +17,12 @@ namespace htvm::app {
 
 // One frame, as decided and as it went.
 struct TimedFrame {
-    int effort = 5;      // see Encoder::set_effort()
-    double waited = 0;   // milliseconds from when the mesh was there to when it was taken
-    double took = 0;     // milliseconds that it then took
-    bool intra = false;  // an I-frame, for which the same is sent at any effort
+    int effort = 5;          // see Encoder::set_effort()
+    double waited = 0;       // milliseconds from when the mesh was there to when it was taken
+    double took = 0;         // milliseconds that it then took
+    bool intra = false;      // an I-frame, for which the same is sent at any effort
+    bool left_lost = false;  // tracking was lost, and there was no time to repair it
+    double repaired = 0;     // milliseconds that repairing it took; 0: there was nothing to repair
     double latency() const { return waited + took; }
     bool motion_alone() const { return effort == 0 && !intra; }
 };
@@ -34,21 +36,28 @@ public:
     // For a frame that has waited for so long. 0, motion alone, at most so many times in a row.
     static constexpr std::size_t most_alone = 10;
     int effort(double waited) const;
+    // Whether a frame in which tracking is lost may be repaired, so long after its mesh was there. Not so where it
+    // would be late, but at most so many times in a row: a picture that falls apart is worse than a few late frames.
+    static constexpr std::size_t most_left_lost = 30;
+    bool may_repair(double so_far) const;
     void took(const TimedFrame& frame);
 
     double milliseconds() const { return milliseconds_; }
     int most() const { return most_; }
     const std::vector<TimedFrame>& frames() const { return frames_; }
-    std::size_t late() const;     // frames that were
-    std::size_t lowered() const;  // frames that got less than was asked for
-    std::size_t alone() const;    // of these, those whose motion alone was coded
+    std::size_t late() const;       // frames that were
+    std::size_t lowered() const;    // frames that got less than was asked for
+    std::size_t alone() const;      // of these, those whose motion alone was coded
+    std::size_t left_lost() const;  // frames that were not repaired for want of time
 
 private:
     double usual() const;  // what seven of nine of them do not exceed; 0: not known yet
 
     double milliseconds_;
     int most_;
-    std::vector<double> usual_;  // milliseconds that each of the last frames would have taken at the usual effort
+    std::vector<double> usual_;    // milliseconds that each of the last frames would have taken at the usual effort
+    std::vector<double> repairs_;  // milliseconds that the last repairs took
+    std::size_t unrepaired_ = 0;   // frames left lost since the last repair
     std::vector<TimedFrame> frames_;
 };
 
@@ -65,9 +74,16 @@ nlohmann::json deadline_json(const Deadline& deadline);
 // be dropped.
 std::string deadline_warning(const Deadline& deadline, bool may_drop);
 
-// A line per frame: its number, effort, waiting and time. Read back, the efforts alone count.
+// What was decided for a frame.
+struct LoggedFrame {
+    int effort = 5;
+    bool repaired = true;  // if there was anything to repair
+    bool operator==(const LoggedFrame&) const = default;
+};
+// A line per frame: its number, effort, waiting and time, and whether it was to be repaired. Read back, what was
+// decided alone counts; logs without the last column are of frames that were repaired.
 Result<void> write_effort_log(OutputFile& file, const std::vector<TimedFrame>& frames);
-Result<std::vector<int>> read_effort_log(const std::filesystem::path& path);
+Result<std::vector<LoggedFrame>> read_effort_log(const std::filesystem::path& path);
 // Why such a log does not do for so many frames, a number or "more".
 std::string too_few_efforts(const std::string& path, std::size_t efforts, const std::string& frames);
 

@@ -213,8 +213,8 @@ Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, co
 }
 
 // Of --repeat-efforts; empty without it.
-Result<std::vector<int>> efforts_to_repeat(const EncodeOptions& options, const Capture& capture) {
-    if (options.repeat_efforts.empty()) return std::vector<int>{};
+Result<std::vector<LoggedFrame>> efforts_to_repeat(const EncodeOptions& options, const Capture& capture) {
+    if (options.repeat_efforts.empty()) return std::vector<LoggedFrame>{};
     auto efforts = read_effort_log(options.repeat_efforts);
     if (!efforts) return efforts;
     // Of a pipe nobody knows how many come, nor of files which of them can be read.

@@ -85,9 +85,14 @@ Result<int> choose_effort(Pass& pass, double waited) {
     const auto place = pass.deadline->frames().size();
     if (!pass.efforts.empty() && place >= pass.efforts.size())
         return fail(ErrorKind::bad_input, too_few_efforts(pass.options.repeat_efforts, pass.efforts.size(), "more"));
-    const int effort = pass.efforts.empty() ? pass.deadline->effort(waited) : pass.efforts[place];
+    const int effort = pass.efforts.empty() ? pass.deadline->effort(waited) : pass.efforts[place].effort;
     if (auto set = pass.encoder.set_effort(effort); !set) return tl::unexpected(set.error());
     return effort;
+}
+
+// Nothing where no efforts are chosen, as in profiles that have none.
+Result<void> set_repair(Pass& pass, std::function<bool()> may_repair) {
+    return pass.deadline ? pass.encoder.set_repair(std::move(may_repair)) : Result<void>();
 }
 
 // What became of a mesh.
@@ -125,8 +130,25 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         if (!effort) return tl::unexpected(effort.error());
         timed.effort = *effort;
     }
+    // When it was found that this frame is to be repaired. Under rate control it may be asked for several times.
+    std::optional<std::chrono::steady_clock::time_point> repairing;
+    const auto may_repair = [&] {
+        if (repairing || timed.left_lost) return !timed.left_lost;
+        timed.left_lost = !pass.deadline->may_repair(timed.waited + milliseconds_since(start));
+        if (!timed.left_lost) repairing = std::chrono::steady_clock::now();
+        return !timed.left_lost;
+    };
+    const bool limited = pass.deadline && pass.deadline->milliseconds() > 0;  // then no frame waits in the encoder
+    std::function<bool()> repair;
+    if (limited)
+        repair = may_repair;
+    else if (!pass.efforts.empty())
+        repair = [repaired = pass.efforts[pass.deadline->frames().size()].repaired] { return repaired; };
+    if (auto set = set_repair(pass, repair); !set) return tl::unexpected(set.error());
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
     const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
+    if (limited)
+        if (auto set = set_repair(pass, {}); !set) return tl::unexpected(set.error());
     summary.encode_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const bool dropped = !pushed && is_of_dropped(pass, pushed.error());
     if (!pushed && !dropped)
@@ -145,6 +167,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     if (pass.deadline) {
         timed.took = milliseconds_since(start);
         timed.intra = pass.encoder.last_frame().type == FrameType::intra;
+        if (repairing) timed.repaired = milliseconds_since(*repairing);
         pass.deadline->took(timed);
     }
     if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());

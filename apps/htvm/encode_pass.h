@@ -59,9 +59,9 @@ struct Pass {
     RateReport& rate;
     std::function<bool()> wants_key_frame = {};           // asked before each frame: whether it should be an I-frame
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
-    Deadline* deadline = nullptr;   // how much is searched for each frame, and how long that takes; null: not counted
-    std::vector<int> efforts = {};  // of each frame, in place of what the deadline says; empty: as that says
-    PictureTrack* pictures = nullptr;  // of the frames; null: none go into the stream
+    Deadline* deadline = nullptr;  // how much is searched for each frame, and how long that takes; null: not counted
+    std::vector<LoggedFrame> efforts = {};  // of each frame, in place of what the deadline says; empty: as that says
+    PictureTrack* pictures = nullptr;       // of the frames; null: none go into the stream
     double slower_line = 0;      // the bitrate that the line carries at present, where it is below the one asked for
     bool saw_triangles = false;  // in a frame so far, or of those before
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.

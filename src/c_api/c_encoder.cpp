@@ -338,6 +338,16 @@ htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort) {
     });
 }
 
+htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, int (*may_repair)(void* user), void* user) {
+    if (!encoder) return HTVM_BAD_INPUT;
+    return guarded(encoder->error, [&] {
+        std::function<bool()> asks;
+        if (may_repair) asks = [may_repair, user] { return may_repair(user) != 0; };
+        const auto set = encoder->encoder.set_repair(std::move(asks));
+        return set ? htvm_status{HTVM_OK} : encoder->error.set(set.error());
+    });
+}
+
 htvm_status htvm_encoder_finish(htvm_encoder* encoder) {
     if (!encoder) return HTVM_BAD_INPUT;
     return guarded(encoder->error, [&] {

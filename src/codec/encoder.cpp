@@ -52,7 +52,8 @@ struct Encoder::State {
     PoseTracker poses;
     Sequence sequence;
     QualityControl control;
-    int effort = usual_effort;  // for the next frame
+    int effort = usual_effort;         // for the next frame
+    std::function<bool()> may_repair;  // Encoder::set_repair()
     Output output;
     std::optional<std::int64_t> last_timestamp;
     std::vector<PushedFrame> waiting;   // the last ones, in their order, with EncoderOptions::latency_frames
@@ -340,6 +341,7 @@ Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* p
     out.mesh = std::move(*on_lattice);
     out.pose = std::move(*coded_pose);
     out.effort = state.effort;
+    out.may_repair = state.may_repair;
     return out;
 }
 
@@ -348,6 +350,7 @@ Result<void> code_frame_of(State& state, PushedFrame frame) {
     FrameWork work(state.configuration, state.sequence, frame.effort, std::move(frame.mesh), std::move(frame.colours),
                    std::move(frame.pose), state.stages);
     work.take(std::move(frame.ahead));
+    work.may_repair = std::move(frame.may_repair);
     const auto bits = [&](const Candidate& candidate) { return bits_of(state, candidate); };
     auto chosen = choose_beside(work, frame.force_intra, enhanced_steps(state.configuration), state.waiting,
                                 [&] { return choose_frame(work, state.control, bits, frame.force_intra); });
@@ -519,6 +522,13 @@ Result<void> Encoder::set_effort(int effort) {
     if (effort < 0 || effort > most_effort)
         return fail(ErrorKind::bad_input, "an effort is 0 to 9, not " + std::to_string(effort));
     state_->effort = effort;
+    return {};
+}
+
+Result<void> Encoder::set_repair(std::function<bool()> may_repair) {
+    if (state_->configuration.options.profile != Profile::tracked)
+        return fail(ErrorKind::bad_input, "tracking is of the tracked profile: others lose none");
+    state_->may_repair = std::move(may_repair);
     return {};
 }
 

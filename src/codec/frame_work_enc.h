@@ -4,6 +4,7 @@
 // (advance()).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -183,6 +184,7 @@ public:
     const std::vector<Colour> colours;  // of its vertices where they are not coded, for tracking alone; or none
     const CodedPose pose;
     std::vector<StageTime>& stages;
+    std::function<bool()> may_repair = {};           // whether what tracking lost is repaired in this frame; null: yes
     std::optional<EncodedTrackedFrame> coded_alone;  // as a T-frame of the reference alone, if it was last coded so and
                                                      // is registered as it was then: what a patch is planned on
 

@@ -23,6 +23,7 @@ struct PushedFrame {
     std::int64_t timestamp_us = 0;
     bool force_intra = false;
     int effort = usual_effort;
+    std::function<bool()> may_repair = {};
     AheadWork ahead = {};
 };
 

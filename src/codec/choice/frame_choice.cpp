@@ -330,7 +330,8 @@ bool may_be_renewed(const FrameWork& work, const FrameSteps& steps, const Lattic
 // A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
 // no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
 // more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
-// late, it is made of the tracked mesh, so that nothing jumps. due: an I-frame is wanted.
+// late, it is made of the tracked mesh, so that nothing jumps. A frame that may not be repaired is sent as it is. due:
+// an I-frame is wanted.
 Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool due) {
     if (work.effort.motion_alone && !due) return code_motion_alone(work, steps);
     if (work.effort.always_other_starts) work.follow_lost_limbs();
@@ -342,6 +343,7 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     };
     auto fit = fit_of(tracked->decoded, tracked->near);
     bool lost = lost_track(work, fit);
+    if (lost && !due && work.may_repair && !work.may_repair()) return tracked;
     std::optional<EncodedTrackedFrame> for_patches;  // which tells whether limbs were found, too
     const bool may_be_patched =
         !due && work.configuration.options.tracked.patch_share > 0 && reference.decoded.mesh().texcoords.empty();
