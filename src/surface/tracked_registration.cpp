@@ -377,15 +377,24 @@ RigidMotion blended(const SampleBlend& blend, const std::vector<RigidMotion>& mo
     return out;
 }
 
+struct MovedSample {
+    Point3f point, normal;
+};
+MovedSample moved_sample(const SampleBlend& blend, const std::vector<RigidMotion>& motion, const Vector3d& rest,
+                         const Vector3d& rest_normal) {
+    const RigidMotion here = blended(blend, motion);
+    const Vector3d normal = here.rotation * rest_normal;
+    const double length = normal.norm();
+    return {point_of(here(rest)), point_of(length > 0 ? Vector3d(normal / length) : rest_normal)};
+}
+
 Moved move_samples(const Stage& stage, Threads threads) {
     Moved out{std::vector<Point3f>(stage.rest.size()), std::vector<Point3f>(stage.rest.size()), {}};
     parallel_for(stage.rest.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const RigidMotion here = blended(stage.level.blends[i], stage.motion);
-            out.points[i] = point_of(here(stage.rest[i]));
-            const Vector3d normal = here.rotation * stage.rest_normals[i];
-            const double length = normal.norm();
-            out.normals[i] = point_of(length > 0 ? Vector3d(normal / length) : stage.rest_normals[i]);
+            const auto moved = moved_sample(stage.level.blends[i], stage.motion, stage.rest[i], stage.rest_normals[i]);
+            out.points[i] = moved.point;
+            out.normals[i] = moved.normal;
         }
     });
     return out;
@@ -426,7 +435,6 @@ struct Round {
     double point_share = 0;
     float gap = 0;          // spacing of the reference's samples
     bool far = false;       // search among the target's samples; distant matches still count
-    std::size_t every = 1;  // use only every n-th sample
     bool colours = false;   // match colours, too; both sides must have them
     bool surfaces = false;  // match the target's samples to the reference's triangles; not with `far`
 };
@@ -488,8 +496,8 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
                                 const SurfaceIndex& target, const Round& round, float cell,
                                 const DeformationOptions& options, Guesses& guesses) {
     constexpr float begins_near = 4;  // spacings: from farther away it is not worth going
-    const std::size_t skip = round.every * (round.far ? 2 : 1);
-    const std::size_t forward = moved.points.size() / round.every, back = target.samples.size() / skip;
+    const std::size_t skip = round.far ? 2 : 1;
+    const std::size_t forward = moved.points.size(), back = target.samples.size() / skip;
     const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
     const MovedGrid reference(moved, cell);
     const float gap = round.far ? target.coarse_gap : target.fine_gap;
@@ -519,9 +527,8 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
         if (match.found) match.index = target.samples[match.index];
         return match;
     };
-    const auto go_forward = [&](std::size_t i, std::uint32_t last) {
-        const std::size_t sample = i * round.every;
-        std::uint32_t& guess = guesses.forward[i];
+    const auto go_forward = [&](std::size_t sample, std::uint32_t last) {
+        std::uint32_t& guess = guesses.forward[sample];
         const auto from = guess == OrientedPoints::no_point ? last : guess;
         const auto match = round.far
                                ? nearest_far(moved.points[sample], moved.normals[sample], from)
@@ -529,8 +536,8 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
                                                        {.reach = reach, .agreement = agreement, .along = true}, from);
         if (!match.found) return guess;
         guess = match.index;
-        out[i] = match_of(moved, static_cast<std::uint32_t>(sample), target, match.index, gap);
-        out[i].weight = match_weight(match.squared_distance, round);
+        out[sample] = match_of(moved, static_cast<std::uint32_t>(sample), target, match.index, gap);
+        out[sample].weight = match_weight(match.squared_distance, round);
         return guess;
     };
     const float spacing =
@@ -1193,20 +1200,39 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
 double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
                          const DeformationOptions& options) {
     if (mesh.samples.empty() || target.samples.empty()) return 0;
-    const Stage stage = fine_stage(mesh, {motions.begin(), motions.end()});
-    const Moved moved = move_samples(stage, options.threads);
-    const double reach = options.near_reach * options.millimetre;
     const std::size_t every = mesh.samples.size() + target.samples.size() < 2000 ? 1 : 4;
-    const Round round{.reach = reach, .stiffness = 0, .point_share = 0, .gap = 0, .far = false, .every = every};
-    Guesses guesses;
-    const auto matches =
-        find_matches(mesh, mesh.fine, moved, target, round, static_cast<float>(reach / 2), options, guesses);
-    double near = 0;
-    for (const Match& match : matches) {
-        const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
-        near += reach - std::min(reach, std::abs(apart.dot(vector_of(target.normals[match.vertex]))));
+    const std::vector<RigidMotion> motion(motions.begin(), motions.end());
+    std::vector<Point3f> points, normals;
+    for (std::size_t i = 0; i < mesh.samples.size(); i += every) {
+        const auto moved = moved_sample(mesh.fine.blends[i], motion, vector_of(mesh.positions[mesh.samples[i]]),
+                                        vector_of(mesh.sample_normals[i]));
+        points.push_back(moved.point);
+        normals.push_back(moved.normal);
     }
-    return reach - near / static_cast<double>(mesh.samples.size() / every + target.samples.size() / every);
+    const double reach = options.near_reach * options.millimetre;
+    const auto far = static_cast<float>(reach), agreement = static_cast<float>(options.agreement);
+    const auto distance = [&](std::size_t sample, std::uint32_t vertex) {
+        const Vector3d apart = vector_of(target.positions[vertex]) - vector_of(points[sample]);
+        return std::min(reach, std::abs(apart.dot(vector_of(target.normals[vertex]))));
+    };
+    double sum = 0;
+    std::size_t count = 0;
+    std::uint32_t guess = OrientedPoints::no_point;
+    for (std::size_t i = 0; i < points.size(); ++i, ++count) {
+        const auto match =
+            target.nearest_facing(points[i], normals[i], {.reach = far, .agreement = agreement, .along = true}, guess);
+        if (match.found) guess = match.index;
+        sum += match.found ? distance(i, match.index) : reach;
+    }
+    const OrientedPoints reference(points, normals, far / 2);
+    guess = OrientedPoints::no_point;
+    for (std::size_t i = 0; i < target.samples.size(); i += every, ++count) {
+        const auto vertex = target.samples[i];
+        const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], far, agreement, guess);
+        if (match.found) guess = match.index;
+        sum += match.found ? distance(match.index, vertex) : reach;
+    }
+    return sum / static_cast<double>(count);
 }
 
 std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, Threads threads) {

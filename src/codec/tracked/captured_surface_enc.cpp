@@ -17,24 +17,28 @@ namespace htvm::internal {
 
 namespace {
 
+// The values of four functions at one place: the distance, then three components of colour. Floats do, since what comes
+// of them is rounded to whole lattice units and levels; four of them are one vector.
+using Four = std::array<float, 4>;
+
 // Fills in values where nothing is known with the mean of the neighbours, from the rim inwards; zero if no neighbour is
 // ever known.
-void fill_gaps(std::vector<double>& values, std::vector<bool> known, std::span<const Triangle> triangles) {
+void fill_gaps(std::vector<Four>& values, std::vector<bool> known, std::span<const Triangle> triangles) {
     constexpr int rounds = 24;
     if (std::find(known.begin(), known.end(), false) == known.end()) return;
     std::vector<Triangle> open;
     const auto is_known = [&](const Triangle& t) { return known[t[0]] && known[t[1]] && known[t[2]]; };
     std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(open),
                  [&](const auto& t) { return !is_known(t); });
-    std::vector<double> sum(values.size());
-    std::vector<std::uint32_t> count(values.size());
+    std::vector<Four> sum(values.size());
+    std::vector<float> count(values.size());
     for (int round = 0; round < rounds && !open.empty(); ++round) {
         for (const auto& t : open)
             for (const auto to : t) {
                 if (known[to]) continue;
                 for (const auto from : t) {
                     if (!known[from]) continue;
-                    sum[to] += values[from];
+                    for (std::size_t i = 0; i < 4; ++i) sum[to][i] += values[from][i];
                     ++count[to];
                 }
             }
@@ -42,7 +46,7 @@ void fill_gaps(std::vector<double>& values, std::vector<bool> known, std::span<c
         for (const auto& t : open)
             for (const auto v : t) {
                 if (known[v] || count[v] == 0) continue;
-                values[v] = sum[v] / count[v];
+                for (std::size_t i = 0; i < 4; ++i) values[v][i] = sum[v][i] / count[v];
                 known[v] = any = true;
             }
         if (!any) break;
@@ -69,20 +73,20 @@ void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::s
 // Where within a triangle samples lie, and how much of its area each stands for. Both rules integrate the square of a
 // linear function exactly.
 struct InnerSample {
-    std::array<double, 3> shares{};  // of the corners
-    double weight = 0;
+    std::array<float, 3> shares{};  // of the corners
+    float weight = 0;
 };
 struct SampleRule {
-    double corner_weight = 0;  // of the vertices, per triangle
+    float corner_weight = 0;  // of the vertices, per triangle
     std::span<const InnerSample> inner;
 };
 
 SampleRule rule_of(TargetSamples samples) {
-    static constexpr std::array<InnerSample, 1> middle = {{{{1.0 / 3, 1.0 / 3, 1.0 / 3}, 3.0 / 4}}};
-    static constexpr std::array<InnerSample, 3> three = {{{{2.0 / 3, 1.0 / 6, 1.0 / 6}, 1.0 / 3},
-                                                          {{1.0 / 6, 2.0 / 3, 1.0 / 6}, 1.0 / 3},
-                                                          {{1.0 / 6, 1.0 / 6, 2.0 / 3}, 1.0 / 3}}};
-    if (samples == TargetSamples::middles) return {1.0 / 12, middle};
+    constexpr float third = 1.0F / 3, sixth = 1.0F / 6;
+    static constexpr std::array<InnerSample, 1> middle = {{{{third, third, third}, 0.75F}}};
+    static constexpr std::array<InnerSample, 3> three = {
+        {{{2 * third, sixth, sixth}, third}, {{sixth, 2 * third, sixth}, third}, {{sixth, sixth, 2 * third}, third}}};
+    if (samples == TargetSamples::middles) return {1.0F / 12, middle};
     return {0, three};
 }
 
@@ -99,8 +103,8 @@ SurfaceSamples samples_of(const MovedReference& moved, const SampleRule& rule) {
         for (const auto& sample : rule.inner) {
             Vector3d point{}, normal{};
             for (std::size_t i = 0; i < 3; ++i) {
-                point = point + to_vector(moved.positions[t[i]]) * sample.shares[i];
-                normal = normal + moved.normals[t[i]] * sample.shares[i];
+                point = point + to_vector(moved.positions[t[i]]) * static_cast<double>(sample.shares[i]);
+                normal = normal + moved.normals[t[i]] * static_cast<double>(sample.shares[i]);
             }
             out.points.push_back(to_floats(point));
             out.normals.push_back(to_floats(normalised(normal)));
@@ -108,18 +112,16 @@ SurfaceSamples samples_of(const MovedReference& moved, const SampleRule& rule) {
     return out;
 }
 
-// Finds the function on the mesh, linear within each triangle, that is nearest to the values at the samples: least
+// Finds the functions on the mesh, linear within each triangle, that are nearest to the values at the samples: least
 // squares by conjugate gradients, with the weights that integrate squares exactly.
 struct SurfaceFit {
     std::span<const Triangle> triangles;
     SampleRule rule;
-    std::vector<double> corner_weight, inner_weight;  // zero if the sample has no value
-    std::vector<double> diagonal;
+    std::vector<float> corner_weight, inner_weight;  // zero if the sample has no value; 1 where it is largest
+    std::vector<float> per_diagonal;                 // 1 / the matrix's diagonal; 0 where that is 0
 
-    // Two functions at a time, which takes vector instructions no longer than one.
-    using Both = std::array<double, 2>;
-    std::vector<Both> times(const std::vector<Both>& x) const;
-    std::array<std::vector<double>, 2> fitted(const std::vector<Both>& seen) const;
+    std::vector<Four> times(const std::vector<Four>& x) const;
+    std::vector<Four> fitted(std::span<const Four> seen) const;
 };
 
 SurfaceFit make_surface_fit(const MovedReference& moved, const SampleRule& rule,
@@ -130,99 +132,102 @@ SurfaceFit make_surface_fit(const MovedReference& moved, const SampleRule& rule,
     out.rule = rule;
     out.corner_weight.assign(vertices, 0);
     out.inner_weight.assign(inner * moved.triangles.size(), 0);
+    std::vector<float> area;
+    area.reserve(moved.triangles.size());
+    for (const auto& t : moved.triangles) area.push_back(static_cast<float>(length(area_vector(moved.positions, t))));
+    const float largest = area.empty() ? 1 : std::max(*std::max_element(area.begin(), area.end()), 1e-6F);
+    std::vector<float> diagonal(vertices, 0);
     for (std::size_t t = 0; t < moved.triangles.size(); ++t) {
         const auto& corners = moved.triangles[t];
-        const double area = length(area_vector(moved.positions, corners)) / 2;
+        const float share = area[t] / largest;
         for (const auto v : corners)
-            if (targets[v].found()) out.corner_weight[v] += area * rule.corner_weight;
-        for (std::size_t k = 0; k < inner; ++k)
-            if (targets[vertices + inner * t + k].found())
-                out.inner_weight[inner * t + k] = area * rule.inner[k].weight;
-    }
-    out.diagonal = out.corner_weight;
-    for (std::size_t t = 0; t < moved.triangles.size(); ++t)
-        for (std::size_t k = 0; k < inner; ++k)
+            if (targets[v].found()) out.corner_weight[v] += share * rule.corner_weight;
+        for (std::size_t k = 0; k < inner; ++k) {
+            if (!targets[vertices + inner * t + k].found()) continue;
+            const auto& sample = rule.inner[k];
+            out.inner_weight[inner * t + k] = share * sample.weight;
             for (std::size_t i = 0; i < 3; ++i)
-                out.diagonal[moved.triangles[t][i]] +=
-                    out.inner_weight[inner * t + k] * rule.inner[k].shares[i] * rule.inner[k].shares[i];
+                diagonal[corners[i]] += share * sample.weight * sample.shares[i] * sample.shares[i];
+        }
+    }
+    for (std::size_t v = 0; v < vertices; ++v) {
+        diagonal[v] += out.corner_weight[v];
+        out.per_diagonal.push_back(diagonal[v] > 0 ? 1 / diagonal[v] : 0);
+    }
     return out;
 }
 
-std::vector<SurfaceFit::Both> SurfaceFit::times(const std::vector<Both>& x) const {
-    std::vector<Both> out(x.size());
+std::vector<Four> SurfaceFit::times(const std::vector<Four>& x) const {
+    std::vector<Four> out(x.size());
     for (std::size_t v = 0; v < x.size(); ++v)
-        for (std::size_t i = 0; i < 2; ++i) out[v][i] = corner_weight[v] * x[v][i];
-    const double* weight = inner_weight.data();
+        for (std::size_t i = 0; i < 4; ++i) out[v][i] = corner_weight[v] * x[v][i];
+    const float* weight = inner_weight.data();
     for (const auto& [a, b, c] : triangles)
         for (const auto& sample : rule.inner) {
             const auto& s = sample.shares;
-            Both value{};
-            for (std::size_t i = 0; i < 2; ++i) value[i] = *weight * (s[0] * x[a][i] + s[1] * x[b][i] + s[2] * x[c][i]);
-            for (std::size_t i = 0; i < 2; ++i) out[a][i] += s[0] * value[i];
-            for (std::size_t i = 0; i < 2; ++i) out[b][i] += s[1] * value[i];
-            for (std::size_t i = 0; i < 2; ++i) out[c][i] += s[2] * value[i];
+            Four value{};
+            for (std::size_t i = 0; i < 4; ++i) value[i] = *weight * (s[0] * x[a][i] + s[1] * x[b][i] + s[2] * x[c][i]);
+            for (std::size_t i = 0; i < 4; ++i) out[a][i] += s[0] * value[i];
+            for (std::size_t i = 0; i < 4; ++i) out[b][i] += s[1] * value[i];
+            for (std::size_t i = 0; i < 4; ++i) out[c][i] += s[2] * value[i];
             ++weight;
         }
     return out;
 }
 
-std::array<std::vector<double>, 2> SurfaceFit::fitted(const std::vector<Both>& seen) const {
+// seen: zero at samples that have no value.
+std::vector<Four> SurfaceFit::fitted(std::span<const Four> seen) const {
     constexpr int rounds = 4;  // two more change the bytes by nothing that can be told from chance
-    const std::size_t vertices = diagonal.size();
-    std::vector<Both> x(vertices), residual(vertices);
+    const std::size_t vertices = corner_weight.size(), inner = rule.inner.size();
+    std::vector<Four> x(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(vertices)), residual(vertices);
     for (std::size_t v = 0; v < vertices; ++v)
-        for (std::size_t i = 0; i < 2; ++i) {
-            x[v][i] = seen[v][i];  // zero if there is none
-            residual[v][i] = corner_weight[v] * seen[v][i];
-        }
-    const std::size_t inner = rule.inner.size();
+        for (std::size_t i = 0; i < 4; ++i) residual[v][i] = corner_weight[v] * seen[v][i];
     for (std::size_t place = 0; place < inner_weight.size(); ++place)
-        for (std::size_t corner = 0; corner < 3; ++corner)
-            for (std::size_t i = 0; i < 2; ++i)
-                residual[triangles[place / inner][corner]][i] +=
-                    inner_weight[place] * rule.inner[place % inner].shares[corner] * seen[vertices + place][i];
-    const auto product = times(x);
-    std::vector<Both> direction(vertices);
-    Both product_before{};
-    for (std::size_t v = 0; v < vertices; ++v)
-        for (std::size_t i = 0; i < 2; ++i) {
-            residual[v][i] -= product[v][i];
-            direction[v][i] = diagonal[v] > 0 ? residual[v][i] / diagonal[v] : 0;
-            product_before[i] += residual[v][i] * direction[v][i];
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+            auto& sum = residual[triangles[place / inner][corner]];
+            const float weight = inner_weight[place] * rule.inner[place % inner].shares[corner];
+            for (std::size_t i = 0; i < 4; ++i) sum[i] += weight * seen[vertices + place][i];
         }
-    for (int round = 0; round < rounds && (product_before[0] > 0 || product_before[1] > 0); ++round) {
+    const auto product = times(x);
+    std::vector<Four> direction(vertices);
+    // Sums over all vertices are in doubles.
+    using Sums = std::array<double, 4>;
+    Sums product_before{};
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t i = 0; i < 4; ++i) {
+            residual[v][i] -= product[v][i];
+            direction[v][i] = residual[v][i] * per_diagonal[v];
+            product_before[i] += static_cast<double>(residual[v][i] * direction[v][i]);
+        }
+    const auto goes_on = [&] {
+        return std::any_of(product_before.begin(), product_before.end(), [](double p) { return p > 0; });
+    };
+    for (int round = 0; round < rounds && goes_on(); ++round) {
         const auto image = times(direction);
-        Both along{}, step{}, product_after{}, turn{};
+        Sums along{}, product_after{};
+        Four step{}, turn{};
         for (std::size_t v = 0; v < vertices; ++v)
-            for (std::size_t i = 0; i < 2; ++i) along[i] += direction[v][i] * image[v][i];
+            for (std::size_t i = 0; i < 4; ++i) along[i] += static_cast<double>(direction[v][i] * image[v][i]);
         // A function that is done stays as it is.
-        for (std::size_t i = 0; i < 2; ++i)
-            step[i] = along[i] > 0 && product_before[i] > 0 ? product_before[i] / along[i] : 0;
-        for (std::size_t v = 0; v < vertices; ++v) {
-            const double per_weight = diagonal[v] > 0 ? 1 / diagonal[v] : 0;
-            for (std::size_t i = 0; i < 2; ++i) {
+        for (std::size_t i = 0; i < 4; ++i)
+            step[i] = along[i] > 0 && product_before[i] > 0 ? static_cast<float>(product_before[i] / along[i]) : 0;
+        for (std::size_t v = 0; v < vertices; ++v)
+            for (std::size_t i = 0; i < 4; ++i) {
                 x[v][i] += step[i] * direction[v][i];
                 residual[v][i] -= step[i] * image[v][i];
-                product_after[i] += residual[v][i] * residual[v][i] * per_weight;
+                product_after[i] += static_cast<double>(residual[v][i] * residual[v][i] * per_diagonal[v]);
             }
-        }
-        for (std::size_t i = 0; i < 2; ++i) turn[i] = step[i] > 0 ? product_after[i] / product_before[i] : 0;
-        for (std::size_t v = 0; v < vertices; ++v) {
-            const double per_weight = diagonal[v] > 0 ? 1 / diagonal[v] : 0;
-            for (std::size_t i = 0; i < 2; ++i)
-                direction[v][i] = residual[v][i] * per_weight + turn[i] * direction[v][i];
-        }
-        for (std::size_t i = 0; i < 2; ++i) product_before[i] = step[i] > 0 ? product_after[i] : 0;
+        for (std::size_t i = 0; i < 4; ++i)
+            turn[i] = step[i] > 0 ? static_cast<float>(product_after[i] / product_before[i]) : 0;
+        for (std::size_t v = 0; v < vertices; ++v)
+            for (std::size_t i = 0; i < 4; ++i)
+                direction[v][i] = residual[v][i] * per_diagonal[v] + turn[i] * direction[v][i];
+        for (std::size_t i = 0; i < 4; ++i) product_before[i] = step[i] > 0 ? product_after[i] : 0;
     }
     std::vector<bool> known(vertices);
-    for (std::size_t v = 0; v < vertices; ++v) known[v] = diagonal[v] > 0;
-    std::array<std::vector<double>, 2> out;
-    for (std::size_t i = 0; i < 2; ++i) {
-        out[i].resize(vertices);
-        for (std::size_t v = 0; v < vertices; ++v) out[i][v] = x[v][i];
-        fill_gaps(out[i], known, triangles);
-    }
-    return out;
+    for (std::size_t v = 0; v < vertices; ++v) known[v] = per_diagonal[v] > 0;
+    fill_gaps(x, std::move(known), triangles);
+    return x;
 }
 
 // What of the surface is nearest to each sample: first to the vertices, then to what lies within the triangles,
@@ -244,46 +249,39 @@ std::vector<SurfacePoint> targets_of(const SurfaceSamples& samples, std::span<co
     return out;
 }
 
-// The distance of each sample from the surface along its normal, in lattice units.
-std::vector<double> distances(const SurfaceSamples& samples, const std::vector<SurfacePoint>& targets) {
-    std::vector<double> out(targets.size(), 0);
-    for (std::size_t i = 0; i < targets.size(); ++i) {
-        if (!targets[i].found()) continue;
-        for (std::size_t axis = 0; axis < 3; ++axis)
-            out[i] +=
-                (static_cast<double>(targets[i].point[axis]) - samples.points[i][axis]) * samples.normals[i][axis];
-    }
-    return out;
-}
-
-// The colour of the surface at each sample minus that of the reference there: a list of levels per component.
-std::array<std::vector<double>, 3> colour_changes(const MovedReference& moved, const SampleRule& rule,
-                                                  const LatticeMesh& captured, const std::vector<SurfacePoint>& targets,
-                                                  Threads threads) {
-    std::array<std::vector<double>, 3> out;
-    for (auto& component : out) component.assign(targets.size(), 0);
-    const std::size_t vertices = moved.positions.size();
+// At each sample, how far the surface is along its normal, in lattice units, and what its colour is less that of the
+// reference, in levels.
+std::vector<Four> seen_at(const SurfaceSamples& samples, const MovedReference& moved, const SampleRule& rule,
+                          const LatticeMesh& captured, const std::vector<SurfacePoint>& targets, Threads threads) {
+    std::vector<Four> out(targets.size());
+    const std::size_t vertices = moved.positions.size(), inner = rule.inner.size();
     const auto look_at = [&](std::size_t i) {
+        auto& [distance, red, green, blue] = out[i];
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            distance += (targets[i].point[axis] - samples.points[i][axis]) * samples.normals[i][axis];
+        if (moved.colours.empty()) return;
+        std::array<float, 3> colour{};
+        const auto add = [&](const Colour& level, float share) {
+            for (std::size_t c = 0; c < 3; ++c) colour[c] += share * static_cast<float>(level[c]);
+        };
         const auto& t = captured.triangles[targets[i].triangle];
-        const auto& share = targets[i].shares;
-        for (std::size_t c = 0; c < 3; ++c) {
-            double level = 0;
-            for (std::size_t corner = 0; corner < 3; ++corner)
-                level += static_cast<double>(share[corner]) * captured.colours[t[corner]][c];
-            if (i < vertices) {
-                level -= moved.colours[i][c];
-            } else {
-                const auto& corners = moved.triangles[(i - vertices) / rule.inner.size()];
-                const auto& shares = rule.inner[(i - vertices) % rule.inner.size()].shares;
-                for (std::size_t corner = 0; corner < 3; ++corner)
-                    level -= shares[corner] * moved.colours[corners[corner]][c];
-            }
-            out[c][i] = level;
+        for (std::size_t corner = 0; corner < 3; ++corner) add(captured.colours[t[corner]], targets[i].shares[corner]);
+        if (i < vertices) {
+            add(moved.colours[i], -1);
+        } else {
+            const auto& corners = moved.triangles[(i - vertices) / inner];
+            const auto& shares = rule.inner[(i - vertices) % inner].shares;
+            for (std::size_t corner = 0; corner < 3; ++corner) add(moved.colours[corners[corner]], -shares[corner]);
         }
+        red = colour[0], green = colour[1], blue = colour[2];
     };
     parallel_for(targets.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
+        constexpr std::size_t ahead = 8;
+        for (std::size_t i = begin; i < end; ++i) {
+            if (i + ahead < end && targets[i + ahead].found())
+                __builtin_prefetch(&captured.triangles[targets[i + ahead].triangle]);
             if (targets[i].found()) look_at(i);
+        }
     });
     return out;
 }
@@ -312,34 +310,20 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
     near.resize(vertices, OrientedPoints::no_point);
     const auto targets = targets_of(samples, moved.triangles, surface, how, near);
     const auto fit = make_surface_fit(moved, rule, targets);
-    std::vector<std::vector<double>> seen(1);
-    seen[0] = distances(samples, targets);
-    if (!moved.colours.empty())
-        for (auto& component : colour_changes(moved, rule, captured, targets, threads))
-            seen.push_back(std::move(component));
-    parallel_for((seen.size() + 1) / 2, threads, 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t pair = begin; pair < end; ++pair) {
-            const bool two = 2 * pair + 1 < seen.size();
-            std::vector<SurfaceFit::Both> both(targets.size());
-            for (std::size_t i = 0; i < both.size(); ++i)
-                both[i] = {seen[2 * pair][i], two ? seen[2 * pair + 1][i] : 0};
-            auto fitted = fit.fitted(both);
-            seen[2 * pair] = std::move(fitted[0]);
-            if (two) seen[2 * pair + 1] = std::move(fitted[1]);
-        }
-    });
+    const auto fitted = fit.fitted(seen_at(samples, moved, rule, captured, targets, threads));
     TrackedTargets out;
     out.near = std::move(near);
     out.displacement.resize(vertices);
     // A field cannot code more than this: 16 mm on the finest lattice. The surface then lags behind by the rest.
-    constexpr double most = field_limit;
+    constexpr float most = field_limit, most_levels = 255;
     for (std::size_t v = 0; v < vertices; ++v)
-        out.displacement[v] = static_cast<std::int32_t>(std::lround(std::clamp(seen[0][v], -most, most)));
+        out.displacement[v] = static_cast<std::int32_t>(std::lround(std::clamp(fitted[v][0], -most, most)));
     if (moved.colours.empty()) return out;
     out.colours.resize(3 * vertices);
     for (std::size_t v = 0; v < vertices; ++v)
         for (std::size_t c = 0; c < 3; ++c)
-            out.colours[3 * v + c] = static_cast<std::int32_t>(std::lround(std::clamp(seen[1 + c][v], -255.0, 255.0)));
+            out.colours[3 * v + c] =
+                static_cast<std::int32_t>(std::lround(std::clamp(fitted[v][1 + c], -most_levels, most_levels)));
     return out;
 }
 

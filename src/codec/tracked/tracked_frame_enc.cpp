@@ -7,6 +7,7 @@
 #include "codec/stage_clock_enc.h"
 #include "codec/tracked/captured_surface_enc.h"
 #include "codec/tracked/node_motion_enc.h"
+#include "core/parallel.h"
 #include "surface/limb_starts.h"
 
 namespace htvm::internal {
@@ -109,15 +110,12 @@ std::vector<NodeMotions> motions_of(const NodeStarts& starts, const DeformableMe
 
 std::size_t nearest_of(const std::vector<NodeMotions>& starts, const DeformableMesh& deformable,
                        const SurfaceIndex& surface, const DeformationOptions& options) {
-    std::size_t best = 0;
-    double least = 0;
-    for (std::size_t i = 0; starts.size() > 1 && i < starts.size(); ++i) {
-        const double error = deformation_error(deformable, surface, starts[i], options);
-        if (i > 0 && error >= least) continue;
-        best = i;
-        least = error;
-    }
-    return best;
+    if (starts.size() < 2) return 0;
+    std::vector<double> error(starts.size());
+    parallel_for(starts.size(), options.threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) error[i] = deformation_error(deformable, surface, starts[i], options);
+    });
+    return static_cast<std::size_t>(std::min_element(error.begin(), error.end()) - error.begin());
 }
 
 }  // namespace
