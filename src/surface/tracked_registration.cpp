@@ -1013,6 +1013,17 @@ void follow_groups(const DeformableMesh& mesh, const Stage& coarse, std::vector<
     }
 }
 
+// What the coarse rounds found last, for the fine ones to begin with: each sample, and each of the target's, begins
+// where it did itself or the one before it.
+Guesses finer(const DeformableMesh& mesh, const Guesses& coarse, std::size_t target_samples) {
+    Guesses out;
+    out.forward.assign(mesh.samples.size(), OrientedPoints::no_point);
+    for (std::size_t i = 0; i < coarse.forward.size(); ++i)
+        for (const std::size_t sample : {mesh.coarse.samples[i], mesh.coarse.samples[i] + 1})
+            if (sample < out.forward.size()) out.forward[sample] = coarse.forward[i];
+    return out;
+}
+
 double between(double from, double to, int step, int steps) {
     return steps <= 1 ? to : from * std::pow(to / from, static_cast<double>(step) / (steps - 1));
 }
@@ -1028,6 +1039,7 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     const double unit = options.millimetre;
     const auto cell = static_cast<float>(30 * unit);
     Stage fine = fine_stage(mesh, std::move(motion));
+    Guesses guesses;
     if (options.coarse_rounds > 0) {
         Stage coarse = coarse_stage(mesh, fine, options.threads);
         RoundMemory memory(mesh.coarse.pattern);
@@ -1039,8 +1051,10 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
             if (moved < options.settled * unit) i = std::max(i, options.coarse_rounds - 2);  // one more round
         }
         follow_groups(mesh, coarse, fine.motion);
+        guesses = finer(mesh, memory.guesses, target.samples.size());
     }
     RoundMemory memory(mesh.fine.pattern);
+    memory.guesses = std::move(guesses);
     double weight = 0;
     for (int i = 0; i < options.fine_rounds; ++i) {
         auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
