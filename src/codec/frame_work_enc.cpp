@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/parallel.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -200,19 +202,29 @@ const NodeRegistration& FrameWork::registered_nodes() {
     return *registered_nodes_;
 }
 
-bool FrameWork::follow_lost_limbs() {
-    if (std::exchange(looked_for_limbs_, true)) return false;
+bool FrameWork::follow_lost_limbs(const std::function<void()>& meanwhile) {
+    if (std::exchange(looked_for_limbs_, true)) {
+        meanwhile();
+        return false;
+    }
     auto registered = registered_nodes();
-    StageClock clock(stages);
+    const auto& captured = surface();
     const auto& nodes = sequence.nodes;
     const auto skeletal = skeletal_node_motion(configuration, reference().decoded, pose);
-    const bool any = internal::follow_lost_limbs(reference().deformable, surface(),
-                                                 {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
-                                                 deformation_options(configuration, effort), registered);
+    bool any = false;
+    std::vector<StageTime> of_limbs;
+    const auto follow = [&] {
+        StageClock clock(of_limbs);
+        any = internal::follow_lost_limbs(reference().deformable, captured,
+                                          {nodes.last, nodes.before_last, nodes.gone_on, skeletal},
+                                          deformation_options(configuration, effort), registered);
+        clock.done("registration");
+    };
+    parallel_invoke(configuration.threads, follow, meanwhile);
+    stages.insert(stages.end(), of_limbs.begin(), of_limbs.end());
     registered_nodes_ = std::move(registered);
     followed_limbs_ = followed_limbs_ || any;
     if (any) coded_alone.reset();
-    clock.done("registration");
     return any;
 }
 

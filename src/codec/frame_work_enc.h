@@ -208,7 +208,8 @@ public:
     std::vector<Colour> colours_at(const LatticeMesh& decoded);
     // Where tracking was lost: makes registered_nodes() follow limbs that another start finds. Gives whether there
     // are any; looks only once.
-    bool follow_lost_limbs();
+    // meanwhile: runs beside it, if there are threads, and sees registered_nodes() as they were.
+    bool follow_lost_limbs(const std::function<void()>& meanwhile);
     // Whether registered_nodes() is as it was first found.
     bool is_as_first_registered() const { return registered_nodes_ && !followed_limbs_; }
     // Whether the frame can be the reference, moved; and whether it may refer to it as well.

@@ -409,16 +409,18 @@ SurfacePoint SurfaceIndex::closest(const Point3f& query) const {
 
 void SurfaceIndex::find_directions(const SurfaceIndexOptions& options) {
     cell_ = options.cell;
-    around = triangles_around(positions.size(), triangles);
-    std::vector<Vector3d> sums(positions.size(), Vector3d{});
     double area = 0;
-    for (const auto& t : triangles) {
-        const Vector3d across = area_vector(std::span<const Point3f>(positions), t);
-        area += length(across) / 2;
-        for (const auto v : t) sums[v] = sums[v] + across;
-    }
-    normals.reserve(positions.size());
-    for (const auto& sum : sums) normals.push_back(to_floats(normalised(sum)));
+    const auto find_normals = [&] {
+        std::vector<Vector3d> sums(positions.size(), Vector3d{});
+        for (const auto& t : triangles) {
+            const Vector3d across = area_vector(std::span<const Point3f>(positions), t);
+            area += length(across) / 2;
+            for (const auto v : t) sums[v] = sums[v] + across;
+        }
+        normals.reserve(positions.size());
+        for (const auto& sum : sums) normals.push_back(to_floats(normalised(sum)));
+    };
+    parallel_invoke(options.threads, find_normals, [&] { around = triangles_around(positions.size(), triangles); });
     fine_gap = gap_of(area, positions.size());
     const std::size_t count = std::min(options.samples, positions.size());
     coarse_gap = gap_of(area, count);

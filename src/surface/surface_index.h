@@ -214,6 +214,10 @@ public:
     // long triangles, and is faster. Needs options.cell > 0. guess, along: as of closest_facing().
     SurfacePoint closest_within(const Point3f& query, float reach, std::uint32_t& guess, bool along = false) const;
 
+    // Whether the triangles around a vertex go all the way round it: it lies on no border, nor where surfaces touch. Of
+    // fans of more than eight this is not known, and false. Needs options.cell > 0.
+    bool is_inside(std::uint32_t vertex) const { return fans_[vertex].closed(); }
+
     // Says that a search will soon begin at this vertex: VertexFans::expect().
     void expect(std::uint32_t vertex) const { fans_.expect(vertex); }
 

@@ -29,6 +29,7 @@ struct alignas(64) VertexFan {
     Vector3f own, normal;                   // the vertex's position and normal; always set
     std::uint32_t triangles;  // 0: not regular, since there are none, more than `lanes`, or such as do not form one fan
     bool regular() const { return triangles > 0; }
+    bool closed() const { return regular() && neighbour[triangles % lanes] == neighbour[0]; }
     Vector3f place(std::size_t lane) const { return {x[lane], y[lane], z[lane]}; }
 };
 

@@ -130,6 +130,29 @@ TEST(Deadline, TellsTheMedianTheNinetyNinthPercentileAndTheLongest) {
     EXPECT_EQ(latency_of({}).longest, 0);
 }
 
+TEST(Deadline, ALostFrameIsRepairedWhereThereIsTime) {
+    Deadline deadline(100, 5);
+    EXPECT_TRUE(deadline.may_repair(20));  // nobody knows yet how long it takes
+    deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
+    EXPECT_TRUE(deadline.may_repair(40));
+    EXPECT_FALSE(deadline.may_repair(41));
+    EXPECT_TRUE(Deadline(0, 5).may_repair(1e6));  // without a deadline there always is
+}
+
+TEST(Deadline, ALostFrameIsRepairedAtLastWhateverItTakes) {
+    Deadline deadline(33, 5);
+    deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
+    for (std::size_t i = 0; i < Deadline::most_left_lost; ++i) {
+        EXPECT_FALSE(deadline.may_repair(10)) << i;
+        deadline.took({.effort = 5, .waited = 0, .took = 20, .left_lost = true});
+    }
+    EXPECT_TRUE(deadline.may_repair(10));
+    EXPECT_EQ(deadline.left_lost(), Deadline::most_left_lost);
+    deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
+    EXPECT_FALSE(deadline.may_repair(10));
+    EXPECT_EQ(deadline_json(deadline)["unrepaired_frames"], Deadline::most_left_lost);
+}
+
 class EffortLog : public testing::Test {
 protected:
     std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "efforts.csv";
@@ -140,10 +163,16 @@ protected:
     }
 };
 
-TEST_F(EffortLog, GivesTheEffortsBack) {
+TEST_F(EffortLog, GivesBackWhatWasDecided) {
     auto file = OutputFile::create(path);
-    ASSERT_TRUE(write_effort_log(*file, {{5, 0, 40}, {0, 12.5, 20}, {9, 1, 2}}));
-    EXPECT_EQ(*read_effort_log(path), (std::vector<int>{5, 0, 9}));
+    ASSERT_TRUE(
+        write_effort_log(*file, {{5, 0, 40}, {.effort = 0, .waited = 12.5, .took = 20, .left_lost = true}, {9, 1, 2}}));
+    EXPECT_EQ(*read_effort_log(path), (std::vector<LoggedFrame>{{5, true}, {0, false}, {9, true}}));
+}
+
+TEST_F(EffortLog, OfEarlierVersionsIsOfFramesThatWereRepaired) {
+    write("frame,effort,waited_ms,took_ms\n0,5,0.000,40.000\n1,2,12.500,20.000\n");
+    EXPECT_EQ(*read_effort_log(path), (std::vector<LoggedFrame>{{5, true}, {2, true}}));
 }
 
 TEST_F(EffortLog, ThatIsNoneIsRefusedWithItsLine) {
@@ -158,6 +187,8 @@ TEST_F(EffortLog, ThatIsNoneIsRefusedWithItsLine) {
         write(std::string("frame,effort\n") + row + "\n");
         EXPECT_EQ(error(), ", line 2: an effort is 0 to 9" + what) << row;
     }
+    write("frame,effort,waited_ms,took_ms,repaired\n0,5,0,0,2\n");
+    EXPECT_EQ(error(), ", line 2: whether it was repaired is 0 or 1" + what);
     write("frame,effort\n0\n");
     EXPECT_EQ(error(), ", line 2: there is no effort" + what);
     write("frame,effort\n");

@@ -403,6 +403,17 @@ TEST(CEncoder, AnEffortIsSetFromZeroToNine) {
     EXPECT_EQ(htvm_encoder_set_effort(nullptr, 5), HTVM_BAD_INPUT);
 }
 
+TEST(CEncoder, RepairsAreAskedForInTheTrackedProfileAlone) {
+    const auto never = [](void*) { return 0; };
+    const auto encoder = make_encoder();
+    EXPECT_EQ(htvm_encoder_set_repair(encoder.get(), never, nullptr), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_set_repair(encoder.get(), nullptr, nullptr), HTVM_OK);
+    const auto options = make_options(HTVM_PROFILE_TOPOLOGY);
+    const auto topology = make_encoder(options.get());
+    EXPECT_EQ(htvm_encoder_set_repair(topology.get(), never, nullptr), HTVM_BAD_INPUT);
+    EXPECT_EQ(htvm_encoder_set_repair(nullptr, never, nullptr), HTVM_BAD_INPUT);
+}
+
 TEST(CEncoder, TheMeshWithoutVerticesIsAFrame) {
     const auto encoder = make_encoder();
     htvm_mesh mesh;

@@ -60,6 +60,29 @@ TEST(PatchedFrames, AreTheReferenceOfWhatFollows) {
     EXPECT_EQ(coded.infos[4].reference, 2u);
 }
 
+TEST(PatchedFrames, WaitUntilTheCallerHasTimeForThem) {
+    const auto sequence = horned_ball(6);
+    for (const int waiting : {0, 1}) {
+        auto options = patched_options();
+        options.latency_frames = waiting;
+        auto encoder = *Encoder::create(options);
+        std::vector<FrameType> types;
+        int asked = 0;
+        for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+            const bool has_time = i >= 4;
+            ASSERT_TRUE(encoder.set_repair([&asked, has_time] { return ++asked, has_time; }));
+            ASSERT_TRUE(encoder.push(sequence.frames[i].mesh, nullptr, 33333 * static_cast<std::int64_t>(i)));
+            for (const auto& frame : encoder.coded_frames()) types.push_back(frame.info.type);
+        }
+        ASSERT_TRUE(encoder.finish());
+        for (const auto& frame : encoder.coded_frames()) types.push_back(frame.info.type);
+        EXPECT_EQ(types, (std::vector{I, T, T, T, TP, T})) << waiting;
+        EXPECT_EQ(asked, 3) << waiting;  // not of frames that are tracked
+    }
+    auto topology = *Encoder::create(default_options(Profile::topology));
+    EXPECT_EQ(topology.set_repair([] { return true; }).error().kind, ErrorKind::bad_input);
+}
+
 TEST(PatchedFrames, CodeOnlyTheTrianglesThatCome) {
     const auto coded = encode(horned_ball(3), patched_options());
     const auto patched = std::find_if(coded.packets.begin(), coded.packets.end(),

@@ -334,7 +334,7 @@ bool may_be_renewed(const FrameWork& work, const FrameSteps& steps, const Lattic
 // an I-frame is wanted.
 Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool due) {
     if (work.effort.motion_alone && !due) return code_motion_alone(work, steps);
-    if (work.effort.always_other_starts) work.follow_lost_limbs();
+    if (work.effort.always_other_starts) work.follow_lost_limbs([] {});
     auto tracked = code_frame(FrameType::tracked, work, steps);
     if (!tracked) return tracked;
     const auto& reference = work.reference();
@@ -348,11 +348,15 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     const bool may_be_patched =
         !due && work.configuration.options.tracked.patch_share > 0 && reference.decoded.mesh().texcoords.empty();
     if (lost) {
-        const bool limbs_moved = work.follow_lost_limbs();
+        // Limbs are rarely found; where they are, what was coded meanwhile is coded again.
+        std::optional<Result<EncodedTrackedFrame>> coded;
+        const bool limbs_moved = work.follow_lost_limbs([&] {
+            if (may_be_patched) coded = code_for_patches(work, steps);
+        });
         if (may_be_patched) {
-            auto coded = code_for_patches(work, steps);
-            if (!coded) return tl::unexpected(coded.error());
-            for_patches.emplace(std::move(*coded));
+            if (limbs_moved) coded = code_for_patches(work, steps);
+            if (!*coded) return tl::unexpected(coded->error());
+            for_patches.emplace(std::move(**coded));
         }
         if (limbs_moved && (!for_patches || !lost_track(work, fit_of(for_patches->mesh, for_patches->near)))) {
             tracked = code_frame(FrameType::tracked, work, steps);

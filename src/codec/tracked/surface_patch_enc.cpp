@@ -923,11 +923,18 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
     capture.points = as_indexed ? surface.positions : points_of(capture.mesh.positions);
     capture.normals =
         as_indexed ? surface.normals : points_of(vertex_normals(capture.mesh.positions, capture.mesh.triangles));
-    const Sides sides(capture.mesh.positions, capture.mesh.triangles);
+    // The sides of a border have both ends on it, so that of most captures hardly any triangles are looked at.
+    std::vector<Triangle> at_border;
+    for (const auto& t : capture.mesh.triangles) {
+        const auto inside = [&](std::uint32_t v) { return as_indexed && surface.is_inside(v); };
+        if (int{inside(t[0])} + int{inside(t[1])} + int{inside(t[2])} < 2) at_border.push_back(t);
+    }
+    const Sides sides(capture.mesh.positions, at_border);
     std::vector<Point3f> along_rim;
     double rim_length = 0;
     for (std::uint32_t s = 0; s < sides.count(); ++s) {
         if (sides.twin(s) != none) continue;
+        if (as_indexed && (surface.is_inside(sides.from(s)) || surface.is_inside(sides.to(s)))) continue;
         if (capture.rim.empty()) capture.rim.assign(capture.points.size(), false);
         const auto a = sides.from(s), b = sides.to(s);
         capture.rim[a] = capture.rim[b] = true;

@@ -136,12 +136,16 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
     auto roughly = options;
     roughly.fine_rounds = std::min(options.fine_rounds, 2);
     roughly.colour_rounds = roughly.surface_rounds = 0;
+    std::vector<NodeMotions> others(from.size());
+    parallel_for(from.size(), options.threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            if (i != registered.start) others[i] = register_deformation(deformable, surface, from[i], roughly);
+    });
     bool any = false;
-    for (std::size_t i = 0; i < from.size(); ++i) {
-        if (i == registered.start) continue;
-        const auto other = register_deformation(deformable, surface, from[i], roughly);
-        if (take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form)) any = true;
-    }
+    for (std::size_t i = 0; i < others.size(); ++i)
+        if (i != registered.start &&
+            take_nearer_limbs(deformable, surface, others[i], options, registered.motion, &registered.form))
+            any = true;
     const auto reached = reached_for_extremities(deformable, surface, registered.motion, starts.last,
                                                  {.millimetre = options.millimetre});
     if (reached.empty()) return any;
