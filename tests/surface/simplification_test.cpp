@@ -166,6 +166,46 @@ TEST(Simplification, takes_the_empty_the_isolated_and_the_degenerate) {
     EXPECT_EQ(out.positions.back(), Vector3d(50, 50, 50));
 }
 
+// Large meshes are cut into regions, which are simplified side by side.
+SimplifiedMesh same_for_any_number_of_threads(const Input& input) {
+    SimplificationOptions options;
+    options.surface_error = 0.5;
+    auto alone = simplify(input.positions, input.triangles, input.colours, options);
+    expect_sound(alone);
+    EXPECT_LT(alone.positions.size(), input.positions.size() / 2);
+    for (const unsigned threads : {2u, 3u, 8u}) {
+        const ThreadPool pool(threads);
+        options.threads = pool;
+        const auto beside = simplify(input.positions, input.triangles, input.colours, options);
+        EXPECT_EQ(beside.positions, alone.positions);
+        EXPECT_EQ(beside.triangles, alone.triangles);
+        EXPECT_EQ(beside.colours, alone.colours);
+    }
+    return alone;
+}
+
+TEST(Simplification, of_large_meshes_is_sound_and_the_same_for_any_number_of_threads) {
+    std::mt19937 random(3);
+    auto ball = sphere(100, 80);
+    for (std::size_t v = 0; v < ball.positions.size(); ++v) {
+        ball.positions[v] *= 1 + static_cast<double>(random() % 8) / 4000;
+        const auto level = static_cast<std::uint8_t>(v % 3 * 10);
+        ball.colours.push_back({level, 100, level});
+    }
+    const auto round = same_for_any_number_of_threads(ball);
+    EXPECT_EQ(round.positions.size() - edges(round.triangles) + round.triangles.size(), 2u);
+
+    const auto flat = same_for_any_number_of_threads(plane(120));
+    EXPECT_LT(flat.positions.size(), 200u);
+    EXPECT_NEAR(area(flat.positions, flat.triangles), 120 * 120, 0.05 * 120 * 120);
+
+    auto soup = plane(100);
+    for (int t = 0; t < 2000; ++t)
+        for (auto& corner : soup.triangles[random() % soup.triangles.size()])
+            if (random() % 2 > 0) corner = static_cast<std::uint32_t>(random() % soup.positions.size());
+    same_for_any_number_of_threads(soup);
+}
+
 TEST(Simplification, random_soups_stay_sound) {
     std::mt19937 random(7);
     for (int trial = 0; trial < 50; ++trial) {

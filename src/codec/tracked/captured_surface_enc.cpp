@@ -474,6 +474,7 @@ LatticeMesh with_fewer_vertices(const LatticeMesh& captured, const SimplifiedRef
     simplification.surface_error = options.surface_error;
     simplification.colour_error = options.colour_error;
     simplification.longest_edge = options.longest_edge;
+    simplification.threads = options.threads;
     auto simplified = simplify(points, captured.triangles, captured.colours, simplification);
     LatticeMesh out;
     const auto whole = [](double c) { return within_lattice(std::llround(c)); };
