@@ -412,16 +412,22 @@ void Simplifier::judge(std::uint32_t a, std::uint32_t b) {
     if (cost <= 1) queue.push(cost, {std::min(a, b), std::max(a, b), work.ages[a] + work.ages[b]});
 }
 
-// The link condition: the common neighbours of both ends are exactly the corners opposite to the edge.
+// The link condition: the common neighbours of both ends are exactly the corners opposite to the edge. And, where asked
+// for, these keep a triangle.
 bool Simplifier::is_linked_well(std::uint32_t a, std::uint32_t b) {
     const std::uint32_t of_a = mark + 1, of_b = mark + 2;
     mark += 2;
     std::size_t shared_triangles = 0, shared = 0, neighbours = 0;
-    for (const auto t : around(a))
-        for (const auto corner : work.triangles[t]) {
-            if (corner == b) ++shared_triangles;
-            if (corner != a && std::exchange(work.marks[corner], of_a) != of_a) ++neighbours;
+    for (const auto t : around(a)) {
+        const auto& corners = work.triangles[t];
+        const bool is_shared = std::find(corners.begin(), corners.end(), b) != corners.end();
+        if (is_shared) ++shared_triangles;
+        for (const auto corner : corners) {
+            if (corner == a) continue;
+            if (is_shared && corner != b && work.options.keep_tips && work.fans[corner].live == 1) return false;
+            if (std::exchange(work.marks[corner], of_a) != of_a) ++neighbours;
         }
+    }
     if (shared_triangles < 1 || shared_triangles > 2) return false;
     for (const auto t : around(b))
         for (const auto corner : work.triangles[t]) {
@@ -488,7 +494,8 @@ void Simplifier::collapse(std::uint32_t keep, std::uint32_t drop, const Vector3d
             ring.push_back(t);
             continue;
         }
-        for (const auto v : corners) --work.fans[v].live;
+        for (const auto v : corners)
+            if (--work.fans[v].live == 0 && v != keep && v != drop) work.ages[v] = dropped;
         corners[0] = dead;
     }
     work.fans[drop] = {};

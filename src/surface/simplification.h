@@ -20,6 +20,7 @@ struct SimplificationOptions {
                                // positions; 0: nothing is collapsed
     double colour_error = 12;  // the same for the colours it stands for, in levels
     double longest_edge = 0;   // no collapse makes an edge longer than this; 0: no limit
+    bool keep_tips = true;     // a vertex at a border that has one triangle keeps it, else goes with it where it does
     Threads threads = {};
 };
 

@@ -107,6 +107,25 @@ TEST(Simplification, a_flat_square_keeps_its_outline_and_little_else) {
     for (const auto& p : out.positions) EXPECT_NEAR(p.z(), 0, 1e-9);
 }
 
+TEST(Simplification, a_vertex_at_the_border_keeps_its_last_triangle_or_goes_with_it) {
+    for (const std::uint32_t cells : {2u, 3u, 9u, 32u, 64u, 100u}) {
+        auto input = plane(cells);
+        const double middle = cells / 2.0;
+        for (auto& p : input.positions) p.z() = -((p - Vector3d(middle, middle, 0)).squaredNorm()) / 160;
+        for (const double error : {0.1, 0.3, 1.0})
+            for (const bool keep_tips : {true, false}) {
+                SimplificationOptions options;
+                options.surface_error = error;
+                options.keep_tips = keep_tips;
+                const auto out = simplify(input.positions, input.triangles, {}, options);
+                expect_sound(out);
+                std::set<std::uint32_t> used;
+                for (const auto& t : out.triangles) used.insert(t.begin(), t.end());
+                EXPECT_EQ(used.size(), out.positions.size());
+            }
+    }
+}
+
 TEST(Simplification, a_sphere_stays_closed_and_round_with_fewer_vertices_the_larger_the_error) {
     const auto input = sphere(100, 30);
     std::size_t before = input.positions.size();
