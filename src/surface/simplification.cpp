@@ -515,7 +515,7 @@ void Simplifier::collapse(std::uint32_t keep, std::uint32_t drop, const Vector3d
 // Judges all edges that may be collapsed, but those of which a region has judged all.
 void Simplifier::judge_all() {
     for (std::uint32_t v = 0; v < work.positions.size(); ++v) {
-        if (work.ages[v] >= dropped || work.regions[v] != region) continue;
+        if (work.regions[v] != region || work.ages[v] >= dropped) continue;
         find_ring(v);
         for (const auto other : ring)
             if (other > v || work.regions[other] != region) judge(std::min(v, other), std::max(v, other));
