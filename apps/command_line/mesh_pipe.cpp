@@ -3,12 +3,14 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <istream>
 #include <mutex>
+#include <new>
 #include <streambuf>
 #include <thread>
 #include <utility>
@@ -19,8 +21,9 @@
 namespace htvm::app {
 namespace {
 
-// Meshes that may wait for the encoder: as many as it takes to get over an I-frame, which takes longer than others.
-constexpr std::size_t most_waiting = 8;
+// Meshes that may wait for the encoder: where none is to be late, as many as it takes to get over an I-frame, which
+// takes longer than others; else one, so that it is read beside the coding of the one before.
+std::size_t most_waiting(WhileBusy while_busy) { return while_busy == WhileBusy::wait ? 1 : 8; }
 
 // Standard input that ends where the program was interrupted, or nobody wants more of it: a read alone would wait on.
 class InterruptibleInput : public std::streambuf {
@@ -60,23 +63,27 @@ struct MeshPipe::State {
         if (thread.joinable()) thread.join();
     }
 
-    Next read() {
+    Next read() try {
         auto mesh = reader.next();
         if (interruption() != 0) return std::optional<PipedMesh>();  // in the middle of a mesh, perhaps
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) return std::optional<PipedMesh>();
         return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.texture(), reader.fps(),
                                        std::chrono::steady_clock::now()});
+    } catch (const std::bad_alloc&) {  // else it would end the process, as this is not the caller's thread
+        return fail(ErrorKind::limit, "out of memory");
     }
 
     void read_on() {
+        const auto most = most_waiting(while_busy);
         for (;;) {
+            std::unique_lock lock(mutex);
+            if (while_busy != WhileBusy::drop) changed.wait(lock, [&] { return unwanted || waiting.size() < most; });
+            lock.unlock();
             auto next = read();
             const bool last = !next || !*next;
-            std::unique_lock lock(mutex);
-            if (while_busy == WhileBusy::read_on)
-                changed.wait(lock, [&] { return last || unwanted || waiting.size() < most_waiting; });
-            if (!last && waiting.size() >= most_waiting) {
+            lock.lock();
+            if (!last && waiting.size() >= most) {
                 waiting.pop_front();
                 ++dropped;
             }
@@ -92,8 +99,8 @@ struct MeshPipe::State {
     std::istream stream;
     PlyStreamReader reader;
     std::size_t came = 0;
-    // Unless the sender waits; those below the mutex are guarded by it.
     std::thread thread;
+    // Those below the mutex are guarded by it.
     std::condition_variable changed;
     mutable std::mutex mutex;
     std::deque<Next> waiting;  // ends with nothing or an error, which stays
@@ -101,19 +108,21 @@ struct MeshPipe::State {
 };
 
 MeshPipe::MeshPipe(WhileBusy while_busy) : state_(std::make_unique<State>(while_busy)) {
-    if (while_busy != WhileBusy::wait) state_->thread = std::thread([state = state_.get()] { state->read_on(); });
+    state_->thread = std::thread([state = state_.get()] { state->read_on(); });
 }
 MeshPipe::MeshPipe(MeshPipe&&) noexcept = default;
 MeshPipe::~MeshPipe() = default;
 
 Result<std::optional<PipedMesh>> MeshPipe::next() {
     auto& state = *state_;
-    if (!state.thread.joinable()) return state.read();
+    const auto asked = std::chrono::steady_clock::now();
     std::unique_lock lock(state.mutex);
     state.changed.wait(lock, [&] { return !state.waiting.empty(); });
     auto& front = state.waiting.front();
     if (!front || !*front) return front;
     auto next = std::move(front);
+    // What was read ahead of a sender that waits might as well have come when it was asked for.
+    if (state.while_busy == WhileBusy::wait) (*next)->came = std::max((*next)->came, asked);
     state.waiting.pop_front();
     state.changed.notify_all();
     return next;

@@ -15,16 +15,17 @@ namespace htvm::app {
 
 struct PipedMesh {
     Mesh mesh;
-    std::size_t place = 0;                         // among all that came, dropped ones too
-    std::string timestamp;                         // as its header says; empty: it does not
-    std::string texture;                           // likewise: the image's name
-    std::string fps;                               // likewise: how many a second are to come
-    std::chrono::steady_clock::time_point came{};  // when it was there in whole
+    std::size_t place = 0;  // among all that came, dropped ones too
+    std::string timestamp;  // as its header says; empty: it does not
+    std::string texture;    // likewise: the image's name
+    std::string fps;        // likewise: how many a second are to come
+    // When it was there in whole; where the sender waits, not before it was asked for.
+    std::chrono::steady_clock::time_point came{};
 };
 
 // What becomes of meshes that come while the caller is at work.
 enum class WhileBusy : std::uint8_t {
-    wait,     // the sender waits: nothing is read before it is asked for
+    wait,     // one is read, then the sender waits
     read_on,  // a few are read, each at the time it comes; then the sender waits
     drop,     // a few are read, and of more the oldest are dropped
 };

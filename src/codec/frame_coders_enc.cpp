@@ -206,6 +206,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     options.colour_step = asked.colour;
     options.merge_duplicates = configuration.options.topology.merge_duplicates;
     options.external = configuration.options.intra_coder ? &*configuration.options.intra_coder : nullptr;
+    options.threads = configuration.threads;
     FramePayload payload;
     auto decoded = encode_intra_frame(mesh, options, payload);
     if (!decoded) return tl::unexpected(decoded.error());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 namespace htvm::internal {
@@ -29,7 +30,9 @@ Result<void> check(const Mesh& mesh) {
     if (auto ok = check_length(mesh.colours, n, "colours"); !ok) return ok;
     if (auto ok = check_length(mesh.normals, n, "normals"); !ok) return ok;
     if (auto ok = check_length(mesh.texcoords, n, "texture coordinates"); !ok) return ok;
-    for (std::size_t k = 0; k < mesh.triangles.size(); ++k)
+    std::uint32_t highest = 0;
+    for (const auto& t : mesh.triangles) highest = std::max(std::max(highest, t[0]), std::max(t[1], t[2]));
+    for (std::size_t k = 0; highest >= n && k < mesh.triangles.size(); ++k)
         for (const auto index : mesh.triangles[k])
             if (index >= n)
                 return fail(ErrorKind::bad_input, "triangle " + std::to_string(k) + " names vertex " +
@@ -37,7 +40,22 @@ Result<void> check(const Mesh& mesh) {
     return {};
 }
 
-std::int32_t rounded(double v) { return static_cast<std::int32_t>(std::floor(v + 0.5)); }
+// floor(v + 0.5), of what fits, without a call.
+std::int32_t rounded(double v) {
+    const double above = v + 0.5;
+    const auto towards_zero = static_cast<std::int32_t>(above);
+    return towards_zero - (towards_zero > above ? 1 : 0);
+}
+
+// Nothing if it is too far away, or not finite.
+std::optional<LatticePoint> rounded_to(const std::array<double, 3>& point, const Lattice& lattice) {
+    const double scale = static_cast<double>(1 << lattice.bits);
+    const double x = (point[0] - lattice.origin[0]) * scale, y = (point[1] - lattice.origin[1]) * scale,
+                 z = (point[2] - lattice.origin[2]) * scale;
+    const auto is_near = [](double c) { return std::abs(c) < capture_limit; };
+    if (!is_near(x) || !is_near(y) || !is_near(z)) return std::nullopt;
+    return LatticePoint{rounded(x), rounded(y), rounded(z)};
+}
 
 }  // namespace
 
@@ -61,17 +79,11 @@ Result<std::array<std::int32_t, 3>> lattice_origin(const Mesh& mesh) {
 }
 
 Result<LatticePoint> to_lattice(const std::array<double, 3>& point, const Lattice& lattice) {
-    const double scale = static_cast<double>(1 << lattice.bits);
-    std::array<std::int32_t, 3> out{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double v = (point[axis] - lattice.origin[axis]) * scale;
-        if (!(std::abs(v) < capture_limit))
-            return fail(ErrorKind::bad_input, "a point lies more than " +
-                                                  std::to_string((capture_limit >> lattice.bits) / 1000) +
-                                                  " m from where the sequence began, or is not finite");
-        out[axis] = rounded(v);
-    }
-    return LatticePoint{out[0], out[1], out[2]};
+    const auto out = rounded_to(point, lattice);
+    if (out) return *out;
+    return fail(ErrorKind::bad_input, "a point lies more than " +
+                                          std::to_string((capture_limit >> lattice.bits) / 1000) +
+                                          " m from where the sequence began, or is not finite");
 }
 
 Result<LatticeMesh> to_lattice(const Mesh& mesh, const Lattice& lattice) {
@@ -79,12 +91,15 @@ Result<LatticeMesh> to_lattice(const Mesh& mesh, const Lattice& lattice) {
     LatticeMesh out;
     out.triangles = mesh.triangles;
     out.colours = mesh.colours;
-    out.positions.reserve(mesh.positions.size());
+    out.positions.resize(mesh.positions.size());
     for (std::size_t k = 0; k < mesh.positions.size(); ++k) {
         const auto& p = mesh.positions[k];
-        auto point = to_lattice(std::array<double, 3>{p[0], p[1], p[2]}, lattice);
-        if (!point) return fail(point.error().kind, "vertex " + std::to_string(k) + ": " + point.error().message);
-        out.positions.push_back(*point);
+        const std::array<double, 3> millimetres{p[0], p[1], p[2]};
+        const auto point = rounded_to(millimetres, lattice);
+        if (!point)
+            return fail(ErrorKind::bad_input,
+                        "vertex " + std::to_string(k) + ": " + to_lattice(millimetres, lattice).error().message);
+        out.positions[k] = *point;
     }
     for (std::size_t k = 0; k < mesh.normals.size(); ++k) {
         const auto& n = mesh.normals[k];

@@ -1,7 +1,6 @@
 #include "io/mesh_file.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -75,15 +74,17 @@ Result<std::vector<std::uint8_t>> read_file(const std::filesystem::path& path, s
         return fail_at(path, ErrorKind::bad_input, "this is a folder, not a file");
     std::ifstream file(path, std::ios::binary);
     if (!file) return fail_at(path, ErrorKind::bad_input, "cannot be opened for reading; see its permissions");
+    constexpr std::size_t piece = 1 << 16;
     std::vector<std::uint8_t> bytes;
-    const std::uintmax_t expected = std::filesystem::file_size(path, error);
-    if (!error && expected <= most_bytes) bytes.reserve(static_cast<std::size_t>(expected));
-    std::array<char, 1 << 16> piece;  // the file's size is only a hint: a pipe has none
-    while (file.read(piece.data(), piece.size()) || file.gcount() > 0) {
-        bytes.insert(bytes.end(), piece.begin(), piece.begin() + file.gcount());
-        if (bytes.size() > most_bytes) {
+    const std::uintmax_t size = std::filesystem::file_size(path, error);  // only a hint: a pipe has none
+    const auto expected = error || size > most_bytes ? std::size_t{0} : static_cast<std::size_t>(size);
+    bytes.reserve(expected + piece);
+    for (std::size_t got = 0; file; bytes.resize(got)) {
+        bytes.resize(got < expected ? expected : got + piece);
+        file.read(reinterpret_cast<char*>(bytes.data() + got), static_cast<std::streamsize>(bytes.size() - got));
+        got += static_cast<std::size_t>(file.gcount());
+        if (got > most_bytes)
             return fail_at(path, ErrorKind::limit, "is larger than " + std::to_string(most_bytes) + " bytes");
-        }
     }
     if (file.bad()) return fail_at(path, ErrorKind::bad_input, "could not be read to its end");
     return bytes;

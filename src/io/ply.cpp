@@ -140,6 +140,8 @@ std::size_t reservation(const Body& body, std::uint64_t count, std::uint64_t byt
 struct VertexLayout {
     std::vector<Field> fields;  // of each property
     std::array<PlyType, field_count> type{};
+    std::array<std::size_t, field_count> offset{};  // in the vertex's bytes, in a binary file, where it has no lists
+    bool lists = false;
     bool normals = false;
     bool texcoords = false;
     bool colours = false;
@@ -178,6 +180,7 @@ Field field_named(std::string_view name) {
 Result<VertexLayout> layout_of(const PlyElement& vertex) {
     VertexLayout layout;
     std::array<bool, field_count> seen{};
+    std::size_t offset = 0;
     for (const PlyProperty& property : vertex.properties) {
         Field field = property.is_list ? ignored : field_named(property.name);
         if (field != ignored && seen[field]) {
@@ -189,8 +192,11 @@ Result<VertexLayout> layout_of(const PlyElement& vertex) {
         if (field != ignored) {
             seen[field] = true;
             layout.type[field] = property.type;
+            layout.offset[field] = offset;
         }
         layout.fields.push_back(field);
+        layout.lists = layout.lists || property.is_list;
+        offset += ply_type_size(property.type);
     }
     if (vertex.count > 0 && !(seen[x] && seen[y] && seen[z])) {
         return fail(ErrorKind::bad_input, "the PLY header declares no x, y, z for the element \"vertex\"");
@@ -238,6 +244,88 @@ void append_vertex(Mesh& mesh, const VertexLayout& layout, const VertexValues& v
     }
 }
 
+tl::unexpected<Error> bad_position(std::uint64_t v) {
+    return fail(ErrorKind::bad_input, "the position of vertex " + std::to_string(v) + " is not finite");
+}
+
+// Where vertices lie that all take the same number of bytes: those of a binary file, without lists.
+struct VertexBlock {
+    const std::uint8_t* bytes = nullptr;
+    std::size_t vertices = 0, stride = 0;
+    bool big_endian = false;
+};
+
+// One property of all vertices as component c of the last elements of `out`; `otherwise` where it is no finite float.
+template <std::size_t size>
+void take_floats(const VertexBlock& block, std::size_t offset, PlyType type, float otherwise, std::size_t c,
+                 std::vector<std::array<float, size>>& out) {
+    auto* to = out.data() + (out.size() - block.vertices);
+    const auto* from = block.bytes + offset;
+    const bool plain = type == PlyType::f32 && !block.big_endian;
+    for (std::size_t v = 0; v < block.vertices; ++v, from += block.stride) {
+        if (plain) {
+            const auto value = std::bit_cast<float>(static_cast<std::uint32_t>(load<4>(from, false)));
+            to[v][c] = std::abs(value) <= std::numeric_limits<float>::max() ? value : otherwise;
+            continue;
+        }
+        const double value = decode_value(from, type, block.big_endian);
+        to[v][c] = fits_float(value) ? static_cast<float>(value) : otherwise;
+    }
+}
+
+// Appends a block's vertices, property by property. Fails if a position is not finite.
+Result<void> append_block(Mesh& mesh, const VertexLayout& layout, const VertexBlock& block) {
+    const std::size_t before = mesh.positions.size(), after = before + block.vertices;
+    mesh.positions.resize(after);
+    for (std::size_t c = 0; c < 3; ++c) {
+        constexpr float none = std::numeric_limits<float>::quiet_NaN();
+        take_floats(block, layout.offset[x + c], layout.type[x + c], none, c, mesh.positions);
+    }
+    for (std::size_t v = before; v < after; ++v) {
+        const auto& p = mesh.positions[v];
+        if (std::isnan(p[0]) || std::isnan(p[1]) || std::isnan(p[2])) return bad_position(v);
+    }
+    if (layout.normals) {
+        mesh.normals.resize(after);
+        for (std::size_t c = 0; c < 3; ++c)
+            take_floats(block, layout.offset[nx + c], layout.type[nx + c], 0, c, mesh.normals);
+    }
+    if (layout.texcoords) {
+        mesh.texcoords.resize(after);
+        for (std::size_t c = 0; c < 2; ++c)
+            take_floats(block, layout.offset[s + c], layout.type[s + c], 0, c, mesh.texcoords);
+    }
+    if (!layout.colours) return {};
+    mesh.colours.resize(after);
+    for (std::size_t c = 0; c < 3; ++c) {
+        const auto type = layout.type[red + c];
+        const auto* from = block.bytes + layout.offset[red + c];
+        for (std::size_t v = before; v < after; ++v, from += block.stride)
+            mesh.colours[v][c] =
+                type == PlyType::u8 ? *from : colour_component(decode_value(from, type, block.big_endian), type);
+    }
+    return {};
+}
+
+// Reads vertices of `stride` bytes each, many at a time, in a tenth of the time that one value after another takes.
+Result<void> read_vertex_blocks(Body& body, const PlyElement& element, const VertexLayout& layout, std::size_t stride,
+                                Mesh& mesh) {
+    constexpr std::size_t piece = 1 << 16;
+    VertexBlock block;
+    block.stride = stride;
+    block.big_endian = body.format == PlyFormat::binary_big_endian;
+    for (std::uint64_t v = 0; v < element.count; v += block.vertices) {
+        const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(element.count - v, piece / stride));
+        const bool ended = !body.source.ensure(wanted * stride);
+        block.vertices = ended ? body.source.buffered() / stride : wanted;
+        block.bytes = body.source.cursor();
+        if (auto fine = append_block(mesh, layout, block); !fine) return fine;
+        if (ended) return ends_within(text_of("vertex", v + block.vertices, element.count));
+        body.source.advance(block.vertices * stride);
+    }
+    return {};
+}
+
 Result<void> read_vertices(Body& body, const PlyElement& element, Mesh& mesh) {
     const auto layout = layout_of(element);
     if (!layout) return tl::unexpected(layout.error());
@@ -247,13 +335,14 @@ Result<void> read_vertices(Body& body, const PlyElement& element, Mesh& mesh) {
     if (layout->normals) mesh.normals.reserve(reserved);
     if (layout->texcoords) mesh.texcoords.reserve(reserved);
     if (layout->colours) mesh.colours.reserve(reserved);
+    constexpr std::uint64_t most_in_blocks = 4096;  // bytes of a vertex: of more properties hardly any is of use
+    if (body.format != PlyFormat::ascii && !layout->lists && fewest <= most_in_blocks && element.count > 0)
+        return read_vertex_blocks(body, element, *layout, static_cast<std::size_t>(fewest), mesh);
     VertexValues value{};
     for (std::uint64_t v = 0; v < element.count; ++v) {
         fetch_ahead(body, fewest, element.count - v);
         if (!take_vertex(body, element, *layout, value)) return ends_within(text_of("vertex", v, element.count));
-        if (!fits_float(value[x]) || !fits_float(value[y]) || !fits_float(value[z])) {
-            return fail(ErrorKind::bad_input, "the position of vertex " + std::to_string(v) + " is not finite");
-        }
+        if (!fits_float(value[x]) || !fits_float(value[y]) || !fits_float(value[z])) return bad_position(v);
         append_vertex(mesh, *layout, value);
     }
     return {};
@@ -292,25 +381,32 @@ Result<void> read_polygon(Body& body, const PlyProperty& list, std::uint64_t fac
     return {};
 }
 
-// Reads the usual face, only a triangle with 32-bit indices, in a fraction of the time. False, with nothing taken, if
-// the next face is of another kind, which read_polygon handles.
-bool take_plain_triangle(Body& body, const PlyElement& element, Mesh& mesh) {
+// Takes the usual faces, only a triangle each with 32-bit indices, in a fraction of the time: some of those that
+// follow. Returns how many, none if the next face is of another kind, which read_polygon handles.
+std::uint64_t take_plain_triangles(Body& body, const PlyElement& element, std::uint64_t faces, Mesh& mesh) {
     constexpr std::size_t bytes = 1 + 3 * 4;
+    constexpr std::uint64_t at_once = 256;  // few, as room for those that are not taken is made again and again
     const PlyProperty& list = element.properties[0];
     const bool plain = body.format == PlyFormat::binary_little_endian && element.properties.size() == 1 &&
                        ply_type_size(list.count_type) == 1 && (list.type == PlyType::u32 || list.type == PlyType::i32);
-    if (!plain || mesh.triangles.size() >= body.limits.most_triangles) return false;
-    if (!body.source.ensure(1) || *body.source.cursor() != 3 || !body.source.ensure(bytes)) return false;
-    const std::uint8_t* face = body.source.cursor();
+    const std::size_t before = mesh.triangles.size();
+    if (!plain || before >= body.limits.most_triangles) return 0;
+    if (!body.source.ensure(1) || *body.source.cursor() != 3 || !body.source.ensure(bytes)) return 0;
     const std::uint64_t most = std::min(body.vertex_count, std::uint64_t{1} << 31);  // an int32 above would be negative
-    Triangle triangle{};
-    for (std::size_t c = 0; c < 3; ++c) {
-        triangle[c] = static_cast<std::uint32_t>(load<4>(face + 1 + 4 * c, false));
-        if (triangle[c] >= most) return false;
+    const auto at_hand = static_cast<std::size_t>(
+        std::min<std::uint64_t>({faces, at_once, body.source.buffered() / bytes, body.limits.most_triangles - before}));
+    mesh.triangles.resize(before + at_hand);
+    const std::uint8_t* face = body.source.cursor();
+    std::size_t taken = 0;
+    for (; taken < at_hand && *face == 3; ++taken, face += bytes) {
+        Triangle triangle{};
+        for (std::size_t c = 0; c < 3; ++c) triangle[c] = static_cast<std::uint32_t>(load<4>(face + 1 + 4 * c, false));
+        if (triangle[0] >= most || triangle[1] >= most || triangle[2] >= most) break;
+        mesh.triangles[before + taken] = triangle;
     }
-    body.source.advance(bytes);
-    mesh.triangles.push_back(triangle);
-    return true;
+    mesh.triangles.resize(before + taken);
+    body.source.advance(taken * bytes);
+    return taken;
 }
 
 Result<void> read_faces(Body& body, const PlyElement& element, Mesh& mesh) {
@@ -326,7 +422,10 @@ Result<void> read_faces(Body& body, const PlyElement& element, Mesh& mesh) {
     mesh.triangles.reserve(reservation(body, element.count, fewest + 3));
     for (std::uint64_t f = 0; f < element.count; ++f) {
         fetch_ahead(body, fewest, element.count - f);
-        if (indices == 0 && take_plain_triangle(body, element, mesh)) continue;
+        if (const auto taken = indices == 0 ? take_plain_triangles(body, element, element.count - f, mesh) : 0) {
+            f += taken - 1;
+            continue;
+        }
         for (std::size_t p = 0; p < element.properties.size(); ++p) {
             if (p == indices) {
                 if (auto ok = read_polygon(body, element.properties[p], f, element.count, mesh); !ok) return ok;

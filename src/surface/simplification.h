@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 
 namespace htvm::internal {
@@ -19,6 +20,8 @@ struct SimplificationOptions {
                                // positions; 0: nothing is collapsed
     double colour_error = 12;  // the same for the colours it stands for, in levels
     double longest_edge = 0;   // no collapse makes an edge longer than this; 0: no limit
+    bool keep_tips = true;     // a vertex at a border that has one triangle keeps it, else goes with it where it does
+    Threads threads = {};
 };
 
 struct SimplifiedMesh {
@@ -31,7 +34,7 @@ struct SimplifiedMesh {
 
 // Works on any mesh. triangles: indices into positions. Borders stay in place to within the error. A collapse that
 // would fold the surface or join two sheets is left out, also around edges of more than two triangles and triangles of
-// no area. Vertices without triangles are kept. Deterministic; runs in one thread. A hub of more than 256 triangles
+// no area. Vertices without triangles are kept. The same for any number of threads. A hub of more than 256 triangles
 // stays where it is, so that the time is near-linear for any mesh.
 SimplifiedMesh simplify(std::span<const Eigen::Vector3d> positions, std::span<const Triangle> triangles,
                         std::span<const Colour> colours, const SimplificationOptions& options);

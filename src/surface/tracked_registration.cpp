@@ -324,17 +324,20 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         mesh.sample_normals.push_back(normals[v]);
         mesh.fine.blends.push_back(mesh.blends[v]);
     }
-    mesh.sample_of = samples_of_vertices(mesh, mesh.fine);
-    mesh.fine.beside = samples_beside(mesh, mesh.fine, mesh.sample_of);
-    mesh.sample_textures = textures_of_samples(mesh, colours);
+    for (std::uint32_t i = 0; i < mesh.samples.size(); i += 2) mesh.coarse.samples.push_back(i);
+    parallel_invoke(
+        options.threads.at_most(2),
+        [&] {
+            mesh.sample_of = samples_of_vertices(mesh, mesh.fine);
+            mesh.fine.beside = samples_beside(mesh, mesh.fine, mesh.sample_of);
+            mesh.coarse.beside = samples_beside(mesh, mesh.coarse, samples_of_vertices(mesh, mesh.coarse));
+        },
+        [&] { mesh.sample_textures = textures_of_samples(mesh, colours); });
     for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
     mesh.fine.pairs = std::move(pairs);
     group_handles(mesh, options.coarse_spacing * options.millimetre);
-    for (std::uint32_t i = 0; i < mesh.samples.size(); i += 2) {
-        mesh.coarse.samples.push_back(i);
+    for (const auto i : mesh.coarse.samples)
         mesh.coarse.blends.push_back(over_groups(mesh.fine.blends[i], mesh.groups));
-    }
-    mesh.coarse.beside = samples_beside(mesh, mesh.coarse, samples_of_vertices(mesh, mesh.coarse));
     find_blocks(mesh.fine.blends, mesh.fine.pairs, handles.size(), mesh.fine.pattern);
     find_blocks(mesh.coarse.blends, mesh.coarse.pairs, mesh.coarse.centre.size(), mesh.coarse.pattern);
     return mesh;

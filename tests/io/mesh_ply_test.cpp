@@ -1,5 +1,6 @@
 #include <bit>
 #include <limits>
+#include <random>
 #include <sstream>
 
 #include "gmock/gmock.h"
@@ -76,6 +77,101 @@ TEST(PlyReading, BigEndianWithEveryPlaceForSurprises) {
     EXPECT_EQ(mesh->positions, (std::vector<Vector3f>{{0.5f, -3, 2}, {-1, 300, 4}}));
     EXPECT_EQ(mesh->colours, (std::vector<Colour>{{0, 128, 255}, {255, 255, 0}}));
     EXPECT_EQ(mesh->triangles, (std::vector<Triangle>{{1, 0, 1}}));
+}
+
+// A value of a binary file: any bits of a whole number; of a number with a fraction at times none that is finite.
+std::string random_value(const std::string& type, bool is_big_endian, std::mt19937& random) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    const double value = random() % 4000 > 0 ? 0.25 * static_cast<double>(random() % 9) - 1
+                         : random() % 2      ? nan
+                                             : 1e300;
+    std::string out = type == "float"    ? be32(static_cast<float>(value))
+                      : type == "double" ? be64(value)
+                                         : std::string();
+    const std::size_t size = type == "char" || type == "uchar" ? 1 : type == "short" || type == "ushort" ? 2 : 4;
+    while (out.empty() || (type != "float" && type != "double" && out.size() < size))
+        out += static_cast<char>(random() & 255);
+    return is_big_endian ? out : std::string(out.rbegin(), out.rend());
+}
+
+// A list, though it is empty, has vertices read value by value.
+TEST(PlyReading, VerticesInBlocksAreAsThoseReadValueByValue) {
+    const std::vector<std::string> types = {"char", "uchar", "short", "ushort", "int", "uint", "float", "double"};
+    std::mt19937 random(6);
+    std::size_t read_well = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+        const bool is_big_endian = random() % 2 > 0;
+        const std::size_t vertices = trial % 20 == 0 ? 4000 : 1 + random() % 9;
+        std::string properties;
+        std::vector<std::string> type_of;
+        for (const char* name : {"x", "y", "other", "z", "nx", "ny", "nz", "s", "more", "t", "red", "green", "blue"}) {
+            type_of.push_back(types[random() % types.size()]);
+            properties += "property " + type_of.back() + " " + name + "\n";
+        }
+        const auto header = [&](const std::string& list) {
+            return std::string("ply\nformat binary_") + (is_big_endian ? "big" : "little") +
+                   "_endian 1.0\nelement vertex " + std::to_string(vertices) + "\n" + properties + list +
+                   "end_header\n";
+        };
+        std::string block = header(""), one_by_one = header("property list uchar uchar none\n");
+        const std::size_t written = random() % 10 > 0 ? vertices : random() % vertices;
+        for (std::size_t v = 0; v < written; ++v) {
+            std::string vertex;
+            for (const auto& type : type_of) vertex += random_value(type, is_big_endian, random);
+            block += vertex;
+            one_by_one += vertex + std::string(1, 0);
+        }
+        std::istringstream stream(block), other_stream(one_by_one);
+        const auto found = PlyStreamReader(stream).next(), expected = PlyStreamReader(other_stream).next();
+        ASSERT_EQ(found.has_value(), expected.has_value()) << trial;
+        const auto in_memory = read(block);
+        EXPECT_EQ(in_memory.has_value(), found.has_value()) << trial;
+        if (!found) {
+            EXPECT_EQ(found.error().message, expected.error().message) << trial;
+            continue;
+        }
+        ++read_well;
+        expect_equal(**found, **expected);
+        expect_equal(*in_memory, **expected);
+    }
+    EXPECT_GT(read_well, 200u);
+}
+
+TEST(PlyReading, TrianglesAmongOtherFacesKeepTheirOrder) {
+    const auto whole = write_ply(random_mesh(8, 9, 0, {}));
+    ASSERT_TRUE(whole);
+    std::string header = text_of(*whole);
+    const auto count = header.find("element face 0");
+    ASSERT_NE(count, header.npos);
+    std::mt19937 random(9);
+    for (const unsigned others : {0u, 3u, 300u}) {  // one of so many
+        constexpr std::uint32_t faces = 2000;
+        std::string bytes = header;
+        bytes.replace(count, 14, "element face " + std::to_string(faces));
+        std::vector<Triangle> expected;
+        for (std::uint32_t f = 0; f < faces; ++f) {
+            std::vector<std::uint32_t> corners(others > 0 && random() % others == 0 ? random() % 6 : 3);
+            bytes += static_cast<char>(corners.size());
+            for (auto& corner : corners) {
+                corner = static_cast<std::uint32_t>(random() % 9);
+                const auto big = be32i(static_cast<std::int32_t>(corner));
+                bytes.append(big.rbegin(), big.rend());
+            }
+            for (std::size_t c = 2; c < corners.size(); ++c)
+                expected.push_back({corners[0], corners[c - 1], corners[c]});
+        }
+        const auto mesh = read(bytes);
+        ASSERT_TRUE(mesh) << mesh.error().message;
+        EXPECT_EQ(mesh->triangles, expected);
+        std::istringstream stream(bytes);
+        const auto next = PlyStreamReader(stream).next();
+        ASSERT_TRUE(next) << next.error().message;
+        EXPECT_EQ((*next)->triangles, expected);
+        const MeshLimits limits{.most_triangles = expected.size() - 1};
+        EXPECT_FALSE(read_ply(bytes_of(bytes), limits));
+        const auto damaged = read(bytes.substr(0, bytes.size() - 1) + "\x01");  // the last corner's highest byte
+        EXPECT_FALSE(damaged);
+    }
 }
 
 TEST(PlyReading, AttributesGoByAnyOfTheirNames) {

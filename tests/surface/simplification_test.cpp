@@ -107,6 +107,25 @@ TEST(Simplification, a_flat_square_keeps_its_outline_and_little_else) {
     for (const auto& p : out.positions) EXPECT_NEAR(p.z(), 0, 1e-9);
 }
 
+TEST(Simplification, a_vertex_at_the_border_keeps_its_last_triangle_or_goes_with_it) {
+    for (const std::uint32_t cells : {2u, 3u, 9u, 32u, 64u, 100u}) {
+        auto input = plane(cells);
+        const double middle = cells / 2.0;
+        for (auto& p : input.positions) p.z() = -((p - Vector3d(middle, middle, 0)).squaredNorm()) / 160;
+        for (const double error : {0.1, 0.3, 1.0})
+            for (const bool keep_tips : {true, false}) {
+                SimplificationOptions options;
+                options.surface_error = error;
+                options.keep_tips = keep_tips;
+                const auto out = simplify(input.positions, input.triangles, {}, options);
+                expect_sound(out);
+                std::set<std::uint32_t> used;
+                for (const auto& t : out.triangles) used.insert(t.begin(), t.end());
+                EXPECT_EQ(used.size(), out.positions.size());
+            }
+    }
+}
+
 TEST(Simplification, a_sphere_stays_closed_and_round_with_fewer_vertices_the_larger_the_error) {
     const auto input = sphere(100, 30);
     std::size_t before = input.positions.size();
@@ -164,6 +183,46 @@ TEST(Simplification, takes_the_empty_the_isolated_and_the_degenerate) {
     const auto out = simplified(input, 1);
     expect_sound(out);
     EXPECT_EQ(out.positions.back(), Vector3d(50, 50, 50));
+}
+
+// Large meshes are cut into regions, which are simplified side by side.
+SimplifiedMesh same_for_any_number_of_threads(const Input& input) {
+    SimplificationOptions options;
+    options.surface_error = 0.5;
+    auto alone = simplify(input.positions, input.triangles, input.colours, options);
+    expect_sound(alone);
+    EXPECT_LT(alone.positions.size(), input.positions.size() / 2);
+    for (const unsigned threads : {2u, 3u, 8u}) {
+        const ThreadPool pool(threads);
+        options.threads = pool;
+        const auto beside = simplify(input.positions, input.triangles, input.colours, options);
+        EXPECT_EQ(beside.positions, alone.positions);
+        EXPECT_EQ(beside.triangles, alone.triangles);
+        EXPECT_EQ(beside.colours, alone.colours);
+    }
+    return alone;
+}
+
+TEST(Simplification, of_large_meshes_is_sound_and_the_same_for_any_number_of_threads) {
+    std::mt19937 random(3);
+    auto ball = sphere(100, 80);
+    for (std::size_t v = 0; v < ball.positions.size(); ++v) {
+        ball.positions[v] *= 1 + static_cast<double>(random() % 8) / 4000;
+        const auto level = static_cast<std::uint8_t>(v % 3 * 10);
+        ball.colours.push_back({level, 100, level});
+    }
+    const auto round = same_for_any_number_of_threads(ball);
+    EXPECT_EQ(round.positions.size() - edges(round.triangles) + round.triangles.size(), 2u);
+
+    const auto flat = same_for_any_number_of_threads(plane(120));
+    EXPECT_LT(flat.positions.size(), 200u);
+    EXPECT_NEAR(area(flat.positions, flat.triangles), 120 * 120, 0.05 * 120 * 120);
+
+    auto soup = plane(100);
+    for (int t = 0; t < 2000; ++t)
+        for (auto& corner : soup.triangles[random() % soup.triangles.size()])
+            if (random() % 2 > 0) corner = static_cast<std::uint32_t>(random() % soup.positions.size());
+    same_for_any_number_of_threads(soup);
 }
 
 TEST(Simplification, random_soups_stay_sound) {

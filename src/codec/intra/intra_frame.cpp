@@ -15,6 +15,8 @@
 namespace htvm::internal {
 namespace {
 
+constexpr std::size_t worth_a_thread = 2000;  // vertices
+
 // Positions in grid steps; colours as captured.
 LatticeMesh on_grid(const LatticeMesh& mesh, std::int32_t step) {
     LatticeMesh out = mesh;
@@ -47,11 +49,20 @@ Result<LatticeMesh> encode_by_tfan(const LatticeMesh& grid, const IntraFrameOpti
     const auto neighbours = find_neighbours(mesh.triangles, mesh.positions.size());
     if (!neighbours) return tl::unexpected(neighbours.error());
     payload.set(Layer::fans, std::move(connectivity.bytes));
-    payload.set(Layer::geometry, encode_intra_positions(mesh.positions, *neighbours));
+    std::vector<std::uint8_t> positions;
+    EncodedColours colours;
+    const bool alone = mesh.positions.size() < worth_a_thread || mesh.colours.empty();
+    parallel_invoke(
+        options.threads.at_most(alone ? 1 : 2),
+        [&] { positions = encode_intra_positions(mesh.positions, *neighbours); },
+        [&] {
+            if (mesh.colours.empty()) return;
+            colours = encode_intra_colours(mesh.colours, mesh.positions, *neighbours, options.colour_step);
+        });
+    payload.set(Layer::geometry, std::move(positions));
     if (!mesh.colours.empty()) {
-        auto coded = encode_intra_colours(mesh.colours, mesh.positions, *neighbours, options.colour_step);
-        payload.set(Layer::colour, std::move(coded.bytes));
-        mesh.colours = std::move(coded.decoded);
+        payload.set(Layer::colour, std::move(colours.bytes));
+        mesh.colours = std::move(colours.decoded);
     }
     if (!mesh.normals.empty()) payload.set(Layer::normals, encode_attribute_values(mesh.normals, *neighbours));
     if (!mesh.texcoords.empty()) payload.set(Layer::texcoords, encode_attribute_values(mesh.texcoords, *neighbours));
@@ -74,7 +85,6 @@ Result<LatticeMesh> encode_by(const ExternalIntraCoder& coder, LatticeMesh grid,
 // Colours follow behind the positions on which they depend.
 Result<void> decode_positions_and_colours(const FramePayloadView& payload, const Neighbours& neighbours,
                                           LatticeMesh& mesh, Threads threads) {
-    constexpr std::size_t worth_a_thread = 2000;  // vertices
     Result<void> positions;
     Result<std::vector<Colour>> colours;
     Progress progress;

@@ -21,6 +21,7 @@ struct IntraFrameOptions {
     std::int32_t colour_step = 6;     // levels, 1..255
     bool merge_duplicates = true;
     const ExternalIntraCoder* external = nullptr;  // null: TFAN
+    Threads threads = {};
 };
 
 // Fills the payload's header and layers (except the pose), and returns the mesh that the decoder will have.

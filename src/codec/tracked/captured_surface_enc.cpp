@@ -499,7 +499,8 @@ LatticeMesh welded(const LatticeMesh& captured) {
 
 namespace {
 
-LatticeMesh with_fewer_vertices(const LatticeMesh& captured, const SimplifiedReferenceOptions& options) {
+LatticeMesh with_fewer_vertices(const LatticeMesh& captured, bool keep_tips,
+                                const SimplifiedReferenceOptions& options) {
     std::vector<Eigen::Vector3d> points;
     points.reserve(captured.positions.size());
     for (const auto p : captured.positions) points.emplace_back(p.x, p.y, p.z);
@@ -507,6 +508,8 @@ LatticeMesh with_fewer_vertices(const LatticeMesh& captured, const SimplifiedRef
     simplification.surface_error = options.surface_error;
     simplification.colour_error = options.colour_error;
     simplification.longest_edge = options.longest_edge;
+    simplification.keep_tips = keep_tips;
+    simplification.threads = options.threads;
     auto simplified = simplify(points, captured.triangles, captured.colours, simplification);
     LatticeMesh out;
     const auto whole = [](double c) { return within_lattice(std::llround(c)); };
@@ -532,7 +535,8 @@ void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const Surfac
 
 LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captured, const SurfaceIndex& surface,
                              const SimplifiedReferenceOptions& options) {
-    auto out = with_fewer_vertices(piece, options);
+    // Its border is met by a strip of triangles, which is found more often where it has no tips.
+    auto out = with_fewer_vertices(piece, false, options);
     fit_to_surface(out, captured, surface, options);
     return out;
 }
@@ -540,7 +544,8 @@ LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captur
 LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options) {
     if (captured.triangles.empty() || !captured.texcoords.empty()) return captured;
-    auto out = simplified_piece(welded(captured), captured, surface, options);
+    auto out = with_fewer_vertices(welded(captured), true, options);
+    fit_to_surface(out, captured, surface, options);
     if (!captured.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, out.triangles));
     return out;
 }
