@@ -109,8 +109,9 @@ TEST(Skinning, TiesGoToTheLowerBone) {
                                              {{0, 0, 0}, {0, 100, 0}, 5},
                                              {{20, 0, 0}, {20, 100, 0}, 5},
                                              {{0, 100, 0}, {0, 0, 0}, 5}};
-    const std::vector<LatticePoint> vertices = {{10, 50, 0}, {0, 50, 3}, {35, 50, 0}, {10, 150, 0}};
-    EXPECT_EQ(skin(vertices, twins, {}), (std::vector<BoneIndex>{1, 1, 0, 1}));
+    const std::vector<LatticePoint> vertices = {{10, 50, 0},  {0, 50, 3},  {35, 50, 0},
+                                                {10, 150, 0}, {22, 50, 0}, {35, 50, 0}};
+    EXPECT_EQ(skin(vertices, twins, {}), (std::vector<BoneIndex>{1, 1, 0, 1, 2, 0}));
 }
 
 TEST(Skinning, IsTheSameForAnyNumberOfThreads) {

@@ -103,6 +103,21 @@ TEST(Quantiser, ChoosesAsBruteForceOverAllCodewordsAndTheEscape) {
             }
 }
 
+TEST(Quantiser, AResidualIsQuantisedTheSameWhereverItStands) {
+    QuantiserOptions options;
+    options.step = 4;
+    for (const double deviation : {2.0, 10.0, 60.0}) {
+        const auto residuals = gaussian(9000, deviation, 6);
+        const auto codebook = train_codebook(residuals, options);
+        const auto together = quantise(residuals, codebook, options);
+        for (std::size_t k = 0; k < residuals.size(); k += 7) {
+            const auto alone = quantise(Residuals{residuals[k]}, codebook, options);
+            ASSERT_EQ(together.indices[k], alone.indices[0]);
+            ASSERT_EQ(together.values[k], alone.values[0]);
+        }
+    }
+}
+
 TEST(Quantiser, LambdaZeroTakesTheNearest) {
     Codebook codebook;
     codebook.codewords = {{0, 0, 0}, {10, 0, 0}, {11, 0, 0}};

@@ -30,9 +30,11 @@ struct Vector {
     double x, y, z;
 };
 
-Vector between(LatticePoint from, LatticePoint to) {
-    return {static_cast<double>(to.x - from.x), static_cast<double>(to.y - from.y), static_cast<double>(to.z - from.z)};
+// Whole numbers of at most 27 bits, so that differences are exact.
+Vector vector_of(LatticePoint p) {
+    return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
 }
+Vector between(Vector from, Vector to) { return {to.x - from.x, to.y - from.y, to.z - from.z}; }
 double dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 Vector cross(Vector a, Vector b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 Vector operator+(Vector a, Vector b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -42,7 +44,7 @@ constexpr double signed_square(double cosine) { return cosine < 0 ? -cosine * co
 
 // How many of the descending cosines are above the cosine of the angle; 0 if a side has no length.
 template <std::size_t N>
-std::uint32_t count_below(Vector a, Vector b, const std::array<double, N>& squares) {
+[[gnu::always_inline]] inline std::uint32_t count_below(Vector a, Vector b, const std::array<double, N>& squares) {
     const double product = dot(a, b), square = product < 0 ? -product * product : product * product;
     const double lengths = dot(a, a) * dot(b, b);
     std::uint32_t count = 0;
@@ -51,7 +53,7 @@ std::uint32_t count_below(Vector a, Vector b, const std::array<double, N>& squar
 }
 
 // Classes 1 .. 15 of a full turn from a to b around the normal, finer for small turns.
-std::uint32_t turn_class(Vector a, Vector b, Vector normal) {
+[[gnu::always_inline]] inline std::uint32_t turn_class(Vector a, Vector b, Vector normal) {
     constexpr std::array<double, 10> forward = {
         signed_square(0.94), signed_square(0.82),  signed_square(0.68),  signed_square(0.5),   signed_square(0.3),
         signed_square(0.08), signed_square(-0.17), signed_square(-0.42), signed_square(-0.71), signed_square(-0.9)};
@@ -61,7 +63,7 @@ std::uint32_t turn_class(Vector a, Vector b, Vector normal) {
 }
 
 // Classes 1 .. 7 of an angle up to 180 degrees; 7 beyond that.
-std::uint32_t angle_class(Vector a, Vector b, Vector normal) {
+[[gnu::always_inline]] inline std::uint32_t angle_class(Vector a, Vector b, Vector normal) {
     constexpr std::array<double, 5> limits = {signed_square(0.76), signed_square(0.5), signed_square(0.2),
                                               signed_square(-0.17), signed_square(-0.5)};
     if (dot(cross(a, b), normal) < 0) return 7;
@@ -71,20 +73,20 @@ std::uint32_t angle_class(Vector a, Vector b, Vector normal) {
 // The positions by visiting number, and the angles between visited vertices.
 class VisitedPositions {
 public:
-    void push_back(LatticePoint point) { points_.push_back(point); }
-    LatticePoint operator[](std::uint32_t number) const { return points_[number]; }
+    void push_back(LatticePoint point) { points_.push_back(vector_of(point)); }
+    Vector operator[](std::uint32_t number) const { return points_[number]; }
 
     // The angles that the next step of the fan could close.
     FanHints hints(const FanState& fan) const;
 
 private:
-    std::vector<LatticePoint> points_;
+    std::vector<Vector> points_;
 };
 
 FanHints VisitedPositions::hints(const FanState& fan) const {
     FanHints hints;
     if (fan.behind == OpenEdges::none || fan.end_count == 0 || fan.ends[0] == fan.start) return hints;
-    const LatticePoint focus = points_[fan.focus], at = points_[fan.current], end = points_[fan.ends[0]];
+    const Vector focus = points_[fan.focus], at = points_[fan.current], end = points_[fan.ends[0]];
     const Vector to_current = between(focus, at), to_end = between(focus, end);
     Vector normal = cross(between(focus, points_[fan.behind]), to_current);
     if (fan.beyond_end != OpenEdges::none) normal = normal + cross(to_end, between(focus, points_[fan.beyond_end]));
@@ -105,11 +107,19 @@ constexpr std::size_t first_look = 8;
 struct Candidate {
     std::uint32_t vertex = 0;
     double misfit = 0;
+    Vector to_it = {};  // from the focus
+};
+
+// Where the fan's next boundary vertex is looked for.
+struct OpenSide {
+    std::uint32_t stage = 0;  // 0: the fan's start, 1: no triangle behind, 2: no end to reach, 3: within a gap
+    Vector side = {};         // from the focus to the current vertex
+    Vector normal = {};       // of the triangle behind, in stages 2 and 3
 };
 
 // The contexts for coding whether a candidate is the vertex.
 struct CandidateClasses {
-    std::uint32_t stage = 0;  // 0: the fan's start, 1: no triangle behind, 2: no end to reach, 3: within a gap
+    std::uint32_t stage = 0;                            // of OpenSide
     std::uint32_t place = 0, left = 0;                  // 0 .. 7: number of candidates before it and after it
     std::uint32_t better_before = 0, better_after = 0;  // 0 .. 3: number of those with less misfit
     std::uint32_t fit = 0;                              // 0 .. 7: class of the misfit
@@ -149,13 +159,13 @@ public:
     // look() sets candidates() for the next boundary vertex of the fan, from the `first_look` nearest. look_farther(),
     // called after it, adds the farther ones.
     void look(const VisitedPositions& known, const FanState& fan, std::uint32_t focus);
-    void look_farther(const VisitedPositions& known, const FanState& fan);
+    void look_farther();
     std::span<const Candidate> candidates() const { return {candidates_.data(), count_}; }
-    CandidateClasses classes(const VisitedPositions& known, const FanState& fan, std::size_t place) const;
+    CandidateClasses classes(std::size_t place) const;
 
 private:
     void search_ahead();
-    void add_candidate(const VisitedPositions& known, const FanState& fan, std::uint32_t vertex);
+    [[gnu::always_inline]] void add_candidate(std::uint32_t vertex);
 
     std::span<const LatticePoint> positions_;
     NearestOrder order_;
@@ -166,6 +176,7 @@ private:
     Threads threads_ = {};  // the caller's thread alone if the mesh is too small for more
     std::vector<bool> visited_;
     std::uint32_t focus_;  // the vertex whose nearest vertices are in `nearest_`
+    OpenSide at_;
     std::size_t found_ = 0, looked_ = 0, count_ = 0;
     std::array<std::uint32_t, mtfan_max_nearest> nearest_;
     std::array<Candidate, mtfan_max_nearest> candidates_;
@@ -204,62 +215,65 @@ void UnvisitedNear::look(const VisitedPositions& known, const FanState& fan, std
                         first_look, nearest_.begin());
         }
     }
+    at_ = {};
+    if (fan.current != OpenEdges::none) {
+        const Vector centre = vector_of(positions_[focus]);
+        at_.stage = 1;
+        at_.side = between(centre, known[fan.current]);
+        if (fan.behind != OpenEdges::none) {
+            at_.stage = fan.end_count == 0 || fan.ends[0] == fan.start ? 2 : 3;
+            at_.normal = cross(between(centre, known[fan.behind]), at_.side);
+        }
+    }
     count_ = 0;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < found_; ++i)
         if (!visited_[nearest_[i]]) nearest_[kept++] = nearest_[i];
     found_ = kept;
-    for (std::size_t i = 0; i < found_; ++i) add_candidate(known, fan, nearest_[i]);
+    for (std::size_t i = 0; i < found_; ++i) add_candidate(nearest_[i]);
 }
 
-void UnvisitedNear::look_farther(const VisitedPositions& known, const FanState& fan) {
+void UnvisitedNear::look_farther() {
     if (looked_ < first_look || looked_ >= m_) return;
     std::array<std::uint32_t, mtfan_max_nearest> all;
     const std::size_t found = order_.find(focus_, std::span(all).first(m_));
     for (std::size_t i = looked_; i < found; ++i) {
         if (visited_[all[i]]) continue;
         nearest_[found_++] = all[i];
-        add_candidate(known, fan, all[i]);
+        add_candidate(all[i]);
     }
     looked_ = m_;
 }
 
-void UnvisitedNear::add_candidate(const VisitedPositions& known, const FanState& fan, std::uint32_t vertex) {
-    const LatticePoint centre = positions_[focus_], point = positions_[vertex];
-    const LatticePoint at = fan.current == OpenEdges::none ? centre : known[fan.current];
-    const Vector side = between(centre, at), to_it = between(centre, point), from_current = between(at, point);
-    const Vector face = cross(side, to_it);
-    const double area = dot(face, face), product = dot(to_it, from_current);
+inline void UnvisitedNear::add_candidate(std::uint32_t vertex) {
     Candidate& candidate = candidates_[count_++];
     candidate.vertex = vertex;
+    candidate.to_it = between(vector_of(positions_[focus_]), vector_of(positions_[vertex]));
+    const Vector from_current = between(at_.side, candidate.to_it);
+    const Vector face = cross(at_.side, candidate.to_it);
+    const double area = dot(face, face), product = dot(candidate.to_it, from_current);
     candidate.misfit = area > 0 ? (product < 0 ? -product * product : product * product) / area : 1e12;
-    if (fan.behind == OpenEdges::none) return;
-    const Vector normal = cross(between(centre, known[fan.behind]), side);
-    if (dot(face, normal) < 0) candidate.misfit = 1e13 - candidate.misfit;
+    if (at_.stage >= 2 && dot(face, at_.normal) < 0) candidate.misfit = 1e13 - candidate.misfit;
 }
 
-CandidateClasses UnvisitedNear::classes(const VisitedPositions& known, const FanState& fan, std::size_t place) const {
+CandidateClasses UnvisitedNear::classes(std::size_t place) const {
     CandidateClasses classes;
+    const Candidate& candidate = candidates_[place];
     constexpr std::array<double, 7> fits = {-0.09, 0, 0.09, 0.36, 1, 2.25, 9};
-    for (const double limit : fits) classes.fit += candidates_[place].misfit >= limit;
-    for (std::size_t i = 0; i < count_; ++i)
-        if (candidates_[i].misfit < candidates_[place].misfit)
-            ++(i < place ? classes.better_before : classes.better_after);
+    for (const double limit : fits) classes.fit += candidate.misfit >= limit;
+    for (std::size_t i = 0; i < place; ++i) classes.better_before += candidates_[i].misfit < candidate.misfit;
+    for (std::size_t i = place + 1; i < count_; ++i) classes.better_after += candidates_[i].misfit < candidate.misfit;
     classes.better_before = std::min(classes.better_before, 3u);
     classes.better_after = std::min(classes.better_after, 3u);
     classes.place = static_cast<std::uint32_t>(std::min<std::size_t>(place, 7));
     classes.left = static_cast<std::uint32_t>(std::min<std::size_t>(count_ - place - 1, 7));
-    if (fan.current == OpenEdges::none) return classes;
-    classes.stage = 1;
-    const LatticePoint centre = positions_[focus_], at = known[fan.current];
-    const LatticePoint point = positions_[candidates_[place].vertex];
-    const Vector side = between(centre, at), to_it = between(centre, point), from_current = between(at, point);
+    classes.stage = at_.stage;
+    if (at_.stage == 0) return classes;
     constexpr std::array<double, 7> ratios = {0.4, 0.7, 1.0, 1.45, 2.0, 3.0, 5.0};
-    const double from = dot(from_current, from_current), to = dot(to_it, to_it);
+    const Vector from_current = between(at_.side, candidate.to_it);
+    const double from = dot(from_current, from_current), to = dot(candidate.to_it, candidate.to_it);
     for (const double ratio : ratios) classes.distance += from >= ratio * to;
-    if (fan.behind == OpenEdges::none) return classes;
-    classes.stage = fan.end_count == 0 || fan.ends[0] == fan.start ? 2 : 3;
-    classes.turn = turn_class(side, to_it, cross(between(centre, known[fan.behind]), side));
+    if (at_.stage >= 2) classes.turn = turn_class(at_.side, candidate.to_it, at_.normal);
     return classes;
 }
 
@@ -288,9 +302,8 @@ std::size_t code_distance_order(Coder& coder, DistanceOrderModels& models, Unvis
     for (int round = 0; round < 2; ++round) {
         const auto candidates = unvisited.candidates();
         for (; place < candidates.size(); ++place)
-            if (code_is_it(coder, models, unvisited.classes(known, fan, place), candidates[place].vertex == wanted))
-                return place;
-        if (round == 0) unvisited.look_farther(known, fan);
+            if (code_is_it(coder, models, unvisited.classes(place), candidates[place].vertex == wanted)) return place;
+        if (round == 0) unvisited.look_farther();
     }
     return place;
 }

@@ -77,6 +77,27 @@ private:
     std::optional<Tree> tree_;
 };
 
+// Where each residual was last met. Residuals of colours are small whole numbers, most of which come often.
+class RecentResiduals {
+public:
+    RecentResiduals() : last_(std::size_t{1} << bits, none) {}
+    // An earlier residual that equals residual k, or k itself; from now on k is the last one.
+    std::size_t exchange(std::span<const ResidualVector> residuals, std::size_t k) {
+        const auto& e = residuals[k];
+        std::uint32_t mixed = 0;
+        for (const auto c : e) mixed = (mixed ^ static_cast<std::uint32_t>(c)) * 0x9E3779B1u;
+        auto& last = last_[mixed >> (32 - bits)];
+        if (last != none && residuals[last] == e) return last;
+        last = static_cast<std::uint32_t>(k);
+        return k;
+    }
+
+private:
+    static constexpr int bits = 12;
+    static constexpr std::uint32_t none = 0xFFFFFFFFu;
+    std::vector<std::uint32_t> last_;
+};
+
 struct Cell {
     std::array<double, 3> sum{};
     double population = 0;
@@ -160,26 +181,36 @@ QuantisedResiduals quantise(std::span<const ResidualVector> residuals, const Cod
     QuantisedResiduals out;
     out.indices.resize(residuals.size());
     out.values.resize(residuals.size());
-    parallel_for(residuals.size(), options.threads, 1024, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) {
-            const auto& e = residuals[k];
-            const auto [index, cost] = search.best(e);
-            // The escape's error is at most half the diagonal of its cell. If the codeword beats even a perfect escape,
-            // the escape need not be tried.
-            if (cost > lambda * (codebook.lengths[escape] / 8.0 + 3)) {
-                ResidualVector value{};
-                for (std::size_t c = 0; c < 3; ++c) value[c] = multiple(e[c], codebook.escape_step);
-                const double escape_cost =
-                    squared_error(e, value) +
-                    lambda * (codebook.lengths[escape] / 8.0 + escape_bits(value, codebook.escape_step));
-                if (escape_cost < cost) {
-                    out.indices[k] = escape;
-                    out.values[k] = value;
-                    continue;
-                }
+    const auto quantise_one = [&](std::size_t k) {
+        const auto& e = residuals[k];
+        const auto [index, cost] = search.best(e);
+        out.indices[k] = static_cast<std::uint16_t>(index);
+        // The escape's error is at most half the diagonal of its cell. If the codeword beats even a perfect escape,
+        // the escape need not be tried.
+        if (cost > lambda * (codebook.lengths[escape] / 8.0 + 3)) {
+            ResidualVector value{};
+            for (std::size_t c = 0; c < 3; ++c) value[c] = multiple(e[c], codebook.escape_step);
+            const double escape_cost = squared_error(e, value) + lambda * (codebook.lengths[escape] / 8.0 +
+                                                                           escape_bits(value, codebook.escape_step));
+            if (escape_cost < cost) {
+                out.indices[k] = escape;
+                out.values[k] = value;
+                return;
             }
-            out.indices[k] = static_cast<std::uint16_t>(index);
-            out.values[k] = codebook.codewords[index];
+        }
+        out.values[k] = codebook.codewords[index];
+    };
+    constexpr std::size_t piece = 4096;
+    parallel_for(residuals.size(), options.threads, piece, [&](std::size_t begin, std::size_t end) {
+        RecentResiduals recent;
+        for (std::size_t k = begin; k < end; ++k) {
+            const std::size_t same = recent.exchange(residuals, k);
+            if (same == k) {
+                quantise_one(k);
+            } else {
+                out.indices[k] = out.indices[same];
+                out.values[k] = out.values[same];
+            }
         }
     });
     return out;

@@ -43,19 +43,47 @@ double distance_to_axis(LatticePoint vertex, const BoneCylinder& bone) {
     return projection.inside ? projection.axis_distance : -1.0;
 }
 
+namespace {
+
+// A sphere around a bone's cylinder. The distance to the bone is at least the distance to the sphere.
+struct BoneSphere {
+    double x = 0, y = 0, z = 0, radius = 0;
+
+    explicit BoneSphere(const BoneCylinder& bone) {
+        constexpr double more = 1;  // lattice units: what roundings may sum up to is far less
+        x = (bone.first.x + bone.second.x) / 2.0;
+        y = (bone.first.y + bone.second.y) / 2.0;
+        z = (bone.first.z + bone.second.z) / 2.0;
+        const auto length = static_cast<double>(squared_distance(bone.first, bone.second));
+        radius = std::sqrt(length) / 2 + std::max(bone.radius, 0) + more;
+    }
+    bool is_beyond(double distance, LatticePoint v) const {
+        const double dx = v.x - x, dy = v.y - y, dz = v.z - z, reach = radius + distance;
+        return reach > 0 && dx * dx + dy * dy + dz * dz > reach * reach;
+    }
+};
+
+}  // namespace
+
+// Most bones are too far away by far. The neighbouring vertex's bone comes first, as it is likely to be the nearest.
 std::vector<BoneIndex> skin(std::span<const LatticePoint> vertices, std::span<const BoneCylinder> bones,
                             Threads threads) {
+    const std::vector<BoneSphere> spheres(bones.begin(), bones.end());
     std::vector<BoneIndex> out(vertices.size());
     parallel_for(vertices.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
+        std::size_t nearest = 0;
         for (std::size_t k = begin; k < end; ++k) {
-            double best = distance_to_bone(vertices[k], bones[0]);
-            for (std::size_t i = 1; i < bones.size(); ++i) {
+            const std::size_t first = nearest;
+            double best = distance_to_bone(vertices[k], bones[first]);
+            for (std::size_t i = 0; i < bones.size(); ++i) {
+                if (i == first || spheres[i].is_beyond(best, vertices[k])) continue;
                 const double d = distance_to_bone(vertices[k], bones[i]);
-                if (d < best) {
+                if (d < best || (d == best && i < nearest)) {
                     best = d;
-                    out[k] = static_cast<BoneIndex>(i);
+                    nearest = i;
                 }
             }
+            out[k] = static_cast<BoneIndex>(nearest);
         }
     });
     return out;
