@@ -319,6 +319,9 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
     mesh.samples = spread_samples(mesh.weights, handles.size(), options.samples);
     mesh.sample_gap = point_gap(positions, triangles, mesh.samples.size());
     const auto normals = points_of(vertex_normals(positions, triangles));
+    mesh.sample_fans.resize(mesh.samples.size());
+    for (std::size_t i = 0; i < mesh.samples.size(); ++i)
+        fan_searches().set_fan(mesh.positions, mesh.triangles, mesh.around, mesh.samples[i], mesh.sample_fans[i]);
     for (const std::uint32_t v : mesh.samples) {
         mesh.fine.samples.push_back(static_cast<std::uint32_t>(mesh.fine.samples.size()));
         mesh.sample_normals.push_back(normals[v]);
@@ -450,25 +453,41 @@ float match_weight(double squared_distance, const Round& round) {
     return static_cast<float>(fade * fade);
 }
 
-// How far a point lies from the moved triangles around a vertex, and from there to it; none if it has no triangles.
+// How far a point lies from the moved triangles around a sample's vertex, and from there to it; none if it has no
+// triangles.
 struct FromReference {
     Point3f apart{};
     float squared_distance = std::numeric_limits<float>::infinity();
 };
 
-FromReference nearest_around(const DeformableMesh& mesh, std::span<const Point3f> vertices, std::uint32_t vertex,
+FromReference nearest_around(const DeformableMesh& mesh, std::span<const Point3f> vertices, std::uint32_t sample,
                              const Point3f& query) {
     FromReference out;
-    for (const auto triangle : mesh.around.of(vertex)) {
-        const auto& t = mesh.triangles[triangle];
-        const NearOnTriangle near =
-            near_on_triangle(vertices[t[0]], vertices[t[1]], vertices[t[2]], query, out.squared_distance);
-        if (!(near.squared_distance < out.squared_distance)) continue;
+    const auto try_triangle = [&](const Point3f& a, const Point3f& b, const Point3f& c) {
+        const NearOnTriangle near = near_on_triangle(a, b, c, query, out.squared_distance);
+        if (!(near.squared_distance < out.squared_distance)) return;
         out.squared_distance = near.squared_distance;
         for (std::size_t axis = 0; axis < 3; ++axis)
             out.apart[axis] =
-                query[axis] - (near.shares[0] * vertices[t[0]][axis] + near.shares[1] * vertices[t[1]][axis] +
-                               near.shares[2] * vertices[t[2]][axis]);
+                query[axis] - (near.shares[0] * a[axis] + near.shares[1] * b[axis] + near.shares[2] * c[axis]);
+    };
+    const auto vertex = mesh.samples[sample];
+    const auto& rest = mesh.sample_fans[sample];
+    if (rest.regular()) {
+        VertexFan fan;
+        fan.own = vertices[vertex];
+        fan.triangles = rest.triangles;
+        for (std::size_t lane = 0; lane < VertexFan::lanes; ++lane) {
+            const auto& p = vertices[rest.neighbour[lane]];
+            fan.x[lane] = p[0], fan.y[lane] = p[1], fan.z[lane] = p[2];
+        }
+        const std::size_t nearest = fan_searches().nearest(fan, query, nullptr).lane;
+        try_triangle(fan.own, fan.place(nearest), fan.place((nearest + 1) % VertexFan::lanes));
+        return out;
+    }
+    for (const auto triangle : mesh.around.of(vertex)) {
+        const auto& t = mesh.triangles[triangle];
+        try_triangle(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
     }
     return out;
 }
@@ -570,7 +589,7 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
         there = match_of(moved, match.index, target, vertex, round.gap);
         auto squared_distance = static_cast<double>(match.squared_distance);
         if (round.surfaces) {
-            const auto near = nearest_around(mesh, moved.vertices, mesh.samples[match.index], target.positions[vertex]);
+            const auto near = nearest_around(mesh, moved.vertices, match.index, target.positions[vertex]);
             if (near.squared_distance < match.squared_distance) {
                 squared_distance = static_cast<double>(near.squared_distance);
                 there.across = there.normal.dot(floats_of(near.apart));

@@ -135,6 +135,7 @@ struct DeformableMesh {
     std::vector<std::uint32_t> samples;    // indices of vertices
     std::vector<std::uint32_t> sample_of;  // for each vertex, the sample that is the fewest edges away, or
                                            // OrientedPoints::no_point
+    std::vector<VertexFan> sample_fans;    // one per sample, at rest
     std::vector<Point3f> sample_normals;
     std::vector<SampleTexture> sample_textures;  // one per sample, or none if nothing is textured
     float sample_gap = 0;                        // approximate spacing of neighbouring samples

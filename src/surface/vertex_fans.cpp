@@ -149,9 +149,10 @@ using Order = std::array<std::uint32_t, lanes>;
     return seen == (1U << row.count) - 1;
 }
 
-[[gnu::always_inline]] inline void set_fan(std::uint32_t vertex, std::span<const Vector3f> positions,
-                                           std::span<const Triangle> triangles, std::span<const std::uint32_t> around,
+[[gnu::always_inline]] inline void set_fan(std::span<const Vector3f> positions, std::span<const Triangle> triangles,
+                                           const TrianglesAround& triangles_around, std::uint32_t vertex,
                                            VertexFan& fan) {
+    const auto around = triangles_around.of(vertex);
     fan.own = positions[vertex];
     fan.triangles = 0;
     const std::size_t count = around.size();
@@ -182,18 +183,11 @@ using Order = std::array<std::uint32_t, lanes>;
     }
 }
 
-[[gnu::always_inline]] inline void set_fans(std::span<const Vector3f> positions, std::span<const Triangle> triangles,
-                                            const TrianglesAround& around, std::uint32_t begin, std::uint32_t end,
-                                            VertexFan* fans) {
-    for (std::uint32_t v = begin; v < end; ++v) set_fan(v, positions, triangles, around.of(v), fans[v]);
-}
-
 #ifdef __x86_64__
 
-[[gnu::target("avx2")]] void set_fans_by_avx2(std::span<const Vector3f> positions, std::span<const Triangle> triangles,
-                                              const TrianglesAround& around, std::uint32_t begin, std::uint32_t end,
-                                              VertexFan* fans) {
-    set_fans(positions, triangles, around, begin, end, fans);
+[[gnu::target("avx2")]] void set_fan_by_avx2(std::span<const Vector3f> positions, std::span<const Triangle> triangles,
+                                             const TrianglesAround& around, std::uint32_t vertex, VertexFan& fan) {
+    set_fan(positions, triangles, around, vertex, fan);
 }
 [[gnu::target("avx2")]] FanWalk walk_by_avx2(std::span<const VertexFan> fans, const Vector3f& query, std::uint32_t from,
                                              float squared_distance) {
@@ -208,13 +202,13 @@ using Order = std::array<std::uint32_t, lanes>;
 }  // namespace
 
 const FanSearches& portable_fan_searches() {
-    static const FanSearches out = {set_fans, walk, nearest};
+    static const FanSearches out = {set_fan, walk, nearest};
     return out;
 }
 
 const FanSearches& fan_searches() {
 #ifdef __x86_64__
-    static const FanSearches by_avx2 = {set_fans_by_avx2, walk_by_avx2, nearest_by_avx2};
+    static const FanSearches by_avx2 = {set_fan_by_avx2, walk_by_avx2, nearest_by_avx2};
     static const bool has_avx2 = __builtin_cpu_supports("avx2") > 0;
     if (has_avx2) return by_avx2;
 #endif
@@ -225,9 +219,10 @@ VertexFans::VertexFans(std::span<const Vector3f> positions, std::span<const Vect
                        std::span<const Triangle> triangles, const TrianglesAround& around, Threads threads)
     : fans_(std::make_unique_for_overwrite<VertexFan[]>(positions.size())), count_(positions.size()) {
     parallel_for(count_, threads, 1024, [&](std::size_t begin, std::size_t end) {
-        searches_->set_fans(positions, triangles, around, static_cast<std::uint32_t>(begin),
-                            static_cast<std::uint32_t>(end), fans_.get());
-        for (std::size_t v = begin; v < end; ++v) fans_[v].normal = normals[v];
+        for (std::size_t v = begin; v < end; ++v) {
+            searches_->set_fan(positions, triangles, around, static_cast<std::uint32_t>(v), fans_[v]);
+            fans_[v].normal = normals[v];
+        }
     });
 }
 

@@ -51,9 +51,9 @@ struct NearInFan {
 
 // The searches, as compiled for one set of instructions.
 struct FanSearches {
-    // Sets the fans of the vertices [begin, end), but for their normals. around: the triangles around each vertex.
-    void (*set_fans)(std::span<const Vector3f> positions, std::span<const Triangle> triangles,
-                     const TrianglesAround& around, std::uint32_t begin, std::uint32_t end, VertexFan* fans);
+    // Sets a vertex's fan, but for its normal. around: the triangles around each vertex.
+    void (*set_fan)(std::span<const Vector3f> positions, std::span<const Triangle> triangles,
+                    const TrianglesAround& around, std::uint32_t vertex, VertexFan& fan);
     // From vertex to vertex as long as the distance to the query shrinks, as far as fans are regular. squared_distance:
     // of the query from the vertex where it begins.
     FanWalk (*walk)(std::span<const VertexFan> fans, const Vector3f& query, std::uint32_t from, float squared_distance);

@@ -160,9 +160,9 @@ TEST(VertexFans, FindTheSameToTheBitWithAnyInstructions) {
     const auto count = static_cast<std::uint32_t>(made.positions.size());
     std::vector<VertexFan> fans(count), others(count);
     for (auto* all : {&fans, &others}) std::fill(all->begin(), all->end(), VertexFan{});
-    here.set_fans(made.positions, made.triangles, made.around, 0, count, fans.data());
-    portable.set_fans(made.positions, made.triangles, made.around, 0, count, others.data());
     for (std::uint32_t v = 0; v < count; ++v) {
+        here.set_fan(made.positions, made.triangles, made.around, v, fans[v]);
+        portable.set_fan(made.positions, made.triangles, made.around, v, others[v]);
         ASSERT_EQ(fans[v].triangles, others[v].triangles);
         ASSERT_EQ(fans[v].neighbour, others[v].neighbour);
         ASSERT_EQ(fans[v].side, others[v].side);
