@@ -61,7 +61,8 @@ struct FrameTime {
 
 template <class Values>
 std::uint32_t digest(const Values& values) {
-    return htvm::internal::crc32({reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(values[0])});
+    return htvm::internal::crc32(
+        {reinterpret_cast<const std::uint8_t*>(values.data()), values.size() * sizeof(values[0])});
 }
 
 std::uint32_t digest(const htvm::MeshView& mesh) {
@@ -116,11 +117,12 @@ void print(const std::string& what, const std::vector<FrameTime>& frames, double
         real.push_back(scale * frame.real);
         sum += frame.vertices;
     }
-    fmt::print("  {:14} {:4} frames {:6.0f} vertices; processor p50 {:6.2f} p99 {:6.2f} most {:6.2f} ms; real p50 {:6.2f} "
-               "p99 {:6.2f} most {:6.2f} ms\n",
-               what, frames.size(), sum / static_cast<double>(frames.size()), percentile(processor, 0.5),
-               percentile(processor, 0.99), percentile(processor, 1), percentile(real, 0.5), percentile(real, 0.99),
-               percentile(real, 1));
+    fmt::print(
+        "  {:14} {:4} frames {:6.0f} vertices; processor p50 {:6.2f} p99 {:6.2f} most {:6.2f} ms; real p50 {:6.2f} "
+        "p99 {:6.2f} most {:6.2f} ms\n",
+        what, frames.size(), sum / static_cast<double>(frames.size()), percentile(processor, 0.5),
+        percentile(processor, 0.99), percentile(processor, 1), percentile(real, 0.5), percentile(real, 0.99),
+        percentile(real, 1));
 }
 
 bool measure(const std::string& stream, const Options& options) {

@@ -208,8 +208,7 @@ void find_slopes(const Layer& fine, const Layer& coarse, std::uint32_t p, Hierar
         m[i] = {sums[i][0], sums[i][1], sums[i][2]};
         m[i][i] += hold * trace + 1e-3;
     }
-    const Vector3d turned =
-        solve(m, centre_of(fine.place[level.first[p]]) - centre_of(fine.place[level.second[p]]));
+    const Vector3d turned = solve(m, centre_of(fine.place[level.first[p]]) - centre_of(fine.place[level.second[p]]));
     std::int32_t* slopes = level.slopes.data() + coarse.first_neighbour[p];
     for (std::size_t k = 0; k < around.size(); ++k) {
         const double slope =
