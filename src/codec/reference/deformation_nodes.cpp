@@ -197,7 +197,8 @@ VerticesAround with_links(const VerticesAround& around, std::span<const VertexPa
     return out;
 }
 
-Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach) {
+Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach,
+                 const VerticesAround* around) {
     DisjointSets pieces(positions.size());
     for (const auto& t : triangles) {
         pieces.join(t[0], t[1]);
@@ -209,7 +210,7 @@ Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triang
     for (std::size_t i = 0, count = links.size(); i < count; ++i) links.emplace_back(links[i].second, links[i].first);
     std::sort(links.begin(), links.end());
     Graph graph;
-    graph.around = vertices_around(positions.size(), triangles);
+    graph.around = around ? *around : vertices_around(positions.size(), triangles);
     if (!links.empty()) graph.around = with_links(graph.around, links);
     measure(positions, graph);
     return graph;
@@ -565,10 +566,11 @@ KeptNodes keep_nodes(const DeformationNodes& nodes, std::span<const std::uint32_
 }
 
 DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
-                                          const DeformationNodeOptions& options, const KeptNodes& kept) {
+                                          const DeformationNodeOptions& options, const KeptNodes& kept,
+                                          const VerticesAround* around) {
     DeformationNodes nodes;
     if (positions.empty()) return nodes;
-    const Graph graph = mesh_graph(positions, triangles, options.link_reach);
+    const Graph graph = mesh_graph(positions, triangles, options.link_reach, around);
     const std::size_t most = std::clamp<std::size_t>(options.most_nodes, 1, most_deformation_nodes);
     Cover cover;
     const bool goes_on =

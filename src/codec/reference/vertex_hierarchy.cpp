@@ -31,13 +31,12 @@ struct Layer {
     }
 };
 
-Layer layer_of_vertices(std::span<const LatticePoint> positions, std::span<const Triangle> triangles) {
+Layer layer_of_vertices(std::span<const LatticePoint> positions, VerticesAround around) {
     Layer layer;
     layer.vertices.assign(positions.size(), 1);
     layer.place.reserve(positions.size());
     for (const LatticePoint p : positions)
         layer.place.push_back({static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z), 1.0});
-    auto around = vertices_around(positions.size(), triangles);
     layer.first_neighbour = std::move(around.first);
     layer.neighbours = std::move(around.vertices);
     return layer;
@@ -224,7 +223,7 @@ void find_slopes(const Layer& fine, const Layer& coarse, std::uint32_t p, Hierar
 }  // namespace
 
 Result<VertexHierarchy> build_vertex_hierarchy(std::span<const LatticePoint> positions,
-                                               std::span<const Triangle> triangles) {
+                                               std::span<const Triangle> triangles, const VerticesAround* around) {
     if (positions.size() > most_elements || triangles.size() > most_elements)
         return fail(ErrorKind::limit, "vertex hierarchy: more than 2^28 vertices or triangles");
     for (std::size_t v = 0; v < positions.size(); ++v)
@@ -237,7 +236,7 @@ Result<VertexHierarchy> build_vertex_hierarchy(std::span<const LatticePoint> pos
                             "vertex hierarchy: triangle " + std::to_string(t) + " names a vertex that does not exist");
     VertexHierarchy hierarchy;
     hierarchy.vertex_count = positions.size();
-    Layer fine = layer_of_vertices(positions, triangles);
+    Layer fine = layer_of_vertices(positions, around ? *around : vertices_around(positions.size(), triangles));
     while (fine.size() > 1) {
         HierarchyLevel level;
         Layer coarse = join(fine, match(fine), level);

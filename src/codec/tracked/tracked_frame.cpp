@@ -119,7 +119,7 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing, std::int32_t step,
                                                 Threads threads, const KeptNodes& kept,
-                                                std::optional<VertexHierarchy> ahead) {
+                                                std::optional<TrackedAhead> ahead) {
     TrackedReference out;
     out.mesh = mesh;
     out.mesh.positions = averaged_within_cells(mesh.positions, mesh.triangles, step);
@@ -127,15 +127,17 @@ Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::in
     options.spacing = node_spacing;
     options.link_reach = std::max(node_spacing / 10, 1);
     Result<VertexHierarchy> hierarchy;
+    const VerticesAround around =
+        ahead ? std::move(ahead->around) : vertices_around(out.mesh.positions.size(), out.mesh.triangles);
     parallel_invoke(
         threads,
         [&] {
             if (ahead)
-                hierarchy = std::move(*ahead);
+                hierarchy = std::move(ahead->hierarchy);
             else
-                hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles);
+                hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles, &around);
         },
-        [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options, kept); });
+        [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options, kept, &around); });
     out.graph = graph_of(out.nodes, out.mesh);
     if (!hierarchy) return tl::unexpected(hierarchy.error());
     out.hierarchy = std::move(*hierarchy);
