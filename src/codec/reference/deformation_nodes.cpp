@@ -345,10 +345,13 @@ public:
     void push(const Visit& visit) {
         ++size_;
         const Distance bucket = distance_of(visit.key) >> width_bits_;
-        if (bucket == now_)
+        if (bucket == now_) {
             push_first(visit);
-        else
-            buckets_[bucket & mask_].push_back(visit);
+            return;
+        }
+        auto& into = buckets_[bucket & mask_];
+        if (into.capacity() == 0) into.reserve(likely_visits);
+        into.push_back(visit);
     }
     Visit pop() {
         if (first_.empty() && others_.empty()) next_bucket();
@@ -362,6 +365,7 @@ public:
 
 private:
     static constexpr int most_bucket_bits = 10;
+    static constexpr std::size_t likely_visits = 16;  // of a bucket
     static bool later(const Visit& a, const Visit& b) { return a.key > b.key; }
     void push_first(const Visit& visit) {
         first_.push_back(visit);

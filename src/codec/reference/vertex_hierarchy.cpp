@@ -24,6 +24,7 @@ struct Layer {
     std::vector<std::uint32_t> vertices;  // number of vertices below each node
     std::vector<Place> place;
     std::vector<std::uint32_t> first_neighbour, neighbours;
+    bool mutual = true;  // as HierarchyLevel's
 
     std::size_t size() const { return vertices.size(); }
     std::span<const std::uint32_t> around(std::size_t node) const {
@@ -111,6 +112,7 @@ std::vector<std::uint32_t> match(const Layer& layer) {
 // Joins partners. Sets everything in `level` except the slopes; returns the layer of the joined nodes.
 Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, HierarchyLevel& level) {
     Layer coarse;
+    coarse.mutual = fine.mutual;
     std::vector<std::uint32_t> parent(fine.size());
     std::uint32_t nodes = 0;
     for (std::uint32_t v = 0; v < fine.size(); ++v) {
@@ -162,6 +164,7 @@ Layer join(const Layer& fine, const std::vector<std::uint32_t>& partner, Hierarc
             }
         }
         coarse.first_neighbour[p + std::size_t{1}] = static_cast<std::uint32_t>(count);
+        coarse.mutual &= count != full;
     }
     coarse.neighbours.resize(count);
     return coarse;
@@ -244,6 +247,7 @@ Result<VertexHierarchy> build_vertex_hierarchy(std::span<const LatticePoint> pos
         for (std::uint32_t p = 0; p < level.size(); ++p)
             if (level.second[p] != no_node) find_slopes(fine, coarse, p, level);
         level.vertices = coarse.vertices;
+        level.mutual = coarse.mutual;
         level.first_neighbour = coarse.first_neighbour;
         level.neighbours = coarse.neighbours;
         hierarchy.levels.push_back(std::move(level));

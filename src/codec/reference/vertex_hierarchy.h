@@ -45,6 +45,7 @@ struct HierarchyLevel {
     // The predicted difference is the sum of slope * (mean of the neighbour - own mean), by the gradient that fits best
     // in the least-squares sense. In 1/2^slope_bits, |.| <= 2^15. Zero without a second.
     std::vector<std::int32_t> slopes;
+    bool mutual = true;  // every node is a neighbour of its neighbours; not where rows are at their limit
 
     std::size_t size() const { return first.size(); }
 };

@@ -157,8 +157,11 @@ std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
 
 std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                                     std::span<const std::int32_t> displacement) {
+    // Rounded down by cutting off: a field's values are far below 2^31, and normals no longer than one.
     const auto along = [](std::int32_t own, double normal, double distance) {
-        return within_lattice(own + static_cast<std::int64_t>(std::floor(normal * distance + 0.5)));
+        const double moved = normal * distance + 0.5;
+        const auto whole = static_cast<std::int32_t>(moved);
+        return within_lattice(std::int64_t{own} + whole - (moved < whole));
     };
     std::vector<LatticePoint> out;
     out.reserve(positions.size());
