@@ -416,16 +416,22 @@ std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::
     for (const Visit& start : starts) reach = std::max(reach, distance_of(start.key));
     BucketQueue queue(graph, reach);
     for (const Visit& start : starts) queue.push(start);
+    // Known not to change, unlike what may be reached through a reference.
+    const std::span<const std::uint32_t> first = graph.around.first, vertices = graph.around.vertices;
+    const std::span<const Distance> lengths = graph.lengths;
+    const std::span<NodeKeys> near = lists;
     while (!queue.empty()) {
         const Visit visit = queue.pop();
-        const NodeKeys& list = lists[visit.vertex];
+        const NodeKeys& list = near[visit.vertex];
         bool listed = false;
         for (const NodeKey key : list) listed |= key == visit.key;
         if (!listed || distance_of(visit.key) > unreached / 2) continue;
-        graph.from(visit.vertex, [&](std::uint32_t u, Distance length) {
-            const NodeKey there = visit.key + (NodeKey{length} << key_node_bits);
-            if (lists[u].back() > there && enter(lists[u], there)) queue.push({there, u});
-        });
+        const std::uint32_t end = first[visit.vertex + std::size_t{1}];
+        for (std::uint32_t i = first[visit.vertex]; i < end; ++i) {
+            const NodeKey there = visit.key + (NodeKey{lengths[i]} << key_node_bits);
+            const std::uint32_t u = vertices[i];
+            if (near[u].back() > there && enter(near[u], there)) queue.push({there, u});
+        }
     }
     std::vector<NearNodes> out(lists.size());
     for (std::size_t v = 0; v < lists.size(); ++v)
