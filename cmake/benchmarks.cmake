@@ -12,3 +12,6 @@ target_link_libraries(live_watch PRIVATE htvm_live_client htvm_decoder CLI11::CL
 # The pace of encoding a capture: docs/performance.md.
 add_executable(htvm_pace bench/pace/pace.cpp)
 target_link_libraries(htvm_pace PRIVATE htvm_encoder htvm_io htvm_synth CLI11::CLI11 fmt::fmt)
+# The pace of decoding a stream: docs/performance.md.
+add_executable(htvm_decode_pace bench/pace/decode_pace.cpp)
+target_link_libraries(htvm_decode_pace PRIVATE htvm_decoder CLI11::CLI11 fmt::fmt)

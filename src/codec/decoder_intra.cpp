@@ -13,7 +13,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     // What is derived for T-frames takes much memory, so it is freed before the next I-frame is decoded; without this,
     // a stream of many I-frames would need half as much memory again as a stream with one. It can be rebuilt from the
     // mesh: if this frame turns out to be bad, the next T-frame does so.
-    if (state.reference && referred) state.reference->tracked.reset(), state.reference->hierarchy.reset();
+    if (state.reference && referred) state.reference->tracked.reset(), state.reference->ahead.reset();
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(payload, external ? &*external : nullptr, state.threads);
     if (!mesh) return tl::unexpected(mesh.error());

@@ -100,4 +100,44 @@ TrianglesAround triangles_around(std::size_t vertices, std::span<const Triangle>
     return out;
 }
 
+VerticesAround vertices_around(std::size_t vertices, std::span<const Triangle> triangles) {
+    VerticesAround out;
+    std::vector<std::uint32_t> next(vertices + 1, 0);  // where the next triangle's two other corners go
+    for (const auto& t : triangles)
+        for (const auto v : t) next[v + std::size_t{1}] += 2;
+    for (std::size_t v = 0; v < vertices; ++v) next[v + 1] += next[v];
+    out.vertices.resize(next.back());
+    const std::span<std::uint32_t> named = out.vertices;
+    const auto add = [&](std::uint32_t v, std::uint32_t one, std::uint32_t other) {
+        named[next[v]] = one;
+        named[next[v] + std::size_t{1}] = other;
+        next[v] += 2;
+    };
+    for (const auto& t : triangles) {
+        add(t[0], t[1], t[2]);
+        add(t[1], t[0], t[2]);
+        add(t[2], t[0], t[1]);
+    }
+    // Of the two corners that a triangle adds, a closed mesh has seen one. Whether a vertex was seen already cannot be
+    // foreseen, so each is written, and what follows overwrites it if it was. Rows only move towards the front.
+    out.first.resize(vertices + 1);
+    std::vector<std::uint32_t> seen(vertices, std::numeric_limits<std::uint32_t>::max());
+    std::uint32_t count = 0, begin = 0;
+    for (std::uint32_t v = 0; v < vertices; ++v) {
+        seen[v] = v;
+        const std::uint32_t end = next[v];
+        for (std::uint32_t i = begin; i < end; ++i) {
+            const std::uint32_t u = named[i];
+            named[count] = u;
+            count += seen[u] != v;
+            seen[u] = v;
+        }
+        begin = end;
+        out.first[v + std::size_t{1}] = count;
+    }
+    out.vertices.resize(count);
+    out.vertices.shrink_to_fit();
+    return out;
+}
+
 }  // namespace htvm::internal

@@ -82,4 +82,15 @@ struct TrianglesAround {
 };
 TrianglesAround triangles_around(std::size_t vertices, std::span<const Triangle> triangles);
 
+// The vertices that share a triangle with each vertex, in compressed rows: without repeats or the vertex itself, in the
+// order in which its triangles name them.
+struct VerticesAround {
+    std::vector<std::uint32_t> first;  // where each vertex's row begins, then the end of the last row
+    std::vector<std::uint32_t> vertices;
+    std::span<const std::uint32_t> of(std::size_t vertex) const {
+        return std::span(vertices).subspan(first[vertex], first[vertex + 1] - first[vertex]);
+    }
+};
+VerticesAround vertices_around(std::size_t vertices, std::span<const Triangle> triangles);
+
 }  // namespace htvm::internal

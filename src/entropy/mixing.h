@@ -26,11 +26,19 @@ constexpr std::int32_t probability_of_log_odds(std::int32_t log_odds) {
     return (logistic_knots[knot] * (128 - part) + logistic_knots[knot + 1] * part) >> 7;
 }
 
-// The same for every log odds from -2047 to 2047: decoding asks once for each decision, and waits for the answer.
+// A mixed probability as it is learnt from, and as it is coded by: no nearer to 0 and 1 than a model's.
+struct MixedProbability {
+    std::uint16_t learnt = 0, coded = 0;
+};
+
+// For every log odds from -2047 to 2047: decoding asks once for each decision, and waits for the answer.
 inline constexpr auto probability_table = [] {
-    std::array<std::uint16_t, 4095> table{};
-    for (std::int32_t x = 0; x < 4095; ++x)
-        table[static_cast<std::size_t>(x)] = static_cast<std::uint16_t>(probability_of_log_odds(x - 2047));
+    std::array<MixedProbability, 4095> table{};
+    for (std::int32_t x = 0; x < 4095; ++x) {
+        const std::int32_t probability = probability_of_log_odds(x - 2047);
+        table[static_cast<std::size_t>(x)] = {static_cast<std::uint16_t>(probability),
+                                              static_cast<std::uint16_t>(std::clamp(probability, 48, 65535 - 48))};
+    }
     return table;
 }();
 
@@ -67,19 +75,22 @@ template <class Coder, std::size_t N>
         votes[i] = log_odds_table[models[i]->one >> 4];
         sum += std::int64_t{votes[i]} * mixer.weights[i];
     }
-    const std::int32_t probability =
+    const MixedProbability probability =
         probability_table[static_cast<std::size_t>(std::clamp<std::int64_t>(sum >> 16, -2047, 2047) + 2047)];
     // Only carries the probability to the coder; what it learns is not used.
-    BinaryModel mixed{static_cast<std::uint16_t>(std::clamp(probability, 48, 65535 - 48)), model_seen_limit};
+    BinaryModel mixed{probability.coded, model_seen_limit};
     const bool bit = coder.bit(mixed, wanted);
-    const std::int32_t error = mixing_rate * ((bit ? 65536 : 0) - probability);  // below 2^19; a vote below 2^11
+    const std::int32_t error = mixing_rate * ((bit ? 65536 : 0) - probability.learnt);  // below 2^19; a vote below 2^11
+    // Whether any is out of bounds, which is seldom: one of them has a bit above the largest's, or is near it.
+    std::uint32_t beyond = 0;
     for (std::size_t i = 0; i < N; ++i) {
-        std::int32_t weight = mixer.weights[i] + ((votes[i] * error) >> 18);
-        if (static_cast<std::uint32_t>(weight + most_weight) > 2u * most_weight)  // seldom
-            weight = weight < 0 ? -most_weight : most_weight;
+        const std::int32_t weight = mixer.weights[i] + ((votes[i] * error) >> 18);
+        beyond |= static_cast<std::uint32_t>(weight + most_weight);
         mixer.weights[i] = weight;
-        models[i]->update(bit);
     }
+    if (beyond > 2u * most_weight - 1)
+        for (auto& weight : mixer.weights) weight = std::clamp(weight, -most_weight, most_weight);
+    for (BinaryModel* model : models) model->update(bit);
     return bit;
 }
 

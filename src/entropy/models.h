@@ -49,7 +49,7 @@ inline void BinaryModel::update(bool bit) {
         one = static_cast<std::uint16_t>(std::min<std::uint32_t>(now + (((65535u - now) * rate) >> 16), 65535u - 48));
     else
         one = static_cast<std::uint16_t>(std::max<std::uint32_t>(now - ((now * rate + 65535u) >> 16), 48u));
-    if (seen < model_seen_limit) ++seen;
+    seen = static_cast<std::uint16_t>(seen + (seen < model_seen_limit));  // not a branch, which cannot be foreseen
 }
 
 // Symbols 0 .. 2^bits - 1 as a binary tree, most significant bit first.

@@ -349,6 +349,20 @@ TEST(SmoothedWithinCells, MovesNoCoordinateByMoreThanHalfAStep) {
     EXPECT_EQ(smoothed_within_cells(positions, {}, {64}), positions);
 }
 
+TEST(SmoothedWithinCells, MovesWhatIsNotSettledAsIfNothingWere) {
+    const auto mesh = tfan_test::grid(8, 8);
+    std::mt19937 random(4);
+    std::vector<LatticePoint> positions;
+    for (int k = 0; k < 81; ++k)
+        positions.push_back({between(random, -900, 900), between(random, -900, 900), between(random, -900, 900)});
+    const auto all = smoothed_within_cells(positions, mesh.triangles, {64});
+    for (const std::uint32_t settled : {1u, 40u, 80u, 81u}) {
+        auto expected = all;
+        std::copy_n(positions.begin(), settled, expected.begin());
+        EXPECT_EQ(smoothed_within_cells(positions, mesh.triangles, {.step = 64, .settled = settled}), expected);
+    }
+}
+
 TEST(SmoothedWithinCells, TakesAnEighthOffWhatBendsMoreThanTheNeighboursDo) {
     // The hub of four triangles stands 40 above its rim, whose vertices' neighbours are 20 above them.
     const std::vector<LatticePoint> positions = {{0, 0, 40}, {100, 0, 0}, {0, 100, 0}, {-100, 0, 0}, {0, -100, 0}};

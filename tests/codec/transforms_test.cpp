@@ -80,6 +80,42 @@ TEST(Transforms, DamageGivesAnErrorOrTransformsInRange) {
     });
 }
 
+TEST(BlendedMove, IsTheWeightedMeanOfWhatEachTransformDoesExactly) {
+    std::mt19937 random(1);
+    for (int round = 0; round < 2000; ++round) {
+        const auto transforms = random_transforms(handles_per_vertex, random);
+        const std::int32_t reach = 1 << random() % 25;
+        std::vector<LatticePoint> pivots;
+        for (std::size_t i = 0; i < transforms.size(); ++i) pivots.push_back(random_point(reach, random));
+        VertexWeights weights;
+        int left = 1 << weight_bits;
+        for (std::size_t i = 0; i < handles_per_vertex; ++i) {
+            weights.handle[i] = static_cast<std::uint16_t>(i);
+            const int weight = i + 1 == handles_per_vertex ? left : test::between(random, 0, left);
+            weights.weight[i] = static_cast<std::uint16_t>(weight);
+            left -= weight;
+            if (weight == 0) break;
+        }
+        weights.weight[0] = static_cast<std::uint16_t>(weights.weight[0] + left);
+        const auto point = random_point(reach, random);
+        std::array<std::int64_t, 3> sum{};
+        for (std::size_t i = 0; i < handles_per_vertex && weights.weight[i] > 0; ++i) {
+            const auto m = rotation_matrix(transforms[i].rotation);
+            const LatticePoint from = point - pivots[i], to = pivots[i] + transforms[i].shift;
+            const std::array<std::int32_t, 3> place{to.x, to.y, to.z};
+            for (std::size_t c = 0; c < 3; ++c)
+                sum[c] += weights.weight[i] * ((std::int64_t{place[c]} << matrix_bits) + m[3 * c] * from.x +
+                                               m[3 * c + 1] * from.y + m[3 * c + 2] * from.z);
+        }
+        constexpr int bits = matrix_bits + weight_bits;
+        const auto rounded = [&](std::size_t c) {
+            return within_lattice((sum[c] + (std::int64_t{1} << (bits - 1))) >> bits);
+        };
+        EXPECT_EQ(blended_move(point, weights, point_moves(transforms, pivots)),
+                  (LatticePoint{rounded(0), rounded(1), rounded(2)}));
+    }
+}
+
 TEST(CodedPose, ComesBack) {
     std::mt19937 random(3);
     for (const auto& [joints, bones] :

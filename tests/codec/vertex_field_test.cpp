@@ -8,6 +8,7 @@
 
 #include "codec/hostile_bytes.h"
 #include "codec/intra_test_meshes.h"
+#include "codec/tracked/vertex_field_walk.h"
 #include "core/bytes.h"
 #include "core/crc32.h"
 
@@ -31,6 +32,41 @@ std::vector<std::int32_t> field(std::size_t vertices, std::size_t components, un
             if (seed % 7 == 6) value = test::between(random, -field_limit, field_limit);
         }
     return values;
+}
+
+TEST(LevelPrediction, IsTheSameForSmallAndLargeDifferences) {
+    std::mt19937 random(1);
+    for (const std::int32_t most : {0, 3, 1000, (1 << 24) - 1, 1 << 24, 2 * most_mean}) {
+        std::vector<std::int32_t> now, slope_before;
+        LevelPrediction prediction;
+        for (int p = 0; p < 37; ++p) {
+            now.push_back(p == 0 ? -most : test::between(random, -most, most));
+            slope_before.push_back(p == 0 ? most : test::between(random, -most, most));
+            prediction.before.push_back(p == 0 ? -most : test::between(random, -most, most));
+        }
+        prediction.now = now;
+        prediction.slope_before = slope_before;
+        for (std::uint32_t slope = 0; slope < 8; ++slope)
+            for (std::uint32_t before = 0; before <= 4; ++before) {
+                const LevelMode mode{.coded = true, .slope = slope, .before = before};
+                prediction.choose(mode);
+                for (std::size_t p = 0; p < now.size(); ++p) EXPECT_EQ(prediction.chosen[p], prediction.of(p, mode));
+            }
+    }
+}
+
+TEST(SplitMeans, StayWithinTheirLimits) {
+    constexpr std::int64_t most = most_mean, far = std::int64_t{1} << 55;
+    for (const std::int64_t mean : {-most, std::int64_t{-1}, std::int64_t{0}, most})
+        for (const std::int64_t difference : {-far, -2 * most - 1, -2 * most, std::int64_t{-3}, 2 * most, far})
+            for (const std::uint32_t share : {0u, 1u << (share_bits - 1), (1u << share_bits) - 1}) {
+                const std::int64_t kept = std::clamp(difference, -2 * most, 2 * most);
+                const std::int64_t first =
+                    mean + ((kept * share + (std::int64_t{1} << (share_bits - 1))) >> share_bits);
+                const auto means = split_mean(static_cast<std::int32_t>(mean), difference, share);
+                EXPECT_EQ(means.first, std::clamp(first, -most, most));
+                EXPECT_EQ(means.second, std::clamp(first - kept, -most, most));
+            }
 }
 
 FieldOptions options_of(double step, double lambda) { return {.step = {step, step, step}, .lambda = lambda}; }

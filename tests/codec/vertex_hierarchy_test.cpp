@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "codec/intra_test_meshes.h"
 #include "core/bytes.h"
 #include "core/crc32.h"
@@ -37,6 +39,10 @@ void expect_sound(const VertexHierarchy& hierarchy, std::size_t vertex_count) {
                 EXPECT_LT(level.neighbours[i], level.size());
                 EXPECT_NE(level.neighbours[i], p);
                 EXPECT_LE(std::abs(level.slopes[i]), 1 << 15);
+                const auto first = level.first_neighbour[level.neighbours[i]],
+                           end = level.first_neighbour[level.neighbours[i] + 1];
+                EXPECT_TRUE(!level.mutual ||
+                            std::count(level.neighbours.begin() + first, level.neighbours.begin() + end, p) == 1);
             }
         }
         for (const int times : joined) EXPECT_EQ(times, 1);

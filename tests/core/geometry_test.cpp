@@ -92,5 +92,18 @@ TEST(TrianglesAround, AreListedByVertex) {
     EXPECT_EQ(of(4), (std::vector<std::uint32_t>{2}));
 }
 
+TEST(VerticesAround, AreListedOnceInTheOrderOfTheTriangles) {
+    const std::vector<Triangle> triangles = {{0, 2, 1}, {0, 1, 3}, {3, 3, 1}, {2, 1, 0}, {5, 5, 5}};
+    const auto around = vertices_around(6, triangles);
+    const auto of = [&](std::size_t v) { return std::vector(around.of(v).begin(), around.of(v).end()); };
+    EXPECT_EQ(of(0), (std::vector<std::uint32_t>{2, 1, 3}));
+    EXPECT_EQ(of(1), (std::vector<std::uint32_t>{0, 2, 3}));
+    EXPECT_EQ(of(2), (std::vector<std::uint32_t>{0, 1}));
+    EXPECT_EQ(of(3), (std::vector<std::uint32_t>{0, 1}));
+    EXPECT_EQ(of(4), (std::vector<std::uint32_t>{}));
+    EXPECT_EQ(of(5), (std::vector<std::uint32_t>{}));
+    EXPECT_EQ(vertices_around(0, {}).first, (std::vector<std::uint32_t>{0}));
+}
+
 }  // namespace
 }  // namespace htvm::internal

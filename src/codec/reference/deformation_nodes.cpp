@@ -18,29 +18,71 @@ namespace {
 using Distance = std::uint32_t;
 constexpr Distance unreached = std::numeric_limits<Distance>::max();
 
-// floor(sqrt(value)) for values up to 2^52, exact: the root computed in doubles is off by at most one.
-std::uint32_t integer_root(std::int64_t value) {
-    auto root = static_cast<std::int64_t>(std::sqrt(static_cast<double>(value)));
-    while (root * root > value) --root;
-    while ((root + 1) * (root + 1) <= value) ++root;
-    return static_cast<std::uint32_t>(root);
-}
-
-struct Step {
-    std::uint32_t vertex;
-    Distance length;
-};
-
-// The steps from each vertex, in compressed rows.
+// The steps from each vertex, in rows, and how long they are.
 struct Graph {
-    std::vector<std::uint32_t> first;
-    std::vector<Step> steps;
-    std::span<const Step> from(std::uint32_t vertex) const {
-        return std::span(steps).subspan(first[vertex], first[vertex + 1] - first[vertex]);
+    VerticesAround around;
+    std::vector<Distance> lengths;   // of each step
+    std::vector<Distance> shortest;  // of the steps from each vertex
+    Distance longest = 0;            // of all
+    std::size_t size() const { return shortest.size(); }
+    // Calls take(vertex, length) for each step.
+    template <class Take>
+    void from(std::uint32_t vertex, const Take& take) const {
+        const std::uint32_t end = around.first[vertex + std::size_t{1}];
+        for (std::uint32_t i = around.first[vertex]; i < end; ++i) take(around.vertices[i], lengths[i]);
     }
 };
 
+// How far apart the ends of each step are, rounded down. Squared distances are below 2^52, so that doubles are exact,
+// and a root is rounded up to a whole number only if it is one.
+void measure(std::span<const LatticePoint> positions, Graph& graph) {
+    const auto& first = graph.around.first;
+    graph.lengths.resize(graph.around.vertices.size());
+    graph.shortest.resize(positions.size());
+    constexpr std::size_t at_once = 16;
+    std::array<double, at_once> x, y, z;
+    for (std::uint32_t v = 0; v < positions.size(); ++v) {
+        const LatticePoint here = positions[v];
+        Distance shortest = unreached;
+        for (std::size_t i = first[v]; i < first[v + std::size_t{1}]; i += at_once) {
+            const std::size_t count = std::min<std::size_t>(first[v + std::size_t{1}] - i, at_once);
+            for (std::size_t k = 0; k < count; ++k) {
+                const LatticePoint apart = positions[graph.around.vertices[i + k]] - here;
+                x[k] = apart.x, y[k] = apart.y, z[k] = apart.z;
+            }
+            Distance* lengths = graph.lengths.data() + i;
+            for (std::size_t k = 0; k < count; ++k)
+                lengths[k] = static_cast<Distance>(
+                    static_cast<std::int32_t>(std::sqrt(x[k] * x[k] + y[k] * y[k] + z[k] * z[k])));
+            for (std::size_t k = 0; k < count; ++k) {
+                shortest = std::min(shortest, lengths[k]);
+                graph.longest = std::max(graph.longest, lengths[k]);
+            }
+        }
+        graph.shortest[v] = shortest;
+    }
+}
+
 using VertexPair = std::pair<std::uint32_t, std::uint32_t>;
+
+// Numbers ascending by their upper half, those with the same one in the order in which they are: sorted by their
+// digits.
+void sort_by_upper_half(std::vector<std::uint64_t>& numbers) {
+    constexpr int digit_bits = 11;
+    std::uint32_t differ = 0;
+    for (const auto n : numbers) differ |= static_cast<std::uint32_t>((n ^ numbers.front()) >> 32);
+    std::vector<std::uint64_t> sorted(numbers.size());
+    std::array<std::uint32_t, 1 << digit_bits> place;
+    for (int shift = 0; shift < 32 && differ >> shift != 0; shift += digit_bits) {
+        const auto digit = [&](std::uint64_t n) { return n >> (32 + shift) & (place.size() - 1); };
+        place.fill(0);
+        for (const auto n : numbers) ++place[digit(n)];
+        std::uint32_t count = 0;
+        for (auto& p : place) count += std::exchange(p, count);
+        for (const auto n : numbers) sorted[place[digit(n)]++] = n;
+        numbers.swap(sorted);
+    }
+}
 
 // Links each vertex with the next one at the same place. Most vertices differ in x already, so numbers are sorted
 // instead of points.
@@ -49,12 +91,15 @@ void link_coincident(std::span<const LatticePoint> positions, DisjointSets& piec
     order.reserve(positions.size());
     for (std::uint32_t v = 0; v < positions.size(); ++v)
         order.push_back(std::uint64_t{static_cast<std::uint32_t>(positions[v].x) ^ 0x80000000u} << 32 | v);
-    std::sort(order.begin(), order.end());
+    sort_by_upper_half(order);
     std::vector<std::pair<LatticePoint, std::uint32_t>> plane;  // across x
-    for (std::size_t i = 0; i < order.size();) {
+    for (std::size_t i = 0, end = 0; i < order.size(); i = end) {
+        for (end = i + 1; end < order.size() && order[end] >> 32 == order[i] >> 32; ++end) {
+        }
+        if (end == i + 1) continue;
         plane.clear();
-        for (const std::uint64_t x = order[i] >> 32; i < order.size() && order[i] >> 32 == x; ++i) {
-            const auto v = static_cast<std::uint32_t>(order[i]);
+        for (std::size_t k = i; k < end; ++k) {
+            const auto v = static_cast<std::uint32_t>(order[k]);
             plane.emplace_back(positions[v], v);
         }
         std::sort(plane.begin(), plane.end());
@@ -131,7 +176,29 @@ void link_near(std::span<const LatticePoint> positions, std::int32_t reach, Disj
     }
 }
 
-Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach) {
+// Adds links to the rows of those that share a triangle, behind these and without repeats. links: ascending.
+VerticesAround with_links(const VerticesAround& around, std::span<const VertexPair> links) {
+    VerticesAround out;
+    out.first.reserve(around.first.size());
+    out.first.push_back(0);
+    out.vertices.reserve(around.vertices.size() + links.size());
+    std::size_t link = 0;
+    for (std::uint32_t v = 0; v + std::size_t{1} < around.first.size(); ++v) {
+        const auto row = static_cast<std::ptrdiff_t>(out.vertices.size());
+        const auto own = around.of(v);
+        out.vertices.insert(out.vertices.end(), own.begin(), own.end());
+        for (; link < links.size() && links[link].first == v; ++link) {
+            const auto u = links[link].second;
+            if (u != v && std::find(out.vertices.begin() + row, out.vertices.end(), u) == out.vertices.end())
+                out.vertices.push_back(u);
+        }
+        out.first.push_back(static_cast<std::uint32_t>(out.vertices.size()));
+    }
+    return out;
+}
+
+Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triangle> triangles, std::int32_t reach,
+                 const VerticesAround* around) {
     DisjointSets pieces(positions.size());
     for (const auto& t : triangles) {
         pieces.join(t[0], t[1]);
@@ -142,31 +209,10 @@ Graph mesh_graph(std::span<const LatticePoint> positions, std::span<const Triang
     link_near(positions, reach, pieces, links);
     for (std::size_t i = 0, count = links.size(); i < count; ++i) links.emplace_back(links[i].second, links[i].first);
     std::sort(links.begin(), links.end());
-
     Graph graph;
-    graph.first.reserve(positions.size() + 1);
-    // Whether a vertex was seen already cannot be foreseen: each is written, and what follows overwrites it if it was.
-    graph.steps.resize(6 * triangles.size() + links.size() + 1);
-    const auto around = triangles_around(positions.size(), triangles);
-    std::vector<std::uint32_t> seen(positions.size(), unreached);
-    std::size_t count = 0;
-    auto link = links.begin();
-    for (std::uint32_t v = 0; v < positions.size(); ++v) {
-        graph.first.push_back(static_cast<std::uint32_t>(count));
-        seen[v] = v;
-        const auto step_to = [&](std::uint32_t u) {
-            graph.steps[count].vertex = u;
-            count += seen[u] != v;
-            seen[u] = v;
-        };
-        for (const auto t : around.of(v))
-            for (const auto u : triangles[t]) step_to(u);
-        for (; link != links.end() && link->first == v; ++link) step_to(link->second);
-        for (std::size_t i = graph.first.back(); i < count; ++i)
-            graph.steps[i].length = integer_root(squared_distance(positions[v], positions[graph.steps[i].vertex]));
-    }
-    graph.steps.resize(count);
-    graph.first.push_back(static_cast<std::uint32_t>(graph.steps.size()));
+    graph.around = around ? *around : vertices_around(positions.size(), triangles);
+    if (!links.empty()) graph.around = with_links(graph.around, links);
+    measure(positions, graph);
     return graph;
 }
 
@@ -193,14 +239,14 @@ void reach_from(const Graph& graph, CoverQueue& queue, Distance spacing, Cover& 
         if (distance != cover.distance[vertex]) continue;
         ++cover.reached[vertex];
         ++cover.searched;
-        for (const Step& step : graph.from(vertex)) {
-            const Distance there = distance + step.length;  // both are below 2^26
-            if (there > spacing || there >= cover.distance[step.vertex]) continue;
-            if (cover.reached[step.vertex] == most_reached) continue;
-            cover.distance[step.vertex] = there;
-            queue.emplace_back(there, step.vertex);
+        graph.from(vertex, [&, so_far = distance](std::uint32_t u, Distance length) {
+            const Distance there = so_far + length;  // both are below 2^26
+            if (there > spacing || there >= cover.distance[u]) return;
+            if (cover.reached[u] == most_reached) return;
+            cover.distance[u] = there;
+            queue.emplace_back(there, u);
             std::push_heap(queue.begin(), queue.end(), std::greater<>());
-        }
+        });
     }
 }
 
@@ -210,10 +256,10 @@ template <class IsOfKind>
 std::vector<std::uint32_t> around(const Graph& graph, std::size_t count, const IsOfKind& is_of_kind) {
     std::vector<std::uint32_t> out;
     if (count == 0) return out;
-    for (std::uint32_t v = 0; v + 1 < graph.first.size(); ++v)
+    for (std::uint32_t v = 0; v < graph.size(); ++v)
         if (is_of_kind(v))
-            for (const Step& step : graph.from(v))
-                if (step.vertex < count) out.push_back(step.vertex);
+            for (const auto u : graph.around.of(v))
+                if (u < count) out.push_back(u);
     std::sort(out.begin(), out.end());
     out.erase(std::unique(out.begin(), out.end()), out.end());
     return out;
@@ -235,7 +281,7 @@ void cover_by_kept(const Graph& graph, const KeptNodes& kept, Distance spacing, 
 
 // Covers all vertices with nodes, or stops if more than most_nodes are needed.
 bool cover_all(const Graph& graph, const KeptNodes& kept, Distance spacing, std::size_t most_nodes, Cover& cover) {
-    const std::size_t vertices = graph.first.size() - 1;
+    const std::size_t vertices = graph.size();
     cover.distance.assign(vertices, unreached);
     cover.reached.assign(vertices, 0);
     cover.nodes = kept.vertex;
@@ -291,21 +337,21 @@ class BucketQueue {
 public:
     // reach: how far apart the distances in the queue can be.
     BucketQueue(const Graph& graph, Distance reach)
-        : width_bits_(std::max(0, static_cast<int>(std::bit_width(reach)) - most_bucket_bits)),
-          has_short_steps_(graph.first.size() - 1),
-          buckets_(std::bit_ceil((std::size_t{reach} >> width_bits_) + 2)) {
-        for (std::uint32_t v = 0; v < has_short_steps_.size(); ++v)
-            for (const Step& step : graph.from(v))
-                if (step.length >> width_bits_ == 0) has_short_steps_[v] = true;
-    }
+        : shortest_(graph.shortest),
+          width_bits_(std::max(0, static_cast<int>(std::bit_width(reach)) - most_bucket_bits)),
+          buckets_(std::bit_ceil((std::size_t{reach} >> width_bits_) + 2)),
+          mask_(static_cast<Distance>(buckets_.size() - 1)) {}
     bool empty() const { return size_ == 0; }
     void push(const Visit& visit) {
         ++size_;
         const Distance bucket = distance_of(visit.key) >> width_bits_;
-        if (bucket == now_)
+        if (bucket == now_) {
             push_first(visit);
-        else
-            buckets_[bucket & (buckets_.size() - 1)].push_back(visit);
+            return;
+        }
+        auto& into = buckets_[bucket & mask_];
+        if (into.capacity() == 0) into.reserve(likely_visits);
+        into.push_back(visit);
     }
     Visit pop() {
         if (first_.empty() && others_.empty()) next_bucket();
@@ -319,6 +365,7 @@ public:
 
 private:
     static constexpr int most_bucket_bits = 10;
+    static constexpr std::size_t likely_visits = 16;  // of a bucket
     static bool later(const Visit& a, const Visit& b) { return a.key > b.key; }
     void push_first(const Visit& visit) {
         first_.push_back(visit);
@@ -327,20 +374,21 @@ private:
     void next_bucket() {
         do {
             ++now_;
-        } while (buckets_[now_ & (buckets_.size() - 1)].empty());
-        auto& bucket = buckets_[now_ & (buckets_.size() - 1)];
+        } while (buckets_[now_ & mask_].empty());
+        auto& bucket = buckets_[now_ & mask_];
         for (const Visit& visit : bucket)
-            if (has_short_steps_[visit.vertex])
+            if (shortest_[visit.vertex] >> width_bits_ == 0)
                 push_first(visit);
             else
                 others_.push_back(visit);
         bucket.clear();
     }
+    std::span<const Distance> shortest_;
     int width_bits_;
-    std::vector<std::uint8_t> has_short_steps_;  // by vertex
-    std::vector<std::vector<Visit>> buckets_;    // a ring
-    std::vector<Visit> first_, others_;          // of the bucket whose turn it is; the first are a heap
-    Distance now_ = unreached;                   // its number; before the first, so that the next is 0
+    std::vector<std::vector<Visit>> buckets_;  // a ring
+    Distance mask_;                            // of their numbers
+    std::vector<Visit> first_, others_;        // of the bucket whose turn it is; the first are a heap
+    Distance now_ = unreached;                 // its number; before the first, so that the next is 0
     std::size_t size_ = 0;
 };
 
@@ -354,7 +402,7 @@ std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::
         keys.fill(no_key);
         return keys;
     }();
-    std::vector<NodeKeys> lists(graph.first.size() - 1, none);
+    std::vector<NodeKeys> lists(graph.size(), none);
     for (std::size_t v = 0; v < kept.near.size(); ++v)
         for (std::size_t k = 0; k < kept.near[v].count; ++k) lists[v][k] = key_of(kept.near[v].near[k]);
     std::vector<Visit> starts;
@@ -364,20 +412,25 @@ std::vector<NearNodes> nearest_nodes(const Graph& graph, const std::vector<std::
     for (std::size_t n = kept.vertex.size(); n < nodes.size(); ++n)
         if (enter(lists[nodes[n]], n)) starts.push_back({n, nodes[n]});
 
-    Distance reach = 0;
-    for (const Step& step : graph.steps) reach = std::max(reach, step.length);
+    Distance reach = graph.longest;
     for (const Visit& start : starts) reach = std::max(reach, distance_of(start.key));
     BucketQueue queue(graph, reach);
     for (const Visit& start : starts) queue.push(start);
+    // Known not to change, unlike what may be reached through a reference.
+    const std::span<const std::uint32_t> first = graph.around.first, vertices = graph.around.vertices;
+    const std::span<const Distance> lengths = graph.lengths;
+    const std::span<NodeKeys> near = lists;
     while (!queue.empty()) {
         const Visit visit = queue.pop();
-        const NodeKeys& list = lists[visit.vertex];
+        const NodeKeys& list = near[visit.vertex];
         bool listed = false;
         for (const NodeKey key : list) listed |= key == visit.key;
         if (!listed || distance_of(visit.key) > unreached / 2) continue;
-        for (const Step& step : graph.from(visit.vertex)) {
-            const NodeKey there = visit.key + (NodeKey{step.length} << key_node_bits);
-            if (enter(lists[step.vertex], there)) queue.push({there, step.vertex});
+        const std::uint32_t end = first[visit.vertex + std::size_t{1}];
+        for (std::uint32_t i = first[visit.vertex]; i < end; ++i) {
+            const NodeKey there = visit.key + (NodeKey{lengths[i]} << key_node_bits);
+            const std::uint32_t u = vertices[i];
+            if (near[u].back() > there && enter(near[u], there)) queue.push({there, u});
         }
     }
     std::vector<NearNodes> out(lists.size());
@@ -394,26 +447,34 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
     const Distance last = list.near[count - 1].distance;
     const Distance zero = list.count == near_nodes ? std::max<Distance>(list.near[near_nodes - 1].distance, 1)
                                                    : std::max<Distance>(2 * spacing, last + spacing / 4 + 1);
-    std::array<std::uint64_t, handles_per_vertex> share{};
-    std::uint64_t sum = 0;
-    for (std::size_t k = 0; k < count; ++k) {
+    // Quotients are rounded down; below 2^24, those of whole numbers that doubles hold are exact that far.
+    std::array<double, handles_per_vertex> share{};
+    double sum = 0;
+    for (std::size_t k = 0; k < handles_per_vertex; ++k) {
         // Reduced to twelve bits before squaring, so that the sum cannot overflow.
-        const std::uint64_t nearness = std::uint64_t{zero - list.near[k].distance} * 4096 / zero;
+        const double apart = k < count ? static_cast<double>(zero - list.near[k].distance) : 0.0;
+        const double nearness = static_cast<std::int32_t>(apart * 4096.0 / static_cast<double>(zero));
         share[k] = nearness * nearness;
         sum += share[k];
     }
     // By descending weight, then by node: as one number, the weight by what it lacks of all.
     constexpr std::uint32_t all = 1u << weight_bits;
     std::array<std::uint32_t, handles_per_vertex> entries;
-    entries.fill(all << 16);
     std::uint32_t rest = all;
-    for (std::size_t k = 1; k < count; ++k) {
-        const auto weight = sum == 0 ? 0 : static_cast<std::uint32_t>((share[k] << weight_bits) / sum);
+    for (std::size_t k = 1; k < handles_per_vertex; ++k) {
+        const std::uint32_t weight =
+            sum == 0 ? 0 : static_cast<std::uint32_t>(static_cast<std::int32_t>(share[k] * all / sum));
         entries[k] = (all - weight) << 16 | list.near[k].node;
         rest -= weight;
     }
     entries[0] = (all - rest) << 16 | list.near[0].node;
-    std::sort(entries.begin(), entries.end());
+    const auto in_order = [&](std::size_t a, std::size_t b) {
+        const std::uint32_t low = std::min(entries[a], entries[b]);
+        entries[b] = std::max(entries[a], entries[b]);
+        entries[a] = low;
+    };
+    static_assert(handles_per_vertex == 4);
+    in_order(0, 1), in_order(2, 3), in_order(0, 2), in_order(1, 3), in_order(1, 2);
     VertexWeights out;
     for (std::size_t k = 0; k < handles_per_vertex && entries[k] >> 16 < all; ++k) {
         out.handle[k] = static_cast<std::uint16_t>(entries[k]);
@@ -439,8 +500,8 @@ std::vector<NodePair> touching_regions(const Graph& graph, const std::vector<std
     std::vector<NodePair> pairs;
     std::vector<bool> known(nodes * nodes);
     for (std::uint32_t v = 0; v < node.size(); ++v)
-        for (const Step& step : graph.from(v)) {
-            const NodePair pair{node[v], node[step.vertex]};
+        for (const auto u : graph.around.of(v)) {
+            const NodePair pair{node[v], node[u]};
             if (pair.first >= pair.second || known[pair.first * nodes + pair.second]) continue;
             known[pair.first * nodes + pair.second] = true;
             pairs.push_back(pair);
@@ -515,10 +576,11 @@ KeptNodes keep_nodes(const DeformationNodes& nodes, std::span<const std::uint32_
 }
 
 DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
-                                          const DeformationNodeOptions& options, const KeptNodes& kept) {
+                                          const DeformationNodeOptions& options, const KeptNodes& kept,
+                                          const VerticesAround* around) {
     DeformationNodes nodes;
     if (positions.empty()) return nodes;
-    const Graph graph = mesh_graph(positions, triangles, options.link_reach);
+    const Graph graph = mesh_graph(positions, triangles, options.link_reach, around);
     const std::size_t most = std::clamp<std::size_t>(options.most_nodes, 1, most_deformation_nodes);
     Cover cover;
     const bool goes_on =

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "core/geometry.h"
 #include "core/lattice.h"
 #include "core/vertex_weights.h"
 #include "htvm/mesh.hpp"
@@ -81,7 +82,9 @@ KeptNodes keep_nodes(const DeformationNodes& nodes, std::span<const std::uint32_
 //
 // kept: goes on from these nodes at their spacing. Only vertices with fewer than near_nodes near ones look for more,
 // and only those that no kept node reaches become nodes. If this takes more than most_nodes, all are chosen anew.
+// around: of these triangles, where it is known; or null.
 DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
-                                          const DeformationNodeOptions& options, const KeptNodes& kept = {});
+                                          const DeformationNodeOptions& options, const KeptNodes& kept = {},
+                                          const VerticesAround* around = nullptr);
 
 }  // namespace htvm::internal

@@ -18,15 +18,19 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
 }
 
 void derive_hierarchy(Reference& reference, const SequenceHeader& header) {
-    if (header.node_spacing == 0 || reference.step != 1 || reference.tracked || reference.hierarchy) return;
-    auto hierarchy = build_vertex_hierarchy(reference.mesh().positions, reference.mesh().triangles);
-    if (hierarchy) reference.hierarchy = std::move(*hierarchy);  // else derive_nodes() says what is wrong
+    if (header.node_spacing == 0 || reference.step != 1 || reference.tracked || reference.ahead) return;
+    const auto& mesh = reference.mesh();
+    auto around = vertices_around(mesh.positions.size(), mesh.triangles);
+    auto hierarchy = build_vertex_hierarchy(mesh.positions, mesh.triangles, &around);
+    if (hierarchy)
+        reference.ahead =
+            TrackedAhead{std::move(around), std::move(*hierarchy)};  // else derive_nodes() says what is wrong
 }
 
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
     if (reference.tracked) return {};
     auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads,
-                                          reference.kept, std::exchange(reference.hierarchy, std::nullopt));
+                                          reference.kept, std::exchange(reference.ahead, std::nullopt));
     if (!tracked) return tl::unexpected(tracked.error());
     reference.tracked = std::move(*tracked);
     reference.tracked->captured = reference.captured;

@@ -22,9 +22,9 @@ struct Reference {
     TexturedSurface textured;  // where the stream has charts: of the mesh
     ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
     bool has_bones = false;    // whether it was derived
-    std::optional<TrackedReference> tracked;   // what depends on the nodes, if it was derived
-    KeptNodes kept;                            // of a patched mesh: what it takes over of the nodes before
-    std::optional<VertexHierarchy> hierarchy;  // of what depends on the nodes, if only this was derived so far
+    std::optional<TrackedReference> tracked;  // what depends on the nodes, if it was derived
+    KeptNodes kept;                           // of a patched mesh: what it takes over of the nodes before
+    std::optional<TrackedAhead> ahead;        // of what depends on the nodes, if only this was derived so far
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
 

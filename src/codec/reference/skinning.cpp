@@ -325,15 +325,15 @@ ReferenceMesh make_reference(LatticeMesh mesh, const std::vector<Bone>& bones, s
 std::vector<LatticePoint> predict_positions(const ReferenceMesh& reference,
                                             std::span<const QuantisedTransform> transforms, Threads threads) {
     const auto moves = point_moves(transforms, reference.pivots);
+    const auto rotations = rotation_matrices(transforms);
     std::vector<LatticePoint> out(reference.mesh.positions.size());
     // About 10 ns per vertex: a mesh of ordinary size is done before another thread would be awake.
     parallel_for(out.size(), threads, 1 << 16, [&](std::size_t begin, std::size_t end) {
         for (std::size_t k = begin; k < end; ++k) {
             const LatticePoint v = reference.mesh.positions[k];
             const auto bone = reference.bone_of_vertex[k];
-            out[k] = blends(reference, k)
-                         ? blended_move(v, reference.weights[k], moves)
-                         : move(v, moves[bone].rotation, reference.pivots[bone], transforms[bone].shift);
+            out[k] = blends(reference, k) ? blended_move(v, reference.weights[k], moves)
+                                          : move(v, rotations[bone], reference.pivots[bone], transforms[bone].shift);
         }
     });
     return out;

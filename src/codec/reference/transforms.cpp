@@ -83,21 +83,25 @@ std::vector<PointMove> point_moves(std::span<const QuantisedTransform> transform
             return (std::int64_t{moved} << matrix_bits) -
                    (m[row] * pivot.x + m[row + 1] * pivot.y + m[row + 2] * pivot.z);
         };
-        out.push_back({m, {offset(0, to.x), offset(3, to.y), offset(6, to.z)}});
+        auto& move = out.emplace_back(PointMove{{}, {offset(0, to.x), offset(3, to.y), offset(6, to.z)}});
+        for (std::size_t k = 0; k < m.size(); ++k) move.rotation[k] = static_cast<double>(m[k]);
     }
     return out;
 }
 
 // The handles' matrices and offsets are blended first, which takes fewer products than to blend the places.
 LatticePoint blended_move(LatticePoint point, const VertexWeights& weights, std::span<const PointMove> moves) {
-    RotationMatrix m{};
+    std::array<double, 10> rotation{};  // whole numbers below 2^37
     WeightedSum offset{};
     for (std::size_t i = 0; i < handles_per_vertex && weights.weight[i] > 0; ++i) {
         const std::int64_t weight = weights.weight[i];
+        const double share = weights.weight[i];
         const PointMove& move = moves[weights.handle[i]];
-        for (std::size_t k = 0; k < m.size(); ++k) m[k] += weight * move.rotation[k];
+        for (std::size_t k = 0; k < rotation.size(); ++k) rotation[k] += share * move.rotation[k];
         for (std::size_t c = 0; c < offset.size(); ++c) offset[c] += weight * move.offset[c];
     }
+    RotationMatrix m;
+    for (std::size_t k = 0; k < m.size(); ++k) m[k] = static_cast<std::int64_t>(rotation[k]);
     const auto along = [&](std::size_t row, std::int64_t start) {
         return within_lattice(rounded(start + m[row] * point.x + m[row + 1] * point.y + m[row + 2] * point.z));
     };

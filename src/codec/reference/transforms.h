@@ -49,9 +49,10 @@ std::vector<RotationMatrix> rotation_matrices(std::span<const QuantisedTransform
 // One point moved by one transform; the result is clamped to the lattice.
 LatticePoint move(LatticePoint point, const RotationMatrix& matrix, LatticePoint pivot, LatticePoint shift);
 
-// A transform as it moves any point: R point + offset, the latter in units of 2^-matrix_bits.
+// A transform as it moves any point: R point + offset, both in units of 2^-matrix_bits. The matrix is in doubles, which
+// hold it and what is blended of it exactly, and ten for nine: vectors of two are faster than whole numbers of 64 bits.
 struct PointMove {
-    RotationMatrix rotation;
+    std::array<double, 10> rotation;  // the last is 0
     std::array<std::int64_t, 3> offset;
 };
 // pivots: one per transform.

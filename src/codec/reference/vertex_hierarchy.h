@@ -17,6 +17,7 @@
 #include <span>
 #include <vector>
 
+#include "core/geometry.h"
 #include "core/lattice.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
@@ -44,6 +45,7 @@ struct HierarchyLevel {
     // The predicted difference is the sum of slope * (mean of the neighbour - own mean), by the gradient that fits best
     // in the least-squares sense. In 1/2^slope_bits, |.| <= 2^15. Zero without a second.
     std::vector<std::int32_t> slopes;
+    bool mutual = true;  // every node is a neighbour of its neighbours; not where rows are at their limit
 
     std::size_t size() const { return first.size(); }
 };
@@ -63,7 +65,9 @@ struct VertexHierarchy {
 // Accepts any triangles: non-manifold, duplicate, degenerate, none. Every level has at most three quarters of the nodes
 // of the one below, plus one. Apart from sorting, time is linear in vertices plus triangles. Errors: bad_input if a
 // triangle names a vertex that does not exist or a position is off the lattice; limit above 2^28 vertices or triangles.
+// around: of these triangles, where it is known; or null.
 Result<VertexHierarchy> build_vertex_hierarchy(std::span<const LatticePoint> positions,
-                                               std::span<const Triangle> triangles);
+                                               std::span<const Triangle> triangles,
+                                               const VerticesAround* around = nullptr);
 
 }  // namespace htvm::internal

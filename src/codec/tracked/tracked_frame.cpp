@@ -62,6 +62,14 @@ std::vector<Surroundings> surroundings(std::span<const Triple> values, std::span
     return out;
 }
 
+// The triangles that have one of the vertices that are marked.
+std::vector<Triangle> triangles_at(std::span<const Triangle> triangles, const std::vector<std::uint8_t>& marked) {
+    std::vector<Triangle> out;
+    for (const auto& t : triangles)
+        if ((marked[t[0]] | marked[t[1]] | marked[t[2]]) != 0) out.push_back(t);
+    return out;
+}
+
 std::vector<Triple> triples(std::span<const LatticePoint> positions) {
     std::vector<Triple> out;
     out.reserve(positions.size());
@@ -100,13 +108,26 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
     const std::int64_t reach = cells.step / 2;
     if (reach == 0) return out;
     const auto leader = cells.at_seams ? first_at_same_place(positions) : std::vector<std::uint32_t>{};
+    // Of a patched mesh little moves: only the triangles there, and those around what bends there, are looked at.
+    const bool in_part = cells.settled > 0 && !cells.at_seams;
+    std::vector<Triangle> nearest, near;
+    if (in_part) {
+        std::vector<std::uint8_t> marked(positions.size(), 1);
+        std::fill_n(marked.begin(), std::min<std::size_t>(cells.settled, marked.size()), std::uint8_t{0});
+        nearest = triangles_at(triangles, marked);
+        for (const auto& t : nearest)
+            for (const auto v : t) marked[v] = 1;
+        near = triangles_at(triangles, marked);
+    }
+    const auto moving = in_part ? std::span<const Triangle>(nearest) : triangles;
+    const auto bending = in_part ? std::span<const Triangle>(near) : triangles;
     const auto own = triples(positions);
-    auto around = surroundings(own, triangles, leader);
+    auto around = surroundings(own, bending, leader);
     std::vector<Triple> bend(own.size(), Triple{});  // from each vertex to the mean of its neighbours
     for (std::size_t v = 0; v < own.size(); ++v)
         for (std::size_t c = 0; c < 3 && around[v].count > 0; ++c)
             bend[v][c] = divide_rounded(around[v].sum[c] - around[v].count * own[v][c], around[v].count);
-    around = surroundings(bend, triangles, leader);
+    around = surroundings(bend, moving, leader);
     for (std::size_t v = cells.settled; v < out.size(); ++v) {
         const auto& [sum, count] = around[v];
         if (count == 0) continue;
@@ -119,7 +140,7 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
 
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing, std::int32_t step,
                                                 Threads threads, const KeptNodes& kept,
-                                                std::optional<VertexHierarchy> ahead) {
+                                                std::optional<TrackedAhead> ahead) {
     TrackedReference out;
     out.mesh = mesh;
     out.mesh.positions = averaged_within_cells(mesh.positions, mesh.triangles, step);
@@ -127,15 +148,17 @@ Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::in
     options.spacing = node_spacing;
     options.link_reach = std::max(node_spacing / 10, 1);
     Result<VertexHierarchy> hierarchy;
+    const VerticesAround around =
+        ahead ? std::move(ahead->around) : vertices_around(out.mesh.positions.size(), out.mesh.triangles);
     parallel_invoke(
         threads,
         [&] {
             if (ahead)
-                hierarchy = std::move(*ahead);
+                hierarchy = std::move(ahead->hierarchy);
             else
-                hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles);
+                hierarchy = build_vertex_hierarchy(out.mesh.positions, out.mesh.triangles, &around);
         },
-        [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options, kept); });
+        [&] { out.nodes = choose_deformation_nodes(out.mesh.positions, out.mesh.triangles, options, kept, &around); });
     out.graph = graph_of(out.nodes, out.mesh);
     if (!hierarchy) return tl::unexpected(hierarchy.error());
     out.hierarchy = std::move(*hierarchy);
@@ -155,8 +178,11 @@ std::vector<LatticePoint> moved_by_nodes(const TrackedReference& reference,
 
 std::vector<LatticePoint> displaced(std::span<const LatticePoint> positions, std::span<const Vector3d> normals,
                                     std::span<const std::int32_t> displacement) {
+    // Rounded down by cutting off: a field's values are far below 2^31, and normals no longer than one.
     const auto along = [](std::int32_t own, double normal, double distance) {
-        return within_lattice(own + static_cast<std::int64_t>(std::floor(normal * distance + 0.5)));
+        const double moved = normal * distance + 0.5;
+        const auto whole = static_cast<std::int32_t>(moved);
+        return within_lattice(std::int64_t{own} + whole - (moved < whole));
     };
     std::vector<LatticePoint> out;
     out.reserve(positions.size());

@@ -28,12 +28,17 @@ struct TrackedReference {
     VertexHierarchy hierarchy;
     CapturedCounts captured;  // what the I-frame was captured with; make_tracked_reference() does not know it
 };
+// What is derived first, for a frame that does a part of the next one's work.
+struct TrackedAhead {
+    VerticesAround around;
+    VertexHierarchy hierarchy;
+};
 // node_spacing: lattice units, > 0. step: of the mesh's positions, lattice units, where they are still to be averaged,
 // as in streams before shown_smoothed_version; else 1. threads: uses two at most. kept: of a patched mesh, what it
-// takes over of the nodes before. ahead: the mesh's hierarchy, where it is known already; then step must be 1.
+// takes over of the nodes before. ahead: of this mesh, where it is known already; then step must be 1.
 Result<TrackedReference> make_tracked_reference(const LatticeMesh& mesh, std::int32_t node_spacing, std::int32_t step,
                                                 Threads threads = {}, const KeptNodes& kept = {},
-                                                std::optional<VertexHierarchy> ahead = {});
+                                                std::optional<TrackedAhead> ahead = {});
 
 // How a mesh's positions are quantised.
 struct QuantiserCells {

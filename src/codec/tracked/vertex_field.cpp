@@ -29,32 +29,66 @@ template <std::size_t N>
 void predict_splits(const HierarchyLevel& level, const std::array<std::span<const std::int32_t>, N>& means,
                     const std::array<std::span<std::int32_t>, N>& splits) {
     constexpr std::int64_t most = std::int64_t{2} * most_mean;
-    for (std::size_t p = 0; p < level.size(); ++p) {
+    const std::span<const std::uint32_t> second = level.second, first_neighbour = level.first_neighbour,
+                                         neighbours = level.neighbours;
+    const std::span<const std::int32_t> slopes = level.slopes;
+    for (std::size_t p = 0; p < second.size(); ++p) {
         std::array<std::int64_t, N> sum{};
-        if (level.second[p] != no_node)
-            for (std::uint32_t i = level.first_neighbour[p]; i < level.first_neighbour[p + 1]; ++i)
-                for (std::size_t c = 0; c < N; ++c)
-                    sum[c] += std::int64_t{level.slopes[i]} * (means[c][level.neighbours[i]] - means[c][p]);
+        std::int64_t of_own = 0;  // how much the node's own mean takes off, in all together
+        if (second[p] != no_node) {
+            const std::uint32_t end = first_neighbour[p + 1];
+            for (std::uint32_t i = first_neighbour[p]; i < end; ++i) {
+                const std::int64_t slope = slopes[i];
+                of_own += slope;
+                for (std::size_t c = 0; c < N; ++c) sum[c] += slope * means[c][neighbours[i]];
+            }
+        }
         for (std::size_t c = 0; c < N; ++c)
-            splits[c][p] = static_cast<std::int32_t>(std::clamp(sum[c] >> slope_bits, -most, most));
+            splits[c][p] =
+                static_cast<std::int32_t>(std::clamp((sum[c] - of_own * means[c][p]) >> slope_bits, -most, most));
     }
 }
 
 }  // namespace
 
+// In 32 bits where all that is mixed is small, as on every common mesh: several nodes at once.
+void LevelPrediction::choose(const LevelMode& mode) {
+    const std::size_t nodes = now.size();
+    chosen.resize(nodes);
+    const bool with_before = mode.before > 0 && !before.empty();
+    constexpr std::int32_t small = 1 << 24;
+    std::int32_t bits = 0;  // of all, negative ones turned over
+    for (const auto x : now) bits |= x ^ (x >> 31);
+    if (with_before)
+        for (std::size_t p = 0; p < nodes; ++p)
+            bits |= (before[p] ^ (before[p] >> 31)) | (slope_before[p] ^ (slope_before[p] >> 31));
+    if (bits >= small) {
+        for (std::size_t p = 0; p < nodes; ++p) chosen[p] = of(p, mode);
+        return;
+    }
+    const auto slope = static_cast<std::int32_t>(mode.slope), weight = static_cast<std::int32_t>(mode.before);
+    if (with_before)
+        for (std::size_t p = 0; p < nodes; ++p)
+            chosen[p] = (slope * now[p] + weight * before[p] - ((slope * weight * slope_before[p]) >> 2) + 2) >> 2;
+    else
+        for (std::size_t p = 0; p < nodes; ++p) chosen[p] = (slope * now[p] + 2) >> 2;
+}
+
 void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means,
                  std::span<const std::int32_t> predicted, std::uint32_t step, std::span<const std::int32_t> rests,
                  std::vector<std::int32_t>& finer) {
-    for (std::size_t p = 0; p < level.size(); ++p) {
-        if (level.second[p] == no_node) {
-            finer[level.first[p]] = means[p];
+    const std::span<const std::uint32_t> first = level.first, second = level.second, second_share = level.second_share;
+    const std::span<std::int32_t> out = finer;
+    for (std::size_t p = 0; p < second.size(); ++p) {
+        if (second[p] == no_node) {
+            out[first[p]] = means[p];
             continue;
         }
         std::int64_t difference = predicted[p];
         if (rests[p] != 0) difference += rests[p] * split_step(step, level.split_scale[p]);
-        const SplitMeans children = split_mean(means[p], difference, level.second_share[p]);
-        finer[level.first[p]] = children.first;
-        finer[level.second[p]] = children.second;
+        const SplitMeans children = split_mean(means[p], difference, second_share[p]);
+        out[first[p]] = children.first;
+        out[second[p]] = children.second;
     }
 }
 
@@ -147,13 +181,39 @@ void FieldWalk::end_level(std::size_t k, std::size_t c, const LevelMode& mode) {
     component.above = std::move(below);
 }
 
-LevelMagnitudes FieldWalk::magnitudes(std::size_t k, std::size_t c) const {
-    const ComponentWalk& component = components[c];
-    LevelMagnitudes out{.above = component.above, .before = {}, .other = {}, .third = {}};
-    if (component.before) out.before = component.before->magnitude[k];
-    if (c > 0) out.other = components[c - 1].rests[k];
-    if (c > 1) out.third = components[c - 2].rests[k];
-    return out;
+void FieldWalk::find_contexts(std::size_t k, std::size_t c) {
+    using C = SplitContext;
+    ComponentWalk& component = components[c];
+    const std::size_t nodes = hierarchy.levels[k].size();
+    const auto three = [](std::uint8_t magnitude) { return std::min<std::uint8_t>(magnitude, C::magnitudes - 1); };
+    const std::span<std::uint8_t> active = component.active;
+    component.activity.assign(nodes, 0);
+    auto& contexts = component.contexts;
+    contexts.by_level.resize(nodes);
+    contexts.by_before.assign(nodes, 0);
+    contexts.by_other.assign(nodes, 0);
+    const std::span<std::uint8_t> by_level = contexts.by_level, by_before = contexts.by_before,
+                                  by_other = contexts.by_other;
+    const auto add_other = [&](const std::vector<std::uint8_t>& magnitude, int weight) {
+        const std::span<const std::uint8_t> of = magnitude;
+        for (std::size_t p = 0; p < nodes; ++p)
+            by_other[p] = static_cast<std::uint8_t>(by_other[p] + weight * three(of[p]));
+    };
+    constexpr int magnitudes = C::magnitudes;
+    if (c > 0) add_other(components[c - 1].plane.magnitude[k], magnitudes * magnitudes * magnitudes);
+    if (c > 1) add_other(components[c - 2].plane.magnitude[k], magnitudes * magnitudes);
+    add_other(component.above, magnitudes);
+    if (component.before) {
+        add_other(component.before->magnitude[k], 1);
+        const std::span<const std::uint8_t> before = component.before->magnitude[k];
+        for (std::size_t p = 0; p < nodes; ++p)
+            by_before[p] = static_cast<std::uint8_t>(static_cast<int>(C::activities) * three(before[p]));
+    }
+    const std::span<const std::uint8_t> above = component.above;
+    for (std::size_t p = 0; p < nodes; ++p) {
+        by_level[p] = static_cast<std::uint8_t>(static_cast<int>(C::activities) * three(above[p]));
+        active[p] = activity_above(above[p]);
+    }
 }
 
 FieldHistory history_of(FieldWalk& walk, bool turned) {
@@ -238,7 +298,8 @@ void read_field(FieldWalk& walk, FieldReader& reader) {
         for (std::size_t c = 0; c < walk.components.size(); ++c) {
             if (walk.components[c].step == 0) continue;
             const LevelMode mode = code_mode(reader, walk, walk.components[c].last, {});
-            if (mode.coded) code_level(reader, walk, k, c, mode, [](auto, auto, auto, const auto&) { return 0; });
+            if (mode.coded)
+                code_level(reader, walk, k, c, mode, [](auto, auto, auto, const auto&, const auto&) { return 0; });
             walk.end_level(k, c, mode);
         }
     }

@@ -24,11 +24,11 @@ std::array<double, 2> mixed_cost(const Mixer<N>& mixer, const std::array<BinaryM
 // The bits of small quantised differences in one context.
 class SplitCost {
 public:
-    SplitCost(SplitModels& models, const SplitContext& context)
+    SplitCost(SplitModels& models, const SplitContext& context, const SignContext& sign)
         : models_(models),
           context_(context),
           nonzero_(mixed_cost(models.nonzero_mixer[context.level], split_detail::nonzero(models, context))),
-          negative_(mixed_cost(models.sign_mixer, split_detail::negative(models, context))) {}
+          negative_(mixed_cost(models.sign_mixer, split_detail::negative(models, sign))) {}
     double of(std::int32_t rest) const {
         if (rest == 0) return nonzero_[0];
         double bits = nonzero_[1] + negative_[rest < 0];
@@ -138,13 +138,14 @@ bool quantise_level(FieldWalk& walk, std::size_t k, std::size_t c, std::span<con
     ComponentWalk& component = walk.components[c];
     const SplitModels models_before = component.models;
     double gained = 0;  // squared steps that the rests spare
-    auto choose = [&](std::size_t p, std::int32_t predicted, std::int64_t step, const SplitContext& context) {
+    auto choose = [&](std::size_t p, std::int32_t predicted, std::int64_t step, const SplitContext& context,
+                      const auto& sign) {
         const std::int64_t difference = std::int64_t{finer[level.first[p]]} - finer[level.second[p]] - predicted;
         if (2 * std::abs(difference) < step) return 0;
         const double off = static_cast<double>(difference) / static_cast<double>(step);
         auto best = static_cast<std::int32_t>(std::round(off));
         if (lambda > 0) {
-            const SplitCost cost(component.models, context);
+            const SplitCost cost(component.models, context, sign());
             const std::int32_t inner = best + (best < 0 ? 1 : -1);
             double least = (off - best) * (off - best) + lambda * cost.of(best);
             for (const std::int32_t candidate : {inner, 0}) {

@@ -19,18 +19,27 @@
 
 namespace htvm::internal {
 
-// What is known round a difference before it is coded. Classes, each from 0 to below its limit.
+// What is known round a difference before it is coded, as the models that it selects. They follow from classes, each
+// from 0 to below its limit.
 struct SplitContext {
     static constexpr std::size_t levels = 6, magnitudes = 3, activities = 12, steeps = 8, signs = 3;
-    std::size_t level = 0;     // of the hierarchy, the finest is 0
-    std::size_t up = 0;        // magnitude of the difference above: 0, 1, more
-    std::size_t activity = 0;  // of the differences round it: those coded, and those above the ones not yet coded
-    std::size_t before = 0;    // magnitude of the same difference in the frame before
-    std::size_t other = 0;     // magnitude of the same difference in the component before
-    std::size_t third = 0;     // and in the one before that
-    std::size_t steep = 0;     // magnitude of the predicted difference over the step
-    std::size_t slope = 0;     // its sign: 0 none, 1 positive, 2 negative
-    std::size_t sign = 0;      // sign of the same difference in the component before
+    std::size_t level = 0;  // of the hierarchy, the finest is 0
+    // Of the differences round it: those coded, and those above the ones not yet coded.
+    std::size_t activity = 0;
+    // By level, the magnitude of the difference above (0, 1, more) and the activity.
+    std::size_t by_level = level * magnitudes * activities;
+    // By the magnitude of the same difference in the frame before and the activity.
+    std::size_t by_before = 0;
+    // By the magnitudes of the same difference in the component before and in the one before that, of the difference
+    // above, and of the same in the frame before.
+    std::size_t by_other = 0;
+    // By level and the magnitude of the predicted difference over the step.
+    std::size_t by_steep = level * steeps;
+};
+// The same for its sign.
+struct SignContext {
+    std::size_t by_slope = 0;  // the predicted difference's sign (0 none, 1 positive, 2 negative) and magnitude
+    std::size_t by_sign = 0;   // the sign of the same difference in the component before, and that of the predicted one
 };
 
 // Of one component.
@@ -59,31 +68,28 @@ struct SplitModels {
 
 namespace split_detail {
 
-using C = SplitContext;
-
-inline std::array<BinaryModel*, 4> nonzero(SplitModels& m, const C& c) {
-    return {&m.by_level[(c.level * C::magnitudes + c.up) * C::activities + c.activity],
-            &m.by_before[c.before * C::activities + c.activity],
-            &m.by_other[((c.other * C::magnitudes + c.third) * C::magnitudes + c.up) * C::magnitudes + c.before],
-            &m.by_steep[c.steep * C::levels + c.level]};
+inline std::array<BinaryModel*, 4> nonzero(SplitModels& m, const SplitContext& c) {
+    return {&m.by_level[c.by_level], &m.by_before[c.by_before], &m.by_other[c.by_other], &m.by_steep[c.by_steep]};
 }
 
-inline std::array<BinaryModel*, 2> negative(SplitModels& m, const C& c) {
-    return {&m.by_slope[c.slope * C::steeps + c.steep], &m.by_sign[c.sign * C::signs + c.slope]};
+inline std::array<BinaryModel*, 2> negative(SplitModels& m, const SignContext& c) {
+    return {&m.by_slope[c.by_slope], &m.by_sign[c.by_sign]};
 }
 
-inline std::array<BinaryModel*, 2> more(SplitModels& m, const C& c, std::size_t i) {
-    return {&m.more_by_activity[c.activity][i], &m.more_by_before[c.before * C::magnitudes + c.up][i]};
+inline std::array<BinaryModel*, 2> more(SplitModels& m, const SplitContext& c, std::size_t i) {
+    constexpr std::size_t above_and_before = SplitContext::magnitudes * SplitContext::magnitudes;
+    return {&m.more_by_activity[c.activity][i], &m.more_by_before[c.by_other % above_and_before][i]};
 }
 
 }  // namespace split_detail
 
 inline constexpr std::int32_t most_split = 1 << 30;  // of a quantised difference's magnitude
 
-// Codes the sign and the magnitude of a quantised difference that is not zero.
+// Codes the sign and the magnitude of a quantised difference that is not zero. Contexts are passed as values, so that
+// they are in memory only where this is called, which is seldom.
 template <class Coder>
-std::int32_t code_nonzero(Coder& coder, SplitModels& m, const SplitContext& c, std::int32_t wanted) {
-    const bool negative = code_mixed(coder, m.sign_mixer, split_detail::negative(m, c), wanted < 0);
+std::int32_t code_nonzero(Coder& coder, SplitModels& m, SplitContext c, SignContext sign, std::int32_t wanted) {
+    const bool negative = code_mixed(coder, m.sign_mixer, split_detail::negative(m, sign), wanted < 0);
     const auto rest = static_cast<std::uint32_t>(std::max(std::abs(wanted), 1) - 1);
     std::uint32_t coded = 0;
     while (coded < SplitModels::unary &&
@@ -105,12 +111,12 @@ std::int32_t code_nonzero(Coder& coder, SplitModels& m, const SplitContext& c, s
 
 // Codes one quantised difference. Coder::bit(BinaryModel&, bool) and raw(std::uint32_t, int) put what is wanted into
 // the stream, or, decoding, ignore it, and return what the stream says. Most are zero, so that this is done where it is
-// called, and what follows elsewhere.
-template <class Coder>
+// called, and what follows elsewhere. sign() gives the context of the sign.
+template <class Coder, class Sign>
 [[gnu::always_inline]] inline std::int32_t code_split(Coder& coder, SplitModels& m, const SplitContext& c,
-                                                      std::int32_t wanted) {
+                                                      const Sign& sign, std::int32_t wanted) {
     if (!code_mixed(coder, m.nonzero_mixer[c.level], split_detail::nonzero(m, c), wanted != 0)) return 0;
-    return code_nonzero(coder, m, c, wanted);
+    return code_nonzero(coder, m, c, sign(), wanted);
 }
 
 inline constexpr int field_bits = 8;  // of the fraction of means, differences and steps
@@ -148,10 +154,7 @@ struct LevelPrediction {
                    (((std::int64_t{mode.slope} * mode.before) * slope_before[node]) >> 2);
         return static_cast<std::int32_t>(std::clamp<std::int64_t>((sum + 2) >> 2, -2 * most_mean, 2 * most_mean));
     }
-    void choose(const LevelMode& mode) {
-        chosen.resize(now.size());
-        for (std::size_t p = 0; p < now.size(); ++p) chosen[p] = of(p, mode);
-    }
+    void choose(const LevelMode& mode);
 };
 
 // The two means that a node's own mean and the difference between them give.
@@ -159,11 +162,17 @@ struct SplitMeans {
     std::int32_t first, second;
 };
 inline SplitMeans split_mean(std::int32_t mean, std::int64_t difference, std::uint32_t second_share) {
-    difference = std::clamp<std::int64_t>(difference, -2 * most_mean, 2 * most_mean);
+    // Seldom: every sum of the small is small.
+    const auto beyond = [](std::int64_t x, std::int64_t most) {
+        return static_cast<std::uint64_t>(x + most) > 2 * static_cast<std::uint64_t>(most);
+    };
+    constexpr std::int64_t most_difference = std::int64_t{2} * most_mean;
+    if (beyond(difference, most_difference)) difference = difference < 0 ? -most_difference : most_difference;
     const std::int64_t part = (difference * second_share + (std::int64_t{1} << (share_bits - 1))) >> share_bits;
     const std::int64_t first = mean + part;
-    auto kept = [](std::int64_t m) {
-        return static_cast<std::int32_t>(std::clamp<std::int64_t>(m, -most_mean, most_mean));
+    auto kept = [&](std::int64_t m) {
+        if (beyond(m, most_mean)) m = m < 0 ? -most_mean : most_mean;
+        return static_cast<std::int32_t>(m);
     };
     return {kept(first), kept(first - difference)};
 }
@@ -172,13 +181,6 @@ inline SplitMeans split_mean(std::int32_t mean, std::int64_t difference, std::ui
 void split_level(const HierarchyLevel& level, std::span<const std::int32_t> means,
                  std::span<const std::int32_t> predicted, std::uint32_t step, std::span<const std::int32_t> rests,
                  std::vector<std::int32_t>& finer);
-
-// The magnitudes from which contexts are made, by node of one level.
-struct LevelMagnitudes {
-    std::span<const std::uint8_t> above;         // of the coarser level's difference that made the node
-    std::span<const std::uint8_t> before;        // of the frame before; may be empty
-    std::span<const std::int32_t> other, third;  // the same level's rests in the components before; may be empty
-};
 
 inline std::uint8_t magnitude_of(std::int32_t rest) {
     return static_cast<std::uint8_t>(std::min<std::uint32_t>(static_cast<std::uint32_t>(std::abs(rest)), 255));
@@ -196,32 +198,29 @@ inline constexpr auto activity_classes = [] {
     return classes;
 }();
 
-// around: the node's neighbours. active: what each node adds to the activity.
-inline SplitContext split_context(std::size_t k, std::size_t node, std::span<const std::uint32_t> around,
-                                  const LevelMagnitudes& magnitudes, std::span<const std::uint8_t> active,
-                                  std::int32_t predicted, std::int64_t step) {
-    SplitContext c;
-    auto three = [](std::size_t magnitude) { return std::min<std::size_t>(magnitude, 2); };
-    c.level = std::min(k, SplitContext::levels - 1);
-    c.up = three(magnitudes.above[node]);
-    std::size_t activity = 0;
-    for (const std::uint32_t neighbour : around) activity += active[neighbour];
-    c.activity = activity_classes[activity];
-    if (!magnitudes.before.empty()) c.before = three(magnitudes.before[node]);
-    if (!magnitudes.other.empty()) {
-        c.other = three(static_cast<std::size_t>(std::abs(magnitudes.other[node])));
-        c.sign = magnitudes.other[node] == 0 ? 0 : magnitudes.other[node] > 0 ? 1 : 2;
-    }
-    if (!magnitudes.third.empty()) c.third = three(static_cast<std::size_t>(std::abs(magnitudes.third[node])));
-    // The bits of 8 * |predicted| / step, without dividing.
+// The magnitude's class of the predicted difference over the step: the bits of 8 * |predicted| / step, without
+// dividing.
+inline std::size_t steep_class(std::int32_t predicted, std::int64_t step) {
     const auto steep = static_cast<std::uint64_t>(8 * std::abs(std::int64_t{predicted}));
     const auto unit = static_cast<std::uint64_t>(step);
-    const int bits = static_cast<int>(std::bit_width(steep)) - static_cast<int>(std::bit_width(unit));
-    if (bits >= 0)
-        c.steep = std::min(static_cast<std::size_t>(bits) + (steep >= unit << bits), SplitContext::steeps - 1);
-    c.slope = c.steep == 0 ? 0 : predicted > 0 ? 1 : 2;
-    return c;
+    // Neither width is that of zero, which is another case, and where it matters neither changes.
+    const int bits = static_cast<int>(std::bit_width(steep | 1)) - static_cast<int>(std::bit_width(unit | 1));
+    if (bits < 0) return 0;
+    return std::min(static_cast<std::size_t>(bits) + (steep >= unit << bits), SplitContext::steeps - 1);
 }
+
+inline SignContext sign_context(std::int32_t predicted, std::size_t steep, std::int32_t other) {
+    using C = SplitContext;
+    const std::size_t slope = steep == 0 ? 0 : predicted > 0 ? 1 : 2;
+    const std::size_t sign = other == 0 ? 0 : other > 0 ? 1 : 2;
+    return {.by_slope = slope * C::steeps + steep, .by_sign = sign * C::signs + slope};
+}
+
+// The parts of a level's contexts that are known before the first of its differences is coded, by node.
+struct LevelContexts {
+    std::vector<std::uint8_t> by_level, by_before;  // without the level and the activity
+    std::vector<std::uint8_t> by_other;
+};
 
 // One component of a field while its levels are coded, from the top to the finest. Components know of each other what
 // the contexts need: the rests of those before at the same level.
@@ -233,7 +232,9 @@ struct ComponentWalk {
     LevelMode last;                                // of the level above, which most levels repeat
     std::vector<std::uint8_t> above;               // magnitudes by node of the level at hand
     std::vector<std::vector<std::int32_t>> rests;  // by level and node
-    std::vector<std::uint8_t> active;              // of the level at hand, see split_context
+    std::vector<std::uint8_t> active;              // of the level at hand, what each node adds to the activity
+    std::vector<std::uint16_t> activity;           // around each node, where the level is mutual
+    LevelContexts contexts;
     LevelPrediction prediction;
 };
 
@@ -251,39 +252,73 @@ struct FieldWalk {
     void begin_level(std::size_t k, std::size_t c);                       // predicts its differences
     void begin_level(std::size_t k);                                      // of all components, which is faster
     void end_level(std::size_t k, std::size_t c, const LevelMode& mode);  // sets the means of the finer level
-    LevelMagnitudes magnitudes(std::size_t k, std::size_t c) const;
+    void find_contexts(std::size_t k, std::size_t c);                     // before its differences are coded
 
 private:
     void prepare_level(std::size_t k, std::size_t c);
 };
 
-// Codes the differences of one level and component into its rests and magnitudes. choose(node, predicted, step,
-// context) gives the rest that is wanted; decoding, anything.
+// Codes the differences of one level and component into its rests and magnitudes, which are zero. choose(node,
+// predicted, step, context, sign) gives the rest that is wanted; decoding, anything.
 template <class Coder, class Choose>
 void code_level(Coder& coder, FieldWalk& walk, std::size_t k, std::size_t c, const LevelMode& mode,
                 const Choose& choose) {
+    using C = SplitContext;
     const HierarchyLevel& level = walk.hierarchy.levels[k];
     ComponentWalk& component = walk.components[c];
     component.prediction.choose(mode);
-    const LevelMagnitudes magnitudes = walk.magnitudes(k, c);
+    walk.find_contexts(k, c);
     // Bytes are written here, which could be part of anything that is not a copy.
     const std::span<const std::int32_t> chosen = component.prediction.chosen;
     const std::span<std::uint8_t> own = component.plane.magnitude[k], active = component.active;
+    const std::span<const std::uint8_t> by_level = component.contexts.by_level, by_other = component.contexts.by_other,
+                                        by_before = component.contexts.by_before;
     const std::span<std::int32_t> rests = component.rests[k];
-    const std::span<const std::uint32_t> second = level.second, first_neighbour = level.first_neighbour,
-                                         neighbours = level.neighbours;
+    const std::span<const std::int32_t> other =
+        c > 0 ? std::span<const std::int32_t>(walk.components[c - 1].rests[k]) : std::span<const std::int32_t>();
+    const std::span<const std::uint32_t> second = level.second, first_neighbour = level.first_neighbour;
+    const std::span<const std::uint32_t> neighbours = level.neighbours;
     const std::span<const std::uint16_t> split_scale = level.split_scale;
     const std::uint32_t step = component.step;
-    for (std::size_t p = 0; p < second.size(); ++p) active[p] = activity_above(magnitudes.above[p]);
+    const std::size_t depth = std::min(k, C::levels - 1);
+    const std::size_t first_by_level = depth * C::magnitudes * C::activities, first_by_steep = depth * C::steeps;
+    // Most nodes add nothing, so that it is faster to add what a node does to its neighbours than to ask them.
+    const bool mutual = level.mutual;
+    const std::span<std::uint16_t> activities = component.activity;
+    const auto add_around = [&](std::size_t p, int change) {
+        for (std::uint32_t i = first_neighbour[p]; i < first_neighbour[p + 1]; ++i)
+            activities[neighbours[i]] = static_cast<std::uint16_t>(activities[neighbours[i]] + change);
+    };
+    if (mutual)
+        for (std::size_t p = 0; p < second.size(); ++p)
+            if (active[p] != 0) add_around(p, active[p]);
     for (std::size_t p = 0; p < second.size(); ++p) {
+        std::int32_t rest = 0;
         if (second[p] != no_node) {
             const std::int64_t unit = split_step(step, split_scale[p]);
-            const auto around = neighbours.subspan(first_neighbour[p], first_neighbour[p + 1] - first_neighbour[p]);
-            const SplitContext context = split_context(k, p, around, magnitudes, active, chosen[p], unit);
-            rests[p] = code_split(coder, component.models, context, choose(p, chosen[p], unit, context));
-            own[p] = magnitude_of(rests[p]);
+            std::size_t active_around = 0;
+            if (mutual)
+                active_around = activities[p];
+            else
+                for (std::uint32_t i = first_neighbour[p]; i < first_neighbour[p + 1]; ++i)
+                    active_around += active[neighbours[i]];
+            const std::size_t activity = activity_classes[active_around];
+            const std::size_t steep = steep_class(chosen[p], unit);
+            const SplitContext context{.level = depth,
+                                       .activity = activity,
+                                       .by_level = first_by_level + by_level[p] + activity,
+                                       .by_before = by_before[p] + activity,
+                                       .by_other = by_other[p],
+                                       .by_steep = first_by_steep + steep};
+            const auto sign = [&] { return sign_context(chosen[p], steep, other.empty() ? 0 : other[p]); };
+            rest = code_split(coder, component.models, context, sign, choose(p, chosen[p], unit, context, sign));
         }
-        active[p] = activity_coded(own[p]);
+        if (rest == 0 && active[p] == 0) continue;
+        rests[p] = rest;
+        own[p] = magnitude_of(rest);
+        const std::uint8_t now = activity_coded(own[p]);
+        if (mutual) add_around(p, now - active[p]);
+        active[p] = now;
     }
 }
 
@@ -303,7 +338,8 @@ void code_root(Coder& coder, ComponentWalk& component, std::size_t vertex_count,
     const std::int64_t unit = root_step(component.step, vertex_count);
     const std::int64_t from = component.before ? component.before->mean.back()[0] : 0;
     constexpr SplitContext context{.level = SplitContext::levels - 1};
-    const std::int32_t quantised = code_split(coder, component.models, context, wanted);
+    const std::int32_t quantised = code_split(
+        coder, component.models, context, [] { return SignContext{}; }, wanted);
     component.plane.mean.back()[0] =
         static_cast<std::int32_t>(std::clamp<std::int64_t>(from + quantised * unit, -most_mean, most_mean));
 }
