@@ -612,11 +612,10 @@ SurfacePoint SurfaceIndex::closest_facing(const Point3f& query, const Point3f& n
     return found(best);
 }
 
-SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std::uint32_t& guess, bool along) const {
+SurfacePoint SurfaceIndex::closest_within(const Point3f& query, float reach, std::uint32_t& guess) const {
     // The corners of a triangle within reach may be farther away.
     constexpr float longest_side = 4;  // spacings of the vertices
-    const auto match =
-        nearest_facing(query, {}, {.reach = reach + longest_side * fine_gap, .agreement = -2, .along = along}, guess);
+    const auto match = nearest_facing(query, {}, {.reach = reach + longest_side * fine_gap, .agreement = -2}, guess);
     if (!match.found) return {};
     guess = match.index;
     const auto best = closest_around(match.index, query, nullptr);

@@ -211,8 +211,8 @@ public:
 
     // The closest point of the surface near the query, however it faces: on the triangles around the nearest vertex
     // within reach, then around their corners, as long as the distance shrinks. Finds less than closest() does under
-    // long triangles, and is faster. Needs options.cell > 0. guess, along: as of closest_facing().
-    SurfacePoint closest_within(const Point3f& query, float reach, std::uint32_t& guess, bool along = false) const;
+    // long triangles, and is faster. Needs options.cell > 0. guess: as of closest_facing().
+    SurfacePoint closest_within(const Point3f& query, float reach, std::uint32_t& guess) const;
 
     // Whether the triangles around a vertex go all the way round it: it lies on no border, nor where surfaces touch. Of
     // fans of more than eight this is not known, and false. Needs options.cell > 0.

@@ -437,7 +437,8 @@ std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, std::vec
     return squared;
 }
 
-// near: of each sample a decoded vertex that may be beside it.
+// Searched among all of the decoded mesh: found along it, what is lost is noticed later, and a dancer takes 7 to 10 %
+// more bits. near: of each sample a decoded vertex that may be beside it.
 TrackedFit fit_of_captured(const SurfaceSamples& captured, std::span<const std::uint32_t> near,
                            const SurfaceIndex& decoded, const TrackedFitOptions& options) {
     const auto reach = static_cast<float>(options.reach);
@@ -450,7 +451,7 @@ TrackedFit fit_of_captured(const SurfaceSamples& captured, std::span<const std::
                          std::uint32_t guess = OrientedPoints::no_point;
                          for (std::size_t i = row * in_a_row; i < std::min(squared.size(), (row + 1) * in_a_row); ++i) {
                              if (near[i] != OrientedPoints::no_point) guess = near[i];
-                             const auto found = decoded.closest_within(captured.points[i], reach, guess, true);
+                             const auto found = decoded.closest_within(captured.points[i], reach, guess);
                              if (found.found())
                                  squared[i] = std::min(squared[i], static_cast<double>(found.squared_distance));
                          }
