@@ -470,8 +470,8 @@ void add_encode(CLI::App& app, Run& run) {
     command
         ->add_option("--deadline", options->deadline,
                      "Milliseconds from when a mesh is there to when its packet is: where a frame would be late, less\n"
-                     "is searched for it (see --effort), at last its motion alone is coded; no frame is left out.\n"
-                     "How many were late or got less is said at the end")
+                     "is searched for it (see --effort), at last its motion alone is coded, and lost tracking is\n"
+                     "repaired in a later one; no frame is left out. How many were late or got less is said at the end")
         ->check(CLI::Range(1.0, 60000.0))
         ->type_name("MS")
         ->group(pace);

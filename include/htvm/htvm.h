@@ -549,11 +549,12 @@ htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_seco
  * coded, for a frame that would be late otherwise. HTVM_BAD_INPUT: above 9, or another profile than the tracked one. */
 htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort);
 
-/* may_repair is asked, with user, while a frame is coded and tracking turns out to be lost in it: whether that is
- * repaired at once, which takes three to ten times as long as other frames; 0: the frame is sent as it was tracked, and
- * a later one is asked anew. It may be called from a thread of the encoder's. NULL: always. HTVM_BAD_INPUT: another
- * profile than the tracked one. */
-htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, int (*may_repair)(void* user), void* user);
+/* Of the meshes sent from now on. may_repair is asked, with user, while a frame is coded and tracking turns out to be
+ * lost in it: whether that is repaired at once, which takes three to ten times as long as other frames; 0: the frame is
+ * sent as it was tracked, and a later one is asked anew. It may be called from a thread of the encoder's. NULL: always.
+ * HTVM_BAD_INPUT: another profile than the tracked one. */
+typedef int (*htvm_may_repair)(void* user);
+htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, htvm_may_repair may_repair, void* user);
 
 /* Ends the sequence: codes what is held. No mesh may be sent afterwards. HTVM_OUT_OF_MEMORY: nothing has ended. */
 htvm_status htvm_encoder_finish(htvm_encoder* encoder);

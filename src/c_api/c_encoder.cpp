@@ -338,7 +338,7 @@ htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort) {
     });
 }
 
-htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, int (*may_repair)(void* user), void* user) {
+htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, htvm_may_repair may_repair, void* user) {
     if (!encoder) return HTVM_BAD_INPUT;
     return guarded(encoder->error, [&] {
         std::function<bool()> asks;
