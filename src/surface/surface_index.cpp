@@ -537,7 +537,13 @@ Neighbour SurfaceIndex::nearest_along(const Point3f& query, std::uint32_t from) 
     Neighbour best{from, squared_distance_of(fans_[from].own, query)};
     for (;;) {
         const auto walk = fans_.walk(query, best.index, best.squared_distance);
-        best = {walk.vertex, squared_distance_of(fans_[walk.vertex].own, query)};
+        if (walk.vertex != best.index) {
+            // To a walk distances that differ by less than a millionth are equal: only what is truly nearer counts, or
+            // two vertices could lead to each other for ever.
+            const Neighbour there{walk.vertex, squared_distance_of(fans_[walk.vertex].own, query)};
+            if (!(there.squared_distance < best.squared_distance)) return best;
+            best = there;
+        }
         if (walk.ended) return best;
         const auto here = best.index;
         for (const auto t : around.of(here))

@@ -55,7 +55,8 @@ struct FanSearches {
     void (*set_fan)(std::span<const Vector3f> positions, std::span<const Triangle> triangles,
                     const TrianglesAround& around, std::uint32_t vertex, VertexFan& fan);
     // From vertex to vertex as long as the distance to the query shrinks, as far as fans are regular. squared_distance:
-    // of the query from the vertex where it begins.
+    // of the query from the vertex where it begins. Where distances differ by less than a millionth, the vertex found
+    // may be the farther one.
     FanWalk (*walk)(std::span<const VertexFan> fans, const Vector3f& query, std::uint32_t from, float squared_distance);
     // The triangle of a regular fan that is nearest to the query. facing: null if all may be found. Distances that
     // differ by less than a millionth count as equal.
