@@ -160,12 +160,14 @@ Result<std::vector<LoggedFrame>> read_effort_log(const std::filesystem::path& pa
                                 path.string(), line, what));
     };
     std::size_t line = 0;
+    std::ptrdiff_t columns = 0;
     for (std::size_t at = 0; at < text.size();) {
         const auto end = std::min(text.find('\n', at), text.size());
         const auto row = text.substr(at, end - at);
         at = end + 1;
         if (++line == 1) {
             if (row.rfind("frame,effort", 0) != 0) return wrong(line, "this is no effort log");
+            columns = std::count(row.begin(), row.end(), ',');
             continue;
         }
         if (row.empty()) continue;
@@ -177,8 +179,9 @@ Result<std::vector<LoggedFrame>> read_effort_log(const std::filesystem::path& pa
         if (frame != static_cast<double>(out.size())) return wrong(line, "frames are not numbered from 0 on");
         if (!(effort >= 0 && effort <= 9) || effort != static_cast<int>(effort))
             return wrong(line, "an effort is 0 to 9");
-        const auto commas = std::count(row.begin(), row.end(), ',');
-        const auto repaired = commas < 4 ? "1" : row.substr(row.rfind(',') + 1);
+        const auto repaired = columns < 4 ? "1" : row.substr(row.rfind(',') + 1);
+        if (std::count(row.begin(), row.end(), ',') != columns)
+            return wrong(line, "a column is missing, or one too many");
         if (repaired != "0" && repaired != "1") return wrong(line, "whether it was repaired is 0 or 1");
         out.push_back({static_cast<int>(effort), repaired == "1"});
     }

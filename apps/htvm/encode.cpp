@@ -140,8 +140,13 @@ bool may_be_live(const std::string& output) {
 
 // ---- The passes -----------------------------------------------------------------------------------------------------
 
+// Whether frames go by a clock, or by the log of a run that did.
+bool is_paced(const EncodeOptions& options) {
+    return options.deadline > 0 || !options.effort_log.empty() || !options.repeat_efforts.empty();
+}
+
 int fewest_passes(const EncodeOptions& options, const EncoderOptions& settings) {
-    if (!(settings.rate.bits_per_second > 0) || options.deadline > 0) return 1;
+    if (!(settings.rate.bits_per_second > 0) || is_paced(options)) return 1;
     if (options.encoding.passes > 0) return options.encoding.passes;
     return is_piped(options.capture) ? 1 : 2;
 }
@@ -361,6 +366,7 @@ void check_waiting(const EncodeOptions& options) {
         throw CLI::ValidationError("--latency-frames",
                                    "lets a frame wait for the next one, while --deadline counts the time until it is "
                                    "coded: give one of them");
+    if (std::isnan(options.deadline)) throw CLI::ValidationError("--deadline", "is a number of milliseconds, not nan");
 }
 
 // What goes with the clock, frame after frame.
@@ -414,7 +420,8 @@ Result<void> encode(const EncodeOptions& options) {
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
     if (auto set = set_texture(options, *capture, *settings); !set) return set;
-    if (settings->tracked.group == 0 && may_not_wait(options)) settings->tracked.group = 1;
+    // A run and its repetition make the same of an effort.
+    if (settings->tracked.group == 0 && (may_not_wait(options) || is_paced(options))) settings->tracked.group = 1;
     // Nobody waits for the frames of a file.
     if (!is_given(options.encoding, "latency_frames") && !is_piped(options.capture) && !may_be_live(options.output) &&
         options.deadline == 0 && options.effort_log.empty())

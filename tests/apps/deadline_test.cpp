@@ -187,6 +187,8 @@ TEST_F(EffortLog, ThatIsNoneIsRefusedWithItsLine) {
         write(std::string("frame,effort\n") + row + "\n");
         EXPECT_EQ(error(), ", line 2: an effort is 0 to 9" + what) << row;
     }
+    write("frame,effort,waited_ms,took_ms,repaired\n0,5,0,0\n");
+    EXPECT_EQ(error(), ", line 2: a column is missing, or one too many" + what);
     write("frame,effort,waited_ms,took_ms,repaired\n0,5,0,0,2\n");
     EXPECT_EQ(error(), ", line 2: whether it was repaired is 0 or 1" + what);
     write("frame,effort\n0\n");

@@ -45,7 +45,7 @@ expect 2 "--session" "$htvm" encode capture --session never -o x.htvm
 
 # ---- Seeking and editing without encoding again ---------------------------------------------------------------------
 
-"$htvm" synth walk --frames 12 --vertices 300 >/dev/null 2>&1
+"$htvm" synth walk --frames 12 --vertices 400 >/dev/null 2>&1
 "$htvm" encode walk --keyint 4 -o walk.htvm 2>/dev/null
 "$htvm" decode walk.htvm -o whole 2>/dev/null
 # packets FILE: a line per packet: its offset, its size, its kind, its frame.
