@@ -5,11 +5,9 @@
 // A frame's time is the least of its rounds; of processor time, which hardly depends on what else the machine does, and
 // of real time.
 #include <fmt/core.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -19,11 +17,14 @@
 #include <utility>
 #include <vector>
 
+#include "clocks.h"
 #include "core/crc32.h"
 #include "htvm/decoder.hpp"
 #include "htvm/packet.hpp"
 
 namespace {
+
+using htvm::pace::milliseconds, htvm::pace::processor_milliseconds;
 
 struct Options {
     std::vector<std::string> streams;
@@ -32,17 +33,6 @@ struct Options {
     double vertices = 0;
     bool each = false;
 };
-
-double processor_milliseconds() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto of = [](const timeval& t) { return 1e3 * static_cast<double>(t.tv_sec) + 1e-3 * double(t.tv_usec); };
-    return of(usage.ru_utime) + of(usage.ru_stime);
-}
-
-double milliseconds() {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 std::vector<htvm::Packet> packets_of(const std::string& path) {
     std::ifstream file(path, std::ios::binary);

@@ -4,22 +4,23 @@
 //
 // Processor time hardly depends on what else the machine does; real time does.
 #include <fmt/core.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <cstdio>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "clocks.h"
 #include "htvm/encoder.hpp"
 #include "io/mesh_file.h"
 #include "io/sequence.h"
 #include "synth/synth.h"
 
 namespace {
+
+using htvm::pace::milliseconds, htvm::pace::processor_milliseconds;
 
 struct Options {
     std::string capture, profile = "tracked";
@@ -29,17 +30,6 @@ struct Options {
     int effort = 5, latency_frames = 0, vertices = 35000;
     bool each = false;
 };
-
-double processor_milliseconds() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto of = [](const timeval& t) { return 1e3 * static_cast<double>(t.tv_sec) + 1e-3 * double(t.tv_usec); };
-    return of(usage.ru_utime) + of(usage.ru_stime);
-}
-
-double milliseconds() {
-    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
 
 struct Captured {
     htvm::Mesh mesh;
