@@ -537,7 +537,8 @@ const char* htvm_encoder_last_error(const htvm_encoder* encoder);
  * lost it (not allowed for the first frame), or if there is no skeleton. Timestamps must ascend. force_intra: 1 for an
  * I-frame. HTVM_BAD_INPUT: the mesh or pose is invalid; HTVM_LIMIT: under rate control, a frame that does not fit the
  * buffer. After an error the frame is not part of the stream, and the next may be sent. With the option tracked.group,
- * frames are held until their group is whole: none or several packets come at once then. */
+ * frames are held until their group is whole: none or several packets come at once then. With latency_frames a call
+ * codes a frame sent before, and an error may be of that one: it is not part of the stream then. */
 htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh, const htvm_pose* pose,
                                    int64_t timestamp_us, int force_intra);
 
@@ -556,7 +557,8 @@ htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort);
 typedef int (*htvm_may_repair)(void* user);
 htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, htvm_may_repair may_repair, void* user);
 
-/* Ends the sequence: codes what is held. No mesh may be sent afterwards. HTVM_OUT_OF_MEMORY: nothing has ended. */
+/* Ends the sequence: codes what is held. No mesh may be sent afterwards. After an error nothing has ended: the held
+ * frame that failed is not part of the stream, and a second call goes on with the others. */
 htvm_status htvm_encoder_finish(htvm_encoder* encoder);
 
 /* Copies the next packet, ready to be stored or sent. *size is set to its size in bytes. HTVM_BUFFER_TOO_SMALL if

@@ -316,7 +316,7 @@ htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh,
             encoder->encoder.push(cpp_mesh, with_pose ? &cpp_pose : nullptr, timestamp_us, force_intra != 0);
         if (!pushed) return error.set(pushed.error());
         if (const auto bounds = encoder->encoder.bounds()) encoder->indexer.add(*bounds);
-        encoder->any_frame = true;
+        encoder->any_frame = encoder->any_frame || !encoder->encoder.coded_frames().empty();
         encoder->attributes = htvm::c_api::attributes_of(htvm::view_of(cpp_mesh));
         return htvm_status{HTVM_OK};
     });
@@ -354,6 +354,7 @@ htvm_status htvm_encoder_finish(htvm_encoder* encoder) {
         if (encoder->finished) return htvm_status{HTVM_OK};
         if (const auto finished = encoder->encoder.finish(); !finished) return encoder->error.set(finished.error());
         if (const auto bounds = encoder->encoder.bounds()) encoder->indexer.add(*bounds);
+        encoder->any_frame = encoder->any_frame || !encoder->encoder.coded_frames().empty();
         encoder->finished = true;
         return htvm_status{HTVM_OK};
     });

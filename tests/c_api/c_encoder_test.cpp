@@ -239,6 +239,30 @@ TEST(CEncoder, TellsOfTheLastFrame) {
     EXPECT_EQ(info.type, std::uint32_t{HTVM_FRAME_INTRA}) << "forced";
 }
 
+TEST(CEncoder, WithLatencyAFrameComesACallLaterAndTheLastOnesAtTheEnd) {
+    const auto options = make_options();
+    ASSERT_EQ(htvm_encoder_options_set(options.get(), "latency_frames", "1"), HTVM_OK);
+    const auto encoder = make_encoder(options.get());
+    const auto sequence = sequence_of(tfan_test::grid(5, 5), 2, all);
+    std::vector<std::uint8_t> packets;
+    htvm_frame_info info;
+    const auto send = [&](const Mesh& frame, std::int64_t timestamp_us) {
+        const auto mesh = c_mesh(frame);
+        EXPECT_EQ(htvm_encoder_send_mesh(encoder.get(), &mesh, nullptr, timestamp_us, 0), HTVM_OK);
+        EXPECT_EQ(receive_all(encoder.get(), packets), HTVM_AGAIN);
+    };
+    send(sequence.frames[0].mesh, -6667);
+    EXPECT_TRUE(packets.empty());
+    EXPECT_EQ(htvm_encoder_last_frame(encoder.get(), &info, sizeof info), HTVM_AGAIN) << "none is coded yet";
+    send(sequence.frames[1].mesh, 26666);
+    EXPECT_FALSE(packets.empty());
+    ASSERT_EQ(htvm_encoder_last_frame(encoder.get(), &info, sizeof info), HTVM_OK);
+    EXPECT_EQ(info.timestamp_us, -6667);
+    ASSERT_EQ(htvm_encoder_finish(encoder.get()), HTVM_OK);
+    EXPECT_EQ(receive_all(encoder.get(), packets), HTVM_END);
+    EXPECT_EQ(packets, bytes_of(sequence, make_options()));
+}
+
 TEST(CEncoder, APacketStaysUntilItsBufferIsLargeEnough) {
     const auto encoder = make_encoder();
     const auto frame = sequence_of(tfan_test::grid(5, 5), 1, none).frames[0].mesh;
