@@ -711,6 +711,24 @@ Guesses finer(const DeformableMesh& mesh, const Guesses& coarse) {
     return out;
 }
 
+// How far apart, in mm on an adult, two motions take a handle if one of them takes it elsewhere.
+constexpr double elsewhere = 15;
+
+bool is_elsewhere(const DeformableMesh& mesh, std::size_t handle, const RigidMotion& motion, const RigidMotion& other,
+                  const DeformationOptions& options) {
+    const auto& place = mesh.handles[handle];
+    return (motion(place) - other(place)).norm() > elsewhere * options.millimetre;
+}
+
+// Whether the motion takes no limb elsewhere than `known` does.
+bool leads_to(const DeformableMesh& mesh, std::span<const RigidMotion> motion, std::span<const RigidMotion> known,
+              const DeformationOptions& options) {
+    constexpr int fewest_in_limb = 3;
+    int there = 0;
+    for (std::size_t h = 0; h < known.size(); ++h) there += is_elsewhere(mesh, h, motion[h], known[h], options) ? 1 : 0;
+    return there < fewest_in_limb;
+}
+
 double between(double from, double to, int step, int steps) {
     return steps <= 1 ? to : from * std::pow(to / from, static_cast<double>(step) / (steps - 1));
 }
@@ -719,7 +737,7 @@ double between(double from, double to, int step, int steps) {
 
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const SurfaceIndex& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options,
-                                              DeformationForm* form) {
+                                              DeformationForm* form, std::span<const RigidMotion> known) {
     std::vector<RigidMotion> motion(start.begin(), start.end());
     motion.resize(mesh.handles.size());
     if (mesh.samples.empty() || target.samples.empty()) return motion;
@@ -736,6 +754,10 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
                                  0.7f * mesh.sample_gap, true};
             const double moved = run_round(coarse, target, round, cell, memory, options).farthest;
             if (moved < options.settled * unit) i = std::max(i, options.coarse_rounds - 2);  // one more round
+            if (known.empty()) continue;
+            auto so_far = fine.motion;
+            follow_groups(mesh, coarse, so_far);
+            if (leads_to(mesh, so_far, known, options)) return {known.begin(), known.end()};
         }
         follow_groups(mesh, coarse, fine.motion);
         guesses = finer(mesh, memory.guesses);
@@ -862,11 +884,11 @@ double error_of(const LimbSamples& samples, const Moved& moved, const SurfaceInd
 
 bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
                        const DeformationOptions& options, std::vector<RigidMotion>& motions, DeformationForm* form) {
-    constexpr double elsewhere = 15;  // mm
     const double reach = options.near_reach * options.millimetre;
     std::vector<bool> differs(motions.size());
     for (std::size_t h = 0; h < motions.size(); ++h)
-        differs[h] = (motions[h](mesh.handles[h]) - other[h](mesh.handles[h])).norm() > elsewhere * options.millimetre;
+        differs[h] = is_elsewhere(mesh, h, motions[h], other[h], options);
+    if (std::find(differs.begin(), differs.end(), true) == differs.end()) return false;
     const auto beside = graph_of_handles(mesh).beside;
     Stage stage = fine_stage(mesh, motions);
     Moved moved = move_samples(stage, options.threads);

@@ -142,13 +142,15 @@ struct Seeker {
 };
 
 // The closest points that face the same way. The search by direction misses points in the middle of long triangles, so
-// where it finds nothing near, the search in all directions is tried as well.
+// where it finds nothing near, the search in all directions is tried as well. near: of each point a vertex of the
+// surface to begin with, or OrientedPoints::no_point; or none.
 std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std::span<const Point3f> points,
-                                               std::span<const Point3f> normals, const Seeker& how) {
+                                               std::span<const Point3f> normals, const Seeker& how,
+                                               std::vector<std::uint32_t> near = {}) {
     if (surface.triangles.empty()) return std::vector<SurfacePoint>(points.size());
     auto out = closest_facing(surface, points, normals,
                               {.reach = static_cast<float>(how.reach), .agreement = static_cast<float>(how.agreement)},
-                              how.threads);
+                              how.threads, near);
     parallel_for(points.size(), how.threads, 512, [&](std::size_t begin, std::size_t end) {
         std::uint32_t guess = OrientedPoints::no_point;
         for (std::size_t i = begin; i < end; ++i) {
@@ -201,10 +203,14 @@ struct Capture {
 // Distances of the tracked mesh from the capture, one per vertex: of the vertex itself, or of the middles of the
 // triangles around it on average if that is more. What lies beyond the capture's border does not count: it may be there
 // and have been out of sight.
-std::vector<double> errors_of(const LatticeMesh& decoded, const SurfaceIndex& shown, const Capture& capture,
+std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& shown, const Capture& capture,
                               const SurfacePatchOptions& options) {
     const auto& points = shown.positions;
+    const auto& decoded = tracked.decoded;
     std::vector<Point3f> samples(points), facing(shown.normals);
+    std::vector<std::uint32_t> near(tracked.near.begin(), tracked.near.end());
+    if (!near.empty())
+        for (const auto& t : decoded.triangles) near.push_back(near[t[0]]);
     for (const auto& t : decoded.triangles) {
         Vector3d middle{};
         for (const auto v : t) middle = middle + to_vector(decoded.positions[v]) * (1.0 / 3);
@@ -212,7 +218,8 @@ std::vector<double> errors_of(const LatticeMesh& decoded, const SurfaceIndex& sh
         facing.push_back(to_floats(normal_of(decoded.positions, t)));
     }
     const auto found =
-        closest_on_same_side(capture.surface, samples, facing, {options.reach, options.lost / 2, 0, options.threads});
+        closest_on_same_side(capture.surface, samples, facing, {options.reach, options.lost / 2, 0, options.threads},
+                             std::move(near));
     std::vector<double> error(samples.size());
     parallel_for(samples.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
@@ -909,8 +916,8 @@ struct SurfacePatchSearch::Measured {
     std::vector<bool> rims, bad_shape;  // what is lost whatever the error: around uncovered surface, and distorted
     double area = 0;                    // of the tracked mesh
 
-    Measured(const LatticeMesh& tracked, std::span<const LatticePoint> rest, const LatticeMesh& mesh,
-             const SurfaceIndex& index, const SurfacePatchOptions& wanted);
+    Measured(const TrackedMesh& tracked, const LatticeMesh& mesh, const SurfaceIndex& index,
+             const SurfacePatchOptions& wanted);
     void measure_sides();  // edge and area
 };
 
@@ -951,10 +958,9 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
 
 }  // namespace
 
-SurfacePatchSearch::Measured::Measured(const LatticeMesh& tracked, std::span<const LatticePoint> rest,
-                                       const LatticeMesh& mesh, const SurfaceIndex& index,
-                                       const SurfacePatchOptions& wanted)
-    : decoded(tracked), captured(mesh), surface(index), options(wanted) {
+SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const LatticeMesh& mesh,
+                                       const SurfaceIndex& index, const SurfacePatchOptions& wanted)
+    : decoded(tracked.decoded), captured(mesh), surface(index), options(wanted) {
     std::optional<SurfaceIndex> shown;
     const auto look_at_tracked = [&] {
         sides.emplace(decoded.positions, decoded.triangles);
@@ -962,14 +968,21 @@ SurfacePatchSearch::Measured::Measured(const LatticeMesh& tracked, std::span<con
         shown.emplace(
             points_of(decoded.positions), decoded.triangles,
             SurfaceIndexOptions{.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
-        bad_shape = distorted(decoded, rest, *sides, options);
+        bad_shape = distorted(decoded, tracked.rest, *sides, options);
         measure_sides();
     };
     parallel_invoke(
         options.threads, [&] { capture.emplace(make_capture(mesh, index, wanted)); }, look_at_tracked);
-    capture->on_decoded = closest_on_same_side(*shown, capture->points, capture->normals,
-                                               {options.reach, options.lost / 2, 0.2, options.threads});
-    error = errors_of(decoded, *shown, *capture, options);
+    // Where the capture's seams were closed, its vertices have other numbers.
+    const bool near = capture->points.size() == index.positions.size();
+    const TrackedMesh shown_near = {decoded, {}, near ? tracked.near : std::span<const std::uint32_t>()};
+    std::vector<std::uint32_t> beside(shown_near.near.empty() ? 0 : capture->points.size(), OrientedPoints::no_point);
+    for (std::uint32_t v = 0; v < shown_near.near.size(); ++v)
+        if (shown_near.near[v] < beside.size()) beside[shown_near.near[v]] = v;
+    capture->on_decoded =
+        closest_on_same_side(*shown, capture->points, capture->normals,
+                             {options.reach, options.lost / 2, 0.2, options.threads}, std::move(beside));
+    error = errors_of(shown_near, *shown, *capture, options);
     error_around = errors_around(shown->positions, error, *capture, options);
     rims.assign(decoded.positions.size(), false);
     add_rims_of_uncovered(*capture, decoded, options, rims);
@@ -987,11 +1000,10 @@ void SurfacePatchSearch::Measured::measure_sides() {
     for (const auto& t : decoded.triangles) area += area_of(decoded.positions, t);
 }
 
-SurfacePatchSearch::SurfacePatchSearch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
-                                       const LatticeMesh& captured, const SurfaceIndex& surface,
-                                       const SurfacePatchOptions& options) {
-    if (!captured.texcoords.empty() || captured.triangles.empty() || decoded.triangles.empty()) return;
-    measured_ = std::make_unique<const Measured>(decoded, rest, captured, surface, options);
+SurfacePatchSearch::SurfacePatchSearch(const TrackedMesh& tracked, const LatticeMesh& captured,
+                                       const SurfaceIndex& surface, const SurfacePatchOptions& options) {
+    if (!captured.texcoords.empty() || captured.triangles.empty() || tracked.decoded.triangles.empty()) return;
+    measured_ = std::make_unique<const Measured>(tracked, captured, surface, options);
 }
 SurfacePatchSearch::SurfacePatchSearch(SurfacePatchSearch&&) noexcept = default;
 SurfacePatchSearch& SurfacePatchSearch::operator=(SurfacePatchSearch&&) noexcept = default;
@@ -1033,10 +1045,9 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(double region_lost) const {
     return std::nullopt;
 }
 
-std::optional<SurfacePatch> find_surface_patch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
-                                               const LatticeMesh& captured, const SurfaceIndex& surface,
-                                               const SurfacePatchOptions& options) {
-    return SurfacePatchSearch(decoded, rest, captured, surface, options).find(options.region_lost);
+std::optional<SurfacePatch> find_surface_patch(const TrackedMesh& tracked, const LatticeMesh& captured,
+                                               const SurfaceIndex& surface, const SurfacePatchOptions& options) {
+    return SurfacePatchSearch(tracked, captured, surface, options).find(options.region_lost);
 }
 
 }  // namespace htvm::internal

@@ -32,14 +32,20 @@ struct SurfacePatchOptions {
     Threads threads = {};                       // their number does not change the result
 };
 
+// A tracked mesh to be patched.
+struct TrackedMesh {
+    const LatticeMesh& decoded;                // as the decoder has it
+    std::span<const LatticePoint> rest = {};   // its vertices in the mesh that it refers to, by which stretched and
+                                               // folded triangles are told; or none
+    std::span<const std::uint32_t> near = {};  // TrackedTargets::near, where searches begin; or none
+};
+
 // Looks for patches of one tracked mesh. What is lost is measured once, then it may be tried to replace more or less.
 class SurfacePatchSearch {
 public:
-    // decoded: the tracked mesh as the decoder has it. rest: its vertices in the mesh that it refers to, by which
-    // stretched and folded triangles are told; may be empty. surface: index by direction of `captured`. All must
-    // outlive this object.
-    SurfacePatchSearch(const LatticeMesh& decoded, std::span<const LatticePoint> rest, const LatticeMesh& captured,
-                       const SurfaceIndex& surface, const SurfacePatchOptions& options);
+    // surface: index by direction of `captured`. All must outlive this object.
+    SurfacePatchSearch(const TrackedMesh& tracked, const LatticeMesh& captured, const SurfaceIndex& surface,
+                       const SurfacePatchOptions& options);
     SurfacePatchSearch(SurfacePatchSearch&&) noexcept;
     SurfacePatchSearch& operator=(SurfacePatchSearch&&) noexcept;
     ~SurfacePatchSearch();
@@ -54,8 +60,7 @@ private:
 };
 
 // The same in one call.
-std::optional<SurfacePatch> find_surface_patch(const LatticeMesh& decoded, std::span<const LatticePoint> rest,
-                                               const LatticeMesh& captured, const SurfaceIndex& surface,
-                                               const SurfacePatchOptions& options);
+std::optional<SurfacePatch> find_surface_patch(const TrackedMesh& tracked, const LatticeMesh& captured,
+                                               const SurfaceIndex& surface, const SurfacePatchOptions& options);
 
 }  // namespace htvm::internal

@@ -139,7 +139,8 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
     std::vector<NodeMotions> others(from.size());
     parallel_for(from.size(), options.threads, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i)
-            if (i != registered.start) others[i] = register_deformation(deformable, surface, from[i], roughly);
+            if (i != registered.start)
+                others[i] = register_deformation(deformable, surface, from[i], roughly, nullptr, registered.motion);
     });
     bool any = false;
     for (std::size_t i = 0; i < others.size(); ++i)
