@@ -283,13 +283,14 @@ TargetFilterOptions filter_options(const FrameWork& work) {
 
 // before: state of the frame that it refers to; null if that is the reference.
 Result<EncodedTrackedFrame> encode_tracked(FrameWork& work, const FrameSteps& steps, TrackedParts parts,
-                                           const TrackedState* before) {
+                                           const TrackedState* before, std::span<const std::uint32_t> near = {}) {
     const auto& configuration = work.configuration;
     auto options = tracked_frame_options(configuration, steps);
     if (denoises(configuration)) options.denoise = filter_options(work);
     options.keeps_noise = configuration.options.tracked.group > 1;
     options.motion_alone = parts == TrackedParts::motion_alone;
     options.target_samples = work.effort.target_samples;
+    options.near = near;
     return encode_tracked_frame(work.mesh, work.surface(), *work.reference().decoded.tracked, work.registered_nodes(),
                                 before, work.sequence.nodes.targets, options, work.stages);
 }
@@ -406,9 +407,10 @@ Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, con
     return code_moving_part(work, steps, coded);
 }
 
-Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps) {
+Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps,
+                                             std::span<const std::uint32_t> near) {
     if (auto coded = std::exchange(work.coded_alone, std::nullopt)) return std::move(*coded);
-    return encode_tracked(work, steps, TrackedParts::all, nullptr);
+    return encode_tracked(work, steps, TrackedParts::all, nullptr, near);
 }
 
 Result<std::optional<Candidate>> code_patched(FrameWork& work, const FrameSteps& steps,
@@ -456,7 +458,9 @@ Result<std::optional<Candidate>> code_patched(FrameWork& work, const FrameSteps&
     facts.edge = work.edge();
     facts.colours = work.colours_at(out.decoded);
     clock.done("patch coding");
-    facts.fit = work.tracked_fit(out.decoded, facts.edge, {}, {});
+    std::vector<std::uint32_t> near(vertices, OrientedPoints::no_point);
+    for (std::size_t i = 0; i < patched->stays.size(); ++i) near[i] = tracked.near[patched->stays[i]];
+    facts.fit = work.tracked_fit(out.decoded, facts.edge, near, {});
     return std::optional(std::move(out));
 }
 

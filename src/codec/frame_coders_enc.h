@@ -37,7 +37,9 @@ Result<Candidate> code_renewed_intra(FrameWork& work, const FrameSteps& steps, c
 // whole EP-frame if nothing would be left to animate. coded: one per bone.
 Result<Candidate> code_coded_bones(FrameWork& work, const FrameSteps& steps, const std::vector<bool>& coded);
 // A T-frame of the reference alone, on which patches are planned: whoever joins later needs the references alone.
-Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps);
+// near: of the T-frame that was tried, Candidate::near.
+Result<EncodedTrackedFrame> code_for_patches(FrameWork& work, const FrameSteps& steps,
+                                             std::span<const std::uint32_t> near);
 // This T-frame with a patch: see surface_patch.h. Nothing where the texture's picture has no room for the patch's
 // charts.
 Result<std::optional<Candidate>> code_patched(FrameWork& work, const FrameSteps& steps,

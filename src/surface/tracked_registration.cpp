@@ -923,7 +923,7 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
 double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
                          const DeformationOptions& options) {
     if (mesh.samples.empty() || target.samples.empty()) return 0;
-    const std::size_t every = mesh.samples.size() + target.samples.size() < 2000 ? 1 : 4;
+    const std::size_t every = mesh.samples.size() + target.samples.size() < 2000 ? 1 : 16;
     const std::vector<RigidMotion> motion(motions.begin(), motions.end());
     std::vector<Point3f> points, normals;
     for (std::size_t i = 0; i < mesh.samples.size(); i += every) {

@@ -352,10 +352,10 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
         // Limbs are rarely found; where they are, what was coded meanwhile is coded again.
         std::optional<Result<EncodedTrackedFrame>> coded;
         const bool limbs_moved = work.follow_lost_limbs([&] {
-            if (may_be_patched) coded = code_for_patches(work, steps);
+            if (may_be_patched) coded = code_for_patches(work, steps, tracked->near);
         });
         if (may_be_patched) {
-            if (limbs_moved) coded = code_for_patches(work, steps);
+            if (limbs_moved) coded = code_for_patches(work, steps, tracked->near);
             if (!*coded) return tl::unexpected(coded->error());
             for_patches.emplace(std::move(**coded));
         }

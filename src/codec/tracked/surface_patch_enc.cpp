@@ -136,32 +136,49 @@ std::vector<std::vector<std::uint32_t>> border_loops(const Sides& sides, const S
 
 struct Seeker {
     double reach = 0;
-    double enough = 0;  // what is this near need not be searched for a second time
+    double enough = 0;  // what is this near need not be searched for a second time; 0: nothing is
     double agreement = 0.2;
     Threads threads = {};
 };
 
-// The closest points that face the same way. The search by direction misses points in the middle of long triangles, so
-// where it finds nothing near, the search in all directions is tried as well. near: of each point a vertex of the
-// surface to begin with, or OrientedPoints::no_point; or none.
+// The closest points that face the same way. What is found along the surface is taken where that is near enough; else
+// the search is among all that face that way, and since that misses points in the middle of long triangles, in all
+// directions as well where it finds nothing near. near: of each point a vertex of the surface to begin with, or
+// OrientedPoints::no_point; or none.
 std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std::span<const Point3f> points,
                                                std::span<const Point3f> normals, const Seeker& how,
-                                               std::vector<std::uint32_t> near = {}) {
-    if (surface.triangles.empty()) return std::vector<SurfacePoint>(points.size());
-    auto out = closest_facing(surface, points, normals,
-                              {.reach = static_cast<float>(how.reach), .agreement = static_cast<float>(how.agreement)},
-                              how.threads, near);
-    parallel_for(points.size(), how.threads, 512, [&](std::size_t begin, std::size_t end) {
-        std::uint32_t guess = OrientedPoints::no_point;
-        for (std::size_t i = begin; i < end; ++i) {
-            const double least = out[i].found() ? static_cast<double>(out[i].squared_distance) : how.reach * how.reach;
-            if (least <= how.enough * how.enough) continue;
-            const auto any = surface.closest_within(points[i], static_cast<float>(how.reach), guess);
-            if (!any.found() || static_cast<double>(any.squared_distance) >= least) continue;
-            const auto across =
-                normalised(area_vector(std::span<const Point3f>(surface.positions), surface.triangles[any.triangle]));
-            const auto facing = dot(across, to_vector(normals[i]));
-            if (facing >= how.agreement) out[i] = any;
+                                               std::span<const std::uint32_t> near = {}) {
+    std::vector<SurfacePoint> out(points.size());
+    if (surface.triangles.empty()) return out;
+    const auto reach = static_cast<float>(how.reach), agreement = static_cast<float>(how.agreement);
+    const auto is_enough = [&](const SurfacePoint& found) {
+        return found.found() && static_cast<double>(found.squared_distance) <= how.enough * how.enough;
+    };
+    const auto closest = [&](const Point3f& point, const Point3f& normal, std::uint32_t& guess) {
+        if (how.enough > 0) {
+            auto along =
+                surface.closest_facing(point, normal, {.reach = reach, .agreement = agreement, .along = true}, guess);
+            if (is_enough(along)) return along;
+        }
+        auto facing = surface.closest_facing(point, normal, {.reach = reach, .agreement = agreement}, guess);
+        if (is_enough(facing)) return facing;
+        auto from = guess;
+        const auto any = surface.closest_within(point, reach, from);
+        if (!any.found() || (facing.found() && any.squared_distance >= facing.squared_distance)) return facing;
+        const auto across =
+            normalised(area_vector(std::span<const Point3f>(surface.positions), surface.triangles[any.triangle]));
+        return dot(across, to_vector(normal)) >= how.agreement ? any : facing;
+    };
+    // Guesses may decide what is found, so they must not depend on how the threads cut the range.
+    constexpr std::size_t in_a_row = 512, ahead = 6;
+    parallel_for((points.size() + in_a_row - 1) / in_a_row, how.threads, 2, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t row = begin; row < end; ++row) {
+            std::uint32_t guess = OrientedPoints::no_point;
+            for (std::size_t i = row * in_a_row; i < std::min(points.size(), (row + 1) * in_a_row); ++i) {
+                if (i + ahead < near.size()) surface.expect(near[i + ahead]);
+                if (!near.empty() && near[i] != OrientedPoints::no_point) guess = near[i];
+                out[i] = closest(points[i], normals[i], guess);
+            }
         }
     });
     return out;
@@ -219,7 +236,7 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
     }
     const auto found =
         closest_on_same_side(capture.surface, samples, facing, {options.reach, options.lost / 2, 0, options.threads},
-                             std::move(near));
+                             near);
     std::vector<double> error(samples.size());
     parallel_for(samples.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
@@ -981,7 +998,7 @@ SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const Lattice
         if (shown_near.near[v] < beside.size()) beside[shown_near.near[v]] = v;
     capture->on_decoded =
         closest_on_same_side(*shown, capture->points, capture->normals,
-                             {options.reach, options.lost / 2, 0.2, options.threads}, std::move(beside));
+                             {options.reach, options.lost / 2, 0.2, options.threads}, beside);
     error = errors_of(shown_near, *shown, *capture, options);
     error_around = errors_around(shown->positions, error, *capture, options);
     rims.assign(decoded.positions.size(), false);

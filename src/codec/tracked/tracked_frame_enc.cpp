@@ -181,7 +181,8 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
         targets = find_tracked_targets(
             {moved, normals, triangles, reference.mesh.colours}, mesh, surface,
             {.reach = options.reach, .samples = options.target_samples, .threads = options.threads},
-            registered.form.matches);
+            options.near.empty() ? registered.form.matches
+                                 : std::vector<std::uint32_t>(options.near.begin(), options.near.end()));
         out.near = std::move(targets.near);
     }
     clock.done("targets");

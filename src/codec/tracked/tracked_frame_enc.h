@@ -35,6 +35,8 @@ struct TrackedFrameOptions {
     const RemovedNoise* noise = nullptr;         // else: what to take off them
     bool keeps_noise = false;                    // whether to tell what filtering took off
     TargetSamples target_samples = TargetSamples::middles;
+    std::span<const std::uint32_t> near = {};  // EncodedTrackedFrame::near of another attempt, where searches begin;
+                                               // none: they begin at the registration's matches
     bool motion_alone = false;  // displacement and colours stay as predicted: the smallest frame possible
     Threads threads = {};
 };
