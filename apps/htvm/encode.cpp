@@ -465,7 +465,8 @@ void add_encode(CLI::App& app, Run& run) {
         ->add_option(
             "--on-bad-frame", options->on_bad_frame,
             "What becomes of a frame that cannot be read or coded: stop (default), skip, or repeat, the frame\n"
-            "before once more. Its time is kept. With skip and repeat, frames without triangles are bad too")
+            "before once more. Its time is kept. With skip and repeat, frames without triangles are bad too, each\n"
+            "is told, and the exit code is 0. On standard input only behind a mesh that came whole")
         ->check(CLI::IsMember({"stop", "skip", "repeat"}));
     command->add_flag(
         "--fill", options->fill,

@@ -14,19 +14,25 @@ void warn_of_frame(const Pass& pass, FrameWarnings::Kind kind, const std::string
     if (pass.warnings) pass.warnings->tell(kind, line);
 }
 
-Result<void> drain(const Pass& pass) {
+Result<void> write(Pass& pass, Packet packet) {
+    auto written = pass.write(std::move(packet));
+    if (!written) pass.may_go_on = false;
+    return written;
+}
+
+Result<void> drain(Pass& pass) {
     while (auto packet = pass.encoder.pull()) {
         pass.rate.buffer.add(*packet);
         if (!pass.write) continue;
         const PacketHeader header = *packet;
         const auto bytes = packet->payload.size() + packet_overhead;
-        if (auto written = pass.write(std::move(*packet)); !written) return written;
+        if (auto written = write(pass, std::move(*packet)); !written) return written;
         if (!pass.pictures) continue;
         auto picture = pass.pictures->behind(header, bytes);
         if (!picture) return tl::unexpected(picture.error());
         if (!*picture) continue;
         pass.rate.buffer.add(**picture);
-        if (auto written = pass.write(std::move(**picture)); !written) return written;
+        if (auto written = write(pass, std::move(**picture)); !written) return written;
     }
     return {};
 }
@@ -205,8 +211,13 @@ Result<void> take_bad(Pass& pass, const Error& error) {
     auto& summary = pass.summary;
     const auto& policy = pass.options.on_bad_frame;
     if (pass.is_stopped() || error.kind == ErrorKind::disk_full) return tl::unexpected(error);
-    if (!pass.capture.survives_errors()) return tl::unexpected(error);
-    if (is_of_rate(pass, error)) return tl::unexpected(error);  // no frame is bad
+    if (!pass.may_go_on || is_of_rate(pass, error)) return tl::unexpected(error);  // no frame is bad
+    if (!pass.capture.survives_errors())
+        return policy == "stop"
+                   ? tl::unexpected(error)
+                   : fail(error.kind, fmt::format("{} (--on-bad-frame {} goes on behind meshes that came whole, which "
+                                                  "is not known of this one)",
+                                                  error.message, policy));
     if (policy == "stop") return fail(error.kind, error.message + " (--on-bad-frame skip goes on without such frames)");
     const bool repeats = policy == "repeat" && pass.last;
     warn_of_frame(pass, FrameWarnings::bad,

@@ -66,6 +66,7 @@ struct Pass {
     bool saw_triangles = false;  // in a frame so far, or of those before
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
     std::optional<Mesh> last = {};
+    bool may_go_on = true;  // false: what went wrong is of no single frame, and those behind it would fare no better
     std::optional<Pose> last_pose = {};
     std::shared_ptr<const TexturedMesh> last_textured = {};
 };

@@ -31,11 +31,30 @@ cp -r capture odd
 expect 1 "frame_00002.ply" "$htvm" encode odd -o x.htvm
 expect 0 "frame_00002.ply" "$htvm" encode odd --on-bad-frame skip -o skipped.htvm
 has_times skipped.htvm 0 33 100 133 167
+cp -r odd far
 sed -i 's/1e12/0/' odd/frame_00002.ply
 expect 0 "1 of 6 frames has no triangles" "$htvm" encode odd -o x.htvm
 expect 0 "frame_00002.ply has no triangles; the frame before is repeated" "$htvm" encode odd --on-bad-frame repeat -o x.htvm
-# From standard input there is no way to the next one.
-expect 1 "mesh 1 of the stream" bash -c "cat capture/frame_00000.ply bad/frame_00003.ply | '$htvm' encode - --on-bad-frame skip -o x.htvm"
+# From standard input the same, where a mesh came whole: not where nobody knows where the next one begins.
+piped() { cat "$1"/*.ply | "$htvm" encode - "${@:2}"; }
+for meshes in far odd; do
+    expect 0 "mesh 2 of standard input has no triangles; it is left out" piped $meshes --on-bad-frame skip -o skipped.htvm
+    has_times skipped.htvm 0 33 100 133 167
+    expect 0 "mesh 2 of standard input has no triangles; the frame before is repeated in its place" \
+        piped $meshes --on-bad-frame repeat -o repeated.htvm
+    has_times repeated.htvm 0 33 67 100 133 167
+done
+expect 0 "1 bad frame left out" piped odd --on-bad-frame skip -o x.htvm
+expect 1 "(--on-bad-frame skip goes on without such frames)" piped far -o x.htvm
+expect 0 "1 of 6 frames has no triangles" piped odd -o x.htvm
+expect 1 "mesh 1 of the stream: this is not a PLY file: it does not begin with a line \"ply\" (--on-bad-frame skip goes on behind meshes that came whole, which is not known of this one)" \
+    bash -c "cat capture/frame_00000.ply bad/frame_00003.ply | '$htvm' encode - --on-bad-frame skip -o x.htvm"
+# What cannot be written is no bad frame.
+full() { (trap '' XFSZ; ulimit -f 1; cat capture/*.ply | "$htvm" encode "$1" --on-bad-frame skip -q 60 -o full.htvm 2>&1); }
+for input in - capture; do
+    expect 1 "full.htvm cannot be written: File too large" full $input
+    full $input | grep "left out" && fail "what cannot be written is a bad frame"
+done
 
 # Each frame is compared with its own original: as far off as the others, not by the motion between two.
 "$htvm" encode capture -q 60 --keyint 1 -o whole.htvm --quiet
