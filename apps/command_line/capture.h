@@ -100,6 +100,7 @@ public:
     std::size_t missing_before() const { return missing_; }  // frames of the numbers between it and the one before
     std::int64_t missing_timestamp_us(std::size_t k) const;  // of those, k from 0
 
+    const std::vector<std::filesystem::path>& files() const { return files_.paths; }  // none: standard input
     std::size_t frames() const { return frames_; }  // 0: not known, from standard input
     // The first frame that can be read, with its texture; null if it has none. Before next() and take_first().
     const TexturedMesh* first_textured() const { return peeked_ && peeked_->texture ? &*peeked_ : nullptr; }
@@ -151,8 +152,8 @@ private:
     SequenceFiles files_;
     std::vector<std::uint64_t> places_;     // of the files in time, in frames
     std::shared_ptr<MeshPipe> pipe_;        // standard input; copies share it
-    FrameTimes listed_;                     // of --timestamps
     bool is_lost_ = false;                  // the place on standard input, or in time
+    FrameTimes listed_;                     // of --timestamps
     std::vector<std::int64_t> file_times_;  // microseconds, of each file, where they are not regular
     FrameRate rate_{30000, 1000};
     bool rate_is_told_ = true;         // else the first mesh on standard input may say it

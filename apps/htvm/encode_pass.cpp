@@ -89,8 +89,10 @@ double milliseconds_since(std::chrono::steady_clock::time_point then) {
 // How much is searched for the next frame, which has waited for so long.
 Result<int> choose_effort(Pass& pass, double waited) {
     const auto place = pass.deadline->frames().size();
-    if (!pass.efforts.empty() && place >= pass.efforts.size())
+    if (!pass.efforts.empty() && place >= pass.efforts.size()) {
+        pass.may_go_on = false;
         return fail(ErrorKind::bad_input, too_few_efforts(pass.options.repeat_efforts, pass.efforts.size(), "more"));
+    }
     const int effort = pass.efforts.empty() ? pass.deadline->effort(waited) : pass.efforts[place].effort;
     if (auto set = pass.encoder.set_effort(effort); !set) return tl::unexpected(set.error());
     return effort;
@@ -99,6 +101,15 @@ Result<int> choose_effort(Pass& pass, double waited) {
 // Nothing where no efforts are chosen, as in profiles that have none.
 Result<void> set_repair(Pass& pass, std::function<bool()> may_repair) {
     return pass.deadline ? pass.encoder.set_repair(std::move(may_repair)) : Result<void>();
+}
+
+// Of a frame that is coded or dropped: the next ones' efforts follow from it, and the log tells of it.
+Result<void> count(Pass& pass, const TimedFrame& timed) {
+    if (pass.deadline) pass.deadline->took(timed);
+    if (!pass.effort_log) return {};
+    auto logged = pass.effort_log->add(timed);
+    if (!logged) pass.may_go_on = false;
+    return logged;
 }
 
 // What became of a mesh.
@@ -146,10 +157,13 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     };
     const bool limited = pass.deadline && pass.deadline->milliseconds() > 0;  // then no frame waits in the encoder
     std::function<bool()> repair;
-    if (limited)
+    if (limited) {
         repair = may_repair;
-    else if (!pass.efforts.empty())
-        repair = [repaired = pass.efforts[pass.deadline->frames().size()].repaired] { return repaired; };
+    } else if (!pass.efforts.empty()) {
+        const bool may = pass.efforts[pass.deadline->frames().size()].may_repair;
+        timed.left_lost = !may;
+        repair = [may] { return may; };
+    }
     if (auto set = set_repair(pass, repair); !set) return tl::unexpected(set.error());
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
     const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
@@ -163,7 +177,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     summary.last_us = timestamp_us;
     if (dropped) {
         timed.took = milliseconds_since(start);
-        if (pass.deadline) pass.deadline->took(timed);
+        if (auto ok = count(pass, timed); !ok) return tl::unexpected(ok.error());
         drop(pass, pass.capture.name(), pushed.error());
         pass.step("dropped");
         return Coded::dropped;
@@ -174,8 +188,8 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         timed.took = milliseconds_since(start);
         timed.intra = pass.encoder.last_frame().type == FrameType::intra;
         if (repairing) timed.repaired = milliseconds_since(*repairing);
-        pass.deadline->took(timed);
     }
+    if (auto ok = count(pass, timed); !ok) return tl::unexpected(ok.error());
     if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());
     pass.step(progress_text(pass));
     return Coded::yes;

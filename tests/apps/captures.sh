@@ -209,7 +209,7 @@ rm x.htvm
 expect 1 "nowhere/log.csv cannot be written" "$htvm" encode capture --effort-log nowhere/log.csv -o x.htvm
 [ ! -e x.htvm ] || fail "the log's place is looked at after encoding"
 expect 2 "--deadline" "$htvm" encode capture --jobs 2 --deadline 50 -o x.htvm
-expect 2 "--deadline" "$htvm" encode capture --repeat-efforts efforts.csv --deadline 50 -o x.htvm
+expect 2 "--deadline excludes --repeat-efforts" "$htvm" encode capture --repeat-efforts efforts.csv --deadline 50 -o x.htvm
 
 # Points without a surface.
 mkdir points
