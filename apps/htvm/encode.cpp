@@ -74,7 +74,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
                               {"repeated_frames", summary.repeated},
                               {"missing_frames", summary.missing},
                               {"filled_frames", summary.filled},
-                              {"late_frames", dropped_late},
+                              {"dropped_late_frames", dropped_late},
                               {"megabits_per_second", megabits / seconds},
                               {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
         if (hub) out["not_sent_frames"] = not_sent;
@@ -526,7 +526,8 @@ void add_encode(CLI::App& app, Run& run) {
         "Where the numbers of the files leave some out, repeat the frame before (default: a gap in time)");
     command->add_flag("--drop-late", options->drop_late,
                       "Of meshes on standard input that come faster than they are encoded, drop the oldest that wait,\n"
-                      "so that a camera never has to (default: the sender waits)");
+                      "so that a camera never has to (default: the sender waits). A warning says how many were, and\n"
+                      "the exit code is 0, as they were dropped by wish");
     constexpr const char* pace = "A camera's pace";
     command
         ->add_option("--deadline", options->deadline,
@@ -568,10 +569,10 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  htvm encode capture/ --jobs 8 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 --drop-late -o wss://hub.example/publish/person");
-    show_first(*command,
-               {"--skeleton", "--output", "--fps",          "--unit",    "--height", "--texture", "--texture-as",
-                "--audio",    "--frames", "--first",        "--quality", "--effort", "--profile", "--bitrate",
-                "--buffer",   "--keyint", "--on-bad-frame", "--threads", "--chunks", "--jobs",    "--json"});
+    show_first(*command, {"--skeleton",   "--output",  "--fps",     "--unit",   "--height",  "--texture",
+                          "--texture-as", "--audio",   "--frames",  "--first",  "--quality", "--effort",
+                          "--deadline",   "--profile", "--bitrate", "--buffer", "--keyint",  "--on-bad-frame",
+                          "--threads",    "--chunks",  "--jobs",    "--json"});
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();

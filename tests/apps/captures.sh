@@ -175,9 +175,10 @@ has_times live.htvm 0 100 200
 for k in $(seq 10); do cat capture/*.ply; done >burst.ply
 "$htvm" encode - --drop-late --json -o burst.htvm <burst.ply >burst.json 2>said || fail "--drop-late: $(tail -1 said)"
 grep -q "of 60 frames came faster than they were encoded, and were dropped" said || fail "late frames are not told"
-late=$(awk -F'[:,]' '/"late_frames"/ { print $2 }' burst.json)
+late=$(awk -F'[:,]' '/"dropped_late_frames"/ { print $2 }' burst.json)
 [ $(($(times burst.htvm 1000 | wc -w) + late)) -eq 60 ] || fail "$late frames are late, and $(times burst.htvm 1000 | wc -w) in the stream"
 [ "$(times burst.htvm 1000 | awk '{ print $NF }')" = 1967 ] || fail "late frames change the times of others"
+grep -q '"late_frames"' burst.json && fail "frames that are dropped are called late, as those behind a deadline are"
 expect 2 "--drop-late" "$htvm" encode capture --drop-late -o x.htvm
 
 # A deadline costs effort, not frames, and what was decided can be repeated.
