@@ -497,6 +497,7 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
     }
     for (;;) {
         auto piped = pipe_->next();
+        is_lost_ = !piped;
         if (!piped) return tl::unexpected(piped.error());
         if (!*piped) return std::optional<TexturedMesh>{};
         auto& [mesh, place, timestamp, image, per_second, came] = **piped;
@@ -506,7 +507,9 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
         // Of the first mesh, as sequence headers say it from then on.
         if (!std::exchange(rate_is_told_, true))
             if (const auto rate = parse_frame_rate(per_second)) rate_ = *rate;
-        if (auto ok = find_piped_time(place, timestamp); !ok) return tl::unexpected(ok.error());
+        auto timed = find_piped_time(place, timestamp);
+        is_lost_ = !timed;
+        if (!timed) return tl::unexpected(timed.error());
         if (auto ok = scale_positions(mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
         TextureReference said;
         if (!image.empty()) add_image(said, image);

@@ -77,8 +77,9 @@ public:
     // The next frame's mesh in mm, as it is to be encoded, or nothing at the end. After an error of a file the next
     // call gives the next file.
     Result<std::optional<Mesh>> next();
-    // Whether there can be a next frame after an error: standard input is lost with its place.
-    bool survives_errors() const { return !pipe_; }
+    // Whether there can be a next frame after an error: of standard input not behind a mesh that did not come whole, as
+    // nobody knows where the next one begins, nor behind one whose time is not known.
+    bool survives_errors() const { return !is_lost_; }
     // Back to the first frame. From files only: standard input does not come again.
     void rewind();
     // To these frames alone, of those there were when it was opened. From files only.
@@ -99,6 +100,7 @@ public:
     std::size_t missing_before() const { return missing_; }  // frames of the numbers between it and the one before
     std::int64_t missing_timestamp_us(std::size_t k) const;  // of those, k from 0
 
+    const std::vector<std::filesystem::path>& files() const { return files_.paths; }  // none: standard input
     std::size_t frames() const { return frames_; }  // 0: not known, from standard input
     // The first frame that can be read, with its texture; null if it has none. Before next() and take_first().
     const TexturedMesh* first_textured() const { return peeked_ && peeked_->texture ? &*peeked_ : nullptr; }
@@ -150,6 +152,7 @@ private:
     SequenceFiles files_;
     std::vector<std::uint64_t> places_;     // of the files in time, in frames
     std::shared_ptr<MeshPipe> pipe_;        // standard input; copies share it
+    bool is_lost_ = false;                  // the place on standard input, or in time
     FrameTimes listed_;                     // of --timestamps
     std::vector<std::int64_t> file_times_;  // microseconds, of each file, where they are not regular
     FrameRate rate_{30000, 1000};

@@ -36,7 +36,7 @@ struct ExitCode {
 inline constexpr std::array exit_codes = {
     ExitCode{0, "done"},        ExitCode{1, "bad input"},
     ExitCode{2, "usage"},       ExitCode{3, "corrupt stream"},
-    ExitCode{4, "unsupported"}, ExitCode{5, "limit exceeded, or frames dropped"},
+    ExitCode{4, "unsupported"}, ExitCode{5, "limit exceeded, or frames dropped to keep to a bitrate"},
     ExitCode{6, "disk full"},   ExitCode{130, "interrupted (143: by SIGTERM)"},
 };
 

@@ -3,11 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "command_line/terminal.h"
-#include "io/mesh_file.h"
-#include "io/number_text.h"
 #include "metrics/percentile.h"
 
 namespace htvm::app {
@@ -136,64 +135,6 @@ std::string deadline_warning(const Deadline& deadline, bool may_drop) {
         late, counted(frames, "frame") + (frames == 1 ? " was" : " were"),
         may_drop ? ", or the meshes came faster than a camera's, as from a file" : "",
         deadline.most() > 1 ? " or --effort" : "", may_drop ? ", or --drop-late, which leaves frames out" : "");
-}
-
-Result<void> write_effort_log(OutputFile& file, const std::vector<TimedFrame>& frames) {
-    std::string text = "frame,effort,waited_ms,took_ms,repaired\n";
-    for (std::size_t i = 0; i < frames.size(); ++i)
-        text += fmt::format("{},{},{:.3f},{:.3f},{}\n", i, frames[i].effort, frames[i].waited, frames[i].took,
-                            frames[i].left_lost ? 0 : 1);
-    if (auto written = file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}); !written)
-        return written;
-    return file.finish();
-}
-
-Result<std::vector<LoggedFrame>> read_effort_log(const std::filesystem::path& path) {
-    const auto bytes = read_file(path);
-    if (!bytes) return tl::unexpected(bytes.error());
-    const std::string text(bytes->begin(), bytes->end());
-    std::vector<LoggedFrame> out;
-    const auto wrong = [&](std::size_t line, const char* what) {
-        return fail(ErrorKind::bad_input,
-                    fmt::format("{}, line {}: {} (an effort log, as --effort-log writes it, has a "
-                                "line \"frame,effort,...\", then one per frame)",
-                                path.string(), line, what));
-    };
-    std::size_t line = 0;
-    std::ptrdiff_t columns = 0;
-    for (std::size_t at = 0; at < text.size();) {
-        const auto end = std::min(text.find('\n', at), text.size());
-        const auto row = text.substr(at, end - at);
-        at = end + 1;
-        if (++line == 1) {
-            if (row.rfind("frame,effort", 0) != 0) return wrong(line, "this is no effort log");
-            columns = std::count(row.begin(), row.end(), ',');
-            continue;
-        }
-        if (row.empty()) continue;
-        const auto comma = row.find(',');
-        const auto second = comma == std::string::npos ? comma : row.find(',', comma + 1);
-        if (comma == std::string::npos) return wrong(line, "there is no effort");
-        const double frame = parse_number(row.substr(0, comma)).value_or(-1);
-        const double effort = parse_number(row.substr(comma + 1, second - comma - 1)).value_or(-1);
-        if (frame != static_cast<double>(out.size())) return wrong(line, "frames are not numbered from 0 on");
-        if (!(effort >= 0 && effort <= 9) || effort != static_cast<int>(effort))
-            return wrong(line, "an effort is 0 to 9");
-        const auto repaired = columns < 4 ? "1" : row.substr(row.rfind(',') + 1);
-        if (std::count(row.begin(), row.end(), ',') != columns)
-            return wrong(line, "a column is missing, or one too many");
-        if (repaired != "0" && repaired != "1") return wrong(line, "whether it was repaired is 0 or 1");
-        out.push_back({static_cast<int>(effort), repaired == "1"});
-    }
-    if (out.empty()) return wrong(line + 1, "there is no frame");
-    return out;
-}
-
-std::string too_few_efforts(const std::string& path, std::size_t efforts, const std::string& frames) {
-    return fmt::format(
-        "{} has the efforts of {}, but there are {}: repeat the run that wrote it, with the same frames "
-        "and options, or give --frames {}",
-        path, counted(efforts, "frame"), frames, efforts);
 }
 
 }  // namespace htvm::app

@@ -1,17 +1,11 @@
-// How much may be searched for each frame of a live capture, so that none is late; and what was decided, to be
-// repeated.
+// How much may be searched for each frame of a live capture, so that none is late.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
-
-#include "htvm/result.hpp"
-#include "io/output_file.h"
 
 namespace htvm::app {
 
@@ -73,18 +67,5 @@ nlohmann::json deadline_json(const Deadline& deadline);
 // What helps where half of the frames were late, or more; empty if there is no need. may_drop: whether late meshes can
 // be dropped.
 std::string deadline_warning(const Deadline& deadline, bool may_drop);
-
-// What was decided for a frame.
-struct LoggedFrame {
-    int effort = 5;
-    bool repaired = true;  // if there was anything to repair
-    bool operator==(const LoggedFrame&) const = default;
-};
-// A line per frame: its number, effort, waiting and time, and whether it was to be repaired. Read back, what was
-// decided alone counts; logs without the last column are of frames that were repaired.
-Result<void> write_effort_log(OutputFile& file, const std::vector<TimedFrame>& frames);
-Result<std::vector<LoggedFrame>> read_effort_log(const std::filesystem::path& path);
-// Why such a log does not do for so many frames, a number or "more".
-std::string too_few_efforts(const std::string& path, std::size_t efforts, const std::string& frames);
 
 }  // namespace htvm::app

@@ -15,6 +15,7 @@
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/thread.h"
+#include "effort_log.h"
 #include "encode_jobs.h"
 #include "encode_pass.h"
 #include "htvm/running_time.hpp"
@@ -73,7 +74,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
                               {"repeated_frames", summary.repeated},
                               {"missing_frames", summary.missing},
                               {"filled_frames", summary.filled},
-                              {"late_frames", dropped_late},
+                              {"dropped_late_frames", dropped_late},
                               {"megabits_per_second", megabits / seconds},
                               {"encode_frames_per_second", static_cast<double>(frames) / summary.encode_seconds}};
         if (hub) out["not_sent_frames"] = not_sent;
@@ -217,34 +218,43 @@ Result<void> encode_in_groups(const EncodeOptions& options, Capture& capture, co
     return {};
 }
 
-// Of --repeat-efforts; empty without it.
-Result<std::vector<LoggedFrame>> efforts_to_repeat(const EncodeOptions& options, const Capture& capture) {
-    if (options.repeat_efforts.empty()) return std::vector<LoggedFrame>{};
-    auto efforts = read_effort_log(options.repeat_efforts);
-    if (!efforts) return efforts;
+// Of --repeat-efforts; nothing without it.
+Result<std::optional<EffortLog>> efforts_to_repeat(const EncodeOptions& options, const Capture& capture) {
+    if (options.repeat_efforts.empty()) return std::nullopt;
+    auto log = read_effort_log(options.repeat_efforts);
+    if (!log) return tl::unexpected(log.error());
     // Of a pipe nobody knows how many come, nor of files which of them can be read.
     const bool all = !is_piped(options.capture) && options.on_bad_frame != "skip";
-    if (all && efforts->size() < capture.frames())
+    if (all && log->frames.size() < capture.frames())
         return fail(ErrorKind::bad_input,
-                    too_few_efforts(options.repeat_efforts, efforts->size(), std::to_string(capture.frames())));
-    return efforts;
+                    too_few_efforts(options.repeat_efforts, log->frames.size(), std::to_string(capture.frames())));
+    return std::optional(std::move(*log));
 }
 
-// One run after another, until the bitrate is met.
+// A log takes the place of another one, as it may be of an earlier run; but not of what this run reads.
+Result<void> check_effort_log(const EncodeOptions& options, const Capture& capture) {
+    if (options.effort_log.empty()) return {};
+    std::vector<std::filesystem::path> read = capture.files();
+    for (const auto& file : {options.capture.skeleton, options.capture.timestamps, options.encoding.radii_file,
+                             options.audio.file, options.repeat_efforts})
+        if (!file.empty()) read.emplace_back(file);
+    std::error_code ignored;
+    for (const auto& file : read)
+        if (std::filesystem::equivalent(options.effort_log, file, ignored))
+            return fail(ErrorKind::bad_input,
+                        fmt::format("--effort-log {} would replace {}, which is read: give the log another name",
+                                    options.effort_log, file.string()));
+    return {};
+}
+
+// One run after another, until the bitrate is met. log: takes the efforts of the last one; null: nobody asked for them.
 Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, EncoderOptions settings,
-                              const std::optional<AudioTrack>& audio) {
+                              const std::optional<AudioTrack>& audio, const std::vector<LoggedFrame>& efforts,
+                              EffortLogWriter* log) {
     const int fewest = fewest_passes(options, settings);
     // What went to a pipe cannot be taken back.
     const int most = options.encoding.passes == 0 && fewest == 2 && !may_be_live(options.output) ? most_passes : fewest;
     std::optional<RatePasses> passes;
-    const auto efforts = efforts_to_repeat(options, capture);
-    if (!efforts) return tl::unexpected(efforts.error());
-    std::optional<OutputFile> effort_log;
-    if (!options.effort_log.empty()) {
-        auto file = OutputFile::create(options.effort_log);
-        if (!file) return tl::unexpected(file.error());
-        effort_log.emplace(std::move(*file));
-    }
     // Meshes and pictures share the rate.
     const auto of_all = settings;
     const bool has_pictures = keeps_pictures(options.capture);
@@ -262,7 +272,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         Summary summary;
         RateReport rate(of_all);
         Deadline deadline(options.deadline, settings.tracked.effort);
-        const bool timed = options.deadline > 0 || !options.effort_log.empty() || !efforts->empty() ||
+        const bool timed = options.deadline > 0 || log || !efforts.empty() ||
                            (is_piped(options.capture) && settings.profile == Profile::tracked);
         const bool writes = number >= fewest;
         {
@@ -282,7 +292,8 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
             if (!pictures) return tl::unexpected(pictures.error());
             if (*pictures) pass.pictures = &**pictures;
             if (timed) pass.deadline = &deadline;
-            pass.efforts = *efforts;
+            pass.efforts = efforts;
+            pass.effort_log = log;
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
             if (hub) pass.wants_key_frame = [hub] { return hub->wants_key_frame(); };
             if (hub && rate.rate_controlled() && !options.publishing.fixed_bitrate)
@@ -308,8 +319,8 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
         if (auto finished = output->finish(); !finished) return finished;
         report(options, summary, rate, output->bytes(), capture.fps(), capture.dropped(), hub,
                timed ? &deadline : nullptr);
-        if (effort_log)
-            if (auto written = write_effort_log(*effort_log, deadline.frames()); !written) return written;
+        if (log)
+            if (auto finished = log->finish(); !finished) return finished;
         if (rate.dropped.empty()) return {};
         return fail(
             ErrorKind::limit,
@@ -317,6 +328,25 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
                         "--bitrate or a larger --buffer",
                         options.output, rate.dropped.size(), rate.costs.size()));
     }
+}
+
+// By the clock, or by the log of a run that went by it.
+Result<void> encode_in_one(const EncodeOptions& options, Capture& capture, EncoderOptions settings,
+                           const std::optional<AudioTrack>& audio) {
+    const auto repeated = efforts_to_repeat(options, capture);
+    if (!repeated) return tl::unexpected(repeated.error());
+    const auto efforts = *repeated ? (*repeated)->frames : std::vector<LoggedFrame>{};
+    if (*repeated) settings.tracked.effort = (*repeated)->asked;
+    if (options.effort_log.empty())
+        return encode_in_passes(options, capture, std::move(settings), audio, efforts, nullptr);
+    auto log = EffortLogWriter::create(options.effort_log, settings.tracked.effort);
+    if (!log) return tl::unexpected(log.error());
+    auto done = encode_in_passes(options, capture, std::move(settings), audio, efforts, &*log);
+    if (done) return done;
+    const auto kept = log->keep();
+    return kept.empty() ? done
+                        : fail(done.error().kind, fmt::format("{}; the efforts of frames up to there are in {}",
+                                                              done.error().message, kept.string()));
 }
 
 // What can become of a capture's pictures.
@@ -385,6 +415,28 @@ void check_pace(const EncodeOptions& options) {
         throw CLI::ValidationError(flag, "goes with one pass over the frames, not with --passes 2");
 }
 
+// Whether both names are of one file, which need not be there yet.
+bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+    std::error_code error;
+    if (std::filesystem::equivalent(a, b, error)) return true;
+    const auto place = [&error](const std::filesystem::path& path) {
+        return std::filesystem::weakly_canonical(std::filesystem::absolute(path, error), error);
+    };
+    return place(a) == place(b);
+}
+
+void check_log_and_output(const EncodeOptions& options) {
+    if (options.effort_log.empty() || live::looks_like_hub_address(options.output)) return;
+    // Until they are whole, both are under other names, which may be taken as little.
+    const std::string output = options.output == "-" ? "/dev/stdout" : options.output;
+    for (const char* until_whole : {"", ".partial"})
+        if (is_same_file(options.effort_log, output + until_whole) ||
+            is_same_file(options.effort_log + until_whole, output))
+            throw CLI::ValidationError(
+                "--effort-log",
+                fmt::format("{} is where -o puts the stream: give the log another name", options.effort_log));
+}
+
 // What the sequence header says of a capture's pictures, and how often they can be started at.
 Result<void> set_texture(const EncodeOptions& options, const Capture& capture, EncoderOptions& settings) {
     if (!keeps_pictures(options.capture)) return {};
@@ -417,6 +469,7 @@ Result<void> encode(const EncodeOptions& options) {
     watch_for_interruption();
     auto capture = Capture::open(options.capture);
     if (!capture) return tl::unexpected(capture.error());
+    if (auto may_log = check_effort_log(options, *capture); !may_log) return may_log;
     auto settings = encoder_options(options.encoding, *capture);
     if (!settings) return tl::unexpected(settings.error());
     if (auto set = set_texture(options, *capture, *settings); !set) return set;
@@ -431,7 +484,7 @@ Result<void> encode(const EncodeOptions& options) {
     const auto audio = AudioTrack::open(options.audio);
     if (!audio) return tl::unexpected(audio.error());
     return options.in_groups() ? encode_in_groups(options, *capture, *settings, *audio)
-                               : encode_in_passes(options, *capture, std::move(*settings), *audio);
+                               : encode_in_one(options, *capture, std::move(*settings), *audio);
 }
 
 void add_encode(CLI::App& app, Run& run) {
@@ -465,14 +518,16 @@ void add_encode(CLI::App& app, Run& run) {
         ->add_option(
             "--on-bad-frame", options->on_bad_frame,
             "What becomes of a frame that cannot be read or coded: stop (default), skip, or repeat, the frame\n"
-            "before once more. Its time is kept. With skip and repeat, frames without triangles are bad too")
+            "before once more. Its time is kept. With skip and repeat, frames without triangles are bad too, each\n"
+            "is told, and the exit code is 0. On standard input only behind a mesh that came whole")
         ->check(CLI::IsMember({"stop", "skip", "repeat"}));
     command->add_flag(
         "--fill", options->fill,
         "Where the numbers of the files leave some out, repeat the frame before (default: a gap in time)");
     command->add_flag("--drop-late", options->drop_late,
                       "Of meshes on standard input that come faster than they are encoded, drop the oldest that wait,\n"
-                      "so that a camera never has to (default: the sender waits)");
+                      "so that a camera never has to (default: the sender waits). A warning says how many were, and\n"
+                      "the exit code is 0, as they were dropped by wish");
     constexpr const char* pace = "A camera's pace";
     command
         ->add_option("--deadline", options->deadline,
@@ -484,15 +539,19 @@ void add_encode(CLI::App& app, Run& run) {
         ->group(pace);
     command
         ->add_option("--effort-log", options->effort_log,
-                     "Write what was decided of each frame, and how long it took, as lines of CSV")
+                     "Write what was decided of each frame, and how long it took, as lines of CSV, while frames are\n"
+                     "encoded: in FILE.partial until all are there, where an encode that ends early leaves them. An\n"
+                     "earlier log is replaced, other files are not")
         ->type_name("FILE")
         ->group(pace);
     command
         ->add_option("--repeat-efforts", options->repeat_efforts,
-                     "Take the effort of each frame from such a log, not from the clock: the same bytes again")
+                     "Take the effort of each frame from such a log, not from the clock: the same bytes again, if\n"
+                     "the other options are the same. --effort is in the log")
         ->type_name("FILE")
         ->group(pace)
-        ->excludes("--deadline");
+        ->excludes("--deadline")
+        ->excludes("--effort");
     add_job_options(*command, *options);
     command->add_flag("--json", options->json, "Print sizes by frame and layer as JSON on standard output");
     command->add_flag_callback(
@@ -510,10 +569,10 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  htvm encode capture/ --jobs 8 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 --drop-late -o wss://hub.example/publish/person");
-    show_first(*command,
-               {"--skeleton", "--output", "--fps",          "--unit",    "--height", "--texture", "--texture-as",
-                "--audio",    "--frames", "--first",        "--quality", "--effort", "--profile", "--bitrate",
-                "--buffer",   "--keyint", "--on-bad-frame", "--threads", "--chunks", "--jobs",    "--json"});
+    show_first(*command, {"--skeleton",   "--output",  "--fps",     "--unit",   "--height",  "--texture",
+                          "--texture-as", "--audio",   "--frames",  "--first",  "--quality", "--effort",
+                          "--deadline",   "--profile", "--bitrate", "--buffer", "--keyint",  "--on-bad-frame",
+                          "--threads",    "--chunks",  "--jobs",    "--json"});
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();
@@ -530,6 +589,7 @@ void add_encode(CLI::App& app, Run& run) {
                                       : options->deadline > 0 ? WhileBusy::read_on
                                                               : WhileBusy::wait;
         check_pace(*options);
+        check_log_and_output(*options);
         check_waiting(*options);
         if (options->encoding.passes == 2 && is_piped(options->capture))
             throw CLI::ValidationError(

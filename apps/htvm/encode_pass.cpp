@@ -14,19 +14,25 @@ void warn_of_frame(const Pass& pass, FrameWarnings::Kind kind, const std::string
     if (pass.warnings) pass.warnings->tell(kind, line);
 }
 
-Result<void> drain(const Pass& pass) {
+Result<void> write(Pass& pass, Packet packet) {
+    auto written = pass.write(std::move(packet));
+    if (!written) pass.may_go_on = false;
+    return written;
+}
+
+Result<void> drain(Pass& pass) {
     while (auto packet = pass.encoder.pull()) {
         pass.rate.buffer.add(*packet);
         if (!pass.write) continue;
         const PacketHeader header = *packet;
         const auto bytes = packet->payload.size() + packet_overhead;
-        if (auto written = pass.write(std::move(*packet)); !written) return written;
+        if (auto written = write(pass, std::move(*packet)); !written) return written;
         if (!pass.pictures) continue;
         auto picture = pass.pictures->behind(header, bytes);
         if (!picture) return tl::unexpected(picture.error());
         if (!*picture) continue;
         pass.rate.buffer.add(**picture);
-        if (auto written = pass.write(std::move(**picture)); !written) return written;
+        if (auto written = write(pass, std::move(**picture)); !written) return written;
     }
     return {};
 }
@@ -83,8 +89,10 @@ double milliseconds_since(std::chrono::steady_clock::time_point then) {
 // How much is searched for the next frame, which has waited for so long.
 Result<int> choose_effort(Pass& pass, double waited) {
     const auto place = pass.deadline->frames().size();
-    if (!pass.efforts.empty() && place >= pass.efforts.size())
+    if (!pass.efforts.empty() && place >= pass.efforts.size()) {
+        pass.may_go_on = false;
         return fail(ErrorKind::bad_input, too_few_efforts(pass.options.repeat_efforts, pass.efforts.size(), "more"));
+    }
     const int effort = pass.efforts.empty() ? pass.deadline->effort(waited) : pass.efforts[place].effort;
     if (auto set = pass.encoder.set_effort(effort); !set) return tl::unexpected(set.error());
     return effort;
@@ -93,6 +101,15 @@ Result<int> choose_effort(Pass& pass, double waited) {
 // Nothing where no efforts are chosen, as in profiles that have none.
 Result<void> set_repair(Pass& pass, std::function<bool()> may_repair) {
     return pass.deadline ? pass.encoder.set_repair(std::move(may_repair)) : Result<void>();
+}
+
+// Of a frame that is coded or dropped: the next ones' efforts follow from it, and the log tells of it.
+Result<void> count(Pass& pass, const TimedFrame& timed) {
+    if (pass.deadline) pass.deadline->took(timed);
+    if (!pass.effort_log) return {};
+    auto logged = pass.effort_log->add(timed);
+    if (!logged) pass.may_go_on = false;
+    return logged;
 }
 
 // What became of a mesh.
@@ -140,10 +157,13 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     };
     const bool limited = pass.deadline && pass.deadline->milliseconds() > 0;  // then no frame waits in the encoder
     std::function<bool()> repair;
-    if (limited)
+    if (limited) {
         repair = may_repair;
-    else if (!pass.efforts.empty())
-        repair = [repaired = pass.efforts[pass.deadline->frames().size()].repaired] { return repaired; };
+    } else if (!pass.efforts.empty()) {
+        const bool may = pass.efforts[pass.deadline->frames().size()].may_repair;
+        timed.left_lost = !may;
+        repair = [may] { return may; };
+    }
     if (auto set = set_repair(pass, repair); !set) return tl::unexpected(set.error());
     const bool key_frame = pass.wants_key_frame && pass.wants_key_frame();
     const auto pushed = pass.encoder.push(mesh, pose, timestamp_us, key_frame);
@@ -157,7 +177,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     summary.last_us = timestamp_us;
     if (dropped) {
         timed.took = milliseconds_since(start);
-        if (pass.deadline) pass.deadline->took(timed);
+        if (auto ok = count(pass, timed); !ok) return tl::unexpected(ok.error());
         drop(pass, pass.capture.name(), pushed.error());
         pass.step("dropped");
         return Coded::dropped;
@@ -168,8 +188,8 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
         timed.took = milliseconds_since(start);
         timed.intra = pass.encoder.last_frame().type == FrameType::intra;
         if (repairing) timed.repaired = milliseconds_since(*repairing);
-        pass.deadline->took(timed);
     }
+    if (auto ok = count(pass, timed); !ok) return tl::unexpected(ok.error());
     if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());
     pass.step(progress_text(pass));
     return Coded::yes;
@@ -205,8 +225,13 @@ Result<void> take_bad(Pass& pass, const Error& error) {
     auto& summary = pass.summary;
     const auto& policy = pass.options.on_bad_frame;
     if (pass.is_stopped() || error.kind == ErrorKind::disk_full) return tl::unexpected(error);
-    if (!pass.capture.survives_errors()) return tl::unexpected(error);
-    if (is_of_rate(pass, error)) return tl::unexpected(error);  // no frame is bad
+    if (!pass.may_go_on || is_of_rate(pass, error)) return tl::unexpected(error);  // no frame is bad
+    if (!pass.capture.survives_errors())
+        return policy == "stop"
+                   ? tl::unexpected(error)
+                   : fail(error.kind, fmt::format("{} (--on-bad-frame {} goes on behind meshes that came whole, which "
+                                                  "is not known of this one)",
+                                                  error.message, policy));
     if (policy == "stop") return fail(error.kind, error.message + " (--on-bad-frame skip goes on without such frames)");
     const bool repeats = policy == "repeat" && pass.last;
     warn_of_frame(pass, FrameWarnings::bad,

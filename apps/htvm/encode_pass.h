@@ -12,6 +12,7 @@
 
 #include "command_line/layer_table.h"
 #include "deadline.h"
+#include "effort_log.h"
 #include "encode.h"
 #include "htvm/encoder.hpp"
 #include "picture_track.h"
@@ -61,9 +62,11 @@ struct Pass {
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
     Deadline* deadline = nullptr;  // how much is searched for each frame, and how long that takes; null: not counted
     std::vector<LoggedFrame> efforts = {};  // of each frame, in place of what the deadline says; empty: as that says
+    EffortLogWriter* effort_log = nullptr;  // takes what was decided of each frame; null: nobody asked for it
     PictureTrack* pictures = nullptr;       // of the frames; null: none go into the stream
     double slower_line = 0;      // the bitrate that the line carries at present, where it is below the one asked for
     bool saw_triangles = false;  // in a frame so far, or of those before
+    bool may_go_on = true;  // false: what went wrong is of no single frame, and those behind it would fare no better
     // The frame that stands in for others, where one may have to: the last one coded, or the one before the first.
     std::optional<Mesh> last = {};
     std::optional<Pose> last_pose = {};

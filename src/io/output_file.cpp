@@ -94,14 +94,19 @@ Result<void> OutputFile::append(const fs::path& file) {
     return {};
 }
 
+Result<void> OutputFile::flush() {
+    if (std::fflush(file_.get()) != 0) return tl::unexpected(write_error(path_.string(), errno));
+    return {};
+}
+
 Result<void> OutputFile::sync() {
-    if (std::fflush(file_.get()) != 0 || ::fsync(::fileno(file_.get())) != 0)
-        return tl::unexpected(write_error(path_.string(), errno));
+    if (auto ok = flush(); !ok) return ok;
+    if (::fsync(::fileno(file_.get())) != 0) return tl::unexpected(write_error(path_.string(), errno));
     return {};
 }
 
 Result<void> OutputFile::finish() {
-    if (std::fflush(file_.get()) != 0) return tl::unexpected(write_error(path_.string(), errno));
+    if (auto ok = flush(); !ok) return ok;
     if (!partial_.empty() && std::rename(partial_.c_str(), path_.c_str()) != 0)
         return tl::unexpected(write_error(path_.string(), errno));
     file_.reset();
@@ -109,7 +114,7 @@ Result<void> OutputFile::finish() {
 }
 
 Result<void> OutputFile::finish_behind(std::span<const std::uint8_t> front) {
-    if (std::fflush(file_.get()) != 0) return tl::unexpected(write_error(path_.string(), errno));
+    if (auto ok = flush(); !ok) return ok;
     OutputFile whole;
     whole.path_ = path_;
     whole.partial_ = partial_.string() + ".whole";

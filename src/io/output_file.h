@@ -25,6 +25,8 @@ public:
     Result<void> write(std::span<const std::uint8_t> bytes);
     // Writes all of another file. bad_input if it cannot be read.
     Result<void> append(const std::filesystem::path& file);
+    // Hands what was written to the system, so that it is there even if the program is killed.
+    Result<void> flush();
     // Waits until the disk has what was written, so that not even a power cut takes it. Only for files.
     Result<void> sync();
     // Puts the file in its place.

@@ -31,11 +31,30 @@ cp -r capture odd
 expect 1 "frame_00002.ply" "$htvm" encode odd -o x.htvm
 expect 0 "frame_00002.ply" "$htvm" encode odd --on-bad-frame skip -o skipped.htvm
 has_times skipped.htvm 0 33 100 133 167
+cp -r odd far
 sed -i 's/1e12/0/' odd/frame_00002.ply
 expect 0 "1 of 6 frames has no triangles" "$htvm" encode odd -o x.htvm
 expect 0 "frame_00002.ply has no triangles; the frame before is repeated" "$htvm" encode odd --on-bad-frame repeat -o x.htvm
-# From standard input there is no way to the next one.
-expect 1 "mesh 1 of the stream" bash -c "cat capture/frame_00000.ply bad/frame_00003.ply | '$htvm' encode - --on-bad-frame skip -o x.htvm"
+# From standard input the same, where a mesh came whole: not where nobody knows where the next one begins.
+piped() { cat "$1"/*.ply | "$htvm" encode - "${@:2}"; }
+for meshes in far odd; do
+    expect 0 "mesh 2 of standard input has no triangles; it is left out" piped $meshes --on-bad-frame skip -o skipped.htvm
+    has_times skipped.htvm 0 33 100 133 167
+    expect 0 "mesh 2 of standard input has no triangles; the frame before is repeated in its place" \
+        piped $meshes --on-bad-frame repeat -o repeated.htvm
+    has_times repeated.htvm 0 33 67 100 133 167
+done
+expect 0 "1 bad frame left out" piped odd --on-bad-frame skip -o x.htvm
+expect 1 "(--on-bad-frame skip goes on without such frames)" piped far -o x.htvm
+expect 0 "1 of 6 frames has no triangles" piped odd -o x.htvm
+expect 1 "mesh 1 of the stream: this is not a PLY file: it does not begin with a line \"ply\" (--on-bad-frame skip goes on behind meshes that came whole, which is not known of this one)" \
+    bash -c "cat capture/frame_00000.ply bad/frame_00003.ply | '$htvm' encode - --on-bad-frame skip -o x.htvm"
+# What cannot be written is no bad frame.
+full() { (trap '' XFSZ; ulimit -f 1; cat capture/*.ply | "$htvm" encode "$1" --on-bad-frame skip -q 60 -o full.htvm 2>&1); }
+for input in - capture; do
+    expect 1 "full.htvm cannot be written: File too large" full $input
+    full $input | grep "left out" && fail "what cannot be written is a bad frame"
+done
 
 # Each frame is compared with its own original: as far off as the others, not by the motion between two.
 "$htvm" encode capture -q 60 --keyint 1 -o whole.htvm --quiet
@@ -156,9 +175,10 @@ has_times live.htvm 0 100 200
 for k in $(seq 10); do cat capture/*.ply; done >burst.ply
 "$htvm" encode - --drop-late --json -o burst.htvm <burst.ply >burst.json 2>said || fail "--drop-late: $(tail -1 said)"
 grep -q "of 60 frames came faster than they were encoded, and were dropped" said || fail "late frames are not told"
-late=$(awk -F'[:,]' '/"late_frames"/ { print $2 }' burst.json)
+late=$(awk -F'[:,]' '/"dropped_late_frames"/ { print $2 }' burst.json)
 [ $(($(times burst.htvm 1000 | wc -w) + late)) -eq 60 ] || fail "$late frames are late, and $(times burst.htvm 1000 | wc -w) in the stream"
 [ "$(times burst.htvm 1000 | awk '{ print $NF }')" = 1967 ] || fail "late frames change the times of others"
+grep -q '"late_frames"' burst.json && fail "frames that are dropped are called late, as those behind a deadline are"
 expect 2 "--drop-late" "$htvm" encode capture --drop-late -o x.htvm
 
 # A deadline costs effort, not frames, and what was decided can be repeated.
@@ -190,7 +210,7 @@ rm x.htvm
 expect 1 "nowhere/log.csv cannot be written" "$htvm" encode capture --effort-log nowhere/log.csv -o x.htvm
 [ ! -e x.htvm ] || fail "the log's place is looked at after encoding"
 expect 2 "--deadline" "$htvm" encode capture --jobs 2 --deadline 50 -o x.htvm
-expect 2 "--deadline" "$htvm" encode capture --repeat-efforts efforts.csv --deadline 50 -o x.htvm
+expect 2 "--deadline excludes --repeat-efforts" "$htvm" encode capture --repeat-efforts efforts.csv --deadline 50 -o x.htvm
 
 # Points without a surface.
 mkdir points

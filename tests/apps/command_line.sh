@@ -232,11 +232,12 @@ cmp -s whole.csv gap.csv || { echo "FAILED: a missing file changes what others a
 
 # Help: the everyday options first, all on demand; the exit codes.
 expect 0 "--skeleton" "$htvm" encode --help
-for flag in --texture-as --audio --effort; do expect 0 " $flag " "$htvm" encode --help; done
+for flag in --texture-as --audio --effort --deadline; do expect 0 " $flag " "$htvm" encode --help; done
 expect 0 "--help-all shows" "$htvm" help encode
 expect 0 "--still-below" "$htvm" encode --help-all
 "$htvm" encode --help | grep -q -- "--still-below" && fail "the short help shows what few need"
-expect 0 "6 disk full" "$htvm" help
+expect 0 "5 limit exceeded, or frames dropped to keep to a bitrate, 6 disk full" "$htvm" help
+expect 0 "the exit code is 0, as they were dropped by wish" "$htvm" encode --help-all
 expect 2 "did you mean 'encode'?" "$htvm" help encod
 [ "$("$htvm" -V)" = "$("$htvm" --version)" ] || fail "-V is not --version"
 [ -z "$("$htvm" encode capture -o quiet.htvm --quiet 2>&1)" ] || fail "--quiet says something"

@@ -1,10 +1,8 @@
-// How much is searched for frames that have a deadline, and the log by which a run is repeated.
+// How much is searched for frames that have a deadline.
 #include "deadline.h"
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 namespace htvm::app {
@@ -151,50 +149,6 @@ TEST(Deadline, ALostFrameIsRepairedAtLastWhateverItTakes) {
     deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
     EXPECT_FALSE(deadline.may_repair(10));
     EXPECT_EQ(deadline_json(deadline)["unrepaired_frames"], Deadline::most_left_lost);
-}
-
-class EffortLog : public testing::Test {
-protected:
-    std::filesystem::path path = std::filesystem::path(testing::TempDir()) / "efforts.csv";
-    void write(const std::string& text) { std::ofstream(path) << text; }
-    std::string error() {
-        const auto read = read_effort_log(path);
-        return read ? "" : read.error().message.substr(path.string().size());
-    }
-};
-
-TEST_F(EffortLog, GivesBackWhatWasDecided) {
-    auto file = OutputFile::create(path);
-    ASSERT_TRUE(
-        write_effort_log(*file, {{5, 0, 40}, {.effort = 0, .waited = 12.5, .took = 20, .left_lost = true}, {9, 1, 2}}));
-    EXPECT_EQ(*read_effort_log(path), (std::vector<LoggedFrame>{{5, true}, {0, false}, {9, true}}));
-}
-
-TEST_F(EffortLog, OfEarlierVersionsIsOfFramesThatWereRepaired) {
-    write("frame,effort,waited_ms,took_ms\n0,5,0.000,40.000\n1,2,12.500,20.000\n");
-    EXPECT_EQ(*read_effort_log(path), (std::vector<LoggedFrame>{{5, true}, {2, true}}));
-}
-
-TEST_F(EffortLog, ThatIsNoneIsRefusedWithItsLine) {
-    const std::string what =
-        " (an effort log, as --effort-log writes it, has a line \"frame,effort,...\", then one per "
-        "frame)";
-    write("time,effort\n0,5\n");
-    EXPECT_EQ(error(), ", line 1: this is no effort log" + what);
-    write("frame,effort\n0,5\n2,5\n");
-    EXPECT_EQ(error(), ", line 3: frames are not numbered from 0 on" + what);
-    for (const char* row : {"0,10", "0,-1", "0,4.5", "0,", "0,x"}) {
-        write(std::string("frame,effort\n") + row + "\n");
-        EXPECT_EQ(error(), ", line 2: an effort is 0 to 9" + what) << row;
-    }
-    write("frame,effort,waited_ms,took_ms,repaired\n0,5,0,0\n");
-    EXPECT_EQ(error(), ", line 2: a column is missing, or one too many" + what);
-    write("frame,effort,waited_ms,took_ms,repaired\n0,5,0,0,2\n");
-    EXPECT_EQ(error(), ", line 2: whether it was repaired is 0 or 1" + what);
-    write("frame,effort\n0\n");
-    EXPECT_EQ(error(), ", line 2: there is no effort" + what);
-    write("frame,effort\n");
-    EXPECT_EQ(error(), ", line 2: there is no frame" + what);
 }
 
 }  // namespace

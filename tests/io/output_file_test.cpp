@@ -43,6 +43,13 @@ TEST_F(Output, IsInItsPlaceOnceItIsFinished) {
     EXPECT_FALSE(fs::exists(folder / "file.partial"));
 }
 
+TEST_F(Output, IsThereBesideItsPlaceOnceItIsFlushed) {
+    auto file = OutputFile::create(folder / "file");
+    ASSERT_TRUE(file && write(*file, "after") && file->flush());
+    EXPECT_EQ(text("file.partial"), "after");
+    EXPECT_EQ(text("file"), "before");
+}
+
 TEST_F(Output, OfSomebodyElseStaysTheirsWhereRootReplacesIt) {
     if (geteuid() != 0) GTEST_SKIP() << "only root can give files away";
     constexpr uid_t somebody = 12345;
