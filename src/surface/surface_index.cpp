@@ -555,11 +555,13 @@ Neighbour SurfaceIndex::nearest_along(const Point3f& query, std::uint32_t from) 
     }
 }
 
+float SurfaceIndex::begins_near() const { return 4 * fine_gap; }
+
 OrientedMatch SurfaceIndex::nearest_facing(const Point3f& query, const Point3f& normal, const FacingReach& within,
                                            std::uint32_t guess) const {
-    constexpr float near = 4, as_near_as_can_be = 1;  // spacings of the vertices
+    constexpr float as_near_as_can_be = 1;  // spacings of the vertices
     if (within.along && guess < positions.size()) {
-        if (squared_distance_of(fans_[guess].own, query) < near * near * fine_gap * fine_gap) {
+        if (squared_distance_of(fans_[guess].own, query) < begins_near() * begins_near()) {
             const auto found = nearest_along(query, guess);
             const float most = std::min(within.reach, as_near_as_can_be * fine_gap);
             if (found.squared_distance <= most * most && product(fans_[found.index].normal, normal) >= within.agreement)
@@ -637,7 +639,11 @@ std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<
     parallel_for((queries.size() + in_a_row - 1) / in_a_row, threads, 2, [&](std::size_t begin, std::size_t end) {
         for (std::size_t row = begin; row < end; ++row) {
             std::uint32_t last = OrientedPoints::no_point;
-            for (std::size_t i = row * in_a_row; i < std::min(queries.size(), (row + 1) * in_a_row); ++i) {
+            const std::size_t first = row * in_a_row, after = std::min(queries.size(), first + in_a_row);
+            if (within.along && !guesses.empty())
+                surface.walk_all(queries.subspan(first, after - first), surface.begins_near(),
+                                 guesses.subspan(first, after - first));
+            for (std::size_t i = first; i < after; ++i) {
                 if (i + ahead < guesses.size()) surface.expect(guesses[i + ahead]);
                 if (!guesses.empty() && guesses[i] != OrientedPoints::no_point) last = guesses[i];
                 out[i] = surface.closest_facing(queries[i], normals[i], within, last);

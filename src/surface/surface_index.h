@@ -220,6 +220,12 @@ public:
 
     // Says that a search will soon begin at this vertex: VertexFans::expect().
     void expect(std::uint32_t vertex) const { fans_.expect(vertex); }
+    // Moves each guess to the vertex where a search along the surface from it would end, if it is within `near`: many
+    // searches side by side wait less for memory than one after the other. Numbers beyond the vertices stay.
+    void walk_all(std::span<const Point3f> queries, float near, std::span<std::uint32_t> guesses) const {
+        fans_.walk_all(queries, near * near, guesses);
+    }
+    float begins_near() const;  // from farther away a search does not go along the surface
 
     std::vector<Point3f> positions;  // of the mesh's vertices
     std::vector<Triangle> triangles;

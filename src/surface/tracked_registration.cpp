@@ -17,15 +17,12 @@ using Eigen::Matrix3d, Eigen::Matrix3f, Eigen::Vector3d, Eigen::Vector3f;
 
 Vector3d vector_of(const Point3f& p) { return {p[0], p[1], p[2]}; }
 Vector3f floats_of(const Point3f& p) { return {p[0], p[1], p[2]}; }
-Point3f point_of(const Vector3d& v) {
-    return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z())};
-}
 
 // The handles of one level, and the samples that they move away from their rest positions.
 struct Stage {
     const DeformableMesh& mesh;
     const DeformationLevel& level;
-    std::vector<Vector3d> rest, rest_normals;  // of the samples at rest
+    std::vector<Point3f> rest, rest_normals;  // of the samples at rest
     std::vector<Vector3d> centre;              // of the handles, at rest
     std::vector<HandlePair> pairs;             // with their points at rest
     std::vector<RigidMotion> motion;
@@ -48,22 +45,61 @@ RigidMotion blended(const SampleBlend& blend, const std::vector<RigidMotion>& mo
     return out;
 }
 
+// The same for points, of which there are many: in floats, by rows of a turn and a shift, which are vectors. Two in a
+// million of a body's size are a hundredth of a millimetre.
+using Rows = std::array<float, 12>;
+
+std::vector<Rows> rows_of(std::span<const RigidMotion> motions) {
+    std::vector<Rows> out(motions.size());
+    for (std::size_t h = 0; h < out.size(); ++h)
+        for (int i = 0; i < 3; ++i) {
+            auto* row = &out[h][static_cast<std::size_t>(4 * i)];
+            for (int j = 0; j < 3; ++j) row[j] = static_cast<float>(motions[h].rotation(i, j));
+            row[3] = static_cast<float>(motions[h].shift[i]);
+        }
+    return out;
+}
+
+Rows blended(const SampleBlend& blend, const std::vector<Rows>& rows) {
+    Rows out{};
+    for (std::size_t k = 0; k < blend.count; ++k) {
+        const Rows& row = rows[blend.handle[k]];
+        for (std::size_t i = 0; i < out.size(); ++i) out[i] += blend.weight[k] * row[i];
+    }
+    return out;
+}
+
+Point3f turned(const Rows& rows, const Point3f& p) {
+    Point3f out;
+    for (std::size_t i = 0; i < 3; ++i)
+        out[i] = rows[4 * i] * p[0] + rows[4 * i + 1] * p[1] + rows[4 * i + 2] * p[2];
+    return out;
+}
+
+Point3f moved_by(const Rows& rows, const Point3f& p) {
+    auto out = turned(rows, p);
+    for (std::size_t i = 0; i < 3; ++i) out[i] += rows[4 * i + 3];
+    return out;
+}
+
 struct MovedSample {
     Point3f point, normal;
 };
-MovedSample moved_sample(const SampleBlend& blend, const std::vector<RigidMotion>& motion, const Vector3d& rest,
-                         const Vector3d& rest_normal) {
-    const RigidMotion here = blended(blend, motion);
-    const Vector3d normal = here.rotation * rest_normal;
-    const double length = normal.norm();
-    return {point_of(here(rest)), point_of(length > 0 ? Vector3d(normal / length) : rest_normal)};
+MovedSample moved_sample(const SampleBlend& blend, const std::vector<Rows>& rows, const Point3f& rest,
+                         const Point3f& rest_normal) {
+    const Rows here = blended(blend, rows);
+    const Point3f normal = turned(here, rest_normal);
+    const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+    if (!(length > 0)) return {moved_by(here, rest), rest_normal};
+    return {moved_by(here, rest), {normal[0] / length, normal[1] / length, normal[2] / length}};
 }
 
 Moved move_samples(const Stage& stage, Threads threads) {
     Moved out{std::vector<Point3f>(stage.rest.size()), std::vector<Point3f>(stage.rest.size()), {}};
+    const auto rows = rows_of(stage.motion);
     parallel_for(stage.rest.size(), threads, 1024, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            const auto moved = moved_sample(stage.level.blends[i], stage.motion, stage.rest[i], stage.rest_normals[i]);
+            const auto moved = moved_sample(stage.level.blends[i], rows, stage.rest[i], stage.rest_normals[i]);
             out.points[i] = moved.point;
             out.normals[i] = moved.normal;
         }
@@ -270,7 +306,11 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
         for (std::size_t slice = begin; slice < end; ++slice) {
             std::uint32_t last = OrientedPoints::no_point;
             constexpr std::size_t ahead = 6;
-            for (std::size_t i = slice * forward / slices; i < (slice + 1) * forward / slices; ++i) {
+            const std::size_t first = slice * forward / slices, after = (slice + 1) * forward / slices;
+            target.walk_all(std::span(moved.points).subspan(first, after - first),
+                            round.far ? begins_near * gap : target.begins_near(),
+                            std::span(guesses.forward).subspan(first, after - first));
+            for (std::size_t i = first; i < after; ++i) {
                 if (i + ahead < forward) target.expect(guesses.forward[i + ahead]);
                 last = go_forward(i, last);
             }
@@ -317,40 +357,40 @@ std::vector<Pull> sum_pulls(const std::vector<Match>& matches, float point_share
 // ---- Colours: where the reference's colours have a slope, a difference tells how far it has slid along the surface.
 
 // The samples' slopes as they lie now, along the moved surface.
-std::vector<Matrix3d> turned_slopes(const Stage& stage, const Moved& moved) {
-    std::vector<Matrix3d> out(stage.textures.size(), Matrix3d::Zero());
+std::vector<Matrix3f> turned_slopes(const Stage& stage, const Moved& moved) {
+    std::vector<Matrix3f> out(stage.textures.size(), Matrix3f::Zero());
+    const auto rows = rows_of(stage.motion);
     for (std::size_t i = 0; i < out.size(); ++i) {
         if (!(stage.textures[i].trust > 0)) continue;
-        const SampleBlend& blend = stage.level.blends[i];
-        Matrix3d turn = Matrix3d::Zero();
-        for (std::size_t k = 0; k < blend.count; ++k)
-            turn += static_cast<double>(blend.weight[k]) * stage.motion[blend.handle[k]].rotation;
-        const Vector3d normal = vector_of(moved.normals[i]);
-        out[i].noalias() = stage.textures[i].slope.cast<double>() * turn.transpose();
+        const Rows row = blended(stage.level.blends[i], rows);
+        Matrix3f turn;
+        turn << row[0], row[1], row[2], row[4], row[5], row[6], row[8], row[9], row[10];
+        const Vector3f normal = floats_of(moved.normals[i]);
+        out[i].noalias() = stage.textures[i].slope * turn.transpose();
         out[i] -= (out[i] * normal).eval() * normal.transpose();
     }
     return out;
 }
 
 // For each match, what the reference's colour would be at the target's vertex, minus the vertex's: levels.
-std::vector<Vector3d> colour_differences(const Stage& stage, const std::vector<Match>& matches, const Moved& moved,
-                                         const std::vector<Matrix3d>& slopes, const SurfaceIndex& target) {
-    std::vector<Vector3d> out;
+std::vector<Vector3f> colour_differences(const Stage& stage, const std::vector<Match>& matches, const Moved& moved,
+                                         const std::vector<Matrix3f>& slopes, const SurfaceIndex& target) {
+    std::vector<Vector3f> out;
     out.reserve(matches.size());
     for (const Match& match : matches) {
-        const Vector3d apart = vector_of(target.positions[match.vertex]) - vector_of(moved.points[match.sample]);
+        const Vector3f apart = floats_of(target.positions[match.vertex]) - floats_of(moved.points[match.sample]);
         const Colour& seen = target.colours[match.vertex];
-        out.emplace_back(stage.textures[match.sample].colour.cast<double>() + slopes[match.sample] * apart -
-                         Vector3d(seen[0], seen[1], seen[2]));
+        out.emplace_back(stage.textures[match.sample].colour + slopes[match.sample] * apart -
+                         Vector3f(seen[0], seen[1], seen[2]));
     }
     return out;
 }
 
 // Variance of the components, from the median of the squares as if these were Gaussian: so what has slid far does not
 // count as noise.
-double colour_noise(const std::vector<Vector3d>& differences) {
-    constexpr double mean_by_median = 2.2, rounding = 1;
-    std::vector<double> squares;
+float colour_noise(const std::vector<Vector3f>& differences) {
+    constexpr float mean_by_median = 2.2F, rounding = 1;
+    std::vector<float> squares;
     squares.reserve(differences.size());
     for (const auto& difference : differences) squares.push_back(difference.squaredNorm() / 3);
     const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
@@ -359,21 +399,21 @@ double colour_noise(const std::vector<Vector3d>& differences) {
 }
 
 // 1 for a difference of zero; beyond three standard deviations it soon stops to count: a shadow, or another place.
-double colour_trust(const Vector3d& difference, double variance) {
-    const double size = difference.squaredNorm() / 3 / (9 * variance);
+float colour_trust(const Vector3f& difference, float variance) {
+    const float size = difference.squaredNorm() / 3 / (9 * variance);
     return 1 / ((1 + size) * (1 + size));
 }
 
 // The mean difference around each handle, as another exposure or light makes it.
-std::vector<Vector3d> mean_differences(const Stage& stage, const std::vector<Match>& matches,
-                                       const std::vector<Vector3d>& differences, double noise) {
-    std::vector<Vector3d> sums(stage.centre.size(), Vector3d::Zero());
-    std::vector<double> weights(stage.centre.size(), 0);
+std::vector<Vector3f> mean_differences(const Stage& stage, const std::vector<Match>& matches,
+                                       const std::vector<Vector3f>& differences, float noise) {
+    std::vector<Vector3f> sums(stage.centre.size(), Vector3f::Zero());
+    std::vector<float> weights(stage.centre.size(), 0);
     for (std::size_t m = 0; m < matches.size(); ++m) {
         const SampleBlend& blend = stage.level.blends[matches[m].sample];
-        const double weight = static_cast<double>(matches[m].weight) * colour_trust(differences[m], noise);
+        const float weight = matches[m].weight * colour_trust(differences[m], noise);
         for (std::size_t k = 0; k < blend.count; ++k) {
-            const double share = weight * static_cast<double>(blend.weight[k]);
+            const float share = weight * blend.weight[k];
             sums[blend.handle[k]] += share * differences[m];
             weights[blend.handle[k]] += share;
         }
@@ -386,30 +426,31 @@ std::vector<Vector3d> mean_differences(const Stage& stage, const std::vector<Mat
 // How the colours pull each sample along the surface.
 std::vector<Pull> colour_pulls(const Stage& stage, const std::vector<Match>& matches, const Moved& moved,
                                const SurfaceIndex& target, const DeformationOptions& options) {
-    constexpr double least_slope = 0.1;  // noise per mm: a slope that changes less is not told from it in a centimetre
+    constexpr float least_slope = 0.1F;  // noise per mm: a slope that changes less is not told from it in a centimetre
     std::vector<Pull> pulls(stage.rest.size());
     if (matches.empty()) return pulls;
     const auto slopes = turned_slopes(stage, moved);
     const auto differences = colour_differences(stage, matches, moved, slopes, target);
-    const double noise = colour_noise(differences), unit = options.millimetre * options.millimetre;
+    const float noise = colour_noise(differences);
+    const auto unit = static_cast<float>(options.millimetre * options.millimetre);
+    const auto colour_weight = static_cast<float>(options.colour_weight);
     const auto means = mean_differences(stage, matches, differences, noise);
     for (std::size_t m = 0; m < matches.size(); ++m) {
         const Match& match = matches[m];
         const SampleTexture& texture = stage.textures[match.sample];
-        const Matrix3d& slope = slopes[match.sample];
-        const double steepness = slope.squaredNorm() * unit;  // levels^2/mm^2
+        const Matrix3f& slope = slopes[match.sample];
+        const float steepness = slope.squaredNorm() * unit;  // levels^2/mm^2
         if (!(steepness > least_slope * least_slope * noise)) continue;
         const SampleBlend& blend = stage.level.blends[match.sample];
-        Vector3d left = differences[m];
-        for (std::size_t k = 0; k < blend.count; ++k)
-            left -= static_cast<double>(blend.weight[k]) * means[blend.handle[k]];
-        const double variance = noise + static_cast<double>(texture.unevenness);
+        Vector3f left = differences[m];
+        for (std::size_t k = 0; k < blend.count; ++k) left -= blend.weight[k] * means[blend.handle[k]];
+        const float variance = noise + texture.unevenness;
         // At most as much as a match by distance.
-        const double weight = static_cast<double>(match.weight * texture.trust) * colour_trust(left, variance) * unit *
-                              std::min(options.colour_weight / variance, 1 / steepness);
+        const float weight = match.weight * texture.trust * colour_trust(left, variance) * unit *
+                             std::min(colour_weight / variance, 1 / steepness);
         Pull& pull = pulls[match.sample];
-        pull.metric += (weight * slope.transpose() * slope).cast<float>();
-        pull.force += (weight * slope.transpose() * left).cast<float>();
+        pull.metric.noalias() += weight * (slope.transpose() * slope);
+        pull.force.noalias() += weight * (slope.transpose() * left);
     }
     return pulls;
 }
@@ -661,8 +702,8 @@ DeformationForm form_of(const BlockPattern& pattern, BlockSystem system, double 
 Stage fine_stage(const DeformableMesh& mesh, std::vector<RigidMotion> motion) {
     Stage stage{mesh, mesh.fine, {}, {}, mesh.handles, mesh.fine.pairs, std::move(motion), mesh.sample_textures};
     for (std::size_t i = 0; i < mesh.samples.size(); ++i) {
-        stage.rest.push_back(vector_of(mesh.positions[mesh.samples[i]]));
-        stage.rest_normals.push_back(vector_of(mesh.sample_normals[i]));
+        stage.rest.push_back(mesh.positions[mesh.samples[i]]);
+        stage.rest_normals.push_back(mesh.sample_normals[i]);
     }
     return stage;
 }
@@ -673,8 +714,8 @@ Stage coarse_stage(const DeformableMesh& mesh, const Stage& fine, Threads thread
                 {}};
     const Moved moved = move_samples(fine, threads);
     for (const std::uint32_t i : mesh.coarse.samples) {
-        stage.rest.push_back(vector_of(moved.points[i]));
-        stage.rest_normals.push_back(vector_of(moved.normals[i]));
+        stage.rest.push_back(moved.points[i]);
+        stage.rest_normals.push_back(moved.normals[i]);
     }
     for (const std::uint32_t h : mesh.coarse.centre) stage.centre.push_back(fine.motion[h](mesh.handles[h]));
     for (auto& pair : stage.pairs) pair.point = 0.5 * (stage.centre[pair.first] + stage.centre[pair.second]);
@@ -924,11 +965,11 @@ double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target,
                          const DeformationOptions& options) {
     if (mesh.samples.empty() || target.samples.empty()) return 0;
     const std::size_t every = mesh.samples.size() + target.samples.size() < 2000 ? 1 : 16;
-    const std::vector<RigidMotion> motion(motions.begin(), motions.end());
+    const auto rows = rows_of(motions);
     std::vector<Point3f> points, normals;
     for (std::size_t i = 0; i < mesh.samples.size(); i += every) {
-        const auto moved = moved_sample(mesh.fine.blends[i], motion, vector_of(mesh.positions[mesh.samples[i]]),
-                                        vector_of(mesh.sample_normals[i]));
+        const auto moved = moved_sample(mesh.fine.blends[i], rows, mesh.positions[mesh.samples[i]],
+                                        mesh.sample_normals[i]);
         points.push_back(moved.point);
         normals.push_back(moved.normal);
     }
@@ -961,31 +1002,9 @@ double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target,
 std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, Threads threads) {
     std::vector<Point3f> out(mesh.positions);
     if (motions.empty()) return out;
-    // In floats, by rows of a turn and a shift, which are vectors: two in a million of a body's size are a hundredth of
-    // a millimetre.
-    using Rows = std::array<float, 12>;
-    std::vector<Rows> rows;
-    rows.reserve(motions.size());
-    for (const auto& motion : motions) {
-        auto& row = rows.emplace_back();
-        for (int i = 0; i < 3; ++i) {
-            for (int j = 0; j < 3; ++j)
-                row[static_cast<std::size_t>(4 * i + j)] = static_cast<float>(motion.rotation(i, j));
-            row[static_cast<std::size_t>(4 * i + 3)] = static_cast<float>(motion.shift[i]);
-        }
-    }
+    const auto rows = rows_of(motions);
     parallel_for(out.size(), threads, 2048, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t v = begin; v < end; ++v) {
-            const auto& blend = mesh.blends[v];
-            Rows sum{};
-            for (std::size_t k = 0; k < blend.count; ++k) {
-                const Rows& row = rows[blend.handle[k]];
-                for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += blend.weight[k] * row[i];
-            }
-            const auto [x, y, z] = mesh.positions[v];
-            for (std::size_t i = 0; i < 3; ++i)
-                out[v][i] = sum[4 * i] * x + sum[4 * i + 1] * y + sum[4 * i + 2] * z + sum[4 * i + 3];
-        }
+        for (std::size_t v = begin; v < end; ++v) out[v] = moved_by(blended(mesh.blends[v], rows), mesh.positions[v]);
     });
     return out;
 }

@@ -71,6 +71,50 @@ using Whole [[gnu::vector_size(32)]] = std::int32_t;
     }
 }
 
+[[gnu::always_inline]] inline void walk_all(std::span<const VertexFan> fans, std::span<const Vector3f> queries,
+                                            float within, std::span<std::uint32_t> from) {
+    constexpr std::size_t side_by_side = 8;
+    struct Walk {
+        std::size_t query;
+        float squared_distance;
+    };
+    std::array<Walk, side_by_side> walks;
+    const auto expect = [&](std::size_t begin) {
+        for (std::size_t i = begin; i < std::min(begin + side_by_side, from.size()); ++i)
+            if (from[i] < fans.size()) fans[from[i]].expect();
+    };
+    expect(0);
+    for (std::size_t begin = 0; begin < from.size(); begin += side_by_side) {
+        expect(begin + side_by_side);
+        std::size_t going = 0;
+        for (std::size_t i = begin; i < std::min(begin + side_by_side, from.size()); ++i) {
+            if (from[i] >= fans.size()) continue;
+            const auto &own = fans[from[i]].own, &query = queries[i];
+            const float x = own[0] - query[0], y = own[1] - query[1], z = own[2] - query[2];
+            const float squared_distance = x * x + y * y + z * z;
+            if (squared_distance < within) walks[going++] = {i, squared_distance};
+        }
+        while (going > 0) {
+            std::size_t go_on = 0;
+            for (std::size_t k = 0; k < going; ++k) {
+                auto walk = walks[k];
+                const VertexFan& fan = fans[from[walk.query]];
+                if (!fan.regular()) continue;
+                const auto& query = queries[walk.query];
+                const Floats x = lanes_of(fan.x) - query[0], y = lanes_of(fan.y) - query[1],
+                             z = lanes_of(fan.z) - query[2];
+                const auto near = nearest_lane(x * x + y * y + z * z);
+                if (!(near.squared_distance < walk.squared_distance)) continue;
+                from[walk.query] = fan.neighbour[near.lane];
+                fans[from[walk.query]].expect();
+                walk.squared_distance = near.squared_distance;
+                walks[go_on++] = walk;
+            }
+            going = go_on;
+        }
+    }
+}
+
 // How far from the vertex, as a share of the way, the place on a side is that is nearest to the query: how far the
 // query lies along the side, by the side's squared length.
 [[gnu::always_inline]] inline Floats along_side(Floats product, Floats squared_length) {
@@ -193,6 +237,10 @@ using Order = std::array<std::uint32_t, lanes>;
                                              float squared_distance) {
     return walk(fans, query, from, squared_distance);
 }
+[[gnu::target("avx2")]] void walk_all_by_avx2(std::span<const VertexFan> fans, std::span<const Vector3f> queries,
+                                               float within, std::span<std::uint32_t> from) {
+    walk_all(fans, queries, within, from);
+}
 [[gnu::target("avx2")]] NearInFan nearest_by_avx2(const VertexFan& fan, const Vector3f& query, const Facing* facing) {
     return nearest(fan, query, facing);
 }
@@ -202,13 +250,13 @@ using Order = std::array<std::uint32_t, lanes>;
 }  // namespace
 
 const FanSearches& portable_fan_searches() {
-    static const FanSearches out = {set_fan, walk, nearest};
+    static const FanSearches out = {set_fan, walk, walk_all, nearest};
     return out;
 }
 
 const FanSearches& fan_searches() {
 #ifdef __x86_64__
-    static const FanSearches by_avx2 = {set_fan_by_avx2, walk_by_avx2, nearest_by_avx2};
+    static const FanSearches by_avx2 = {set_fan_by_avx2, walk_by_avx2, walk_all_by_avx2, nearest_by_avx2};
     static const bool has_avx2 = __builtin_cpu_supports("avx2") > 0;
     if (has_avx2) return by_avx2;
 #endif

@@ -29,6 +29,11 @@ struct alignas(64) VertexFan {
     Vector3f own, normal;                   // the vertex's position and normal; always set
     std::uint32_t triangles;  // 0: not regular, since there are none, more than `lanes`, or such as do not form one fan
     bool regular() const { return triangles > 0; }
+    // Says that it will soon be read.
+    void expect() const {
+        const auto* begin = reinterpret_cast<const char*>(this);
+        for (std::size_t line = 0; line < sizeof(VertexFan); line += 64) __builtin_prefetch(begin + line);
+    }
     bool closed() const { return regular() && neighbour[triangles % lanes] == neighbour[0]; }
     Vector3f place(std::size_t lane) const { return {x[lane], y[lane], z[lane]}; }
 };
@@ -58,6 +63,11 @@ struct FanSearches {
     // of the query from the vertex where it begins. Where distances differ by less than a millionth, the vertex found
     // may be the farther one.
     FanWalk (*walk)(std::span<const VertexFan> fans, const Vector3f& query, std::uint32_t from, float squared_distance);
+    // As many walks, eight side by side, so that none waits for memory. from: where each begins, set to where it ends or
+    // comes to a fan that is not regular. Walks from beyond the fans, or from farther away than `within`, squared, are
+    // not made.
+    void (*walk_all)(std::span<const VertexFan> fans, std::span<const Vector3f> queries, float within,
+                     std::span<std::uint32_t> from);
     // The triangle of a regular fan that is nearest to the query. facing: null if all may be found. Distances that
     // differ by less than a millionth count as equal.
     NearInFan (*nearest)(const VertexFan& fan, const Vector3f& query, const Facing* facing);
@@ -76,14 +86,15 @@ public:
     FanWalk walk(const Vector3f& query, std::uint32_t from, float squared_distance) const {
         return searches_->walk({fans_.get(), count_}, query, from, squared_distance);
     }
+    void walk_all(std::span<const Vector3f> queries, float within, std::span<std::uint32_t> from) const {
+        searches_->walk_all({fans_.get(), count_}, queries, within, from);
+    }
     NearInFan nearest(std::uint32_t vertex, const Vector3f& query, const Facing* facing) const {
         return searches_->nearest(fans_[vertex], query, facing);
     }
     // Says that a search will soon begin at this vertex, so that it need not wait for the memory. Any number is taken.
     void expect(std::uint32_t vertex) const {
-        if (vertex >= count_) return;
-        const auto* fan = reinterpret_cast<const char*>(&fans_[vertex]);
-        for (std::size_t line = 0; line < sizeof(VertexFan); line += 64) __builtin_prefetch(fan + line);
+        if (vertex < count_) fans_[vertex].expect();
     }
 
 private:

@@ -147,7 +147,7 @@ struct Seeker {
 // OrientedPoints::no_point; or none.
 std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std::span<const Point3f> points,
                                                std::span<const Point3f> normals, const Seeker& how,
-                                               std::span<const std::uint32_t> near = {}) {
+                                               std::vector<std::uint32_t> near = {}) {
     std::vector<SurfacePoint> out(points.size());
     if (surface.triangles.empty()) return out;
     const auto reach = static_cast<float>(how.reach), agreement = static_cast<float>(how.agreement);
@@ -174,7 +174,11 @@ std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std:
     parallel_for((points.size() + in_a_row - 1) / in_a_row, how.threads, 2, [&](std::size_t begin, std::size_t end) {
         for (std::size_t row = begin; row < end; ++row) {
             std::uint32_t guess = OrientedPoints::no_point;
-            for (std::size_t i = row * in_a_row; i < std::min(points.size(), (row + 1) * in_a_row); ++i) {
+            const std::size_t first = row * in_a_row, after = std::min(points.size(), first + in_a_row);
+            if (how.enough > 0 && !near.empty())
+                surface.walk_all(points.subspan(first, after - first), surface.begins_near(),
+                                 std::span(near).subspan(first, after - first));
+            for (std::size_t i = first; i < after; ++i) {
                 if (i + ahead < near.size()) surface.expect(near[i + ahead]);
                 if (!near.empty() && near[i] != OrientedPoints::no_point) guess = near[i];
                 out[i] = closest(points[i], normals[i], guess);
@@ -236,7 +240,7 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
     }
     const auto found =
         closest_on_same_side(capture.surface, samples, facing, {options.reach, options.lost / 2, 0, options.threads},
-                             near);
+                             std::move(near));
     std::vector<double> error(samples.size());
     parallel_for(samples.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
@@ -998,7 +1002,7 @@ SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const Lattice
         if (shown_near.near[v] < beside.size()) beside[shown_near.near[v]] = v;
     capture->on_decoded =
         closest_on_same_side(*shown, capture->points, capture->normals,
-                             {options.reach, options.lost / 2, 0.2, options.threads}, beside);
+                             {options.reach, options.lost / 2, 0.2, options.threads}, std::move(beside));
     error = errors_of(shown_near, *shown, *capture, options);
     error_around = errors_around(shown->positions, error, *capture, options);
     rims.assign(decoded.positions.size(), false);
