@@ -60,11 +60,14 @@ FrameMotion motion_of_bones(const Configuration& configuration, const ReferenceI
 
 NodeRegistration register_frame(const Configuration& configuration, const ReferenceInUse& reference,
                                 const SurfaceIndex& surface, const CodedPose& pose, NodeStarts starts,
-                                const TrackingEffort& effort, std::vector<StageTime>& stages) {
+                                const TrackingEffort& effort, std::vector<StageTime>& stages,
+                                const std::atomic<bool>* in_vain) {
     StageClock clock(stages);
     const auto skeletal = skeletal_node_motion(configuration, reference.decoded, pose);
     starts.skeletal = skeletal;
-    auto out = register_nodes(reference.deformable, surface, starts, deformation_options(configuration, effort));
+    auto options = deformation_options(configuration, effort);
+    options.in_vain = in_vain;
+    auto out = register_nodes(reference.deformable, surface, starts, options);
     clock.done("registration");
     return out;
 }

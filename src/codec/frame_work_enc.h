@@ -4,6 +4,7 @@
 // (advance()).
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -184,6 +185,8 @@ public:
     const std::vector<Colour> colours;  // of its vertices where they are not coded, for tracking alone; or none
     const CodedPose pose;
     std::vector<StageTime>& stages;
+    std::atomic<bool> lost = false;                  // whether tracking turned out to be lost in it: then it is not what
+                                                     // was assumed of it, see frames_in_flight_enc.h
     std::function<bool()> may_repair = {};           // whether what tracking lost is repaired in this frame; null: yes
     std::optional<EncodedTrackedFrame> coded_alone;  // as a T-frame of the reference alone, if it was last coded so and
                                                      // is registered as it was then: what a patch is planned on
@@ -244,7 +247,8 @@ FrameMotion motion_of_bones(const Configuration& configuration, const ReferenceI
                             std::vector<StageTime>& stages);
 NodeRegistration register_frame(const Configuration& configuration, const ReferenceInUse& reference,
                                 const SurfaceIndex& surface, const CodedPose& pose, NodeStarts starts,
-                                const TrackingEffort& effort, std::vector<StageTime>& stages);
+                                const TrackingEffort& effort, std::vector<StageTime>& stages,
+                                const std::atomic<bool>* in_vain = nullptr);
 
 // Side of the cubes of space by which it is judged whether a region is lost, lattice units.
 double region_side(const Configuration& configuration);

@@ -43,15 +43,16 @@ void begin_work(const FrameWork& before, const std::vector<RigidMotion>* bones, 
     }
 }
 
+// Not finished once the frame before it is found lost.
 void go_on_with_work(const FrameWork& before, const Assumed& assumed, PushedFrame& frame,
                      std::vector<StageTime>& stages) {
     const auto& configuration = before.configuration;
     auto& ahead = frame.ahead;
     begin_work(before, assumed.bones ? &*assumed.bones : nullptr, frame, stages);
-    if (assumed.nodes && can_be_moved(configuration, before.sequence, frame.mesh))
+    if (assumed.nodes && !before.lost && can_be_moved(configuration, before.sequence, frame.mesh))
         ahead.registered = register_frame(configuration, before.reference(), *ahead.surface, frame.pose,
                                           {assumed.nodes->motion, before.sequence.nodes.last, {}, {}},
-                                          tracking_effort(frame.effort), stages);
+                                          tracking_effort(frame.effort), stages, &before.lost);
     if (assumed.codebooks && ahead.bone_motion)
         ahead.quantised = quantise_whole(configuration, before.reference(), frame.mesh, *ahead.bone_motion,
                                          *assumed.codebooks, assumed.steps, stages);
@@ -62,7 +63,7 @@ void keep_what_holds(const FrameWork& work, const Result<Candidate>& chosen, std
     const auto is = [&](FrameType type) { return chosen && chosen->type == type; };
     const bool by_bones = is(FrameType::enhanced) || is(FrameType::predicted);
     for (auto& frame : waiting) {
-        if (!is(FrameType::tracked) || !work.is_as_first_registered()) frame.ahead.registered.reset();
+        if (!is(FrameType::tracked) || !work.is_as_first_registered() || work.lost) frame.ahead.registered.reset();
         if (!by_bones) frame.ahead.bone_motion.reset();
         if (!is(FrameType::enhanced)) frame.ahead.quantised.reset();
     }

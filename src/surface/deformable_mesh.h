@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -56,6 +57,7 @@ struct DeformationOptions {
     int surface_rounds = 3;      // last fine rounds in which the target is matched to the reference's triangles, not to
                                  // its vertices alone
     Threads threads = {};
+    const std::atomic<bool>* in_vain = nullptr;  // once it is set no more rounds are made: nobody wants the result
 };
 
 // How a vertex follows the handles, and the blocks of the linear system that it touches.

@@ -770,6 +770,10 @@ bool leads_to(const DeformableMesh& mesh, std::span<const RigidMotion> motion, s
     return there < fewest_in_limb;
 }
 
+bool in_vain(const DeformationOptions& options) {
+    return options.in_vain && options.in_vain->load(std::memory_order_relaxed);
+}
+
 double between(double from, double to, int step, int steps) {
     return steps <= 1 ? to : from * std::pow(to / from, static_cast<double>(step) / (steps - 1));
 }
@@ -789,7 +793,7 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     if (options.coarse_rounds > 0) {
         Stage coarse = coarse_stage(mesh, fine, options.threads);
         RoundMemory memory(mesh.coarse.pattern);
-        for (int i = 0; i < options.coarse_rounds; ++i) {
+        for (int i = 0; i < options.coarse_rounds && !in_vain(options); ++i) {
             const double reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
             const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
@@ -806,7 +810,7 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     RoundMemory memory(mesh.fine.pattern);
     memory.guesses = std::move(guesses);
     double weight = 0;
-    for (int i = 0; i < options.fine_rounds; ++i) {
+    for (int i = 0; i < options.fine_rounds && !in_vain(options); ++i) {
         auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
         Round round = {value(options.middle_reach, options.near_reach) * unit,
                        value(options.first_stiffness, options.last_stiffness),

@@ -349,6 +349,7 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     const bool may_be_patched =
         !due && work.configuration.options.tracked.patch_share > 0 && reference.decoded.mesh().texcoords.empty();
     if (lost) {
+        work.lost = true;
         // Limbs are rarely found; where they are, what was coded meanwhile is coded again.
         std::optional<Result<EncodedTrackedFrame>> coded;
         const bool limbs_moved = work.follow_lost_limbs([&] {
