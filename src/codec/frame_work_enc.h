@@ -185,9 +185,9 @@ public:
     const std::vector<Colour> colours;  // of its vertices where they are not coded, for tracking alone; or none
     const CodedPose pose;
     std::vector<StageTime>& stages;
-    std::atomic<bool> lost = false;                  // whether tracking turned out to be lost in it: then it is not what
-                                                     // was assumed of it, see frames_in_flight_enc.h
-    std::function<bool()> may_repair = {};           // whether what tracking lost is repaired in this frame; null: yes
+    std::atomic<bool> lost = false;         // whether tracking turned out to be lost in it: then it is not what
+                                            // was assumed of it, see frames_in_flight_enc.h
+    std::function<bool()> may_repair = {};  // whether what tracking lost is repaired in this frame; null: yes
     std::optional<EncodedTrackedFrame> coded_alone;  // as a T-frame of the reference alone, if it was last coded so and
                                                      // is registered as it was then: what a patch is planned on
 

@@ -13,15 +13,20 @@ std::uint32_t BlockPattern::find(std::uint16_t row, std::uint16_t column) const 
 BlockPattern make_pattern(std::size_t handles, std::vector<std::pair<std::uint16_t, std::uint16_t>> pairs) {
     BlockPattern pattern;
     pattern.handles = handles;
-    std::erase_if(pairs, [](const auto& p) { return p.first == p.second; });
-    for (auto& p : pairs)
-        if (p.first > p.second) std::swap(p.first, p.second);
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    // The columns of each row; most pairs are named many times.
+    std::vector<std::vector<std::uint16_t>> rows(handles);
+    for (const auto& p : pairs) {
+        if (p.first == p.second) continue;
+        auto& row = rows[std::min(p.first, p.second)];
+        const auto column = std::max(p.first, p.second);
+        if (std::find(row.begin(), row.end(), column) == row.end()) row.push_back(column);
+    }
     pattern.first.assign(handles + 1, 0);
-    for (const auto& p : pairs) ++pattern.first[p.first + std::size_t{1}];
-    for (std::size_t h = 0; h < handles; ++h) pattern.first[h + 1] += pattern.first[h];
-    pattern.place = std::move(pairs);
+    for (std::size_t h = 0; h < handles; ++h) {
+        std::sort(rows[h].begin(), rows[h].end());
+        for (const auto column : rows[h]) pattern.place.emplace_back(static_cast<std::uint16_t>(h), column);
+        pattern.first[h + 1] = static_cast<std::uint32_t>(pattern.place.size());
+    }
     return pattern;
 }
 

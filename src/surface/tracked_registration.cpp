@@ -23,8 +23,8 @@ struct Stage {
     const DeformableMesh& mesh;
     const DeformationLevel& level;
     std::vector<Point3f> rest, rest_normals;  // of the samples at rest
-    std::vector<Vector3d> centre;              // of the handles, at rest
-    std::vector<HandlePair> pairs;             // with their points at rest
+    std::vector<Vector3d> centre;             // of the handles, at rest
+    std::vector<HandlePair> pairs;            // with their points at rest
     std::vector<RigidMotion> motion;
     std::span<const SampleTexture> textures;  // one per sample, or none
 };
@@ -71,8 +71,7 @@ Rows blended(const SampleBlend& blend, const std::vector<Rows>& rows) {
 
 Point3f turned(const Rows& rows, const Point3f& p) {
     Point3f out;
-    for (std::size_t i = 0; i < 3; ++i)
-        out[i] = rows[4 * i] * p[0] + rows[4 * i + 1] * p[1] + rows[4 * i + 2] * p[2];
+    for (std::size_t i = 0; i < 3; ++i) out[i] = rows[4 * i] * p[0] + rows[4 * i + 1] * p[1] + rows[4 * i + 2] * p[2];
     return out;
 }
 
@@ -931,8 +930,7 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
                        const DeformationOptions& options, std::vector<RigidMotion>& motions, DeformationForm* form) {
     const double reach = options.near_reach * options.millimetre;
     std::vector<bool> differs(motions.size());
-    for (std::size_t h = 0; h < motions.size(); ++h)
-        differs[h] = is_elsewhere(mesh, h, motions[h], other[h], options);
+    for (std::size_t h = 0; h < motions.size(); ++h) differs[h] = is_elsewhere(mesh, h, motions[h], other[h], options);
     if (std::find(differs.begin(), differs.end(), true) == differs.end()) return false;
     const auto beside = graph_of_handles(mesh).beside;
     Stage stage = fine_stage(mesh, motions);
@@ -972,8 +970,8 @@ double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target,
     const auto rows = rows_of(motions);
     std::vector<Point3f> points, normals;
     for (std::size_t i = 0; i < mesh.samples.size(); i += every) {
-        const auto moved = moved_sample(mesh.fine.blends[i], rows, mesh.positions[mesh.samples[i]],
-                                        mesh.sample_normals[i]);
+        const auto moved =
+            moved_sample(mesh.fine.blends[i], rows, mesh.positions[mesh.samples[i]], mesh.sample_normals[i]);
         points.push_back(moved.point);
         normals.push_back(moved.normal);
     }

@@ -37,12 +37,11 @@ struct DeformationForm {
 
 // The motions reference -> frame, one per handle, that align the reference with the target. Begins at `start` (one per
 // handle, or empty: no motion). form, if not null, is set to that of the last fine round. known: what another start has
-// led to, one per handle, or empty: once coarse rounds take no limb elsewhere, that is the result. The result is the same
-// for any number of threads.
+// led to, one per handle, or empty: once coarse rounds take no limb elsewhere, that is the result. The result is the
+// same for any number of threads.
 std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const SurfaceIndex& target,
                                               std::span<const RigidMotion> start, const DeformationOptions& options,
-                                              DeformationForm* form = nullptr,
-                                              std::span<const RigidMotion> known = {});
+                                              DeformationForm* form = nullptr, std::span<const RigidMotion> known = {});
 
 // A start for the next frame: each handle repeats its step from `before` to `last`. One motion per handle in each.
 std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const RigidMotion> before,

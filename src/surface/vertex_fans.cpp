@@ -238,7 +238,7 @@ using Order = std::array<std::uint32_t, lanes>;
     return walk(fans, query, from, squared_distance);
 }
 [[gnu::target("avx2")]] void walk_all_by_avx2(std::span<const VertexFan> fans, std::span<const Vector3f> queries,
-                                               float within, std::span<std::uint32_t> from) {
+                                              float within, std::span<std::uint32_t> from) {
     walk_all(fans, queries, within, from);
 }
 [[gnu::target("avx2")]] NearInFan nearest_by_avx2(const VertexFan& fan, const Vector3f& query, const Facing* facing) {

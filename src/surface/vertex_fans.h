@@ -63,9 +63,9 @@ struct FanSearches {
     // of the query from the vertex where it begins. Where distances differ by less than a millionth, the vertex found
     // may be the farther one.
     FanWalk (*walk)(std::span<const VertexFan> fans, const Vector3f& query, std::uint32_t from, float squared_distance);
-    // As many walks, eight side by side, so that none waits for memory. from: where each begins, set to where it ends or
-    // comes to a fan that is not regular. Walks from beyond the fans, or from farther away than `within`, squared, are
-    // not made.
+    // As many walks, eight side by side, so that none waits for memory. from: where each begins, set to where it ends
+    // or comes to a fan that is not regular. Walks from beyond the fans, or from farther away than `within`, squared,
+    // are not made.
     void (*walk_all)(std::span<const VertexFan> fans, std::span<const Vector3f> queries, float within,
                      std::span<std::uint32_t> from);
     // The triangle of a regular fan that is nearest to the query. facing: null if all may be found. Distances that

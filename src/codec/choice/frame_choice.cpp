@@ -287,9 +287,8 @@ Result<std::optional<Candidate>> patch(FrameWork& work, const FrameSteps& steps,
     const double lost = std::min(allowed_in_region(work, work.sequence.nodes.best_fit),
                                  lost_in_steps * static_cast<double>(steps.geometry));
     StageClock measuring(work.stages);
-    const SurfacePatchSearch search(
-        {tracked.mesh, work.reference().decoded.tracked->mesh.positions, tracked.near}, work.mesh, work.surface(),
-        patch_options(work, steps));
+    const SurfacePatchSearch search({tracked.mesh, work.reference().decoded.tracked->mesh.positions, tracked.near},
+                                    work.mesh, work.surface(), patch_options(work, steps));
     measuring.done("patch");
     for (const double region_lost : {lost, 0.0}) {
         StageClock clock(work.stages);

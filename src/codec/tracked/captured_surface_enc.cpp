@@ -8,7 +8,6 @@
 #include <map>
 #include <numeric>
 
-#include "codec/intra/duplicates.h"
 #include "core/parallel.h"
 #include "surface/simplification.h"
 #include "surface/surface_index.h"
@@ -489,12 +488,15 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
             std::max(forth.worst_region, back.worst_region), std::move(squared)};
 }
 
-LatticeMesh welded(const LatticeMesh& captured) {
+Merging at_same_place(const LatticeMesh& captured) {
     LatticeMesh places;
     places.positions = captured.positions;
-    const auto merging = find_duplicates(places);
-    auto out = kept_vertices(captured, merging.kept);
-    out.triangles = merged_triangles(captured.triangles, merging, false);
+    return find_duplicates(places);
+}
+
+LatticeMesh welded(const LatticeMesh& captured, const Merging& same_place) {
+    auto out = kept_vertices(captured, same_place.kept);
+    out.triangles = merged_triangles(captured.triangles, same_place, false);
     return out;
 }
 
@@ -545,7 +547,7 @@ LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captur
 LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
                                  const SimplifiedReferenceOptions& options) {
     if (captured.triangles.empty() || !captured.texcoords.empty()) return captured;
-    auto out = with_fewer_vertices(welded(captured), true, options);
+    auto out = with_fewer_vertices(welded(captured, at_same_place(captured)), true, options);
     fit_to_surface(out, captured, surface, options);
     if (!captured.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, out.triangles));
     return out;

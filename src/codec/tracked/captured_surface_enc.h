@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "codec/intra/duplicates.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/lattice.h"
 #include "core/thread.h"
@@ -105,8 +106,9 @@ LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex
 LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captured, const SurfaceIndex& surface,
                              const SimplifiedReferenceOptions& options);
 
-// Merges all vertices at the same place into one, with the colour of the first: else the two sides of a seam, as of a
-// texture chart, would be simplified, or cut, separately, and gaps would open. Triangles keep their order.
-LatticeMesh welded(const LatticeMesh& captured);
+// Which vertices are at the same place. Merged into one, with the colour of the first: else the two sides of a seam, as
+// of a texture chart, would be simplified, or cut, separately, and gaps would open. Triangles keep their order.
+Merging at_same_place(const LatticeMesh& captured);
+LatticeMesh welded(const LatticeMesh& captured, const Merging& same_place);
 
 }  // namespace htvm::internal

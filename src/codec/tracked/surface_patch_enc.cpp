@@ -196,6 +196,7 @@ double distance_to(const SurfacePoint& found, double reach) {
 
 // The captured mesh, its seams closed. Triangles have the numbers that they have in its index.
 struct Capture {
+    Merging merging;
     LatticeMesh mesh;
     const SurfaceIndex& surface;
     std::vector<bool> rim{};  // vertices on a border: beyond it nothing was seen, so nothing is known there; none if
@@ -238,9 +239,8 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
         samples.push_back(to_floats(middle));
         facing.push_back(to_floats(normal_of(decoded.positions, t)));
     }
-    const auto found =
-        closest_on_same_side(capture.surface, samples, facing, {options.reach, options.lost / 2, 0, options.threads},
-                             std::move(near));
+    const auto found = closest_on_same_side(capture.surface, samples, facing,
+                                            {options.reach, options.lost / 2, 0, options.threads}, std::move(near));
     std::vector<double> error(samples.size());
     parallel_for(samples.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
@@ -411,10 +411,12 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
         std::vector<std::uint32_t> kept(vertices, 0), gone(vertices, 0), lost_corners(vertices, 0),
             corners(vertices, 0);
         std::vector<std::uint32_t> staying;
+        std::vector<char> stays_as_whole(decoded.triangles.size());
         DisjointSets parts(vertices);
         for (std::uint32_t index = 0; index < decoded.triangles.size(); ++index) {
             const auto& t = decoded.triangles[index];
             const bool stays = !removed[t[0]] && !removed[t[1]] && !removed[t[2]];
+            stays_as_whole[index] = stays ? 1 : 0;
             for (std::size_t i = 0; i < 3; ++i) {
                 ++(stays ? kept : gone)[t[i]];
                 for (const std::size_t other : {(i + 1) % 3, (i + 2) % 3}) {
@@ -433,10 +435,7 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
             for (const auto v : t)
                 if (gone[v] > 0) opened[parts.of(v)] = true;
         }
-        const auto stays = [&](std::uint32_t triangle) {
-            const auto& t = decoded.triangles[triangle];
-            return !removed[t[0]] && !removed[t[1]] && !removed[t[2]];
-        };
+        const auto stays = [&](std::uint32_t triangle) { return stays_as_whole[triangle] != 0; };
         std::vector<std::uint32_t> borders(vertices, 0);
         for (std::uint32_t s = 0; s < sides.count(); ++s)
             if (stays(s / 3) && (sides.twin(s) == none || !stays(sides.twin(s) / 3))) ++borders[sides.from(s)];
@@ -946,23 +945,26 @@ namespace {
 
 // The captured mesh with its border.
 Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, const SurfacePatchOptions& options) {
-    Capture capture{.mesh = welded(captured), .surface = surface};
+    auto merging = at_same_place(captured);
+    auto mesh = welded(captured, merging);
+    Capture capture{.merging = std::move(merging), .mesh = std::move(mesh), .surface = surface};
     const bool as_indexed = capture.mesh.positions.size() == surface.positions.size();
     capture.points = as_indexed ? surface.positions : points_of(capture.mesh.positions);
     capture.normals =
         as_indexed ? surface.normals : points_of(vertex_normals(capture.mesh.positions, capture.mesh.triangles));
     // The sides of a border have both ends on it, so that of most captures hardly any triangles are looked at.
+    std::vector<char> inside(capture.points.size(), 1);
+    for (std::uint32_t v = 0; v < surface.positions.size(); ++v)
+        if (!surface.is_inside(v)) inside[capture.merging.number[v]] = 0;
     std::vector<Triangle> at_border;
-    for (const auto& t : capture.mesh.triangles) {
-        const auto inside = [&](std::uint32_t v) { return as_indexed && surface.is_inside(v); };
-        if (int{inside(t[0])} + int{inside(t[1])} + int{inside(t[2])} < 2) at_border.push_back(t);
-    }
+    for (const auto& t : capture.mesh.triangles)
+        if (inside[t[0]] + inside[t[1]] + inside[t[2]] < 2) at_border.push_back(t);
     const Sides sides(capture.mesh.positions, at_border);
     std::vector<Point3f> along_rim;
     double rim_length = 0;
     for (std::uint32_t s = 0; s < sides.count(); ++s) {
         if (sides.twin(s) != none) continue;
-        if (as_indexed && (surface.is_inside(sides.from(s)) || surface.is_inside(sides.to(s)))) continue;
+        if (inside[sides.from(s)] != 0 || inside[sides.to(s)] != 0) continue;
         if (capture.rim.empty()) capture.rim.assign(capture.points.size(), false);
         const auto a = sides.from(s), b = sides.to(s);
         capture.rim[a] = capture.rim[b] = true;
@@ -979,8 +981,8 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
 
 }  // namespace
 
-SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const LatticeMesh& mesh,
-                                       const SurfaceIndex& index, const SurfacePatchOptions& wanted)
+SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const LatticeMesh& mesh, const SurfaceIndex& index,
+                                       const SurfacePatchOptions& wanted)
     : decoded(tracked.decoded), captured(mesh), surface(index), options(wanted) {
     std::optional<SurfaceIndex> shown;
     const auto look_at_tracked = [&] {
@@ -994,16 +996,13 @@ SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const Lattice
     };
     parallel_invoke(
         options.threads, [&] { capture.emplace(make_capture(mesh, index, wanted)); }, look_at_tracked);
-    // Where the capture's seams were closed, its vertices have other numbers.
-    const bool near = capture->points.size() == index.positions.size();
-    const TrackedMesh shown_near = {decoded, {}, near ? tracked.near : std::span<const std::uint32_t>()};
-    std::vector<std::uint32_t> beside(shown_near.near.empty() ? 0 : capture->points.size(), OrientedPoints::no_point);
-    for (std::uint32_t v = 0; v < shown_near.near.size(); ++v)
-        if (shown_near.near[v] < beside.size()) beside[shown_near.near[v]] = v;
+    std::vector<std::uint32_t> beside(tracked.near.empty() ? 0 : capture->points.size(), OrientedPoints::no_point);
+    for (std::uint32_t v = 0; v < tracked.near.size(); ++v)
+        if (tracked.near[v] != OrientedPoints::no_point) beside[capture->merging.number[tracked.near[v]]] = v;
     capture->on_decoded =
         closest_on_same_side(*shown, capture->points, capture->normals,
                              {options.reach, options.lost / 2, 0.2, options.threads}, std::move(beside));
-    error = errors_of(shown_near, *shown, *capture, options);
+    error = errors_of(tracked, *shown, *capture, options);
     error_around = errors_around(shown->positions, error, *capture, options);
     rims.assign(decoded.positions.size(), false);
     add_rims_of_uncovered(*capture, decoded, options, rims);
