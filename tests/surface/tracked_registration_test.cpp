@@ -338,6 +338,33 @@ TEST(MovedOn, HandlesOfAPatchedMeshRepeatTheStepOfThoseThatWereThere) {
     EXPECT_TRUE(moved_on(mesh, {}, {}, handles).empty());
 }
 
+TEST(RegisterDeformation, FromAnotherStartEndsOnceItLeadsToWhatIsKnown) {
+    const DeformationOptions options;
+    const auto surface = sweep(121, 40, arm);
+    const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
+    const auto target = target_of(surface, options);
+    const std::vector<RigidMotion> start(9, RigidMotion{Eigen::Matrix3d::Identity(), Vector3d(0, 40, 0)});
+    auto known = register_deformation(mesh, target, {}, options);
+    const auto same = register_deformation(mesh, target, start, options, nullptr, known);
+    for (std::size_t h = 0; h < known.size(); ++h) EXPECT_EQ(same[h].shift, known[h].shift) << h;
+    for (const std::size_t h : {6, 7, 8}) known[h].shift += Vector3d(0, 50, 0);  // a limb that was lost
+    const auto other = register_deformation(mesh, target, start, options, nullptr, known);
+    EXPECT_LT((other[8](mesh.handles[8]) - mesh.handles[8]).norm(), 5);
+}
+
+TEST(RegisterDeformation, InVainMakesNoRounds) {
+    DeformationOptions options;
+    const std::atomic<bool> yes = true, no = false;
+    const auto surface = sweep(121, 40, arm);
+    const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
+    const auto target = target_of(surface, options);
+    const std::vector<RigidMotion> start(9, RigidMotion{Eigen::Matrix3d::Identity(), Vector3d(0, 30, 0)});
+    options.in_vain = &yes;
+    EXPECT_LT((register_deformation(mesh, target, start, options)[4].shift - start[4].shift).norm(), 1e-3);
+    options.in_vain = &no;
+    EXPECT_LT(rest_after(mesh, target, register_deformation(mesh, target, start, options)).rms, 0.3);
+}
+
 TEST(TakeNearerLimbs, TakesThePartThatLiesNearerAndLeavesTheRest) {
     const DeformationOptions options;
     const auto surface = sweep(121, 40, arm);

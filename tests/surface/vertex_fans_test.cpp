@@ -122,6 +122,28 @@ TEST(VertexFans, WalksEndWhereNoNeighbourIsNearer) {
     EXPECT_GT(ended, 500u);
 }
 
+TEST(VertexFans, WalksSideBySideEndWhereEachWouldAlone) {
+    std::mt19937 random(5);
+    const auto made = sheet(20, random);
+    const auto count = static_cast<std::uint32_t>(made.positions.size());
+    constexpr float within = 60 * 60;
+    for (const std::size_t walks : {0, 1, 7, 8, 9, 500}) {
+        std::vector<Vector3f> queries;
+        std::vector<std::uint32_t> from, expected;
+        for (std::size_t i = 0; i < walks; ++i) {
+            queries.push_back(somewhere(20, random));
+            from.push_back(i % 10 == 9 ? count + static_cast<std::uint32_t>(random() % 3)
+                                       : static_cast<std::uint32_t>(random() % count));
+            expected.push_back(from.back());
+            if (from.back() >= count) continue;
+            const float least = squared(queries.back(), made.positions[from.back()]);
+            if (least < within) expected.back() = made.fans.walk(queries.back(), from.back(), least).vertex;
+        }
+        made.fans.walk_all(queries, within, from);
+        EXPECT_EQ(from, expected);
+    }
+}
+
 TEST(VertexFans, FindTheTriangleThatTryingEachFinds) {
     std::mt19937 random(3);
     const auto made = sheet(12, random);
@@ -168,6 +190,16 @@ TEST(VertexFans, FindTheSameToTheBitWithAnyInstructions) {
         ASSERT_EQ(fans[v].side, others[v].side);
         ASSERT_EQ(fans[v].x, others[v].x);
     }
+    std::vector<Vector3f> queries;
+    std::vector<std::uint32_t> ends, other_ends;
+    for (int i = 0; i < 500; ++i) {
+        queries.push_back(somewhere(20, random));
+        ends.push_back(static_cast<std::uint32_t>(random() % count));
+    }
+    other_ends = ends;
+    here.walk_all(fans, queries, 1e6F, ends);
+    portable.walk_all(fans, queries, 1e6F, other_ends);
+    EXPECT_EQ(ends, other_ends);
     const Facing up{{0, 0, 1}, 0.35F};
     for (int i = 0; i < 5000; ++i) {
         const auto query = somewhere(20, random);
