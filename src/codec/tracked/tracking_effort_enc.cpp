@@ -8,12 +8,12 @@ namespace htvm::internal {
 TrackingEffort tracking_effort(int effort) {
     TrackingEffort out;  // the usual one
     // What is done for lost frames does not depend on it: without other starts and a second way of patching, a dancer
-    // takes 12 % more bits.
+    // takes 12 % more bits. Nor do fine rounds, but where nothing else is coded: without the third it takes 8 % more.
     if (effort <= 4) out.coarse_rounds = 4;
     if (effort <= 3) out.surface_rounds = 2;
-    if (effort <= 2) out.coarse_rounds = 3, out.surface_rounds = 1, out.solver_iterations = 20;
-    if (effort <= 1) out.fine_rounds = 2;
-    if (effort <= 0) out.surface_rounds = 0, out.motion_alone = true;
+    if (effort <= 2) out.coarse_rounds = 3, out.surface_rounds = 1;
+    if (effort <= 1) out.solver_iterations = 20;
+    if (effort <= 0) out.fine_rounds = 2, out.surface_rounds = 0, out.motion_alone = true;
     if (effort >= 6) out.target_samples = TargetSamples::three, out.group = 2;
     if (effort >= 7) out.fine_rounds = 4, out.solver_iterations = 40, out.group = 4;
     if (effort >= 8) out.samples = 1.5, out.fine_rounds = 5, out.group = 8;
