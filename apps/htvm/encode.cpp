@@ -60,6 +60,15 @@ std::string pictures_text(const EncodeOptions& options, const PictureTotals& pic
     return out;
 }
 
+nlohmann::json json_of(const std::vector<ListedFrame>& list) {
+    auto out = nlohmann::json::array();
+    for (const auto& frame : list) {
+        out.push_back(frame_json(frame.info));
+        if (frame.quality) out.back()["quality"] = *frame.quality;
+    }
+    return out;
+}
+
 void report(const EncodeOptions& options, const Summary& summary, const RateReport& rate, std::uint64_t bytes,
             double fps, std::size_t dropped_late, const Publishing* hub = nullptr, const Deadline* deadline = nullptr) {
     const auto frames = summary.totals.all().frames;
@@ -69,7 +78,7 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
     if (options.json) {
         nlohmann::json out = {{"output", options.output},
                               {"bytes", bytes},
-                              {"frames", summary.list},
+                              {"frames", json_of(summary.list)},
                               {"left_out_frames", summary.left_out},
                               {"repeated_frames", summary.repeated},
                               {"missing_frames", summary.missing},

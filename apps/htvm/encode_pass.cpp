@@ -50,8 +50,7 @@ Result<void> take_coded(Pass& pass) {
         add(summary.totals, info);
         add_coded(pass.rate, cost);
         if (!pass.options.json || !pass.write) continue;
-        summary.list.push_back(frame_json(info));
-        if (pass.rate.controlled()) summary.list.back()["quality"] = cost.quality;
+        summary.list.push_back({info, pass.rate.controlled() ? std::optional(cost.quality) : std::nullopt});
     }
     extend(summary.bounds, pass.encoder.bounds());
     return drain(pass);
@@ -280,9 +279,9 @@ Result<void> take(Pass& pass, Mesh& mesh) {
 
 void add(Summary& summary, Summary behind) {
     const auto before = summary.totals.all().frames;
-    for (auto& frame : behind.list) {
-        for (const char* number : {"frame", "reference"}) frame[number] = frame[number].get<std::size_t>() + before;
-        summary.list.push_back(std::move(frame));
+    for (auto frame : behind.list) {
+        for (auto* number : {&frame.info.frame, &frame.info.reference}) *number += static_cast<std::uint32_t>(before);
+        summary.list.push_back(frame);
     }
     add(summary.totals, behind.totals);
     summary.encode_seconds += behind.encode_seconds;

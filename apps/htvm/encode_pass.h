@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <functional>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "command_line/layer_table.h"
 #include "deadline.h"
@@ -19,6 +19,12 @@
 #include "rate_report.h"
 
 namespace htvm::app {
+
+// A frame as --json lists it at the end. As JSON from the start, which is all names, hours of frames would not fit.
+struct ListedFrame {
+    FrameInfo info;
+    std::optional<double> quality;  // under rate control
+};
 
 struct Summary {
     TotalsByType totals;
@@ -32,7 +38,7 @@ struct Summary {
     std::size_t missing = 0, filled = 0;     // by the numbers of the files
     std::optional<SpaceBounds> bounds;       // of the decoded meshes
     PictureTotals pictures;
-    nlohmann::json list = nlohmann::json::array();
+    std::vector<ListedFrame> list;  // with --json
 };
 // Of frames behind those summed up so far, whose own numbers begin with 0.
 void add(Summary& summary, Summary behind);
