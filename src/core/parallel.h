@@ -64,21 +64,18 @@ void parallel_for(std::size_t count, Threads threads, std::size_t grain, const B
     run_pieces(threads, pieces, [&](std::size_t p) { body(count * p / pieces, count * (p + 1) / pieces); });
 }
 
-// Runs both functions, side by side if threads.count > 1. The first begins first, so the second may wait for it. If one
-// throws, the other is still finished before the exception is thrown here; with one thread, `second` is not run if
-// `first` throws.
-template <class First, class Second>
-void parallel_invoke(Threads threads, const First& first, const Second& second) {
+// Runs all functions, side by side if threads.count > 1. They begin in their order, so each may wait for those before
+// it. If one throws, the others are still finished before the first exception is thrown here; with one thread, those
+// behind it are not run.
+template <class... Work>
+void parallel_invoke(Threads threads, const Work&... work) {
     if (threads.count <= 1) {
-        first();
-        second();
+        (work(), ...);
         return;
     }
-    run_pieces(threads, 2, [&](std::size_t p) {
-        if (p == 0)
-            first();
-        else
-            second();
+    run_pieces(threads, sizeof...(Work), [&](std::size_t piece) {
+        std::size_t at = 0;
+        ((at++ == piece ? static_cast<void>(work()) : void()), ...);
     });
 }
 

@@ -1,6 +1,7 @@
 // How far a task has come, for another one that follows behind it, as both functions of parallel_invoke() may.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <limits>
@@ -30,6 +31,23 @@ public:
 
 private:
     std::atomic<std::size_t> done_ = 0;
+};
+
+// How far one may follow behind others, each null where there is nobody to wait for; asks them only where it has to.
+class Followed {
+public:
+    explicit Followed(const Progress* first, const Progress* second = nullptr) : first_(first), second_(second) {}
+    // Returns once all have done more than `step` steps.
+    void wait_beyond(std::size_t step) {
+        if (step < ready_) return;
+        ready_ = std::numeric_limits<std::size_t>::max();
+        for (const Progress* progress : {first_, second_})
+            if (progress) ready_ = std::min(ready_, progress->wait_beyond(step));
+    }
+
+private:
+    const Progress *first_, *second_;
+    std::size_t ready_ = 0;
 };
 
 // Ends a progress wherever its task ends, by an exception, too.

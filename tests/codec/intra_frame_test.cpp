@@ -50,7 +50,7 @@ TEST(IntraFrame, DecodesToWhatTheEncoderSays) {
             }
 }
 
-// Colours are decoded behind the positions, side by side.
+// Colours are decoded behind the positions, and these behind their order, side by side.
 TEST(IntraFrame, DecodesToTheSameOnSeveralThreadsAndRefusesTheSameDamage) {
     const ThreadPool pool(3);
     FramePayload payload;

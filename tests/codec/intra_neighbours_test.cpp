@@ -5,6 +5,7 @@
 
 #include "codec/intra/neighbours.h"
 #include "codec/intra_test_meshes.h"
+#include "core/parallel.h"
 
 namespace htvm::internal {
 namespace {
@@ -46,6 +47,55 @@ TEST(Neighbours, OrderEveryVertexOnceAndNameOnlyEarlierAdjacentOnes) {
         ASSERT_TRUE(neighbours);
         expect_rows_hold(mesh, *neighbours);
     }
+}
+
+TEST(Neighbours, TheRoomForTheirRowsIsEnoughForAnyTriangles) {
+    for (const auto& mesh : intra_test::awkward()) {
+        const auto corners = find_corners(mesh.triangles, mesh.vertex_count);
+        ASSERT_TRUE(corners);
+        auto rows = empty_rows(*corners), roomy = rows;
+        roomy.parallelograms.resize(row_limit * mesh.vertex_count);
+        roomy.neighbours.resize(row_limit * mesh.vertex_count);
+        order_vertices(*corners, {}, rows);
+        order_vertices(*corners, {}, roomy);
+        EXPECT_EQ(rows.order, roomy.order);
+        EXPECT_EQ(rows.first_neighbour, roomy.first_neighbour);
+        EXPECT_EQ(rows.first_parallelogram, roomy.first_parallelogram);
+    }
+}
+
+TEST(Neighbours, WhoFollowsTheirOrderSeesWholeRows) {
+    const auto mesh = intra_test::grid(100);
+    const auto expected = find_neighbours(mesh.triangles, mesh.vertex_count);
+    const auto corners = find_corners(mesh.triangles, mesh.vertex_count, ThreadPool(3));
+    ASSERT_TRUE(expected && corners);
+    auto rows = empty_rows(*corners);
+    Progress ordered;
+    parallel_invoke(
+        ThreadPool(2),
+        [&] {
+            const EndOfProgress end{ordered};
+            order_vertices(*corners, {}, rows, &ordered);
+        },
+        [&] {
+            Followed others(&ordered);
+            for (std::size_t rank = 0; rank < mesh.vertex_count; ++rank) {
+                others.wait_beyond(rank);
+                ASSERT_EQ(rows.order[rank], expected->order[rank]);
+                const auto around = rows.neighbours_of(rank), wanted = expected->neighbours_of(rank);
+                ASSERT_TRUE(std::equal(around.begin(), around.end(), wanted.begin(), wanted.end()));
+                ASSERT_EQ(rows.parallelograms_of(rank).size(), expected->parallelograms_of(rank).size());
+            }
+        });
+}
+
+TEST(Neighbours, OfCornersFoundByThreadsAreThoseOfOne) {
+    const auto mesh = intra_test::grid(200);
+    const auto one = find_corners(mesh.triangles, mesh.vertex_count);
+    const auto three = find_corners(mesh.triangles, mesh.vertex_count, ThreadPool(3));
+    ASSERT_TRUE(one && three);
+    EXPECT_EQ(one->opposite, three->opposite);
+    EXPECT_EQ(one->paired_edges, three->paired_edges);
 }
 
 TEST(Neighbours, TheFourthCornerOfTwoTrianglesHasOneParallelogram) {

@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/progress.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -127,6 +129,49 @@ TEST(ParallelInvoke, TheSecondMayWaitForTheFirst) {
                 [&] { done.wait(false); });
             EXPECT_TRUE(done);
         }
+}
+
+TEST(ParallelInvoke, OfThreeTheLastMayWaitForTheFirstWhileTheSecondFollowsIt) {
+    constexpr std::size_t steps = 1000;
+    for (const auto& runner : {TaskRunner(in_order), TaskRunner(in_reverse), TaskRunner(on_threads_of_their_own),
+                               thread_pool(3), thread_pool(1)}) {
+        Progress first, second;
+        std::vector<std::size_t> made(steps), doubled(steps), last(steps);
+        parallel_invoke(
+            ThreadPool(3, runner),
+            [&] {
+                const EndOfProgress end{first};
+                for (std::size_t i = 0; i < steps; ++i) made[i] = i + 1, first.reach(i + 1);
+            },
+            [&] {
+                const EndOfProgress end{second};
+                Followed others(&first);
+                for (std::size_t i = 0; i < steps; ++i)
+                    others.wait_beyond(i), doubled[i] = 2 * made[i], second.reach(i + 1);
+            },
+            [&] {
+                Followed others(&first, &second);
+                for (std::size_t i = 0; i < steps; ++i) others.wait_beyond(i), last[i] = made[i] + doubled[i];
+            });
+        for (std::size_t i = 0; i < steps; ++i) EXPECT_EQ(last[i], 3 * (i + 1));
+    }
+}
+
+TEST(Followed, WaitsForTheSlowerOfTwo) {
+    Progress first, second;
+    first.end();
+    Followed both(&first, &second);
+    std::atomic<bool> waited = false;
+    std::thread follower([&] {
+        both.wait_beyond(4);
+        waited = true;
+    });
+    second.reach(4);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_FALSE(waited);
+    second.reach(5);
+    follower.join();
+    EXPECT_TRUE(waited);
 }
 
 TEST(ParallelFor, AnExceptionOfAnyPieceReachesTheCallerWhenAllPiecesAreDone) {

@@ -171,6 +171,7 @@ struct ColourSource {
     const Neighbours& neighbours;
     std::int32_t step;
     std::span<const std::uint8_t> known;
+    const Progress* ordered;
 };
 
 // Codes the first `end` vertices of the coding order and sets their colours to the decoded ones.
@@ -181,10 +182,13 @@ void write_colours(std::vector<Colour>& colours, const ColourSource& source, con
     ColourHistory history(neighbours.vertex_count());
     const auto contexts = std::make_unique<ColourContexts>(source.step);
     WritingCoder<Writer> coder{writer};
-    for (std::size_t rank = 0; rank < end; ++rank)
+    Followed rows(source.ordered);
+    for (std::size_t rank = 0; rank < end; ++rank) {
+        rows.wait_beyond(rank);
         if (!take_known(source.known, colours, neighbours.order[rank], history))
             code_colour(coder, std::span(colours), source.positions, neighbours, rank, predictor, source.step, history,
                         *contexts);
+    }
 }
 
 // Of a few predictors, the one that codes the first vertices in the fewest bits.
@@ -209,9 +213,9 @@ ColourPredictor choose_predictor(std::span<const Colour> colours, const ColourSo
 
 EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<const LatticePoint> positions,
                                     const Neighbours& neighbours, std::int32_t step,
-                                    std::span<const std::uint8_t> known) {
+                                    std::span<const std::uint8_t> known, const Progress* ordered) {
     if (colours.empty()) return {};
-    const ColourSource source{positions, neighbours, step, known};
+    const ColourSource source{positions, neighbours, step, known, ordered};
     const ColourPredictor predictor = choose_predictor(colours, source);
     EncodedColours out;
     out.decoded.assign(colours.begin(), colours.end());
@@ -228,8 +232,8 @@ EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<c
 
 Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> bytes,
                                                  std::span<const LatticePoint> positions, const Neighbours& neighbours,
-                                                 std::int32_t step, const Known<Colour>& known,
-                                                 const Progress* progress) {
+                                                 std::int32_t step, const Known<Colour>& known, const Progress* ordered,
+                                                 const Progress* located) {
     const std::size_t vertex_count = neighbours.vertex_count();
     if (step < 1 || step > 255)
         return fail(ErrorKind::corrupt_stream, "intra colours: the colour step is not within 1..255");
@@ -249,9 +253,9 @@ Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> b
     ColourHistory history(vertex_count);
     const auto contexts = std::make_unique<ColourContexts>(step);
     ReadingCoder<RangeDecoder> coder{decoder};
-    std::size_t ready = progress ? 0 : vertex_count;
+    Followed others(ordered, located);
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
-        if (rank >= ready) ready = progress->wait_beyond(rank);
+        others.wait_beyond(rank);
         const auto v = neighbours.order[rank];
         if (take_known(known.is, known.value, v, history)) {
             colours[v] = known.value[v];

@@ -26,17 +26,18 @@ struct EncodedColours {
 
 // colours, positions: one per vertex of `neighbours`; positions as decoded, in any unit, on_lattice(). step: 1..255, in
 // levels; every component decodes to within step / 2 (rounded down) of the original, so 1 is exact. Without vertices
-// there are no bytes. known: as in Known, as `neighbours` was made with.
+// there are no bytes. known: as in Known, as `neighbours` was made with. ordered: of how many ranks the rows of
+// `neighbours` are there, if they are still being made; or null.
 EncodedColours encode_intra_colours(std::span<const Colour> colours, std::span<const LatticePoint> positions,
                                     const Neighbours& neighbours, std::int32_t step,
-                                    std::span<const std::uint8_t> known = {});
+                                    std::span<const std::uint8_t> known = {}, const Progress* ordered = nullptr);
 
 // Errors: corrupt_stream if the bytes end too early or begin with an invalid weight, if step is not 1..255, or if there
-// is not one position per vertex. progress: of the positions, if they are still being decoded: how many ranks of the
-// coding order are known.
+// is not one position per vertex. ordered: as above. located: of how many ranks the positions are there, if they are
+// still being decoded; or null.
 Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> bytes,
                                                  std::span<const LatticePoint> positions, const Neighbours& neighbours,
                                                  std::int32_t step, const Known<Colour>& known = {},
-                                                 const Progress* progress = nullptr);
+                                                 const Progress* ordered = nullptr, const Progress* located = nullptr);
 
 }  // namespace htvm::internal

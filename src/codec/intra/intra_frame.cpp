@@ -15,7 +15,8 @@
 namespace htvm::internal {
 namespace {
 
-constexpr std::size_t worth_a_thread = 2000;  // vertices
+// Waking a thread costs more than a small mesh does.
+Threads threads_for(std::size_t vertices, Threads threads) { return threads.at_most(vertices < 2000 ? 1 : 3); }
 
 // Positions in grid steps; colours as captured.
 LatticeMesh on_grid(const LatticeMesh& mesh, std::int32_t step) {
@@ -46,26 +47,32 @@ Result<LatticeMesh> encode_by_tfan(const LatticeMesh& grid, const IntraFrameOpti
     auto connectivity = encode_tfan(static_cast<std::uint32_t>(grid.positions.size()), grid.triangles);
     LatticeMesh mesh = kept_vertices(grid, connectivity.order);
     mesh.triangles = std::move(connectivity.triangles);
-    const auto neighbours = find_neighbours(mesh.triangles, mesh.positions.size());
-    if (!neighbours) return tl::unexpected(neighbours.error());
     payload.set(Layer::fans, std::move(connectivity.bytes));
+    const auto threads = threads_for(mesh.positions.size(), options.threads);
+    const auto corners = find_corners(mesh.triangles, mesh.positions.size(), threads);
+    if (!corners) return tl::unexpected(corners.error());
+    auto neighbours = empty_rows(*corners);
     std::vector<std::uint8_t> positions;
     EncodedColours colours;
-    const bool alone = mesh.positions.size() < worth_a_thread || mesh.colours.empty();
+    Progress ordered;
     parallel_invoke(
-        options.threads.at_most(alone ? 1 : 2),
-        [&] { positions = encode_intra_positions(mesh.positions, *neighbours); },
+        threads,
+        [&] {
+            const EndOfProgress end{ordered};
+            order_vertices(*corners, {}, neighbours, &ordered);
+        },
+        [&] { positions = encode_intra_positions(mesh.positions, neighbours, {}, &ordered); },
         [&] {
             if (mesh.colours.empty()) return;
-            colours = encode_intra_colours(mesh.colours, mesh.positions, *neighbours, options.colour_step);
+            colours = encode_intra_colours(mesh.colours, mesh.positions, neighbours, options.colour_step, {}, &ordered);
         });
     payload.set(Layer::geometry, std::move(positions));
     if (!mesh.colours.empty()) {
         payload.set(Layer::colour, std::move(colours.bytes));
         mesh.colours = std::move(colours.decoded);
     }
-    if (!mesh.normals.empty()) payload.set(Layer::normals, encode_attribute_values(mesh.normals, *neighbours));
-    if (!mesh.texcoords.empty()) payload.set(Layer::texcoords, encode_attribute_values(mesh.texcoords, *neighbours));
+    if (!mesh.normals.empty()) payload.set(Layer::normals, encode_attribute_values(mesh.normals, neighbours));
+    if (!mesh.texcoords.empty()) payload.set(Layer::texcoords, encode_attribute_values(mesh.texcoords, neighbours));
     return mesh;
 }
 
@@ -82,47 +89,48 @@ Result<LatticeMesh> encode_by(const ExternalIntraCoder& coder, LatticeMesh grid,
     return mesh;
 }
 
-// Colours follow behind the positions on which they depend.
-Result<void> decode_positions_and_colours(const FramePayloadView& payload, const Neighbours& neighbours,
-                                          LatticeMesh& mesh, Threads threads) {
-    Result<void> positions;
-    Result<std::vector<Colour>> colours;
-    Progress progress;
-    mesh.positions.resize(neighbours.vertex_count());
-    parallel_invoke(
-        threads.at_most(mesh.positions.size() < worth_a_thread || !payload.has(Layer::colour) ? 1 : 2),
-        [&] {
-            const EndOfProgress end{progress};
-            positions = decode_intra_positions(payload.of(Layer::geometry), neighbours, {}, mesh.positions, &progress);
-        },
-        [&] {
-            if (!payload.has(Layer::colour)) return;
-            colours = decode_intra_colours(payload.of(Layer::colour), mesh.positions, neighbours,
-                                           static_cast<std::int32_t>(payload.header.colour_step), {}, &progress);
-        });
-    if (!positions) return positions;
-    if (!colours) return tl::unexpected(colours.error());
-    mesh.colours = std::move(*colours);
-    return {};
-}
-
 Result<LatticeMesh> decode_by_tfan(const FramePayloadView& payload, Threads threads) {
     const auto& h = payload.header;
     LatticeMesh mesh;
     auto triangles = decode_tfan(payload.of(Layer::fans), h.vertices, h.triangles);
     if (!triangles) return tl::unexpected(triangles.error());
     mesh.triangles = std::move(*triangles);
-    const auto neighbours = find_neighbours(mesh.triangles, h.vertices);
-    if (!neighbours) return fail(ErrorKind::corrupt_stream, "I-frame: " + neighbours.error().message);
-    if (auto decoded = decode_positions_and_colours(payload, *neighbours, mesh, threads); !decoded)
-        return tl::unexpected(decoded.error());
+    threads = threads_for(h.vertices, threads);
+    const auto corners = find_corners(mesh.triangles, h.vertices, threads);
+    if (!corners) return fail(ErrorKind::corrupt_stream, "I-frame: " + corners.error().message);
+    auto neighbours = empty_rows(*corners);
+    // Positions follow behind the order, colours behind both.
+    Result<void> positions;
+    Result<std::vector<Colour>> colours;
+    Progress ordered, located;
+    mesh.positions.resize(h.vertices);
+    parallel_invoke(
+        threads,
+        [&] {
+            const EndOfProgress end{ordered};
+            order_vertices(*corners, {}, neighbours, &ordered);
+        },
+        [&] {
+            const EndOfProgress end{located};
+            positions =
+                decode_intra_positions(payload.of(Layer::geometry), neighbours, {}, mesh.positions, &ordered, &located);
+        },
+        [&] {
+            if (!payload.has(Layer::colour)) return;
+            colours =
+                decode_intra_colours(payload.of(Layer::colour), mesh.positions, neighbours,
+                                     static_cast<std::int32_t>(payload.header.colour_step), {}, &ordered, &located);
+        });
+    if (!positions) return tl::unexpected(positions.error());
+    if (!colours) return tl::unexpected(colours.error());
+    mesh.colours = std::move(*colours);
     if (payload.has(Layer::normals)) {
-        auto normals = decode_attribute_values<QuantisedNormal>(payload.of(Layer::normals), *neighbours);
+        auto normals = decode_attribute_values<QuantisedNormal>(payload.of(Layer::normals), neighbours);
         if (!normals) return tl::unexpected(normals.error());
         mesh.normals = std::move(*normals);
     }
     if (payload.has(Layer::texcoords)) {
-        auto texcoords = decode_attribute_values<QuantisedTexcoord>(payload.of(Layer::texcoords), *neighbours);
+        auto texcoords = decode_attribute_values<QuantisedTexcoord>(payload.of(Layer::texcoords), neighbours);
         if (!texcoords) return tl::unexpected(texcoords.error());
         mesh.texcoords = std::move(*texcoords);
     }

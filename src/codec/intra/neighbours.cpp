@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+
+#include "core/parallel.h"
 
 namespace htvm::internal {
 
@@ -10,63 +13,45 @@ namespace {
 constexpr std::uint32_t none = 0xFFFFFFFFu;
 constexpr std::size_t size_limit = std::size_t{1} << 28;
 
-// A corner table: corner 3 t + i is corner i of triangle t. Degenerate triangles have no corners in it.
-struct Corners {
-    std::vector<std::uint32_t> vertex;    // of each corner
-    std::vector<std::uint32_t> opposite;  // the corner on the other side of the edge opposite to this corner, or none
-    std::vector<std::uint32_t> first_at;  // where each vertex's row of `at` begins
-    std::vector<std::uint32_t> at;        // the corners at each vertex, in triangle order
-};
-
 std::uint32_t next_corner(std::uint32_t c) { return c % 3 == 2 ? c - 2 : c + 1; }
 std::uint32_t previous_corner(std::uint32_t c) { return c % 3 == 0 ? c + 2 : c - 1; }
 
 // Pairs the corners that face the same edge. Edges are visited from their smaller vertex v, through the corners at v;
-// for each larger vertex, `waiting` holds a corner that has no opposite yet.
-void pair_opposites(Corners& corners, std::size_t vertex_count) {
+// for each larger vertex, `waiting` holds a corner that has no opposite yet. Threads may share the vertices, as no two
+// meet at an edge.
+void pair_opposites(Corners& corners, std::size_t vertex_count, Threads threads) {
+    constexpr std::size_t worth_a_table = 8192;  // vertices, for each piece has a table of its own
     corners.opposite.assign(corners.vertex.size(), none);
-    std::vector<std::uint32_t> waiting(vertex_count, none);
-    auto face = [&](std::uint32_t other, std::uint32_t facing) {
-        if (waiting[other] == none) {
-            waiting[other] = facing;
-            return;
+    std::atomic<std::size_t> paired_edges = 0;
+    parallel_for(vertex_count, threads, worth_a_table, [&](std::size_t begin, std::size_t end) {
+        std::vector<std::uint32_t> waiting(vertex_count, none);
+        std::size_t paired = 0;
+        auto face = [&](std::uint32_t other, std::uint32_t facing) {
+            if (waiting[other] == none) {
+                waiting[other] = facing;
+                return;
+            }
+            corners.opposite[facing] = waiting[other];
+            corners.opposite[waiting[other]] = facing;
+            waiting[other] = none;
+            ++paired;
+        };
+        for (auto v = static_cast<std::uint32_t>(begin); v < end; ++v) {
+            const std::span row =
+                std::span(corners.at).subspan(corners.first_at[v], corners.first_at[v + 1] - corners.first_at[v]);
+            for (const std::uint32_t c : row) {
+                const std::uint32_t after = next_corner(c), before = previous_corner(c);
+                if (corners.vertex[after] > v) face(corners.vertex[after], before);
+                if (corners.vertex[before] > v) face(corners.vertex[before], after);
+            }
+            for (const std::uint32_t c : row) {
+                waiting[corners.vertex[next_corner(c)]] = none;
+                waiting[corners.vertex[previous_corner(c)]] = none;
+            }
         }
-        corners.opposite[facing] = waiting[other];
-        corners.opposite[waiting[other]] = facing;
-        waiting[other] = none;
-    };
-    for (std::uint32_t v = 0; v < vertex_count; ++v) {
-        const std::span row =
-            std::span(corners.at).subspan(corners.first_at[v], corners.first_at[v + 1] - corners.first_at[v]);
-        for (const std::uint32_t c : row) {
-            const std::uint32_t after = next_corner(c), before = previous_corner(c);
-            if (corners.vertex[after] > v) face(corners.vertex[after], before);
-            if (corners.vertex[before] > v) face(corners.vertex[before], after);
-        }
-        for (const std::uint32_t c : row) {
-            waiting[corners.vertex[next_corner(c)]] = none;
-            waiting[corners.vertex[previous_corner(c)]] = none;
-        }
-    }
-}
-
-Corners make_corners(std::span<const Triangle> triangles, std::size_t vertex_count) {
-    Corners corners;
-    corners.vertex.reserve(triangles.size() * 3);
-    corners.first_at.assign(vertex_count + 1, 0);
-    for (const Triangle& t : triangles) {
-        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
-        for (const std::uint32_t v : t) {
-            corners.vertex.push_back(v);
-            ++corners.first_at[v + 1];
-        }
-    }
-    for (std::size_t v = 0; v < vertex_count; ++v) corners.first_at[v + 1] += corners.first_at[v];
-    corners.at.resize(corners.vertex.size());
-    std::vector<std::uint32_t> fill(corners.first_at.begin(), corners.first_at.end() - 1);
-    for (std::uint32_t c = 0; c < corners.vertex.size(); ++c) corners.at[fill[corners.vertex[c]]++] = c;
-    pair_opposites(corners, vertex_count);
-    return corners;
+        paired_edges += paired;
+    });
+    corners.paired_edges = paired_edges;
 }
 
 // The vertex that completes most parallelograms is coded next; a vertex that completes none is better coded later, when
@@ -76,6 +61,10 @@ Corners make_corners(std::span<const Triangle> triangles, std::size_t vertex_cou
 constexpr std::size_t score_limit = 4;
 
 struct Traversal {
+    // A vertex is put in each queue once at most, so that none of them ever has to grow.
+    explicit Traversal(std::size_t vertex_count) : coded(vertex_count), queued(vertex_count), score(vertex_count) {
+        for (auto& queue : queues) queue.reserve(vertex_count);
+    }
     std::vector<std::uint8_t> coded;
     std::vector<std::uint8_t> queued;  // whether it was ever put in a queue
     std::vector<std::uint8_t> score;   // one per vertex
@@ -108,20 +97,26 @@ struct Traversal {
     }
 };
 
-void add_neighbour(Neighbours& out, std::size_t row, std::uint32_t v) {
-    if (out.neighbours.size() - row >= row_limit) return;
-    for (std::size_t i = row; i < out.neighbours.size(); ++i)
+// Where the rows that are written end. An entry beyond a row's limit is dropped.
+struct RowEnds {
+    std::uint32_t neighbours = 0, parallelograms = 0;
+};
+
+void add_neighbour(Neighbours& out, RowEnds& ends, std::uint32_t row, std::uint32_t v) {
+    if (ends.neighbours - row >= row_limit || ends.neighbours == out.neighbours.size()) return;
+    for (std::uint32_t i = row; i < ends.neighbours; ++i)
         if (out.neighbours[i] == v) return;
-    out.neighbours.push_back(v);
+    out.neighbours[ends.neighbours++] = v;
 }
 
 // Codes vertex v: writes out its candidates, and raises the score of the vertices that it completes a parallelogram
 // for. Only parallelograms across an edge count for the order, since the others come along with them.
-void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint32_t v) {
-    const std::size_t neighbour_row = out.neighbours.size(), parallelogram_row = out.parallelograms.size();
+void visit(const Corners& corners, Traversal& state, Neighbours& out, RowEnds& ends, std::uint32_t v) {
+    const auto row = ends;
     auto add_parallelogram = [&](std::uint32_t a, std::uint32_t b, std::uint32_t opposite, bool across) {
-        if (out.parallelograms.size() - parallelogram_row < row_limit)
-            out.parallelograms.push_back({a, b, opposite, across});
+        if (ends.parallelograms - row.parallelograms >= row_limit || ends.parallelograms == out.parallelograms.size())
+            return;
+        out.parallelograms[ends.parallelograms++] = {a, b, opposite, across};
     };
     // The vertex on the other side of the edge that this corner faces, or none.
     auto beyond = [&](std::uint32_t corner) {
@@ -134,8 +129,8 @@ void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint3
         const std::uint32_t c = corners.at[i], after = next_corner(c), before = previous_corner(c);
         const std::uint32_t p = corners.vertex[after], q = corners.vertex[before];
         const bool knows_p = state.coded[p], knows_q = state.coded[q];
-        if (knows_p) add_neighbour(out, neighbour_row, p);
-        if (knows_q) add_neighbour(out, neighbour_row, q);
+        if (knows_p) add_neighbour(out, ends, row.neighbours, p);
+        if (knows_q) add_neighbour(out, ends, row.neighbours, q);
         if (knows_p && knows_q) {
             const std::uint32_t y = beyond(c);
             if (is_known(y) && y != v)
@@ -163,33 +158,69 @@ void visit(const Corners& corners, Traversal& state, Neighbours& out, std::uint3
 
 }  // namespace
 
-Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count,
-                                   std::span<const std::uint8_t> known) {
+Result<Corners> find_corners(std::span<const Triangle> triangles, std::size_t vertex_count, Threads threads) {
     if (vertex_count > size_limit || triangles.size() > size_limit)
         return fail(ErrorKind::limit, "intra attributes: more than 2^28 vertices or triangles; split the mesh");
     for (const Triangle& t : triangles)
         if (std::max({t[0], t[1], t[2]}) >= vertex_count)
             return fail(ErrorKind::bad_input, "intra attributes: a triangle names a vertex that does not exist");
-    const Corners corners = make_corners(triangles, vertex_count);
-    Traversal state;
-    state.coded.assign(vertex_count, 0);
-    state.queued.assign(vertex_count, 0);
-    state.score.assign(vertex_count, 0);
+    Corners corners;
+    corners.vertex.reserve(triangles.size() * 3);
+    corners.first_at.assign(vertex_count + 1, 0);
+    for (const Triangle& t : triangles) {
+        if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) continue;
+        for (const std::uint32_t v : t) {
+            corners.vertex.push_back(v);
+            ++corners.first_at[v + 1];
+        }
+    }
+    for (std::size_t v = 0; v < vertex_count; ++v) corners.first_at[v + 1] += corners.first_at[v];
+    corners.at.resize(corners.vertex.size());
+    std::vector<std::uint32_t> fill(corners.first_at.begin(), corners.first_at.end() - 1);
+    for (std::uint32_t c = 0; c < corners.vertex.size(); ++c) corners.at[fill[corners.vertex[c]]++] = c;
+    pair_opposites(corners, vertex_count, threads);
+    return corners;
+}
+
+// Two triangles that share an edge make one parallelogram at most, that of the last of their vertices; two vertices at
+// an edge are neighbours once, and a paired edge has two corners.
+Neighbours empty_rows(const Corners& corners) {
+    const std::size_t vertex_count = corners.first_at.size() - 1;
+    const std::size_t most = row_limit * vertex_count;
     Neighbours out;
-    out.order.reserve(vertex_count);
-    out.first_parallelogram.reserve(vertex_count + 1);
-    out.first_neighbour.reserve(vertex_count + 1);
+    out.order.resize(vertex_count);
+    out.first_parallelogram.resize(vertex_count + 1);
+    out.first_neighbour.resize(vertex_count + 1);
+    out.parallelograms.resize(std::min(most, corners.paired_edges));
+    out.neighbours.resize(std::min(most, corners.vertex.size() - corners.paired_edges));
+    return out;
+}
+
+void order_vertices(const Corners& corners, std::span<const std::uint8_t> known, Neighbours& out, Progress* progress) {
+    constexpr std::size_t told_every = 64;  // ranks
+    const std::size_t vertex_count = out.order.size();
+    Traversal state(vertex_count);
+    RowEnds ends;
+    std::size_t rank = 0;
     const auto take = [&](std::uint32_t v) {
-        out.first_parallelogram.push_back(static_cast<std::uint32_t>(out.parallelograms.size()));
-        out.first_neighbour.push_back(static_cast<std::uint32_t>(out.neighbours.size()));
-        out.order.push_back(v);
-        visit(corners, state, out, v);
+        out.order[rank] = v;
+        visit(corners, state, out, ends, v);
+        ++rank;
+        out.first_parallelogram[rank] = ends.parallelograms;
+        out.first_neighbour[rank] = ends.neighbours;
+        if (progress && rank % told_every == 0) progress->reach(rank);
     };
     for (std::uint32_t v = 0; v < known.size(); ++v)
         if (known[v] != 0) take(v);
-    while (out.order.size() < vertex_count) take(state.pop());
-    out.first_parallelogram.push_back(static_cast<std::uint32_t>(out.parallelograms.size()));
-    out.first_neighbour.push_back(static_cast<std::uint32_t>(out.neighbours.size()));
+    while (rank < vertex_count) take(state.pop());
+}
+
+Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count,
+                                   std::span<const std::uint8_t> known) {
+    const auto corners = find_corners(triangles, vertex_count);
+    if (!corners) return tl::unexpected(corners.error());
+    auto out = empty_rows(*corners);
+    order_vertices(*corners, known, out);
     return out;
 }
 

@@ -10,6 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "core/progress.h"
+#include "core/thread.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 
@@ -24,7 +26,8 @@ struct Parallelogram {
 };
 
 // Arrays over the ranks of the coding order, in compressed rows: row k is first_x[k] .. first_x[k + 1]. Every vertex
-// named in row k has a rank below k. A row has at most eight parallelograms and eight neighbours.
+// named in row k has a rank below k. A row has at most eight parallelograms and eight neighbours. The rows' arrays may
+// be longer than their last row.
 struct Neighbours {
     std::vector<std::uint32_t> order;  // order[k] = the vertex coded at rank k; a permutation of 0 .. n - 1
     std::vector<std::uint32_t> first_parallelogram;
@@ -53,10 +56,30 @@ struct Known {
     std::span<const Value> value;      // only read where it is
 };
 
-// The coding order and the candidates of each vertex. Accepts any triangles (non-manifold, duplicate, open, none).
-// Degenerate triangles are skipped; of the triangles at an edge, the first is paired with the second, the third with
-// the fourth, and so on. Time and memory are linear in vertices plus triangles. Errors: bad_input if a triangle names a
-// vertex >= vertex_count; limit above 2^28 vertices or triangles. known: as in Known; these vertices come first.
+// A corner table: corner 3 t + i is corner i of triangle t. Degenerate triangles have no corners in it.
+struct Corners {
+    std::vector<std::uint32_t> vertex;    // of each corner
+    std::vector<std::uint32_t> opposite;  // the corner on the other side of the edge opposite to this corner, or none
+    std::vector<std::uint32_t> first_at;  // where each vertex's row of `at` begins
+    std::vector<std::uint32_t> at;        // the corners at each vertex, in triangle order
+    std::size_t paired_edges = 0;         // edges whose two sides both have a corner
+};
+
+// Accepts any triangles (non-manifold, duplicate, open, none). Of the triangles at an edge, the first is paired with
+// the second, the third with the fourth, and so on. Time and memory are linear in vertices plus triangles. Errors:
+// bad_input if a triangle names a vertex >= vertex_count; limit above 2^28 vertices or triangles.
+Result<Corners> find_corners(std::span<const Triangle> triangles, std::size_t vertex_count, Threads threads = {});
+
+// Rows for these corners, all of them empty and every rank's vertex 0, for order_vertices() to fill.
+Neighbours empty_rows(const Corners& corners);
+
+// The coding order and the candidates of each vertex. out: from empty_rows(), of the same corners. known: as in Known;
+// these vertices come first. progress: of how many ranks the rows are there, for whoever follows behind; or null.
+// Throws std::bad_alloc only before the first rank.
+void order_vertices(const Corners& corners, std::span<const std::uint8_t> known, Neighbours& out,
+                    Progress* progress = nullptr);
+
+// All of the above. Errors: as find_corners().
 Result<Neighbours> find_neighbours(std::span<const Triangle> triangles, std::size_t vertex_count,
                                    std::span<const std::uint8_t> known = {});
 

@@ -269,11 +269,13 @@ std::array<double, weight_count> solve(Matrix m) {
 // the error that the usual weights leave, so that neither large triangles nor outliers dominate. The result is drawn
 // towards the usual weights, those of most captures, which decide if there are few vertices.
 PositionWeights fit_weights(std::span<const LatticePoint> q, const Neighbours& neighbours,
-                            std::span<const std::uint8_t> known) {
+                            std::span<const std::uint8_t> known, const Progress* ordered) {
     constexpr std::array<std::array<double, weight_count>, 2> usual{{{0.5, 0.0, -0.4}, {0.46, 0.21, -0.2}}};
     std::array<Matrix, 2> equations{};
     PositionHistory history(q.size());
+    Followed rows(ordered);
     for (std::size_t rank = 0; rank < q.size(); ++rank) {
+        rows.wait_beyond(rank);
         const PositionFeatures f = position_features(q, neighbours, rank, history);
         if (f.parallelograms == 0 || is_known(known, neighbours.order[rank])) continue;
         const LatticePoint p = q[neighbours.order[rank]];
@@ -315,9 +317,9 @@ PositionWeights fit_weights(std::span<const LatticePoint> q, const Neighbours& n
 }  // namespace
 
 std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours,
-                                                 std::span<const std::uint8_t> known) {
+                                                 std::span<const std::uint8_t> known, const Progress* ordered) {
     if (q.empty()) return {};
-    const PositionWeights weights = fit_weights(q, neighbours, known);
+    const PositionWeights weights = fit_weights(q, neighbours, known, ordered);
     ByteWriter writer;
     for (const auto& set : weights)
         for (const std::int8_t weight : set) writer.u8(static_cast<std::uint8_t>(weight));
@@ -339,14 +341,14 @@ Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::ui
                                                          const Neighbours& neighbours,
                                                          const Known<LatticePoint>& known) {
     std::vector<LatticePoint> points(neighbours.vertex_count());
-    if (auto ok = decode_intra_positions(bytes, neighbours, known, points, nullptr); !ok)
+    if (auto ok = decode_intra_positions(bytes, neighbours, known, points, nullptr, nullptr); !ok)
         return tl::unexpected(ok.error());
     return points;
 }
 
 Result<void> decode_intra_positions(std::span<const std::uint8_t> bytes, const Neighbours& neighbours,
                                     const Known<LatticePoint>& known, std::span<LatticePoint> points,
-                                    Progress* progress) {
+                                    const Progress* ordered, Progress* progress) {
     constexpr std::size_t told_every = 64;  // ranks
     const std::size_t vertex_count = neighbours.vertex_count();
     if (vertex_count == 0) return {};
@@ -359,7 +361,9 @@ Result<void> decode_intra_positions(std::span<const std::uint8_t> bytes, const N
     PositionHistory history(vertex_count);
     const auto contexts = std::make_unique<PositionContexts>();
     ReadingCoder<RangeDecoder> coder{decoder};
+    Followed rows(ordered);
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
+        rows.wait_beyond(rank);
         if (progress && rank % told_every == 0) progress->reach(rank);
         const PositionFeatures features = position_features(points, neighbours, rank, history);
         if (const auto v = neighbours.order[rank]; is_known(known.is, v)) {

@@ -20,18 +20,20 @@
 namespace htvm::internal {
 
 // q: one point per vertex, q.size() == neighbours.vertex_count(), every point on_lattice(). Without vertices there are
-// no bytes. known: as in Known, as `neighbours` was made with.
+// no bytes. known: as in Known, as `neighbours` was made with. ordered: of how many ranks the rows of `neighbours` are
+// there, if they are still being made; or null.
 std::vector<std::uint8_t> encode_intra_positions(std::span<const LatticePoint> q, const Neighbours& neighbours,
-                                                 std::span<const std::uint8_t> known = {});
+                                                 std::span<const std::uint8_t> known = {},
+                                                 const Progress* ordered = nullptr);
 
 // The points that were encoded. Errors: corrupt_stream if the bytes end too early or lead off the lattice.
 Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::uint8_t> bytes,
                                                          const Neighbours& neighbours,
                                                          const Known<LatticePoint>& known = {});
-// The same into points, one per vertex. progress: how many ranks of the coding order are decoded, for whoever follows;
-// or null.
+// The same into points, one per vertex. ordered: as above. progress: how many ranks of the coding order are decoded,
+// for whoever follows; or null.
 Result<void> decode_intra_positions(std::span<const std::uint8_t> bytes, const Neighbours& neighbours,
                                     const Known<LatticePoint>& known, std::span<LatticePoint> points,
-                                    Progress* progress);
+                                    const Progress* ordered, Progress* progress);
 
 }  // namespace htvm::internal
