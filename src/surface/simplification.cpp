@@ -298,19 +298,23 @@ void find_quadrics(Work& work) {
 // ---- Regions --------------------------------------------------------------------------------------------------------
 
 // Collapses go one after the other, but what happens at a foot does not depend on what happens at the head. So large
-// meshes are cut into regions across their longest extent, always as many, whose collapses go on side by side. Where
-// vertices have neighbours in another region, at the rim, nothing is touched until all regions are done. A collapse
-// reads and writes its ends, their neighbours and their triangles; neighbours of a vertex that is not at the rim are in
-// its region, and so no two regions touch the same.
-constexpr std::uint8_t most_regions = 4, rim = 255;
+// meshes are cut into regions across their longest extent, whose collapses go on side by side; the larger the mesh, the
+// more, since the cheapest collapse may be anywhere in a region, and where its vertices do not fit in a cache, each
+// waits for memory. Where vertices have neighbours in another region, at the rim, nothing is touched until all regions
+// are done. A collapse reads and writes its ends, their neighbours and their triangles; neighbours of a vertex that is
+// not at the rim are in its region, and so no two regions touch the same.
+constexpr std::uint8_t rim = 255;
 
 // Returns how many there are: small meshes are one, and no vertex of theirs is at the rim.
 std::uint8_t find_regions(Work& work) {
+    constexpr std::size_t least_regions = 4, most_regions = 64;
     constexpr std::size_t least_of_region = 2048;  // vertices: with fewer each, the rims are too much of the whole
+    constexpr std::size_t most_of_region = 16384;
     const auto& positions = work.positions;
     const auto vertices = positions.size();
     work.regions.assign(vertices, 0);
-    if (vertices < most_regions * least_of_region) return 1;
+    if (vertices < least_regions * least_of_region) return 1;
+    const auto regions = std::clamp(vertices / most_of_region, least_regions, most_regions);
     Vector3d low = positions[0], high = positions[0];
     for (const auto& p : positions) {
         low = low.cwiseMin(p);
@@ -321,13 +325,17 @@ std::uint8_t find_regions(Work& work) {
     std::vector<double> along;
     along.reserve(vertices);
     for (const auto& p : positions) along.push_back(p[axis]);
-    for (std::size_t r = 1; r < most_regions; ++r) {
-        const auto middle = along.begin() + static_cast<std::ptrdiff_t>(vertices * r / most_regions);
-        std::nth_element(along.begin(), middle, along.end());
-        const double cut = *middle;
-        for (std::size_t v = 0; v < vertices; ++v)
-            if (positions[v][axis] >= cut) work.regions[v] = static_cast<std::uint8_t>(r);
+    std::vector<double> cuts;
+    auto from = along.begin();
+    for (std::size_t r = 1; r < regions; ++r) {
+        const auto middle = along.begin() + static_cast<std::ptrdiff_t>(vertices * r / regions);
+        std::nth_element(from, middle, along.end());
+        cuts.push_back(*middle);
+        from = middle;
     }
+    for (std::size_t v = 0; v < vertices; ++v)
+        work.regions[v] = static_cast<std::uint8_t>(std::upper_bound(cuts.begin(), cuts.end(), positions[v][axis]) -
+                                                    cuts.begin());
     std::vector<std::uint8_t> at_rim(vertices, 0);
     for (const auto& [a, b, c] : work.triangles) {
         if (a == dead || (work.regions[a] == work.regions[b] && work.regions[b] == work.regions[c])) continue;
@@ -335,7 +343,7 @@ std::uint8_t find_regions(Work& work) {
     }
     for (std::size_t v = 0; v < vertices; ++v)
         if (at_rim[v]) work.regions[v] = rim;
-    return most_regions;
+    return static_cast<std::uint8_t>(regions);
 }
 
 // ---- Collapses ------------------------------------------------------------------------------------------------------
