@@ -218,6 +218,9 @@ TEST(Simplification, of_large_meshes_is_sound_and_the_same_for_any_number_of_thr
     EXPECT_LT(flat.positions.size(), 200u);
     EXPECT_NEAR(area(flat.positions, flat.triangles), 120 * 120, 0.05 * 120 * 120);
 
+    const auto many_regions = same_for_any_number_of_threads(sphere(400, 250));
+    EXPECT_EQ(many_regions.positions.size() - edges(many_regions.triangles) + many_regions.triangles.size(), 2u);
+
     auto soup = plane(100);
     for (int t = 0; t < 2000; ++t)
         for (auto& corner : soup.triangles[random() % soup.triangles.size()])
