@@ -1,6 +1,7 @@
 #include "deadline.h"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -26,6 +27,7 @@ int Deadline::effort(double waited) const {
     const double usually = usual();
     for (int effort = most_; effort > 0; --effort)
         if (waited + usually * share_of(effort) <= room * milliseconds_) return effort;
+    if (lost_since_us_) return std::min(1, most_);
     // Motion alone loses track sooner or later, which nobody mends. Where the machine never has time for more, a few
     // late frames are better than a picture that falls apart.
     const auto alone = [](const TimedFrame& frame) { return frame.motion_alone(); };
@@ -34,8 +36,9 @@ int Deadline::effort(double waited) const {
     return for_long ? std::min(1, most_) : 0;
 }
 
-bool Deadline::may_repair(double so_far) const {
-    if (!(milliseconds_ > 0) || unrepaired_ >= most_left_lost) return true;
+bool Deadline::may_repair(double so_far, std::int64_t timestamp_us) const {
+    if (!(milliseconds_ > 0)) return true;
+    if (lost_since_us_ && timestamp_us - *lost_since_us_ >= longest_lost_us) return true;
     if (repairs_.empty()) return so_far < milliseconds_;  // the first tells how long they take
     auto ascending = repairs_;
     std::sort(ascending.begin(), ascending.end());
@@ -56,9 +59,11 @@ void Deadline::took(const TimedFrame& frame) {
     // there is more time.
     constexpr std::size_t last = 9;
     frames_.push_back(frame);
-    if (frame.left_lost) ++unrepaired_;
+    if (!frame.left_lost && !frame.motion_alone())
+        lost_since_us_.reset();
+    else if (frame.left_lost && !lost_since_us_)
+        lost_since_us_ = frame.timestamp_us;
     if (frame.repaired > 0) {
-        unrepaired_ = 0;
         if (repairs_.size() == last) repairs_.erase(repairs_.begin());
         repairs_.push_back(frame.repaired);
     }
@@ -126,15 +131,26 @@ nlohmann::json deadline_json(const Deadline& deadline) {
     return out;
 }
 
-std::string deadline_warning(const Deadline& deadline, bool may_drop) {
-    const auto frames = deadline.frames().size(), late = deadline.late();
-    if (late == 0 || 2 * late < frames) return {};
-    return fmt::format(
-        "{} of {} late: this machine is too slow for the deadline{}; a larger --deadline helps, a lower "
-        "-q{}, meshes of fewer vertices{}",
-        late, counted(frames, "frame") + (frames == 1 ? " was" : " were"),
-        may_drop ? ", or the meshes came faster than a camera's, as from a file" : "",
-        deadline.most() > 1 ? " or --effort" : "", may_drop ? ", or --drop-late, which leaves frames out" : "");
+std::string deadline_warning(const Deadline& deadline, const LateMeshes& meshes) {
+    const auto frames = deadline.frames().size(), late = deadline.late(), lost = deadline.left_lost();
+    const auto some_of_all = [&](std::size_t some) {
+        return fmt::format("{} of {}", some, counted(frames, "frame") + (frames == 1 ? " was" : " were"));
+    };
+    const bool is_late = late > 0 && 2 * late >= frames;
+    std::string what;
+    if (is_late)
+        what = some_of_all(late) + " late: this machine is too slow for the deadline" +
+               (meshes.piped ? ", or the meshes came faster than a camera's, as from a file" : "");
+    else if (lost > 0 && 10 * lost >= frames)
+        what = fmt::format("{} of {} show what tracking lost in them, as repairing it takes longer than the deadline",
+                           lost, counted(frames, "frame"));
+    else
+        return {};
+    std::vector<std::string> helps = {"a larger --deadline", "a lower -q", "meshes of fewer vertices"};
+    if (is_late && meshes.piped && !meshes.dropped) helps.emplace_back("--drop-late, which leaves frames out");
+    const auto last = std::move(helps.back());
+    helps.pop_back();
+    return fmt::format("{}; what helps is {} or {}", what, fmt::join(helps, ", "), last);
 }
 
 }  // namespace htvm::app

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct TimedFrame {
     bool intra = false;      // an I-frame, for which the same is sent at any effort
     bool left_lost = false;  // tracking was lost, and there was no time to repair it
     double repaired = 0;     // milliseconds that repairing it took; 0: there was nothing to repair
+    std::int64_t timestamp_us = 0;
     double latency() const { return waited + took; }
     bool motion_alone() const { return effort == 0 && !intra; }
 };
@@ -27,13 +29,15 @@ class Deadline {
 public:
     // milliseconds: from when a mesh is there; 0: there is no deadline. most: the effort that was asked for.
     Deadline(double milliseconds, int most) : milliseconds_(milliseconds), most_(most) {}
-    // For a frame that has waited for so long. 0, motion alone, at most so many times in a row.
+    // For a frame that has waited for so long. 0, motion alone, at most so many times in a row, and not while tracking
+    // is known to be lost: motion alone follows what is lost nowhere, and is never repaired.
     static constexpr std::size_t most_alone = 10;
     int effort(double waited) const;
     // Whether a frame in which tracking is lost may be repaired, so long after its mesh was there. Not so where it
-    // would be late, but at most so many times in a row: a picture that falls apart is worse than a few late frames.
-    static constexpr std::size_t most_left_lost = 30;
-    bool may_repair(double so_far) const;
+    // would be late, but a person stays lost for so long at most: a picture that falls apart is worse than a late
+    // frame.
+    static constexpr std::int64_t longest_lost_us = 300'000;
+    bool may_repair(double so_far, std::int64_t timestamp_us) const;
     void took(const TimedFrame& frame);
 
     double milliseconds() const { return milliseconds_; }
@@ -51,7 +55,7 @@ private:
     int most_;
     std::vector<double> usual_;    // milliseconds that each of the last frames would have taken at the usual effort
     std::vector<double> repairs_;  // milliseconds that the last repairs took
-    std::size_t unrepaired_ = 0;   // frames left lost since the last repair
+    std::optional<std::int64_t> lost_since_us_;  // the first of the last frames that were left lost
     std::vector<TimedFrame> frames_;
 };
 
@@ -64,8 +68,13 @@ Latency latency_of(const std::vector<TimedFrame>& frames);
 // "latency 21 ms in the median, ...", and where there is a deadline, how many frames were late or got less effort.
 std::string deadline_summary(const Deadline& deadline);
 nlohmann::json deadline_json(const Deadline& deadline);
-// What helps where half of the frames were late, or more; empty if there is no need. may_drop: whether late meshes can
-// be dropped.
-std::string deadline_warning(const Deadline& deadline, bool may_drop);
+// Where late meshes come from.
+struct LateMeshes {
+    bool piped = false;    // from standard input, where they may come faster than a camera's
+    bool dropped = false;  // some are dropped already
+};
+// What helps where half of the frames were late or a tenth was not repaired, or more of them; empty if there is no
+// need.
+std::string deadline_warning(const Deadline& deadline, const LateMeshes& meshes);
 
 }  // namespace htvm::app

@@ -110,9 +110,11 @@ void report(const EncodeOptions& options, const Summary& summary, const RateRepo
             counted(frames, "frame")));
     if (const auto strain = rate_warning(rate); !strain.empty()) warn(strain);
     if (deadline)
-        if (const auto late = deadline_warning(*deadline, is_piped(options.capture) && !options.drop_late);
+        if (const auto late = deadline_warning(*deadline, {is_piped(options.capture), options.drop_late});
             !late.empty())
             warn(late);
+    if (dropped_late > 0 && !options.effort_log.empty())
+        warn(fmt::format("{} repeats this run of the meshes alone that were kept", options.effort_log));
     if (summary.without_triangles > 0)
         warn(fmt::format("{} of {} no triangles; see that the files hold meshes", summary.without_triangles,
                          counted(frames, "frame") + (summary.without_triangles == 1 ? " has" : " have")));
@@ -304,6 +306,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
             pass.efforts = efforts;
             pass.effort_log = log;
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
+            if (hub) pass.held_back = [&] { return output->held_back(); };
             if (hub) pass.wants_key_frame = [hub] { return hub->wants_key_frame(); };
             if (hub && rate.rate_controlled() && !options.publishing.fixed_bitrate)
                 pass.bitrate = [hub, line = LineRate(rate.bits_per_second)]() mutable {
@@ -542,7 +545,9 @@ void add_encode(CLI::App& app, Run& run) {
         ->add_option("--deadline", options->deadline,
                      "Milliseconds from when a mesh is there to when its packet is: where a frame would be late, less\n"
                      "is searched for it (see --effort), at last its motion alone is coded, and lost tracking is\n"
-                     "repaired in a later one; no frame is left out. How many were late or got less is said at the end")
+                     "repaired in a later one; no frame is left out. How many were late or got less is said at the\n"
+                     "end, and --effort-log has it all. Frames are then coded one by one: not with --latency-frames,\n"
+                     "--group, --passes 2, --chunks, --jobs or another --profile")
         ->check(CLI::Range(1.0, 60000.0))
         ->type_name("MS")
         ->group(pace);
@@ -552,6 +557,9 @@ void add_encode(CLI::App& app, Run& run) {
                      "encoded: in FILE.partial until all are there, where an encode that ends early leaves them. An\n"
                      "earlier log is replaced, other files are not")
         ->type_name("FILE")
+        ->check([](const std::string& file) {
+            return file.empty() || file == "-" ? std::string("is a file's name, as efforts.csv") : std::string();
+        })
         ->group(pace);
     command
         ->add_option("--repeat-efforts", options->repeat_efforts,
@@ -578,10 +586,10 @@ void add_encode(CLI::App& app, Run& run) {
         "  htvm encode capture/ --bitrate 6 --buffer 0.5 -o person.htvm\n"
         "  htvm encode capture/ --jobs 8 -o person.htvm\n"
         "  rig --ply | htvm encode - --bitrate 8 --drop-late -o wss://hub.example/publish/person");
-    show_first(*command, {"--skeleton",   "--output",  "--fps",     "--unit",   "--height",  "--texture",
-                          "--texture-as", "--audio",   "--frames",  "--first",  "--quality", "--effort",
-                          "--deadline",   "--profile", "--bitrate", "--buffer", "--keyint",  "--on-bad-frame",
-                          "--threads",    "--chunks",  "--jobs",    "--json"});
+    show_first(*command, {"--skeleton",   "--output",       "--fps",       "--unit",    "--height",  "--texture",
+                          "--texture-as", "--audio",        "--frames",    "--first",   "--quality", "--effort",
+                          "--deadline",   "--effort-log",   "--drop-late", "--profile", "--bitrate", "--buffer",
+                          "--keyint",     "--on-bad-frame", "--threads",   "--chunks",  "--jobs",    "--json"});
     command->callback([options, command, &run] {
         check_together(options->encoding);
         const auto sessions = command->get_option("--session")->results();

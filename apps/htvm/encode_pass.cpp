@@ -140,6 +140,9 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     auto& summary = pass.summary;
     const auto start = std::chrono::steady_clock::now();
     TimedFrame timed;
+    timed.timestamp_us = timestamp_us;
+    const auto held_back = [&] { return pass.held_back ? pass.held_back() : 0.0; };
+    const double held_before = held_back();
     if (pass.deadline) {
         timed.waited = milliseconds_since(pass.capture.came());
         const auto effort = choose_effort(pass, timed.waited);
@@ -150,7 +153,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     std::optional<std::chrono::steady_clock::time_point> repairing;
     const auto may_repair = [&] {
         if (repairing || timed.left_lost) return !timed.left_lost;
-        timed.left_lost = !pass.deadline->may_repair(timed.waited + milliseconds_since(start));
+        timed.left_lost = !pass.deadline->may_repair(timed.waited + milliseconds_since(start), timestamp_us);
         if (!timed.left_lost) repairing = std::chrono::steady_clock::now();
         return !timed.left_lost;
     };
@@ -184,9 +187,10 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     if (pass.pictures && pass.write && textured) pass.pictures->add(timestamp_us, textured);
     if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
     if (pass.deadline) {
-        timed.took = milliseconds_since(start);
+        const double held = held_back() - held_before;
+        timed.took = milliseconds_since(start) - held;
         timed.intra = pass.encoder.last_frame().type == FrameType::intra;
-        if (repairing) timed.repaired = milliseconds_since(*repairing);
+        if (repairing) timed.repaired = milliseconds_since(*repairing) - held;
     }
     if (auto ok = count(pass, timed); !ok) return tl::unexpected(ok.error());
     if (auto followed = follow_line(pass); !followed) return tl::unexpected(followed.error());

@@ -157,7 +157,11 @@ Result<void> StreamOutput::write_one(const Packet& packet) {
         indexer_.add(packet, bytes_);
     }
     if (publishing_) {
-        if (pacing_ && frame_type(packet.kind)) wait_until(pacing_->due(packet.timestamp_us, Pacing::Clock::now()));
+        if (pacing_ && frame_type(packet.kind)) {
+            const auto now = Pacing::Clock::now();
+            wait_until(pacing_->due(packet.timestamp_us, now));
+            held_back_ += std::chrono::duration<double, std::milli>(Pacing::Clock::now() - now).count();
+        }
         bytes_ += packet_overhead + packet.payload.size();
         return publishing_->send(packet);
     }

@@ -66,6 +66,8 @@ public:
     static Result<StreamOutput> open(const std::string& path, const PublishingOptions& publishing = {});
     // To a hub: frames wait until they are due by their timestamps, as those of files have to.
     void pace() { pacing_.emplace(); }
+    // How long they have waited for that, milliseconds.
+    double held_back() const { return held_back_; }
     // The hub, if there is one.
     Publishing* publishing() { return publishing_ ? &*publishing_ : nullptr; }
     // Lays sound between the frames of the stream, in the place of its own. Before anything is written.
@@ -91,6 +93,7 @@ private:
     std::optional<OutputFile> file_;  // none: standard output, or a hub
     std::optional<Publishing> publishing_;
     std::optional<Pacing> pacing_;
+    double held_back_ = 0;
     std::optional<AudioTrack> audio_;
     StreamIndexer indexer_;
     std::uint64_t bytes_ = 0;

@@ -72,15 +72,16 @@ public:
     // is not a rate that they could have given.
     Result<void> set_bitrate(double bits_per_second);
     // From the next frame on so much is searched for each: 1 to 9, as TrackedOptions::effort; groups stay as long as
-    // they were. With 0 a frame's motion alone is coded, and what tracking loses there is mended by a later one: for a
-    // frame that would be late otherwise. The same efforts for the same frames give the same bytes. bad_input if it is
-    // out of range, or with another profile than tracked.
+    // they were. With 0 a frame's motion alone is coded, and what tracking loses there is mended by a later one, unless
+    // the picture would fall apart: for a frame that would be late otherwise. The same efforts for the same frames give
+    // the same bytes. bad_input if it is out of range, or with another profile than tracked.
     Result<void> set_effort(int effort);
     // Of the frames pushed from now on. Asked while one of them is coded, from the thread that pushes or one of the
     // encoder's, once tracking turns out to be lost in it: whether that is repaired at once, by a patch or an I-frame,
     // which takes three to ten times as long as other frames. If not, the frame is sent as it was tracked, and a later
-    // one is asked anew. Null: always. The same answers give the same bytes. bad_input with another profile than
-    // tracked.
+    // one is asked anew. Not asked where the picture would fall apart, 4 mm off all over or 30 mm in a region of 10 cm
+    // of an adult: that is always repaired. Null: always. The same answers give the same bytes. bad_input with another
+    // profile than tracked.
     Result<void> set_repair(std::function<bool()> may_repair);
     // Ends the sequence: codes what is held, and queues the index of I-frames. After an error nothing has ended.
     Result<void> finish();

@@ -54,7 +54,7 @@ enum class Denoising : std::uint8_t {
 // For Profile::tracked only; with other profiles, anything but the defaults is refused.
 struct TrackedOptions {
     int effort = 5;  // how much is searched for a frame, 1 to 9: less is faster; more takes longer and, from 6 on,
-                     // fewer bits, as frames are then coded in groups, for files (docs/performance.md)
+                     // fewer bits for the same error, as frames are then coded in groups, for files
     TrackedReferences references = TrackedReferences::previous;
     int access_interval = 30;  // with `previous`: largest distance, in frames, between places where decoding can start
                                // for whoever has the I-frame and its patches: T-frames that refer to nothing else

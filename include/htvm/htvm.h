@@ -547,13 +547,15 @@ htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh,
 htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_second);
 
 /* From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort; 0: its motion alone is
- * coded, for a frame that would be late otherwise. HTVM_BAD_INPUT: above 9, or another profile than the tracked one. */
+ * coded, unless the picture would fall apart: for a frame that would be late otherwise. HTVM_BAD_INPUT: above 9, or
+ * another profile than the tracked one. */
 htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort);
 
 /* Of the meshes sent from now on. may_repair is asked, with user, while a frame is coded and tracking turns out to be
  * lost in it: whether that is repaired at once, which takes three to ten times as long as other frames; 0: the frame is
- * sent as it was tracked, and a later one is asked anew. It may be called from a thread of the encoder's. NULL: always.
- * HTVM_BAD_INPUT: another profile than the tracked one. */
+ * sent as it was tracked, and a later one is asked anew. Not asked where the picture would fall apart, 4 mm off all
+ * over or 30 mm in a region of 10 cm of an adult: that is always repaired. It may be called from a thread of the
+ * encoder's. NULL: always. HTVM_BAD_INPUT: another profile than the tracked one. */
 typedef int (*htvm_may_repair)(void* user);
 htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, htvm_may_repair may_repair, void* user);
 

@@ -224,9 +224,8 @@ constexpr Option list[] = {
      .kind = OptionKind::whole_number,
      .least = 1,
      .most = 9,
-     .meaning = "how much is searched for a frame: less is faster; more takes longer and, from 6 on, fewer bits, as "
-                "T-frames are "
-                "then coded in groups, for files",
+     .meaning = "how much is searched for a frame: less is faster; more takes longer and, from 6 on, fewer bits for "
+                "the same error, as T-frames are then coded in groups, for files",
      .get = [](const EncoderOptions& o) -> double { return o.tracked.effort; },
      .set = [](EncoderOptions& o, double value) { o.tracked.effort = static_cast<int>(value); },
      .flag = "--effort"},

@@ -334,8 +334,8 @@ std::uint8_t find_regions(Work& work) {
         from = middle;
     }
     for (std::size_t v = 0; v < vertices; ++v)
-        work.regions[v] = static_cast<std::uint8_t>(std::upper_bound(cuts.begin(), cuts.end(), positions[v][axis]) -
-                                                    cuts.begin());
+        work.regions[v] =
+            static_cast<std::uint8_t>(std::upper_bound(cuts.begin(), cuts.end(), positions[v][axis]) - cuts.begin());
     std::vector<std::uint8_t> at_rim(vertices, 0);
     for (const auto& [a, b, c] : work.triangles) {
         if (a == dead || (work.regions[a] == work.regions[b] && work.regions[b] == work.regions[c])) continue;

@@ -644,7 +644,7 @@ std::vector<SurfacePoint> closest_facing(const SurfaceIndex& surface, std::span<
                 surface.walk_all(queries.subspan(first, after - first), surface.begins_near(),
                                  guesses.subspan(first, after - first));
             for (std::size_t i = first; i < after; ++i) {
-                if (i + ahead < guesses.size()) surface.expect(guesses[i + ahead]);
+                if (i + ahead < after && !guesses.empty()) surface.expect(guesses[i + ahead]);
                 if (!guesses.empty() && guesses[i] != OrientedPoints::no_point) last = guesses[i];
                 out[i] = surface.closest_facing(queries[i], normals[i], within, last);
                 if (!guesses.empty()) guesses[i] = last;

@@ -310,7 +310,7 @@ std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLev
                             round.far ? begins_near * gap : target.begins_near(),
                             std::span(guesses.forward).subspan(first, after - first));
             for (std::size_t i = first; i < after; ++i) {
-                if (i + ahead < forward) target.expect(guesses.forward[i + ahead]);
+                if (i + ahead < after) target.expect(guesses.forward[i + ahead]);
                 last = go_forward(i, last);
             }
             last = OrientedPoints::no_point;

@@ -105,17 +105,31 @@ TEST(Deadline, AnIFrameIsNeverMotionAloneNorLessThanWasAskedFor) {
 TEST(Deadline, WhereHalfOfTheFramesAreLateAWarningSaysWhatHelps) {
     Deadline deadline(50, 5);
     for (const double took : {20.0, 30.0, 60.0}) deadline.took({5, 0, took});
-    EXPECT_EQ(deadline_warning(deadline, true), "");
+    EXPECT_EQ(deadline_warning(deadline, {.piped = true}), "");
     deadline.took({0, 0, 60.0});
-    EXPECT_EQ(deadline_warning(deadline, true),
+    EXPECT_EQ(deadline_warning(deadline, {.piped = true}),
               "2 of 4 frames were late: this machine is too slow for the deadline, or the meshes came faster than a "
-              "camera's, as from a file; a larger --deadline helps, a lower "
-              "-q or --effort, meshes of fewer vertices, or --drop-late, which leaves frames out");
+              "camera's, as from a file; what helps is a larger --deadline, a lower -q, meshes of fewer vertices or "
+              "--drop-late, which leaves frames out");
+    EXPECT_EQ(deadline_warning(deadline, {.piped = true, .dropped = true}),
+              "2 of 4 frames were late: this machine is too slow for the deadline, or the meshes came faster than a "
+              "camera's, as from a file; what helps is a larger --deadline, a lower -q or meshes of fewer vertices");
     Deadline least(50, 1);
     least.took({1, 0, 60.0});
-    EXPECT_EQ(deadline_warning(least, false),
-              "1 of 1 frame was late: this machine is too slow for the deadline; a larger --deadline helps, a lower "
-              "-q, meshes of fewer vertices");
+    EXPECT_EQ(deadline_warning(least, {}),
+              "1 of 1 frame was late: this machine is too slow for the deadline; what helps is a larger --deadline, a "
+              "lower -q or meshes of fewer vertices");
+}
+
+TEST(Deadline, WhereATenthOfTheFramesWasNotRepairedAWarningSaysSo) {
+    Deadline deadline(50, 5);
+    for (int i = 0; i < 18; ++i) deadline.took({5, 0, 20.0});
+    deadline.took({.effort = 5, .took = 20, .left_lost = true});
+    EXPECT_EQ(deadline_warning(deadline, {}), "");
+    deadline.took({.effort = 5, .took = 20, .left_lost = true});
+    EXPECT_EQ(deadline_warning(deadline, {}),
+              "2 of 20 frames show what tracking lost in them, as repairing it takes longer than the deadline; what "
+              "helps is a larger --deadline, a lower -q or meshes of fewer vertices");
 }
 
 TEST(Deadline, TellsTheMedianTheNinetyNinthPercentileAndTheLongest) {
@@ -130,25 +144,43 @@ TEST(Deadline, TellsTheMedianTheNinetyNinthPercentileAndTheLongest) {
 
 TEST(Deadline, ALostFrameIsRepairedWhereThereIsTime) {
     Deadline deadline(100, 5);
-    EXPECT_TRUE(deadline.may_repair(20));  // nobody knows yet how long it takes
+    EXPECT_TRUE(deadline.may_repair(20, 0));  // nobody knows yet how long it takes
     deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
-    EXPECT_TRUE(deadline.may_repair(40));
-    EXPECT_FALSE(deadline.may_repair(41));
-    EXPECT_TRUE(Deadline(0, 5).may_repair(1e6));  // without a deadline there always is
+    EXPECT_TRUE(deadline.may_repair(40, 0));
+    EXPECT_FALSE(deadline.may_repair(41, 0));
+    EXPECT_TRUE(Deadline(0, 5).may_repair(1e6, 0));  // without a deadline there always is
 }
 
-TEST(Deadline, ALostFrameIsRepairedAtLastWhateverItTakes) {
-    Deadline deadline(33, 5);
-    deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
-    for (std::size_t i = 0; i < Deadline::most_left_lost; ++i) {
-        EXPECT_FALSE(deadline.may_repair(10)) << i;
-        deadline.took({.effort = 5, .waited = 0, .took = 20, .left_lost = true});
+TEST(Deadline, ThreeTenthsOfASecondAfterItWasLostAFrameIsRepairedWhateverItTakes) {
+    for (const std::int64_t period_us : {100'000, 33'333}) {
+        Deadline deadline(33, 5);
+        deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
+        std::int64_t now_us = 5'000'000;
+        std::size_t lost = 0;
+        for (; !deadline.may_repair(10, now_us); now_us += period_us, ++lost)
+            deadline.took({.effort = 5, .took = 20, .left_lost = true, .timestamp_us = now_us});
+        EXPECT_EQ(lost, period_us == 100'000 ? 3u : 10u);
+        EXPECT_EQ(deadline_json(deadline)["unrepaired_frames"], lost);
+        deadline.took({.effort = 5, .took = 80, .repaired = 60, .timestamp_us = now_us});
+        EXPECT_FALSE(deadline.may_repair(10, now_us + period_us));
     }
-    EXPECT_TRUE(deadline.may_repair(10));
-    EXPECT_EQ(deadline.left_lost(), Deadline::most_left_lost);
-    deadline.took({.effort = 5, .waited = 0, .took = 80, .repaired = 60});
-    EXPECT_FALSE(deadline.may_repair(10));
-    EXPECT_EQ(deadline_json(deadline)["unrepaired_frames"], Deadline::most_left_lost);
+}
+
+TEST(Deadline, AFrameThatTrackingFindsAgainEndsWhatWasLost) {
+    Deadline deadline(33, 5);
+    deadline.took({.effort = 5, .took = 80, .repaired = 60});
+    deadline.took({.effort = 5, .took = 20, .left_lost = true, .timestamp_us = 0});
+    deadline.took({.effort = 5, .took = 20, .timestamp_us = 200'000});
+    EXPECT_FALSE(deadline.may_repair(10, 400'000));
+}
+
+TEST(Deadline, WhileTrackingIsLostNoFrameIsMotionAlone) {
+    auto deadline = after(20, 30, 33);
+    EXPECT_EQ(deadline.effort(30), 0);
+    deadline.took({.effort = 5, .took = 30, .left_lost = true});
+    EXPECT_EQ(deadline.effort(30), 1);
+    deadline.took({.effort = 1, .took = 30});
+    EXPECT_EQ(deadline.effort(30), 0);
 }
 
 }  // namespace

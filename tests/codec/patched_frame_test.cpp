@@ -60,27 +60,42 @@ TEST(PatchedFrames, AreTheReferenceOfWhatFollows) {
     EXPECT_EQ(coded.infos[4].reference, 2u);
 }
 
-TEST(PatchedFrames, WaitUntilTheCallerHasTimeForThem) {
-    const auto sequence = horned_ball(6);
-    for (const int waiting : {0, 1}) {
-        auto options = patched_options();
-        options.latency_frames = waiting;
-        auto encoder = *Encoder::create(options);
-        std::vector<FrameType> types;
-        int asked = 0;
-        for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
-            const bool has_time = i >= 3;
-            ASSERT_TRUE(encoder.set_repair([&asked, has_time] { return ++asked, has_time; }));
-            ASSERT_TRUE(encoder.push(sequence.frames[i].mesh, nullptr, 33333 * static_cast<std::int64_t>(i)));
+TEST(PatchedFrames, OfASmallLossWaitUntilTheCallerHasTimeForThem) {
+    const auto sequence = horned_ball(4, 2, 104, 0.07);  // lost in one frame, and found again behind it
+    for (const int waiting : {0, 1})
+        for (const bool has_time : {false, true}) {
+            auto options = patched_options();
+            options.latency_frames = waiting;
+            auto encoder = *Encoder::create(options);
+            std::vector<FrameType> types;
+            int asked = 0;
+            for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+                ASSERT_TRUE(encoder.set_repair([&asked, has_time] { return ++asked, has_time; }));
+                ASSERT_TRUE(encoder.push(sequence.frames[i].mesh, nullptr, 33333 * static_cast<std::int64_t>(i)));
+                for (const auto& frame : encoder.coded_frames()) types.push_back(frame.info.type);
+            }
+            ASSERT_TRUE(encoder.finish());
             for (const auto& frame : encoder.coded_frames()) types.push_back(frame.info.type);
+            EXPECT_EQ(types, (std::vector{I, T, has_time ? TP : T, T})) << waiting;
+            EXPECT_EQ(asked, 1) << waiting;  // not of frames that are tracked
         }
-        ASSERT_TRUE(encoder.finish());
-        for (const auto& frame : encoder.coded_frames()) types.push_back(frame.info.type);
-        EXPECT_EQ(types, (std::vector{I, T, T, TP, T, T})) << waiting;
-        EXPECT_EQ(asked, 2) << waiting;  // not of frames that are tracked
-    }
     auto topology = *Encoder::create(default_options(Profile::topology));
     EXPECT_EQ(topology.set_repair([] { return true; }).error().kind, ErrorKind::bad_input);
+}
+
+TEST(PatchedFrames, WaitForNobodyWhereThePictureWouldFallApart) {
+    const auto sequence = horned_ball(5);
+    for (const int effort : {0, 5}) {
+        auto encoder = *Encoder::create(patched_options());
+        std::vector<FrameType> types;
+        for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
+            ASSERT_TRUE(encoder.set_effort(effort));
+            ASSERT_TRUE(encoder.set_repair([] { return false; }));
+            ASSERT_TRUE(encoder.push(sequence.frames[i].mesh, nullptr, 33333 * static_cast<std::int64_t>(i)));
+            types.push_back(encoder.last_frame().type);
+        }
+        EXPECT_EQ(types, (std::vector{I, T, TP, T, T})) << effort;
+    }
 }
 
 TEST(PatchedFrames, CodeOnlyTheTrianglesThatCome) {

@@ -10,13 +10,14 @@ namespace htvm::test {
 
 inline constexpr int never = 1 << 30;
 
-// A ball of 300 mm with a horn on top, which is on the right from frame `lost` on: no motion leads there.
-inline TestSequence horned_ball(int frames, int lost = 2) {
+// A ball of 300 mm with a horn of so many on top, which is on the right from frame `lost` on: no motion leads there.
+inline TestSequence horned_ball(int frames, int lost = 2, double horn = 150, double width = 0.12) {
     TestSequence out{"horned ball", {}, {}};
     for (int t = 0; t < frames; ++t) {
         const std::size_t axis = t < lost ? 2 : 0;
-        const auto ball_now =
-            ball(4, [&](const Vector3d& d) { return 300 + 150 * std::clamp((d[axis] - 0.88) / 0.1, 0.0, 1.0); });
+        const auto ball_now = ball(4, [&](const Vector3d& d) {
+            return 300 + horn * std::clamp((d[axis] - (1 - width)) / (width - 0.02), 0.0, 1.0);
+        });
         SequenceFrame frame;
         for (const auto p : ball_now.positions) {
             frame.mesh.positions.push_back({static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});

@@ -237,19 +237,33 @@ double allowed_in_region(const FrameWork& work, double best) {
                      visible * work.configuration.adult_millimetre, visible_in_edges * intra.edge});
 }
 
+// The same of the whole surface. On a clean, smooth capture the best T-frame may be far better than quantisation lets
+// an I-frame or a patch be.
+double allowed_over_all(const FrameWork& work, double best) {
+    constexpr double worst_to_best = 2.2, quantised = 0.75;  // steps
+    return std::max(worst_to_best * best, quantised * static_cast<double>(work.reference().intra.steps.geometry));
+}
+
+// Whether so much is lost that the picture falls apart: most of the person, as where a capture is cut, or all of a
+// limb.
+bool falls_apart(const FrameWork& work, const TrackedFit& fit) {
+    constexpr double most_of_all = 4, most_in_region = 30;  // mm on an adult
+    constexpr double to_lost = 3;                           // times what already counts as lost
+    const double millimetre = work.configuration.adult_millimetre, best = work.sequence.nodes.best_fit;
+    const double allowed = std::max(allowed_over_all(work, best), work.reference().intra.fit.rms);
+    return fit.rms > std::max(most_of_all * millimetre, to_lost * allowed) ||
+           fit.worst_region > std::max(most_in_region * millimetre, to_lost * allowed_in_region(work, best));
+}
+
 // Whether a T-frame fits visibly worse than the T-frames of its I-frame can: over the whole surface, or in one region,
 // such as a hand.
 bool lost_track(const FrameWork& work, const TrackedFit& fit) {
-    constexpr double more_strays = 0.004, worst_to_best = 2.2;
-    constexpr double quantised = 0.75;  // steps
-    const auto& reference = work.reference();
+    constexpr double more_strays = 0.004;
     const double best_fit = work.sequence.nodes.best_fit;
     const double best = best_fit > 0 ? best_fit : fit.rms;
-    // On a clean, smooth capture the best T-frame may be far better than quantisation lets an I-frame or a patch be.
-    const double too_far =
-        std::max(worst_to_best * best, quantised * static_cast<double>(reference.intra.steps.geometry));
-    return fit.stray_share > reference.intra.fit.stray_share + more_strays || fit.rms > too_far ||
-           fit.worst_region > allowed_in_region(work, best);
+    return fit.stray_share > work.reference().intra.fit.stray_share + more_strays ||
+           fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best) ||
+           falls_apart(work, fit);
 }
 
 // Whether the capture's texture atlas is laid out anew since the I-frame, whose texture coordinates a T-frame shows.
@@ -330,20 +344,23 @@ bool may_be_renewed(const FrameWork& work, const FrameSteps& steps, const Lattic
 // A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
 // no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
 // more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
-// late, it is made of the tracked mesh, so that nothing jumps. A frame that may not be repaired is sent as it is. due:
-// an I-frame is wanted.
+// late, it is made of the tracked mesh, so that nothing jumps. A frame that may not be repaired is sent as it is, and
+// so is one whose motion alone is wanted, unless it falls apart. due: an I-frame is wanted.
 Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool due) {
-    if (work.effort.motion_alone && !due) return code_motion_alone(work, steps);
-    if (work.effort.always_other_starts) work.follow_lost_limbs([] {});
-    auto tracked = code_frame(FrameType::tracked, work, steps);
-    if (!tracked) return tracked;
     const auto& reference = work.reference();
     const auto fit_of = [&](const LatticeMesh& decoded, std::span<const std::uint32_t> near) {
         return work.tracked_fit(decoded, reference.intra.edge, near, reference.intra.fit.squared);
     };
+    if (work.effort.motion_alone && !due) {
+        auto alone = code_motion_alone(work, steps);
+        if (!alone || !falls_apart(work, fit_of(alone->decoded, alone->near))) return alone;
+    }
+    if (work.effort.always_other_starts) work.follow_lost_limbs([] {});
+    auto tracked = code_frame(FrameType::tracked, work, steps);
+    if (!tracked) return tracked;
     auto fit = fit_of(tracked->decoded, tracked->near);
     bool lost = lost_track(work, fit);
-    if (lost && !due && work.may_repair && !work.may_repair()) return tracked;
+    if (lost && !due && !falls_apart(work, fit) && work.may_repair && !work.may_repair()) return tracked;
     std::optional<EncodedTrackedFrame> for_patches;  // which tells whether limbs were found, too
     const bool may_be_patched =
         !due && work.configuration.options.tracked.patch_share > 0 && reference.decoded.mesh().texcoords.empty();

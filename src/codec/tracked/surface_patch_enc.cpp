@@ -179,7 +179,7 @@ std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std:
                 surface.walk_all(points.subspan(first, after - first), surface.begins_near(),
                                  std::span(near).subspan(first, after - first));
             for (std::size_t i = first; i < after; ++i) {
-                if (i + ahead < near.size()) surface.expect(near[i + ahead]);
+                if (i + ahead < after && !near.empty()) surface.expect(near[i + ahead]);
                 if (!near.empty() && near[i] != OrientedPoints::no_point) guess = near[i];
                 out[i] = closest(points[i], normals[i], guess);
             }
