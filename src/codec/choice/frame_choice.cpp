@@ -262,8 +262,7 @@ bool lost_track(const FrameWork& work, const TrackedFit& fit) {
     const double best_fit = work.sequence.nodes.best_fit;
     const double best = best_fit > 0 ? best_fit : fit.rms;
     return fit.stray_share > work.reference().intra.fit.stray_share + more_strays ||
-           fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best) ||
-           falls_apart(work, fit);
+           fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best);
 }
 
 // Whether the capture's texture atlas is laid out anew since the I-frame, whose texture coordinates a T-frame shows.
@@ -360,7 +359,10 @@ Result<Candidate> choose_tracked(FrameWork& work, const FrameSteps& steps, bool 
     if (!tracked) return tracked;
     auto fit = fit_of(tracked->decoded, tracked->near);
     bool lost = lost_track(work, fit);
-    if (lost && !due && !falls_apart(work, fit) && work.may_repair && !work.may_repair()) return tracked;
+    // Behind an I-frame it is not known yet how well its T-frames can fit; where all are motion alone, it never is.
+    const bool must_be_repaired = (lost || work.effort.motion_alone) && falls_apart(work, fit);
+    lost = lost || must_be_repaired;
+    if (lost && !due && !must_be_repaired && work.may_repair && !work.may_repair()) return tracked;
     std::optional<EncodedTrackedFrame> for_patches;  // which tells whether limbs were found, too
     const bool may_be_patched =
         !due && work.configuration.options.tracked.patch_share > 0 && reference.decoded.mesh().texcoords.empty();
