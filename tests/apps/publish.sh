@@ -79,6 +79,11 @@ begun=$(date +%s%N)
 expect 0 "12 frames to ws://$address/publish/once" "$htvm" publish walk.htvm "ws://$address/publish/once"
 lasted=$((($(date +%s%N) - begun) / 1000000))
 [ $lasted -ge 366 ] || fail "12 frames were published in $lasted ms"
+# Encoded from files it goes on at their pace, too, and what waits for its time is not late.
+"$htvm" encode walk --frames 4 --fps 2 --deadline 400 --json -o "ws://$address/publish/slow" >paced.json 2>paced.err ||
+    fail "encoding files for a hub: $(cat paced.err)"
+python3 -c 'import json; pace = json.load(open("paced.json"))["pace"]; assert pace["late_frames"] == 0, pace' ||
+    fail "frames that wait for their time count as late"
 "$htvm" publish - "ws://$address/publish/piped" --speed 10 <walk.htvm 2>piped.err || fail "from a pipe: $(cat piped.err)"
 
 # As a camera sends it: synth, encode, decode.
