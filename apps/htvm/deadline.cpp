@@ -27,13 +27,12 @@ int Deadline::effort(double waited) const {
     const double usually = usual();
     for (int effort = most_; effort > 0; --effort)
         if (waited + usually * share_of(effort) <= room * milliseconds_) return effort;
-    if (lost_since_us_) return std::min(1, most_);
     // Motion alone loses track sooner or later, which nobody mends. Where the machine never has time for more, a few
     // late frames are better than a picture that falls apart.
     const auto alone = [](const TimedFrame& frame) { return frame.motion_alone(); };
     const bool for_long = frames_.size() >= most_alone &&
                           std::all_of(frames_.end() - static_cast<std::ptrdiff_t>(most_alone), frames_.end(), alone);
-    return for_long ? std::min(1, most_) : 0;
+    return for_long || lost_since_us_ ? std::min(1, most_) : 0;
 }
 
 bool Deadline::may_repair(double so_far, std::int64_t timestamp_us) const {
@@ -133,14 +132,12 @@ nlohmann::json deadline_json(const Deadline& deadline) {
 
 std::string deadline_warning(const Deadline& deadline, const LateMeshes& meshes) {
     const auto frames = deadline.frames().size(), late = deadline.late(), lost = deadline.left_lost();
-    const auto some_of_all = [&](std::size_t some) {
-        return fmt::format("{} of {}", some, counted(frames, "frame") + (frames == 1 ? " was" : " were"));
-    };
     const bool is_late = late > 0 && 2 * late >= frames;
     std::string what;
     if (is_late)
-        what = some_of_all(late) + " late: this machine is too slow for the deadline" +
-               (meshes.piped ? ", or the meshes came faster than a camera's, as from a file" : "");
+        what = fmt::format("{} of {} late: this machine is too slow for the deadline{}", late,
+                           counted(frames, "frame") + (frames == 1 ? " was" : " were"),
+                           meshes.piped ? ", or the meshes came faster than a camera's, as from a file" : "");
     else if (lost > 0 && 10 * lost >= frames)
         what = fmt::format("{} of {} show what tracking lost in them, as repairing it takes longer than the deadline",
                            lost, counted(frames, "frame"));

@@ -30,7 +30,7 @@ public:
     // milliseconds: from when a mesh is there; 0: there is no deadline. most: the effort that was asked for.
     Deadline(double milliseconds, int most) : milliseconds_(milliseconds), most_(most) {}
     // For a frame that has waited for so long. 0, motion alone, at most so many times in a row, and not while tracking
-    // is known to be lost: motion alone follows what is lost nowhere, and is never repaired.
+    // is known to be lost, as motion alone is repaired only where the picture falls apart.
     static constexpr std::size_t most_alone = 10;
     int effort(double waited) const;
     // Whether a frame in which tracking is lost may be repaired, so long after its mesh was there. Not so where it
@@ -41,7 +41,6 @@ public:
     void took(const TimedFrame& frame);
 
     double milliseconds() const { return milliseconds_; }
-    int most() const { return most_; }
     const std::vector<TimedFrame>& frames() const { return frames_; }
     std::size_t late() const;       // frames that were
     std::size_t lowered() const;    // frames that got less than was asked for
@@ -68,6 +67,7 @@ Latency latency_of(const std::vector<TimedFrame>& frames);
 // "latency 21 ms in the median, ...", and where there is a deadline, how many frames were late or got less effort.
 std::string deadline_summary(const Deadline& deadline);
 nlohmann::json deadline_json(const Deadline& deadline);
+
 // Where late meshes come from.
 struct LateMeshes {
     bool piped = false;    // from standard input, where they may come faster than a camera's

@@ -306,7 +306,7 @@ Result<void> encode_in_passes(const EncodeOptions& options, Capture& capture, En
             pass.efforts = efforts;
             pass.effort_log = log;
             if (writes) pass.write = [&](const Packet& packet) { return output->write(packet); };
-            if (hub) pass.held_back = [&] { return output->held_back(); };
+            pass.held_back = [&] { return output->held_back(); };
             if (hub) pass.wants_key_frame = [hub] { return hub->wants_key_frame(); };
             if (hub && rate.rate_controlled() && !options.publishing.fixed_bitrate)
                 pass.bitrate = [hub, line = LineRate(rate.bits_per_second)]() mutable {

@@ -141,8 +141,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     const auto start = std::chrono::steady_clock::now();
     TimedFrame timed;
     timed.timestamp_us = timestamp_us;
-    const auto held_back = [&] { return pass.held_back ? pass.held_back() : 0.0; };
-    const double held_before = held_back();
+    const double held_before = pass.held_back();
     if (pass.deadline) {
         timed.waited = milliseconds_since(pass.capture.came());
         const auto effort = choose_effort(pass, timed.waited);
@@ -187,7 +186,7 @@ Result<Coded> code(Pass& pass, const Mesh& mesh, const Pose* pose, std::int64_t 
     if (pass.pictures && pass.write && textured) pass.pictures->add(timestamp_us, textured);
     if (auto taken = take_coded(pass); !taken) return tl::unexpected(taken.error());
     if (pass.deadline) {
-        const double held = held_back() - held_before;
+        const double held = pass.held_back() - held_before;
         timed.took = milliseconds_since(start) - held;
         timed.intra = pass.encoder.last_frame().type == FrameType::intra;
         if (repairing) timed.repaired = milliseconds_since(*repairing) - held;

@@ -66,8 +66,7 @@ struct Pass {
     RateReport& rate;
     std::function<bool()> wants_key_frame = {};           // asked before each frame: whether it should be an I-frame
     std::function<std::optional<double>()> bitrate = {};  // asked after each frame: bits per second, where it changes
-    std::function<double()> held_back =
-        {};                        // milliseconds that packets were held until they are due; null: none ever is
+    std::function<double()> held_back = [] { return 0.0; };  // milliseconds so far that packets waited until due
     Deadline* deadline = nullptr;  // how much is searched for each frame, and how long that takes; null: not counted
     std::vector<LoggedFrame> efforts = {};  // of each frame, in place of what the deadline says; empty: as that says
     EffortLogWriter* effort_log = nullptr;  // takes what was decided of each frame; null: nobody asked for it

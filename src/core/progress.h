@@ -1,4 +1,4 @@
-// How far a task has come, for another one that follows behind it, as both functions of parallel_invoke() may.
+// How far a task has come, for others that follow behind it, as the functions of parallel_invoke() may.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +14,8 @@ namespace htvm::internal {
 
 class Progress {
 public:
+    // Of steps as short as coding a vertex, telling of each would cost more than it saves.
+    static constexpr std::size_t told_every = 64;
     // So many steps are done, and what they wrote may be read.
     void reach(std::size_t steps) { done_.store(steps, std::memory_order_release); }
     // There will be no more: nobody has to wait.

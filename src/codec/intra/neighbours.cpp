@@ -197,7 +197,6 @@ Neighbours empty_rows(const Corners& corners) {
 }
 
 void order_vertices(const Corners& corners, std::span<const std::uint8_t> known, Neighbours& out, Progress* progress) {
-    constexpr std::size_t told_every = 64;  // ranks
     const std::size_t vertex_count = out.order.size();
     Traversal state(vertex_count);
     RowEnds ends;
@@ -208,7 +207,7 @@ void order_vertices(const Corners& corners, std::span<const std::uint8_t> known,
         ++rank;
         out.first_parallelogram[rank] = ends.parallelograms;
         out.first_neighbour[rank] = ends.neighbours;
-        if (progress && rank % told_every == 0) progress->reach(rank);
+        if (progress && rank % Progress::told_every == 0) progress->reach(rank);
     };
     for (std::uint32_t v = 0; v < known.size(); ++v)
         if (known[v] != 0) take(v);

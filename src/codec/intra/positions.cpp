@@ -349,7 +349,6 @@ Result<std::vector<LatticePoint>> decode_intra_positions(std::span<const std::ui
 Result<void> decode_intra_positions(std::span<const std::uint8_t> bytes, const Neighbours& neighbours,
                                     const Known<LatticePoint>& known, std::span<LatticePoint> points,
                                     const Progress* ordered, Progress* progress) {
-    constexpr std::size_t told_every = 64;  // ranks
     const std::size_t vertex_count = neighbours.vertex_count();
     if (vertex_count == 0) return {};
     ByteReader reader(bytes);
@@ -364,7 +363,7 @@ Result<void> decode_intra_positions(std::span<const std::uint8_t> bytes, const N
     Followed rows(ordered);
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
         rows.wait_beyond(rank);
-        if (progress && rank % told_every == 0) progress->reach(rank);
+        if (progress && rank % Progress::told_every == 0) progress->reach(rank);
         const PositionFeatures features = position_features(points, neighbours, rank, history);
         if (const auto v = neighbours.order[rank]; is_known(known.is, v)) {
             points[v] = known.value[v];
