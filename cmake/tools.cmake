@@ -38,7 +38,7 @@ htvm_floor(texture_baking SOURCES src/texture/texture_baking.cpp LINKS htvm_core
 htvm_floor(metrics DIRECTORY src/metrics LINKS htvm_core Eigen3::Eigen embree PNG::PNG)
 
 # Draco-coded I-frames: plugs into the encoder and the decoder, which do not depend on libdraco.
-file(GLOB_RECURSE draco_sources CONFIGURE_DEPENDS src/codec/*_draco.cpp)
+file(GLOB draco_sources CONFIGURE_DEPENDS src/codec/draco/*.cpp)
 htvm_floor(draco SOURCES ${draco_sources} LINKS htvm_decoder htvm_libdraco)
 htvm_library(draco FLOORS draco LINKS decoder NEEDS $<BUILD_INTERFACE:${DRACO_LIBRARY}> $<INSTALL_INTERFACE:htvm::libdraco>)
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "codec/frame_kinds.h"
+#include "codec/format/frame_kinds.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 #include "htvm/decoder.hpp"
 
 namespace htvm::app {

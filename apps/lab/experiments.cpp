@@ -12,13 +12,13 @@
 #include <optional>
 #include <set>
 
+#include "codec/bones/animated_frame.h"
+#include "codec/bones/codebook.h"
+#include "codec/bones/enhanced_frame.h"
+#include "codec/bones/zipper.h"
+#include "codec/format/sequence.h"
 #include "codec/intra/intra_frame.h"
-#include "codec/paper/animated_frame.h"
-#include "codec/paper/codebook.h"
-#include "codec/paper/enhanced_frame.h"
-#include "codec/paper/zipper.h"
 #include "codec/reference/transforms.h"
-#include "codec/stream/sequence.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "core/parallel.h"

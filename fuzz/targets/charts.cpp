@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "codec/charts/chart_layer.h"
-#include "codec/charts/chart_packing_enc.h"
+#include "codec/encoder/charts/chart_packing.h"
 #include "small_mesh.h"
 
 namespace {

@@ -1,5 +1,5 @@
 // Codebooks and their packets, and residual layers coded with them.
-#include "codec/paper/codebook.h"
+#include "codec/bones/codebook.h"
 
 #include "core/lattice.h"
 #include "fuzz_input.h"

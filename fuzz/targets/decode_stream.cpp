@@ -1,6 +1,6 @@
 // The whole decoder on a stream whose packets are lost, doubled, reordered, damaged or mixed up, all with correct CRCs.
 // The input: a number of changes, four bytes each, then a stream.
-#include "codec/stream/frame_payload.h"
+#include "codec/format/frame_payload.h"
 #include "whole_decoder.h"
 
 namespace {

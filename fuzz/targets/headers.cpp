@@ -1,7 +1,7 @@
 // The sequence header, the index and the payload of frames: what can be read is the same after writing and reading
 // again.
-#include "codec/stream/frame_payload.h"
-#include "codec/stream/sequence.h"
+#include "codec/format/frame_payload.h"
+#include "codec/format/sequence.h"
 #include "fuzz_input.h"
 #include "htvm/stream_index.hpp"
 

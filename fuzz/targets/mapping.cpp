@@ -1,5 +1,5 @@
 // The mapping layer: counts of residuals come back; damaged layers give counts with the right sum, or an error.
-#include "codec/paper/mapping.h"
+#include "codec/bones/mapping.h"
 
 #include <numeric>
 

@@ -1,5 +1,5 @@
 // Connectivity of EP-frames: any triangles over any positions come back; any bytes give triangles, or an error.
-#include "codec/paper/mtfan.h"
+#include "codec/bones/mtfan.h"
 
 #include "small_mesh.h"
 

@@ -2,7 +2,7 @@
 // range.
 #include "codec/reference/transforms.h"
 
-#include "codec/tracked/node_motion_enc.h"
+#include "codec/encoder/tracked/node_motion.h"
 #include "small_mesh.h"
 
 namespace {

@@ -1,7 +1,7 @@
 // Zippering of any two meshes: the result indexes existing vertices, and begins with what was coded.
-#include "codec/paper/zipper.h"
+#include "codec/bones/zipper.h"
 
-#include "codec/paper/enhanced_frame.h"
+#include "codec/bones/enhanced_frame.h"
 #include "small_mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

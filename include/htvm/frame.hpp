@@ -18,7 +18,7 @@ enum class FrameType : std::uint8_t {
     patched,    // the same, with a part replaced by a piece with connectivity of its own: a new reference
 };
 
-// How a kind is called. Everything else the codec must know about it is in src/codec/frame_kinds.cpp.
+// How a kind is called. Everything else the codec must know about it is in src/codec/format/frame_kinds.cpp.
 struct FrameKind {
     FrameType type;
     const char* letter;  // as used in tables and on the command line

@@ -1,6 +1,6 @@
 // The encoder's options as a list. The check, the C interface, the command line, its help and docs/options.md are
 // derived from it; a dialogue or a binding to another language can be too. An option is one field in
-// encoder_options.hpp and one row in src/codec/encoder_options.cpp.
+// encoder_options.hpp and one row in src/codec/encoder/encoder_options.cpp.
 //
 //   for (const htvm::Option& option : htvm::option_list())
 //       if (htvm::serves(option.group, options.profile)) show(option.name, htvm::value_text(option,

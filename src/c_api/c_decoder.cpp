@@ -7,7 +7,7 @@
 
 #include "c_api/c_mesh.h"
 #include "c_api/c_status.h"
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 #include "htvm/decoder.hpp"
 #include "htvm/stream_index.hpp"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 
 namespace htvm::c_api {
 

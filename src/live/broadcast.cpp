@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "codec/frame_kinds.h"
+#include "codec/format/frame_kinds.h"
 #include "htvm/decoder.hpp"
 #include "htvm/texture.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 #include "core/bytes.h"
 #include "core/crc32.h"
 

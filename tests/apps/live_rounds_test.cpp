@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 #include "htvm/decoder.hpp"
 #include "pacing.h"
 

@@ -1,4 +1,6 @@
 // The targets of tracked frames: those of a moved reference, the simplified reference, and the fit of the result.
+#include "codec/encoder/tracked/captured_surface.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +10,6 @@
 #include <random>
 
 #include "codec/height_field.h"
-#include "codec/tracked/captured_surface_enc.h"
 
 namespace htvm::internal {
 namespace {

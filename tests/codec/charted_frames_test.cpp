@@ -6,8 +6,8 @@
 #include <set>
 #include <vector>
 
+#include "codec/format/sequence.h"
 #include "codec/patched_sequences.h"
-#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
 

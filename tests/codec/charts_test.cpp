@@ -6,9 +6,9 @@
 #include <random>
 #include <set>
 
-#include "codec/charts/chart_cut_enc.h"
 #include "codec/charts/chart_layer.h"
-#include "codec/charts/chart_packing_enc.h"
+#include "codec/encoder/charts/chart_cut.h"
+#include "codec/encoder/charts/chart_packing.h"
 #include "core/geometry.h"
 #include "core/raster.h"
 

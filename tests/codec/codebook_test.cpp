@@ -1,4 +1,4 @@
-#include "codec/paper/codebook.h"
+#include "codec/bones/codebook.h"
 
 #include <gtest/gtest.h>
 

@@ -15,10 +15,10 @@
 #include <optional>
 
 #include "codec/enhanced_options.h"
+#include "codec/format/sequence.h"
 #include "codec/moving_sequences.h"
 #include "codec/patched_sequences.h"
 #include "codec/patches_by_chance.h"
-#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "codec/tracked_sequences.h"
 #include "core/bytes.h"

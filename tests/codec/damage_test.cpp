@@ -6,8 +6,8 @@
 #include <map>
 
 #include "codec/enhanced_options.h"
+#include "codec/format/frame_payload.h"
 #include "codec/moving_sequences.h"
-#include "codec/stream/frame_payload.h"
 #include "codec/tracked_sequences.h"
 #include "htvm/decoder.hpp"
 

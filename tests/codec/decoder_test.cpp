@@ -6,9 +6,9 @@
 #include <map>
 
 #include "codec/enhanced_options.h"
+#include "codec/format/frame_payload.h"
 #include "codec/hostile_bytes.h"
 #include "codec/moving_sequences.h"
-#include "codec/stream/frame_payload.h"
 #include "codec/test_sequences.h"
 
 namespace htvm::internal {

@@ -1,8 +1,7 @@
-#include "codec/encoder_pose.h"
-
 #include <gtest/gtest.h>
 
-#include "codec/paper/motion_enc.h"
+#include "codec/encoder/bones/motion.h"
+#include "codec/encoder/pose_tracker.h"
 
 namespace htvm::internal {
 namespace {

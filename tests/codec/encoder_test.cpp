@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "codec/enhanced_options.h"
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 #include "codec/test_sequences.h"
 
 namespace htvm::internal {

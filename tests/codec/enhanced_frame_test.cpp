@@ -1,8 +1,9 @@
+#include "codec/encoder/bones/enhanced_frame.h"
+
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "codec/paper/enhanced_frame_enc.h"
 #include "codec/random_numbers.h"
 
 namespace htvm::internal {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "codec/choice/scene_change_enc.h"
+#include "codec/encoder/bones/scene_change.h"
 #include "codec/enhanced_options.h"
 #include "codec/test_sequences.h"
 #include "surface/surface_distance.h"

@@ -9,9 +9,9 @@
 #include <map>
 #include <set>
 
+#include "codec/format/sequence.h"
 #include "codec/moving_sequences.h"
 #include "codec/patched_sequences.h"
-#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
 #include "htvm/dependency.hpp"
 #include "htvm/option_list.hpp"

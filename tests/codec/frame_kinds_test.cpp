@@ -1,5 +1,5 @@
 // The table of frame kinds agrees with what the streams do.
-#include "codec/frame_kinds.h"
+#include "codec/format/frame_kinds.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
 

@@ -1,4 +1,4 @@
-#include "codec/stream/frame_payload.h"
+#include "codec/format/frame_payload.h"
 
 #include <gtest/gtest.h>
 

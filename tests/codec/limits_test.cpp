@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "codec/enhanced_options.h"
+#include "codec/format/frame_payload.h"
+#include "codec/format/sequence.h"
 #include "codec/moving_sequences.h"
-#include "codec/stream/frame_payload.h"
-#include "codec/stream/sequence.h"
 #include "htvm/decoder.hpp"
 
 namespace htvm::internal {

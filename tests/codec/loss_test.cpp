@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <map>
 
+#include "codec/format/frame_payload.h"
 #include "codec/moving_sequences.h"
-#include "codec/stream/frame_payload.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
 

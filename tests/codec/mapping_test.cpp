@@ -1,4 +1,4 @@
-#include "codec/paper/mapping.h"
+#include "codec/bones/mapping.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,11 @@
+#include "codec/encoder/bones/motion.h"
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
 #include <random>
 
-#include "codec/paper/motion_enc.h"
 #include "codec/random_numbers.h"
 #include "codec/tfan_test_meshes.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "codec/enhanced_options.h"
-#include "codec/stream/frame_payload.h"
+#include "codec/format/frame_payload.h"
 #include "codec/test_sequences.h"
 
 namespace htvm::test {

@@ -1,4 +1,4 @@
-#include "codec/paper/mtfan.h"
+#include "codec/bones/mtfan.h"
 
 #include <gtest/gtest.h>
 

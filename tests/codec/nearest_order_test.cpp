@@ -1,4 +1,4 @@
-#include "codec/paper/nearest_order.h"
+#include "codec/bones/nearest_order.h"
 
 #include <gtest/gtest.h>
 

@@ -1,3 +1,5 @@
+#include "codec/encoder/control/rate_control.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -5,8 +7,7 @@
 #include <functional>
 #include <random>
 
-#include "codec/choice/rate_control_enc.h"
-#include "codec/choice/rate_plan_enc.h"
+#include "codec/encoder/control/rate_plan.h"
 #include "codec/random_numbers.h"
 
 namespace htvm::internal {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 
 namespace htvm::internal {
 namespace {

@@ -1,4 +1,4 @@
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,6 @@
 // Patches: what of a tracked mesh goes where tracking is lost, and the piece of the capture that comes in its place.
+#include "codec/encoder/tracked/surface_patch.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +10,6 @@
 
 #include "codec/ball.h"
 #include "codec/height_field.h"
-#include "codec/tracked/surface_patch_enc.h"
 #include "core/geometry.h"
 #include "surface/surface_distance.h"
 

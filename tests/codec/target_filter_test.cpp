@@ -1,4 +1,6 @@
 // What T-frames are to say, filtered over time: noise goes, motion stays.
+#include "codec/encoder/tracked/target_filter.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,7 +8,6 @@
 
 #include "codec/height_field.h"
 #include "codec/test_sequences.h"
-#include "codec/tracked/target_filter_enc.h"
 #include "surface/surface_distance.h"
 
 namespace htvm::internal {

@@ -1,10 +1,11 @@
 // A new layout of the capture's texture atlas is noticed, and needs an I-frame; slips of tracking, seams and atlases
 // that use a place twice are none.
+#include "codec/encoder/tracked/texcoord_layout.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "codec/choice/texcoord_layout_enc.h"
 #include "htvm/encoder.hpp"
 
 namespace htvm::internal {

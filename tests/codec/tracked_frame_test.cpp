@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <limits>
 
+#include "codec/encoder/tracked/node_motion.h"
+#include "codec/encoder/tracked/tracked_frame.h"
 #include "codec/enhanced_options.h"
+#include "codec/format/sequence.h"
 #include "codec/hostile_bytes.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/reference/reference.h"
-#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
-#include "codec/tracked/node_motion_enc.h"
-#include "codec/tracked/tracked_frame_enc.h"
 #include "surface/surface_distance.h"
 
 namespace htvm::internal {

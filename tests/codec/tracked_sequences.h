@@ -5,12 +5,12 @@
 #include <random>
 #include <vector>
 
+#include "codec/encoder/tracked/node_motion.h"
+#include "codec/encoder/tracked/tracked_frame.h"
+#include "codec/format/sequence.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/reference/reference.h"
-#include "codec/stream/sequence.h"
 #include "codec/test_sequences.h"
-#include "codec/tracked/node_motion_enc.h"
-#include "codec/tracked/tracked_frame_enc.h"
 
 namespace htvm::test {
 

@@ -1,4 +1,6 @@
 // How much is searched for a T-frame: what more of it brings, and that it may change from frame to frame.
+#include "codec/encoder/tracked/tracking_effort.h"
+
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -7,7 +9,6 @@
 
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
-#include "codec/tracked/tracking_effort_enc.h"
 #include "htvm/decoder.hpp"
 #include "htvm/option_list.hpp"
 

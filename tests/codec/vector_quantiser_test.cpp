@@ -1,3 +1,5 @@
+#include "codec/encoder/bones/vector_quantiser.h"
+
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -5,7 +7,6 @@
 #include <random>
 #include <string>
 
-#include "codec/paper/vector_quantiser_enc.h"
 #include "codec/random_numbers.h"
 
 namespace htvm::internal {

@@ -1,4 +1,4 @@
-#include "codec/paper/zipper.h"
+#include "codec/bones/zipper.h"
 
 #include <gtest/gtest.h>
 

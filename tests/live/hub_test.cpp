@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "codec/stream/sequence.h"
+#include "codec/format/sequence.h"
 #include "live_packets.h"
 
 namespace htvm::live {

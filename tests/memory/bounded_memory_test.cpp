@@ -4,7 +4,7 @@
 #include <string>
 
 #include "codec/enhanced_options.h"
-#include "codec/frame_kinds.h"
+#include "codec/format/frame_kinds.h"
 #include "core/crc32.h"
 #include "memory/counted_allocations.h"
 #include "memory/memory_streams.h"

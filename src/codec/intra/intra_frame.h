@@ -2,7 +2,7 @@
 // predicted from its neighbours; or the whole mesh coded by another static coder.
 #pragma once
 
-#include "codec/stream/frame_payload.h"
+#include "codec/format/frame_payload.h"
 #include "core/lattice.h"
 #include "core/thread.h"
 #include "htvm/intra_coder.hpp"

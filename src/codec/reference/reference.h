@@ -7,9 +7,9 @@
 #include <optional>
 
 #include "codec/charts/chart_layer.h"
+#include "codec/format/sequence.h"
 #include "codec/reference/skinning.h"
 #include "codec/reference/transforms.h"
-#include "codec/stream/sequence.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/thread.h"
 

@@ -13,8 +13,8 @@
 #include <span>
 #include <vector>
 
+#include "codec/format/frame_payload.h"
 #include "codec/reference/vertex_hierarchy.h"
-#include "codec/stream/frame_payload.h"
 #include "core/lattice.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"

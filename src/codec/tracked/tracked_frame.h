@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
+#include "codec/format/frame_payload.h"
 #include "codec/reference/deformation_nodes.h"
-#include "codec/stream/frame_payload.h"
 #include "codec/tracked/tracked_payload.h"
 #include "core/geometry.h"
 #include "core/lattice.h"

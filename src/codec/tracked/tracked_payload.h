@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "codec/stream/frame_payload.h"
+#include "codec/format/frame_payload.h"
 #include "codec/tracked/node_motion.h"
 #include "codec/tracked/vertex_field.h"
 #include "entropy/range_coder.h"

@@ -1,0 +1,388 @@
+// The decoder: checks a packet, has the decoder of its kind make a mesh of it, and shows that mesh.
+#include "htvm/decoder.hpp"
+
+#include <algorithm>
+#include <new>
+#include <stdexcept>
+
+#include "codec/decoder/decoder_state.h"
+#include "codec/format/decoder_limits.h"
+#include "codec/format/frame_kinds.h"
+#include "core/parallel.h"
+
+namespace htvm {
+
+using namespace internal;
+
+struct Decoder::State : DecoderState {};
+
+namespace internal {
+
+Rotation to_rotation(const RotationMatrix& m) {
+    Rotation out{};
+    for (std::size_t i = 0; i < 9; ++i) out[i] = static_cast<double>(m[i]) / static_cast<double>(1 << matrix_bits);
+    return out;
+}
+
+Pose to_pose(const CodedPose& pose, const Lattice& lattice) {
+    Pose out;
+    for (const auto joint : pose.joints) out.joints.push_back(to_millimetres(joint, lattice));
+    for (const auto& rotation : pose.orientations) out.orientations.push_back(to_rotation(rotation_matrix(rotation)));
+    return out;
+}
+
+Rotation product(const Rotation& a, const Rotation& b) {
+    Rotation out{};
+    for (std::size_t row = 0; row < 3; ++row)
+        for (std::size_t column = 0; column < 3; ++column)
+            for (std::size_t k = 0; k < 3; ++k) out[3 * row + column] += a[3 * row + k] * b[3 * k + column];
+    return out;
+}
+
+namespace {
+
+// A copy moves with the vertex that it is one of.
+template <class Values>
+void repeat(std::span<const std::uint32_t> copied, Values& values) {
+    if (values.empty()) return;
+    values.reserve(values.size() + copied.size());
+    for (const auto v : copied) values.push_back(values[v]);
+}
+
+}  // namespace
+
+void show(DecoderState& state, const LatticeMeshView& mesh, std::uint32_t topology, Pose pose) {
+    const auto& lattice = state.header->lattice;
+    const auto* textured = mesh.textured && !mesh.textured->empty() ? mesh.textured : nullptr;
+    auto& shown = state.shown;
+    shown.topology = 0;
+    to_millimetres(mesh.positions, lattice, shown.positions);
+    to_unit_normals(mesh.normals, shown.normals);
+    if (shown.texcoords_topology != topology) {
+        shown.texcoords_topology = 0;
+        if (textured)
+            to_texcoords(textured->texcoords, chart_texcoord_unit, shown.texcoords);
+        else
+            to_texcoords(mesh.texcoords, captured_texcoord_unit, shown.texcoords);
+        shown.texcoords_topology = topology;
+    }
+    shown.triangles = textured ? textured->triangles : mesh.triangles;
+    shown.colours = mesh.colours;
+    if (textured) {
+        repeat(textured->copied, shown.positions);
+        repeat(textured->copied, shown.normals);
+        if (!mesh.colours.empty()) {
+            shown.own_colours.assign(mesh.colours.begin(), mesh.colours.end());
+            repeat(textured->copied, shown.own_colours);
+            shown.colours = shown.own_colours;
+        }
+    }
+    shown.pose = std::move(pose);
+    shown.topology = topology;
+}
+
+Result<TexturedSurface> read_charts(const DecoderState& state, const FramePayloadView& payload, const LatticeMesh& mesh,
+                                    std::vector<CornerTexcoords> before) {
+    const auto& picture = state.header->texture;
+    if (picture.layout != TextureLayout::charts || (before.empty() && !payload.has(Layer::charts)))
+        return TexturedSurface();
+    if (!mesh.texcoords.empty())
+        return fail(ErrorKind::corrupt_stream, "a frame that has both charts and texture coordinates");
+    const auto triangles = std::span(mesh.triangles).subspan(before.size());
+    if (!triangles.empty()) {
+        const auto layout = decode_charts(payload.of(Layer::charts), mesh.positions, triangles);
+        if (!layout) return tl::unexpected(layout.error());
+        const auto corners = chart_texcoords(*layout, picture, mesh.positions, triangles);
+        if (!corners) return tl::unexpected(corners.error());
+        before.insert(before.end(), corners->begin(), corners->end());
+    }
+    auto out = textured_surface(mesh.positions.size(), mesh.triangles, std::move(before));
+    if (!out) return out;
+    if (out->texcoords.size() > state.options.max_vertices)
+        return fail(ErrorKind::limit, "with those repeated at its charts' seams, the frame has " +
+                                          std::to_string(out->texcoords.size()) +
+                                          " vertices, more than this decoder accepts; raise its max_vertices");
+    return out;
+}
+
+Result<void> check_reference(const DecoderState& state, const Packet& packet) {
+    if (state.reference && state.reference->number == packet.reference) return {};
+    return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " refers to frame " +
+                                               std::to_string(packet.reference) + ", which is not there");
+}
+
+}  // namespace internal
+
+namespace {
+
+SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
+    SequenceInfo info;
+    info.version = header.version;
+    info.ordinal = ordinal;
+    info.session = header.session;
+    info.up = header.up;
+    if (header.floor)
+        info.floor = to_millimetres({*header.floor, *header.floor, *header.floor}, header.lattice)[axis_of(header.up)];
+    info.metadata = header.metadata;
+    info.texture = header.texture;
+    info.lattice_step = header.lattice.step();
+    info.fps_numerator = header.fps_numerator;
+    info.fps_denominator = header.fps_denominator;
+    info.unit_micrometres = header.unit_micrometres;
+    info.skeleton_tracked = header.skeleton_tracked;
+    info.skeleton = header.skeleton;
+    for (const auto r : header.radii) info.radii.push_back(r * info.lattice_step);
+    info.nearest_vertices = header.nearest_vertices;
+    return info;
+}
+
+// Everything that can fail or run out of memory comes first, so that the state is unchanged on failure.
+Result<void> take_header(DecoderState& state, const Packet& packet) {
+    auto header = read_sequence_header(packet.payload);
+    if (!header) return tl::unexpected(header.error());
+    if (auto ok = check_limits(*header, state.options); !ok) return tl::unexpected(ok.error());
+    // A repeated header changes nothing; a different one begins another sequence.
+    const bool same = state.header && state.header_payload == packet.payload;
+    if (!begins_sequence(same, header->session != 0, packet.frame, state.highest_frame)) return {};
+    auto info = describe(*header, state.sequences);
+    auto payload = packet.payload;
+    ++state.sequences;
+    state.highest_frame.reset();
+    state.reference.reset();
+    state.bones = {};
+    state.tracked = {};
+    state.alone.reset();
+    state.info = std::move(info);
+    state.header = std::move(*header);
+    state.header_payload = std::move(payload);
+    return {};
+}
+
+Result<void> take_codebook(DecoderState& state, const Packet& packet) {
+    auto codebook = read_codebook_payload(packet.payload);
+    if (!codebook) return tl::unexpected(codebook.error());
+    if (!state.reference || state.reference->number != packet.reference) return {};
+    auto& history = state.bones;
+    (codebook->purpose == codebook_for_geometry ? history.geometry_codebook : history.colour_codebook) =
+        std::move(*codebook);
+    return {};
+}
+
+MeshCounts counts(const LatticeMesh& mesh) { return {mesh.positions.size(), mesh.triangles.size()}; }
+
+// How many frames of groups there may be at once while this packet is decoded: those of the group in force, of its own,
+// and the mean of two of them.
+std::size_t hidden_frames(const DecoderState& state, const Packet& packet) {
+    const std::size_t held = state.tracked.group.length;
+    if (packet.kind != PacketKind::tracked || state.header->version < grouped_version) return held;
+    const auto place = read_group_place(packet.payload);
+    return place && place->length > 1 ? held + place->length + 1 : held;
+}
+
+// Memory that the decoder holds, including what this frame still has to derive.
+std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const FrameRules& rules, MeshCounts coded) {
+    const auto held = state.reference ? counts(state.reference->mesh()) : MeshCounts{};
+    std::uint64_t kept = state.reference ? memory_of_reference(held) : 0;
+    const bool nodes = state.reference && state.reference->tracked;
+    // A patch adds to the mesh that it is put on.
+    const bool adds = rules.renews && rules.refers_to != RefersTo::nothing;
+    if (nodes || adds || rules.refers_to == RefersTo::reference_or_before) kept += memory_of_tracking(held);
+    const MeshCounts renewed{coded.vertices + (adds ? held.vertices : 0),
+                             coded.triangles + (adds ? held.triangles : 0)};
+    if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);
+    if (state.alone) kept += memory_of_reference(counts(state.alone->mesh));
+    if (state.header->texture.layout == TextureLayout::charts) {
+        kept += memory_of_charts(held);
+        if (rules.renews) kept += memory_of_charts(renewed);
+        if (state.alone) kept += memory_of_charts(counts(state.alone->mesh));
+    }
+    kept += hidden_frames(state, packet) * memory_of_tracked_frame(held);
+    return kept;
+}
+
+// The payload of a frame, once its header shows that this decoder may decode it.
+Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
+    if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
+    // A T-frame's own has no header: its counts are its reference's.
+    const bool is_run = rules.type == FrameType::tracked && state.header->version >= tracked_run_version;
+    auto payload = is_run ? Result<FramePayloadView>() : read_frame_payload(packet.payload);
+    if (!payload) return payload;
+    const auto& header = payload->header;
+    if (rules.codes_mesh && packet.payload.size() < least_payload(header.vertices, header.triangles))
+        return fail(ErrorKind::corrupt_stream, "frame " + std::to_string(packet.frame) + " claims " +
+                                                   std::to_string(header.vertices) + " vertices and " +
+                                                   std::to_string(header.triangles) + " triangles in " +
+                                                   std::to_string(packet.payload.size()) + " bytes");
+    const MeshCounts coded{header.vertices, header.triangles};
+    const bool refers = rules.refers_to != RefersTo::nothing && state.reference;
+    const auto reference = refers ? counts(state.reference->mesh()) : MeshCounts{};
+    if (auto ok = check_limits(rules.memory, coded, reference, kept_memory(state, packet, rules, coded), state.options);
+        !ok)
+        return fail(ok.error().kind, "frame " + std::to_string(packet.frame) + ": " + ok.error().message);
+    if (rules.refers_to == RefersTo::reference)
+        if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
+    return payload;
+}
+
+// What the packet itself says.
+FrameInfo describe(const Packet& packet, FrameType type) {
+    FrameInfo out;
+    out.type = type;
+    out.frame = packet.frame;
+    out.reference = packet.reference;
+    out.timestamp_us = packet.timestamp_us;
+    out.bytes.overhead = packet.payload.size() + packet_overhead;
+    return out;
+}
+
+FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload) {
+    auto out = describe(packet, type);
+    out.source_vertices = payload.header.source_vertices;
+    out.source_triangles = payload.header.source_triangles;
+    out.vertices = payload.header.vertices;
+    out.triangles = payload.header.triangles;
+    LayerBytes layers;
+    for (const auto& [layer, name] : frame_layers) layers[layer] = payload.of(layer).size();
+    out.bytes = with_overhead(layers, packet);
+    return out;
+}
+
+FrameInfo describe(const Packet& packet, const DecoderState& state) {
+    auto out = describe(packet, FrameType::tracked);
+    const auto& captured = state.tracked.newest->state.head.captured;
+    out.source_vertices = captured.vertices;
+    out.source_triangles = captured.triangles;
+    out.bytes = with_overhead(state.tracked.shares, packet);
+    if (state.header->version >= grouped_version) {
+        const auto place = *read_group_place(packet.payload);
+        out.group = static_cast<std::uint8_t>(place.length);
+        out.place = static_cast<std::uint8_t>(place.frame);
+    }
+    return out;
+}
+
+// Lends the shown frame. Counts come from the mesh, since with motion-based coding a header counts only what it codes.
+FrameView lend(const ShownFrame& shown, const FrameInfo& info) {
+    FrameView out;
+    out.info = info;
+    out.info.vertices = static_cast<std::uint32_t>(shown.positions.size());
+    out.info.triangles = static_cast<std::uint32_t>(shown.triangles.size());
+    out.topology = shown.topology;
+    out.mesh = {shown.positions, shown.triangles, shown.colours, shown.normals, shown.texcoords};
+    out.pose = &shown.pose;
+    return out;
+}
+
+// Frees the arrays that only the frame on loan needs, so that there are never two sets of them.
+void take_back(ShownFrame& shown) {
+    shown.topology = 0;
+    shown.own = {};
+}
+
+Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet) {
+    using Taken = std::optional<FrameView>;
+    take_back(state.shown);
+    if (auto ok = check_limits(packet, state.options); !ok) return tl::unexpected(ok.error());
+    if (const auto type = frame_type(packet.kind)) {
+        const auto& rules = rules_of(*type);
+        if (state.header) state.highest_frame = std::max(state.highest_frame.value_or(0), packet.frame);
+        const auto payload = read_frame(state, packet, rules);
+        if (!payload) return tl::unexpected(payload.error());
+        if (auto ok = rules.decode(state, packet, *payload); !ok) return tl::unexpected(ok.error());
+        if (!stands_alone(*type)) state.alone.reset();
+        auto info = *type == FrameType::tracked ? describe(packet, state) : describe(packet, *type, *payload);
+        info.sequence = state.sequences - 1;
+        return Taken{lend(state.shown, info)};
+    }
+    Result<void> taken;
+    if (packet.kind == PacketKind::sequence) taken = take_header(state, packet);
+    if (packet.kind == PacketKind::codebook) taken = take_codebook(state, packet);
+    if (!taken) return tl::unexpected(taken.error());
+    return Taken{};  // skip what this version does not know
+}
+
+tl::unexpected<Error> out_of_memory(const Packet& packet) {
+    try {
+        return fail(ErrorKind::limit, "out of memory at frame " + std::to_string(packet.frame));
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorKind::limit, "out of memory");  // this message is short enough to need no memory
+    }
+}
+
+}  // namespace
+
+DecodedFrame copy_of(const FrameView& frame) {
+    return {frame.info, frame.topology, copy_of(frame.mesh), *frame.pose, frame.concealed};
+}
+
+Decoder::Decoder(const DecoderOptions& options) : state_(std::make_unique<State>()) {
+    state_->options = options;
+    state_->pool = ThreadPool(options.threads, options.runner);
+    state_->threads = state_->pool.threads();
+}
+Decoder::Decoder(Decoder&&) noexcept = default;
+Decoder& Decoder::operator=(Decoder&&) noexcept = default;
+Decoder::~Decoder() = default;
+
+Result<std::optional<FrameView>> Decoder::decode(const Packet& packet) {
+    try {
+        return take(*state_, packet);
+    } catch (const std::bad_alloc&) {
+        return out_of_memory(packet);
+    } catch (const std::length_error&) {
+        return out_of_memory(packet);
+    }
+}
+
+Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
+    try {
+        const auto frame = take(*state_, packet);
+        if (!frame) return tl::unexpected(frame.error());
+        return *frame ? std::optional(copy_of(**frame)) : std::nullopt;
+    } catch (const std::bad_alloc&) {
+        return out_of_memory(packet);
+    } catch (const std::length_error&) {
+        return out_of_memory(packet);
+    }
+}
+
+std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) try {
+    auto& state = *state_;
+    take_back(state.shown);
+    if (!show_intra_alone(state) && !show_hidden(state, frame) && !show_last_tracked(state) &&
+        !show_moved_by_bones(state))
+        return std::nullopt;
+    FrameInfo info;
+    info.sequence = state.sequences - 1;
+    info.type = FrameType::predicted;
+    info.frame = frame;
+    info.reference = state.alone ? state.alone->frame : state.reference->number;
+    info.timestamp_us = timestamp_us;
+    auto out = lend(state.shown, info);
+    out.concealed = true;
+    return out;
+} catch (const std::bad_alloc&) {
+    return std::nullopt;
+} catch (const std::length_error&) {
+    return std::nullopt;
+}
+
+std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) try {
+    const auto lent = stand_in(frame, timestamp_us);
+    return lent ? std::optional(copy_of(*lent)) : std::nullopt;
+} catch (const std::bad_alloc&) {
+    return std::nullopt;
+}
+
+const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->info; }
+
+Result<FrameInfo> inspect(const Packet& packet) {
+    const auto type = frame_type(packet.kind);
+    if (!type) return fail(ErrorKind::bad_input, "the packet is not a frame");
+    if (*type == FrameType::tracked) return describe(packet, *type);
+    const auto payload = read_frame_payload(packet.payload);
+    if (!payload) return tl::unexpected(payload.error());
+    return describe(packet, *type, *payload);
+}
+
+}  // namespace htvm

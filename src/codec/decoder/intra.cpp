@@ -1,0 +1,58 @@
+// Decodes I-frames: complete meshes that later frames refer to unless the packet tells otherwise.
+#include "codec/decoder/decoder_state.h"
+#include "codec/format/frame_kinds.h"
+#include "codec/intra/intra_frame.h"
+
+namespace htvm::internal {
+
+Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayloadView& payload) {
+    const auto& header = *state.header;
+    auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
+    if (!pose) return tl::unexpected(pose.error());
+    const bool referred = is_referred(packet, rules_of(*frame_type(packet.kind)));
+    // What is derived for T-frames takes much memory, so it is freed before the next I-frame is decoded; without this,
+    // a stream of many I-frames would need half as much memory again as a stream with one. It can be rebuilt from the
+    // mesh: if this frame turns out to be bad, the next T-frame does so.
+    if (state.reference && referred) state.reference->tracked.reset(), state.reference->ahead.reset();
+    const auto& external = state.options.intra_coder;
+    auto mesh = decode_intra_frame(payload, external ? &*external : nullptr, state.threads);
+    if (!mesh) return tl::unexpected(mesh.error());
+    const auto step = smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step),
+                                      packet.has(packet_flag::told) && packet.has(packet_flag::settled), header);
+    auto textured = read_charts(state, payload, *mesh);
+    if (!textured) return tl::unexpected(textured.error());
+    auto shown = to_pose(*pose, header.lattice);
+    const auto topology = new_topology(state);
+    if (!referred) {
+        IntraAlone alone{packet.frame, topology, std::move(*mesh), std::move(*textured), std::move(shown)};
+        show(state, view_of(alone.mesh, &alone.textured), topology, alone.pose);
+        state.alone = std::move(alone);
+        return {};
+    }
+    // What depends on bones or nodes is built when a frame asks for it, so that no frame has to do the work of two. Of
+    // the nodes, a third of the work is done at once, which makes this frame and the next take about the same time.
+    ReferenceFacts facts{.number = packet.frame,
+                         .step = step,
+                         .captured = {payload.header.source_vertices, payload.header.source_triangles},
+                         .textured = std::move(*textured)};
+    auto reference = make_reference(header, std::move(facts), std::move(*mesh), std::move(*pose),
+                                    {.bones = false, .nodes = false}, state.threads);
+    if (!reference) return tl::unexpected(reference.error());
+    derive_hierarchy(*reference, header);
+    show(state, view_of(reference->mesh(), &reference->textured), topology, std::move(shown));
+    // Nothing can fail from here on.
+    state.reference = std::move(*reference);
+    state.reference_topology = topology;
+    state.bones = {};
+    state.tracked = {};
+    state.alone.reset();
+    return {};
+}
+
+bool show_intra_alone(DecoderState& state) {
+    if (!state.alone) return false;
+    show(state, view_of(state.alone->mesh, &state.alone->textured), state.alone->topology, state.alone->pose);
+    return true;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,556 @@
+#include "codec/encoder/tracked/captured_surface.h"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <numeric>
+
+#include "core/parallel.h"
+#include "surface/simplification.h"
+#include "surface/surface_index.h"
+
+namespace htvm::internal {
+
+namespace {
+
+// The values of four functions at one place: the distance, then three components of colour. Floats do, since what comes
+// of them is rounded to whole lattice units and levels; four of them are one vector.
+using Four = std::array<float, 4>;
+
+// Fills in values where nothing is known with the mean of the neighbours, from the rim inwards; zero if no neighbour is
+// ever known.
+void fill_gaps(std::vector<Four>& values, std::vector<bool> known, std::span<const Triangle> triangles) {
+    constexpr int rounds = 24;
+    if (std::find(known.begin(), known.end(), false) == known.end()) return;
+    std::vector<Triangle> open;
+    const auto is_known = [&](const Triangle& t) { return known[t[0]] && known[t[1]] && known[t[2]]; };
+    std::copy_if(triangles.begin(), triangles.end(), std::back_inserter(open),
+                 [&](const auto& t) { return !is_known(t); });
+    std::vector<Four> sum(values.size());
+    std::vector<float> count(values.size());
+    for (int round = 0; round < rounds && !open.empty(); ++round) {
+        for (const auto& t : open)
+            for (const auto to : t) {
+                if (known[to]) continue;
+                for (const auto from : t) {
+                    if (!known[from]) continue;
+                    for (std::size_t i = 0; i < 4; ++i) sum[to][i] += values[from][i];
+                    ++count[to];
+                }
+            }
+        bool any = false;
+        for (const auto& t : open)
+            for (const auto v : t) {
+                if (known[v] || count[v] == 0) continue;
+                for (std::size_t i = 0; i < 4; ++i) values[v][i] = sum[v][i] / count[v];
+                known[v] = any = true;
+            }
+        if (!any) break;
+        std::erase_if(open, is_known);
+    }
+}
+
+// The points at which one surface looks for the other.
+struct SurfaceSamples {
+    std::vector<Point3f> points, normals;  // unit length
+};
+
+void add_middle(SurfaceSamples& samples, std::span<const Point3f> points, std::span<const Point3f> normals,
+                const Triangle& triangle) {
+    Vector3d point{}, normal{};
+    for (const auto corner : triangle) {
+        point = point + to_vector(points[corner]) * (1.0 / 3);
+        normal = normal + to_vector(normals[corner]);
+    }
+    samples.points.push_back(to_floats(point));
+    samples.normals.push_back(to_floats(normalised(normal)));
+}
+
+// Where within a triangle samples lie, and how much of its area each stands for. Both rules integrate the square of a
+// linear function exactly.
+struct InnerSample {
+    std::array<float, 3> shares{};  // of the corners
+    float weight = 0;
+};
+struct SampleRule {
+    float corner_weight = 0;  // of the vertices, per triangle
+    std::span<const InnerSample> inner;
+};
+
+SampleRule rule_of(TargetSamples samples) {
+    constexpr float third = 1.0F / 3, sixth = 1.0F / 6;
+    static constexpr std::array<InnerSample, 1> middle = {{{{third, third, third}, 0.75F}}};
+    static constexpr std::array<InnerSample, 3> three = {
+        {{{2 * third, sixth, sixth}, third}, {{sixth, 2 * third, sixth}, third}, {{sixth, sixth, 2 * third}, third}}};
+    if (samples == TargetSamples::middles) return {1.0F / 12, middle};
+    return {0, three};
+}
+
+// The samples at which the captured surface is examined: the moved reference's vertices, then those within each of its
+// triangles.
+SurfaceSamples samples_of(const MovedReference& moved, const SampleRule& rule) {
+    SurfaceSamples out;
+    const auto count = moved.positions.size() + rule.inner.size() * moved.triangles.size();
+    out.points.reserve(count);
+    out.normals.reserve(count);
+    out.points = points_of(moved.positions);
+    out.normals = points_of(moved.normals);
+    for (const auto& t : moved.triangles)
+        for (const auto& sample : rule.inner) {
+            Vector3d point{}, normal{};
+            for (std::size_t i = 0; i < 3; ++i) {
+                point = point + to_vector(moved.positions[t[i]]) * static_cast<double>(sample.shares[i]);
+                normal = normal + moved.normals[t[i]] * static_cast<double>(sample.shares[i]);
+            }
+            out.points.push_back(to_floats(point));
+            out.normals.push_back(to_floats(normalised(normal)));
+        }
+    return out;
+}
+
+// Finds the functions on the mesh, linear within each triangle, that are nearest to the values at the samples: least
+// squares by conjugate gradients, with the weights that integrate squares exactly.
+struct SurfaceFit {
+    std::span<const Triangle> triangles;
+    SampleRule rule;
+    std::vector<float> corner_weight, inner_weight;  // zero if the sample has no value; 1 where it is largest
+    std::vector<float> per_diagonal;                 // 1 / the matrix's diagonal; 0 where that is 0
+
+    std::vector<Four> times(const std::vector<Four>& x) const;
+    std::vector<Four> fitted(std::span<const Four> seen) const;
+};
+
+SurfaceFit make_surface_fit(const MovedReference& moved, const SampleRule& rule,
+                            const std::vector<SurfacePoint>& targets) {
+    const std::size_t vertices = moved.positions.size(), inner = rule.inner.size();
+    SurfaceFit out;
+    out.triangles = moved.triangles;
+    out.rule = rule;
+    out.corner_weight.assign(vertices, 0);
+    out.inner_weight.assign(inner * moved.triangles.size(), 0);
+    std::vector<float> area;
+    area.reserve(moved.triangles.size());
+    for (const auto& t : moved.triangles) area.push_back(static_cast<float>(length(area_vector(moved.positions, t))));
+    const float largest = area.empty() ? 1 : std::max(*std::max_element(area.begin(), area.end()), 1e-6F);
+    std::vector<float> diagonal(vertices, 0);
+    for (std::size_t t = 0; t < moved.triangles.size(); ++t) {
+        const auto& corners = moved.triangles[t];
+        const float share = area[t] / largest;
+        for (const auto v : corners)
+            if (targets[v].found()) out.corner_weight[v] += share * rule.corner_weight;
+        for (std::size_t k = 0; k < inner; ++k) {
+            if (!targets[vertices + inner * t + k].found()) continue;
+            const auto& sample = rule.inner[k];
+            out.inner_weight[inner * t + k] = share * sample.weight;
+            for (std::size_t i = 0; i < 3; ++i)
+                diagonal[corners[i]] += share * sample.weight * sample.shares[i] * sample.shares[i];
+        }
+    }
+    for (std::size_t v = 0; v < vertices; ++v) {
+        diagonal[v] += out.corner_weight[v];
+        out.per_diagonal.push_back(diagonal[v] > 0 ? 1 / diagonal[v] : 0);
+    }
+    return out;
+}
+
+std::vector<Four> SurfaceFit::times(const std::vector<Four>& x) const {
+    std::vector<Four> out(x.size());
+    for (std::size_t v = 0; v < x.size(); ++v)
+        for (std::size_t i = 0; i < 4; ++i) out[v][i] = corner_weight[v] * x[v][i];
+    const float* weight = inner_weight.data();
+    for (const auto& [a, b, c] : triangles)
+        for (const auto& sample : rule.inner) {
+            const auto& s = sample.shares;
+            Four value{};
+            for (std::size_t i = 0; i < 4; ++i) value[i] = *weight * (s[0] * x[a][i] + s[1] * x[b][i] + s[2] * x[c][i]);
+            for (std::size_t i = 0; i < 4; ++i) out[a][i] += s[0] * value[i];
+            for (std::size_t i = 0; i < 4; ++i) out[b][i] += s[1] * value[i];
+            for (std::size_t i = 0; i < 4; ++i) out[c][i] += s[2] * value[i];
+            ++weight;
+        }
+    return out;
+}
+
+// seen: zero at samples that have no value.
+std::vector<Four> SurfaceFit::fitted(std::span<const Four> seen) const {
+    constexpr int rounds = 4;  // two more change the bytes by nothing that can be told from chance
+    const std::size_t vertices = corner_weight.size(), inner = rule.inner.size();
+    std::vector<Four> x(seen.begin(), seen.begin() + static_cast<std::ptrdiff_t>(vertices)), residual(vertices);
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t i = 0; i < 4; ++i) residual[v][i] = corner_weight[v] * seen[v][i];
+    for (std::size_t place = 0; place < inner_weight.size(); ++place)
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+            auto& sum = residual[triangles[place / inner][corner]];
+            const float weight = inner_weight[place] * rule.inner[place % inner].shares[corner];
+            for (std::size_t i = 0; i < 4; ++i) sum[i] += weight * seen[vertices + place][i];
+        }
+    const auto product = times(x);
+    std::vector<Four> direction(vertices);
+    // Sums over all vertices are in doubles.
+    using Sums = std::array<double, 4>;
+    Sums product_before{};
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t i = 0; i < 4; ++i) {
+            residual[v][i] -= product[v][i];
+            direction[v][i] = residual[v][i] * per_diagonal[v];
+            product_before[i] += static_cast<double>(residual[v][i] * direction[v][i]);
+        }
+    const auto goes_on = [&] {
+        return std::any_of(product_before.begin(), product_before.end(), [](double p) { return p > 0; });
+    };
+    for (int round = 0; round < rounds && goes_on(); ++round) {
+        const auto image = times(direction);
+        Sums along{}, product_after{};
+        Four step{}, turn{};
+        for (std::size_t v = 0; v < vertices; ++v)
+            for (std::size_t i = 0; i < 4; ++i) along[i] += static_cast<double>(direction[v][i] * image[v][i]);
+        // A function that is done stays as it is.
+        for (std::size_t i = 0; i < 4; ++i)
+            step[i] = along[i] > 0 && product_before[i] > 0 ? static_cast<float>(product_before[i] / along[i]) : 0;
+        for (std::size_t v = 0; v < vertices; ++v)
+            for (std::size_t i = 0; i < 4; ++i) {
+                x[v][i] += step[i] * direction[v][i];
+                residual[v][i] -= step[i] * image[v][i];
+                product_after[i] += static_cast<double>(residual[v][i] * residual[v][i] * per_diagonal[v]);
+            }
+        for (std::size_t i = 0; i < 4; ++i)
+            turn[i] = step[i] > 0 ? static_cast<float>(product_after[i] / product_before[i]) : 0;
+        for (std::size_t v = 0; v < vertices; ++v)
+            for (std::size_t i = 0; i < 4; ++i)
+                direction[v][i] = residual[v][i] * per_diagonal[v] + turn[i] * direction[v][i];
+        for (std::size_t i = 0; i < 4; ++i) product_before[i] = step[i] > 0 ? product_after[i] : 0;
+    }
+    std::vector<bool> known(vertices);
+    for (std::size_t v = 0; v < vertices; ++v) known[v] = per_diagonal[v] > 0;
+    fill_gaps(x, std::move(known), triangles);
+    return x;
+}
+
+// What of the surface is nearest to each sample: first to the vertices, then to what lies within the triangles,
+// beginning where their first corners were found. near: a captured vertex that may be beside each vertex; set to those
+// that are.
+std::vector<SurfacePoint> targets_of(const SurfaceSamples& samples, std::span<const Triangle> triangles,
+                                     const SurfaceIndex& surface, const TargetSearch& how,
+                                     std::span<std::uint32_t> near) {
+    const FacingReach within{.reach = static_cast<float>(how.reach), .along = true};
+    const auto points = std::span(samples.points), normals = std::span(samples.normals);
+    auto out =
+        closest_facing(surface, points.first(near.size()), normals.first(near.size()), within, how.threads, near);
+    std::vector<std::uint32_t> near_inner(points.size() - near.size());
+    const std::size_t in_triangle = triangles.empty() ? 1 : near_inner.size() / triangles.size();
+    for (std::size_t i = 0; i < near_inner.size(); ++i) near_inner[i] = near[triangles[i / in_triangle][0]];
+    const auto inner = closest_facing(surface, points.subspan(near.size()), normals.subspan(near.size()), within,
+                                      how.threads, near_inner);
+    out.insert(out.end(), inner.begin(), inner.end());
+    return out;
+}
+
+// At each sample, how far the surface is along its normal, in lattice units, and what its colour is less that of the
+// reference, in levels.
+std::vector<Four> seen_at(const SurfaceSamples& samples, const MovedReference& moved, const SampleRule& rule,
+                          const LatticeMesh& captured, const std::vector<SurfacePoint>& targets, Threads threads) {
+    std::vector<Four> out(targets.size());
+    const std::size_t vertices = moved.positions.size(), inner = rule.inner.size();
+    const auto look_at = [&](std::size_t i) {
+        auto& [distance, red, green, blue] = out[i];
+        for (std::size_t axis = 0; axis < 3; ++axis)
+            distance += (targets[i].point[axis] - samples.points[i][axis]) * samples.normals[i][axis];
+        if (moved.colours.empty()) return;
+        std::array<float, 3> colour{};
+        const auto add = [&](const Colour& level, float share) {
+            for (std::size_t c = 0; c < 3; ++c) colour[c] += share * static_cast<float>(level[c]);
+        };
+        const auto& t = captured.triangles[targets[i].triangle];
+        for (std::size_t corner = 0; corner < 3; ++corner) add(captured.colours[t[corner]], targets[i].shares[corner]);
+        if (i < vertices) {
+            add(moved.colours[i], -1);
+        } else {
+            const auto& corners = moved.triangles[(i - vertices) / inner];
+            const auto& shares = rule.inner[(i - vertices) % inner].shares;
+            for (std::size_t corner = 0; corner < 3; ++corner) add(moved.colours[corners[corner]], -shares[corner]);
+        }
+        red = colour[0], green = colour[1], blue = colour[2];
+    };
+    parallel_for(targets.size(), threads, 4096, [&](std::size_t begin, std::size_t end) {
+        constexpr std::size_t ahead = 8;
+        for (std::size_t i = begin; i < end; ++i) {
+            if (i + ahead < end && targets[i + ahead].found())
+                __builtin_prefetch(&captured.triangles[targets[i + ahead].triangle]);
+            if (targets[i].found()) look_at(i);
+        }
+    });
+    return out;
+}
+
+}  // namespace
+
+SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
+    // The cells must not be too fine for the search to go through, as for captures with tiny triangles, or none. Every
+    // eighth triangle gives a good enough estimate of the edges.
+    const double edge =
+        std::max({mean_edge(mesh.positions, mesh.triangles, 8), options.far_reach * options.millimetre / 48, 1.0});
+    SurfaceIndex out(
+        points_of(mesh.positions), mesh.triangles,
+        {.cell = static_cast<float>(2 * edge), .samples = options.back_samples, .threads = options.threads});
+    out.colours = mesh.colours;
+    return out;
+}
+
+TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMesh& captured,
+                                    const SurfaceIndex& surface, const TargetSearch& how,
+                                    std::vector<std::uint32_t> near) {
+    const auto& threads = how.threads;
+    const auto rule = rule_of(how.samples);
+    const auto samples = samples_of(moved, rule);
+    const std::size_t vertices = moved.positions.size();
+    near.resize(vertices, OrientedPoints::no_point);
+    const auto targets = targets_of(samples, moved.triangles, surface, how, near);
+    const auto fit = make_surface_fit(moved, rule, targets);
+    const auto fitted = fit.fitted(seen_at(samples, moved, rule, captured, targets, threads));
+    TrackedTargets out;
+    out.near = std::move(near);
+    out.displacement.resize(vertices);
+    // A field cannot code more than this: 16 mm on the finest lattice. The surface then lags behind by the rest.
+    constexpr float most = field_limit, most_levels = 255;
+    for (std::size_t v = 0; v < vertices; ++v)
+        out.displacement[v] = static_cast<std::int32_t>(std::lround(std::clamp(fitted[v][0], -most, most)));
+    if (moved.colours.empty()) return out;
+    out.colours.resize(3 * vertices);
+    for (std::size_t v = 0; v < vertices; ++v)
+        for (std::size_t c = 0; c < 3; ++c)
+            out.colours[3 * v + c] =
+                static_cast<std::int32_t>(std::lround(std::clamp(fitted[v][1 + c], -most_levels, most_levels)));
+    return out;
+}
+
+namespace {
+
+CubeErrors::Cube cube_of(const Point3f& point, double side) {
+    CubeErrors::Cube out{};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+        out[axis] = static_cast<std::int32_t>(std::floor(static_cast<double>(point[axis]) / side));
+    return out;
+}
+
+}  // namespace
+
+double CubeErrors::worst() const {
+    double out = 0;
+    for (const auto& region : rms) out = std::max(out, region.second);
+    return out;
+}
+
+double CubeErrors::at(const Point3f& point) const {
+    const auto cube = cube_of(point, side);
+    const auto found = std::lower_bound(rms.begin(), rms.end(), cube,
+                                        [](const auto& region, const Cube& other) { return region.first < other; });
+    return found != rms.end() && found->first == cube ? found->second : 0;
+}
+
+CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side,
+                       std::ptrdiff_t fewest, std::ptrdiff_t left_out) {
+    // Neighbouring samples mostly lie in the same cube.
+    std::map<CubeErrors::Cube, std::vector<double>> in_cubes;
+    std::vector<double>* values = nullptr;
+    CubeErrors::Cube last{};
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const auto cube = cube_of(samples[i], side);
+        if (!values || cube != last) values = &in_cubes[last = cube];
+        values->push_back(squared[i]);
+    }
+    CubeErrors out{side};
+    for (auto& [cube, of_cube] : in_cubes) {
+        const auto count = std::ssize(of_cube);
+        if (count < fewest) continue;
+        const auto end = of_cube.end() - left_out;
+        if (left_out > 0) std::nth_element(of_cube.begin(), end, of_cube.end());
+        out.rms.emplace_back(
+            cube, std::sqrt(std::accumulate(of_cube.begin(), end, 0.0) / static_cast<double>(count - left_out)));
+    }
+    return out;
+}
+
+namespace {
+
+// Every n-th vertex, and the centre of every n-th triangle; of each the vertex that it is, or a corner.
+struct SparseSamples {
+    SurfaceSamples samples;
+    std::vector<std::uint32_t> vertex;
+    // What is known of these vertices; no_point where nothing is.
+    std::vector<std::uint32_t> at_vertices(std::span<const std::uint32_t> known) const {
+        std::vector<std::uint32_t> out(vertex.size(), OrientedPoints::no_point);
+        for (std::size_t i = 0; i < out.size() && !known.empty(); ++i) out[i] = known[vertex[i]];
+        return out;
+    }
+};
+
+SparseSamples sparse_samples_of(const SurfaceIndex& surface) {
+    constexpr std::size_t wanted = 2000;  // of each
+    const auto& points = surface.positions;
+    const auto& triangles = surface.triangles;
+    SparseSamples out;
+    for (std::uint32_t v = 0, every = static_cast<std::uint32_t>(1 + points.size() / wanted); v < points.size();
+         v += every) {
+        out.samples.points.push_back(points[v]);
+        out.samples.normals.push_back(surface.normals[v]);
+        out.vertex.push_back(v);
+    }
+    for (std::size_t t = 0, every = 1 + triangles.size() / wanted; t < triangles.size(); t += every) {
+        add_middle(out.samples, points, surface.normals, triangles[t]);
+        out.vertex.push_back(triangles[t][0]);
+    }
+    return out;
+}
+
+TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<double>& squared,
+                     const TrackedFitOptions& options) {
+    // One sample that found the wrong sheet does not mean that a region is lost.
+    constexpr std::ptrdiff_t fewest = 10, left_out = 2;
+    if (points.empty()) return {};
+    double squares = 0;
+    std::size_t strays = 0;
+    for (const double distance : squared) {
+        squares += distance;
+        if (distance > options.stray * options.stray) ++strays;
+    }
+    const auto count = static_cast<double>(points.size());
+    return {std::sqrt(squares / count),
+            static_cast<double>(strays) / count,
+            cube_errors(points, squared, options.region, fewest, left_out).worst(),
+            {}};
+}
+
+// The captured surface's normals tell the two sides of, say, a sleeve apart. near: of each sample a captured vertex
+// that may be beside it.
+std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, std::vector<std::uint32_t> near,
+                                         const SurfaceIndex& captured, const TrackedFitOptions& options) {
+    const auto found = closest_facing(captured, decoded.points, decoded.normals,
+                                      {.reach = static_cast<float>(options.reach), .agreement = 0, .along = true},
+                                      options.threads, near);
+    std::vector<double> squared(found.size(), options.reach * options.reach);
+    for (std::size_t i = 0; i < found.size(); ++i)
+        if (found[i].found()) squared[i] = static_cast<double>(found[i].squared_distance);
+    return squared;
+}
+
+// Searched among all of the decoded mesh: found along it, what is lost is noticed later, and a dancer takes 7 to 10 %
+// more bits. near: of each sample a decoded vertex that may be beside it.
+TrackedFit fit_of_captured(const SurfaceSamples& captured, std::span<const std::uint32_t> near,
+                           const SurfaceIndex& decoded, const TrackedFitOptions& options) {
+    const auto reach = static_cast<float>(options.reach);
+    std::vector<double> squared(captured.points.size(), options.reach * options.reach);
+    // Guesses may decide what is found, so they must not depend on how the threads cut the range.
+    constexpr std::size_t in_a_row = 256;
+    parallel_for((squared.size() + in_a_row - 1) / in_a_row, options.threads, 2,
+                 [&](std::size_t begin, std::size_t end) {
+                     for (std::size_t row = begin; row < end; ++row) {
+                         std::uint32_t guess = OrientedPoints::no_point;
+                         for (std::size_t i = row * in_a_row; i < std::min(squared.size(), (row + 1) * in_a_row); ++i) {
+                             if (near[i] != OrientedPoints::no_point) guess = near[i];
+                             const auto found = decoded.closest_within(captured.points[i], reach, guess);
+                             if (found.found())
+                                 squared[i] = std::min(squared[i], static_cast<double>(found.squared_distance));
+                         }
+                     }
+                 });
+    return summed_up(captured.points, squared, options);
+}
+
+}  // namespace
+
+TrackedFit least_of(TrackedFit fit, const TrackedFit& before) {
+    fit.stray_share = std::min(fit.stray_share, before.stray_share);
+    fit.worst_region = std::min(fit.worst_region, before.worst_region);
+    return fit;
+}
+
+TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& decoded,
+                               std::span<const std::uint32_t> near, std::span<const double> intra_squared,
+                               const TrackedFitOptions& options) {
+    const double edge = mean_edge(decoded.positions, decoded.triangles, 8);
+    const SurfaceIndex index(
+        points_of(decoded.positions), decoded.triangles,
+        {.cell = static_cast<float>(std::max(2 * edge, options.reach / 24)), .threads = options.threads});
+    std::vector<std::uint32_t> beside(captured.positions.size(), OrientedPoints::no_point);
+    for (std::uint32_t v = 0; v < near.size(); ++v)
+        if (near[v] != OrientedPoints::no_point) beside[near[v]] = v;
+    const auto of_captured = sparse_samples_of(captured), of_decoded = sparse_samples_of(index);
+    const auto forth = fit_of_captured(of_captured.samples, of_captured.at_vertices(beside), index, options);
+    auto squared = distances_of_decoded(of_decoded.samples, of_decoded.at_vertices(near), captured, options);
+    std::vector<double> more(squared.size(), 0);
+    if (intra_squared.size() == squared.size())
+        for (std::size_t i = 0; i < squared.size(); ++i) more[i] = std::max(0.0, squared[i] - intra_squared[i]);
+    const auto back = summed_up(of_decoded.samples.points, more, options);
+    return {std::max(forth.rms, back.rms), std::max(forth.stray_share, back.stray_share),
+            std::max(forth.worst_region, back.worst_region), std::move(squared)};
+}
+
+Merging at_same_place(const LatticeMesh& captured) {
+    LatticeMesh places;
+    places.positions = captured.positions;
+    return find_duplicates(places);
+}
+
+LatticeMesh welded(const LatticeMesh& captured, const Merging& same_place) {
+    auto out = kept_vertices(captured, same_place.kept);
+    out.triangles = merged_triangles(captured.triangles, same_place, false);
+    return out;
+}
+
+namespace {
+
+LatticeMesh with_fewer_vertices(const LatticeMesh& captured, bool keep_tips,
+                                const SimplifiedReferenceOptions& options) {
+    std::vector<Eigen::Vector3d> points;
+    points.reserve(captured.positions.size());
+    for (const auto p : captured.positions) points.emplace_back(p.x, p.y, p.z);
+    SimplificationOptions simplification;
+    simplification.surface_error = options.surface_error;
+    simplification.colour_error = options.colour_error;
+    simplification.longest_edge = options.longest_edge;
+    simplification.keep_tips = keep_tips;
+    simplification.threads = options.threads;
+    auto simplified = simplify(points, captured.triangles, captured.colours, simplification);
+    LatticeMesh out;
+    const auto whole = [](double c) { return within_lattice(std::llround(c)); };
+    for (const auto& p : simplified.positions) out.positions.push_back({whole(p.x()), whole(p.y()), whole(p.z())});
+    out.triangles = std::move(simplified.triangles);
+    const auto level = [](double c) { return static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0, 255.0))); };
+    for (const auto& c : simplified.colours) out.colours.push_back({level(c[0]), level(c[1]), level(c[2])});
+    return out;
+}
+
+// Moves the vertices, and sets their colours, so that the triangles between them come as near as possible to the
+// captured surface: the collapses placed each vertex for itself alone.
+void fit_to_surface(LatticeMesh& mesh, const LatticeMesh& captured, const SurfaceIndex& surface,
+                    const SimplifiedReferenceOptions& options) {
+    const auto normals = vertex_normals(mesh.positions, mesh.triangles);
+    const auto targets = find_tracked_targets({mesh.positions, normals, mesh.triangles, mesh.colours}, captured,
+                                              surface, {.reach = options.reach, .threads = options.threads});
+    mesh.positions = displaced(mesh.positions, normals, targets.displacement);
+    if (!mesh.colours.empty()) mesh.colours = recoloured(mesh.colours, targets.colours);
+}
+
+}  // namespace
+
+LatticeMesh simplified_piece(const LatticeMesh& piece, const LatticeMesh& captured, const SurfaceIndex& surface,
+                             const SimplifiedReferenceOptions& options) {
+    // Its border is met by a strip of triangles, which is found more often where it has no tips.
+    auto out = with_fewer_vertices(piece, false, options);
+    fit_to_surface(out, captured, surface, options);
+    return out;
+}
+
+LatticeMesh simplified_reference(const LatticeMesh& captured, const SurfaceIndex& surface,
+                                 const SimplifiedReferenceOptions& options) {
+    if (captured.triangles.empty() || !captured.texcoords.empty()) return captured;
+    auto out = with_fewer_vertices(welded(captured, at_same_place(captured)), true, options);
+    fit_to_surface(out, captured, surface, options);
+    if (!captured.normals.empty()) out.normals = quantised_normals(vertex_normals(out.positions, out.triangles));
+    return out;
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,1073 @@
+#include "codec/encoder/tracked/surface_patch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <utility>
+
+#include "core/disjoint_sets.h"
+#include "core/geometry.h"
+#include "core/parallel.h"
+
+// A patch is made in four steps:
+//  1. Which vertices of the tracked mesh are lost (find_lost). The two surfaces are compared in both directions, since
+//     either may be missing where the other is: a lost arm leaves a tracked arm where nothing was captured, and a
+//     captured one where nothing is tracked.
+//  2. What stays (Remainder) is made tidy, so that its open border is a set of plain chains.
+//  3. The piece (cut_piece) is what of the captured surface lies outside of that border, by half an edge at least. The
+//     gap gives the strip between the two borders triangles of a good shape, and keeps the borders from crossing.
+//  4. The borders are joined (join). Each side of the piece's border looks for the side of the open border that it runs
+//     along; runs of sides that found the same chain are joined to it by a strip of triangles.
+// Where step 4 finds no clear partner, more goes around that place and steps 2 to 4 are repeated: farther from what was
+// lost the surfaces lie closer together, and the borders are longer and rounder.
+
+namespace htvm::internal {
+namespace {
+
+constexpr std::uint32_t none = SurfacePoint::nothing;
+
+// ---- Sides and borders ----------------------------------------------------------------------------------------------
+
+double area_of(std::span<const LatticePoint> positions, const Triangle& t) {
+    return length(area_vector(positions, t)) / 2;
+}
+Vector3d normal_of(std::span<const LatticePoint> positions, const Triangle& t) {
+    return normalised(area_vector(positions, t));
+}
+
+// The sides of a mesh's triangles, each in the direction in which its triangle names its ends, and which lie against
+// each other. Where more than two triangles meet in an edge, as where two surfaces touch, those that continue each
+// other best belong together: borders then never end there.
+class Sides {
+public:
+    Sides(std::span<const LatticePoint> positions, std::span<const Triangle> triangles)
+        : triangles_(triangles), twin_(3 * triangles.size(), none) {
+        // The sides that leave each vertex, ascending, in compressed rows, with where they lead.
+        struct Leaving {
+            std::uint32_t side = 0, to = 0;
+        };
+        std::vector<std::uint32_t> first(positions.size() + 1, 0);
+        std::vector<Leaving> leaving(twin_.size());
+        for (const auto& t : triangles)
+            for (const auto v : t) ++first[v + std::size_t{1}];
+        for (std::size_t v = 0; v < positions.size(); ++v) first[v + 1] += first[v];
+        std::vector<std::uint32_t> next_free(first.begin(), first.end() - 1);
+        for (std::uint32_t t = 0, s = 0; t < triangles.size(); ++t)
+            for (std::size_t i = 0; i < 3; ++i, ++s)
+                leaving[next_free[triangles[t][i]]++] = {s, triangles[t][(i + 1) % 3]};
+        const auto row = [&](std::uint32_t v) {
+            return std::span(leaving).subspan(first[v], first[v + std::size_t{1}] - first[v]);
+        };
+        const auto find = [&](std::uint32_t a, std::uint32_t b, std::vector<std::uint32_t>& found) {
+            found.clear();
+            for (const auto& side : row(a))
+                if (side.to == b) found.push_back(side.side);
+        };
+        // The side from a to b, if there is one alone.
+        const auto only = [&](std::uint32_t a, std::uint32_t b) {
+            std::uint32_t found = none, count = 0;
+            for (const auto& side : row(a))
+                if (side.to == b) found = side.side, ++count;
+            return count == 1 ? found : none;
+        };
+        const auto agreement = [&](std::uint32_t a, std::uint32_t b) {
+            return dot(normal_of(positions, triangles[a / 3]), normal_of(positions, triangles[b / 3]));
+        };
+        std::vector<std::uint32_t> along, against;
+        for (std::uint32_t s = 0; s < twin_.size(); ++s) {
+            if (from(s) == to(s)) twin_[s] = s;  // of a triangle that names a vertex twice: never a border
+            if (twin_[s] != none) continue;
+            const auto other = only(to(s), from(s));
+            if (other != none && only(from(s), to(s)) == s) {
+                twin_[s] = other, twin_[other] = s;
+                continue;
+            }
+            find(from(s), to(s), along);
+            find(to(s), from(s), against);
+            for (std::size_t pairs = std::min(along.size(), against.size()); pairs > 0; --pairs) {
+                double best = -2;
+                std::size_t a = 0, b = 0;
+                for (std::size_t i = 0; i < along.size(); ++i)
+                    for (std::size_t j = 0; j < against.size(); ++j)
+                        if (const double agrees = agreement(along[i], against[j]); agrees > best)
+                            best = agrees, a = i, b = j;
+                twin_[along[a]] = against[b], twin_[against[b]] = along[a];
+                along.erase(along.begin() + static_cast<std::ptrdiff_t>(a));
+                against.erase(against.begin() + static_cast<std::ptrdiff_t>(b));
+            }
+        }
+    }
+    std::uint32_t count() const { return static_cast<std::uint32_t>(twin_.size()); }
+    std::uint32_t from(std::uint32_t side) const { return triangles_[side / 3][side % 3]; }
+    std::uint32_t to(std::uint32_t side) const { return triangles_[side / 3][(side + 1) % 3]; }
+    // The side of the triangle on the other side of the edge; `none` on a border.
+    std::uint32_t twin(std::uint32_t side) const { return twin_[side]; }
+    // The next side of the same triangle.
+    static std::uint32_t next(std::uint32_t side) { return side - side % 3 + (side + 1) % 3; }
+
+private:
+    std::span<const Triangle> triangles_;
+    std::vector<std::uint32_t> twin_;
+};
+
+// The borders of the part of a mesh whose triangles stay: cycles of sides that have this part to their left. They are
+// followed by turning around each vertex, so that borders that touch in one are told apart.
+template <class Stays>
+std::vector<std::vector<std::uint32_t>> border_loops(const Sides& sides, const Stays& stays) {
+    const auto on_border = [&](std::uint32_t s) { return sides.twin(s) == none || !stays(sides.twin(s) / 3); };
+    std::vector<bool> seen(sides.count(), false);
+    std::vector<std::vector<std::uint32_t>> out;
+    for (std::uint32_t first = 0; first < sides.count(); ++first) {
+        if (seen[first] || !stays(first / 3) || !on_border(first)) continue;
+        auto& loop = out.emplace_back();
+        for (std::uint32_t s = first; !seen[s];) {
+            seen[s] = true;
+            loop.push_back(s);
+            s = Sides::next(s);
+            while (!on_border(s)) s = Sides::next(sides.twin(s));
+        }
+    }
+    return out;
+}
+
+// ---- Closest points -------------------------------------------------------------------------------------------------
+
+struct Seeker {
+    double reach = 0;
+    double enough = 0;  // what is this near need not be searched for a second time; 0: nothing is
+    double agreement = 0.2;
+    Threads threads = {};
+};
+
+// The closest points that face the same way. What is found along the surface is taken where that is near enough; else
+// the search is among all that face that way, and since that misses points in the middle of long triangles, in all
+// directions as well where it finds nothing near. near: of each point a vertex of the surface to begin with, or
+// OrientedPoints::no_point; or none.
+std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std::span<const Point3f> points,
+                                               std::span<const Point3f> normals, const Seeker& how,
+                                               std::vector<std::uint32_t> near = {}) {
+    std::vector<SurfacePoint> out(points.size());
+    if (surface.triangles.empty()) return out;
+    const auto reach = static_cast<float>(how.reach), agreement = static_cast<float>(how.agreement);
+    const auto is_enough = [&](const SurfacePoint& found) {
+        return found.found() && static_cast<double>(found.squared_distance) <= how.enough * how.enough;
+    };
+    const auto closest = [&](const Point3f& point, const Point3f& normal, std::uint32_t& guess) {
+        if (how.enough > 0) {
+            auto along =
+                surface.closest_facing(point, normal, {.reach = reach, .agreement = agreement, .along = true}, guess);
+            if (is_enough(along)) return along;
+        }
+        auto facing = surface.closest_facing(point, normal, {.reach = reach, .agreement = agreement}, guess);
+        if (is_enough(facing)) return facing;
+        auto from = guess;
+        const auto any = surface.closest_within(point, reach, from);
+        if (!any.found() || (facing.found() && any.squared_distance >= facing.squared_distance)) return facing;
+        const auto across =
+            normalised(area_vector(std::span<const Point3f>(surface.positions), surface.triangles[any.triangle]));
+        return dot(across, to_vector(normal)) >= how.agreement ? any : facing;
+    };
+    // Guesses may decide what is found, so they must not depend on how the threads cut the range.
+    constexpr std::size_t in_a_row = 512, ahead = 6;
+    parallel_for((points.size() + in_a_row - 1) / in_a_row, how.threads, 2, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t row = begin; row < end; ++row) {
+            std::uint32_t guess = OrientedPoints::no_point;
+            const std::size_t first = row * in_a_row, after = std::min(points.size(), first + in_a_row);
+            if (how.enough > 0 && !near.empty())
+                surface.walk_all(points.subspan(first, after - first), surface.begins_near(),
+                                 std::span(near).subspan(first, after - first));
+            for (std::size_t i = first; i < after; ++i) {
+                if (i + ahead < after && !near.empty()) surface.expect(near[i + ahead]);
+                if (!near.empty() && near[i] != OrientedPoints::no_point) guess = near[i];
+                out[i] = closest(points[i], normals[i], guess);
+            }
+        }
+    });
+    return out;
+}
+
+double distance_to(const SurfacePoint& found, double reach) {
+    return found.found() ? std::sqrt(static_cast<double>(found.squared_distance)) : reach;
+}
+
+// ---- 1. What is lost ------------------------------------------------------------------------------------------------
+
+// The captured mesh, its seams closed. Triangles have the numbers that they have in its index.
+struct Capture {
+    Merging merging;
+    LatticeMesh mesh;
+    const SurfaceIndex& surface;
+    std::vector<bool> rim{};  // vertices on a border: beyond it nothing was seen, so nothing is known there; none if
+                              // there is no border
+    std::vector<Point3f> points{}, normals{};
+    std::vector<SurfacePoint> on_decoded{};  // the nearest point of the tracked mesh to each vertex
+
+    std::optional<NearestPoints> along_rim{};  // points of the border, half a side apart
+    double rim_reach = 0;                      // what is nearer than this to one of them is at the border
+
+    // Whether the capture's point nearest to this one lies on its border.
+    bool ends_at(const Point3f& point) const {
+        constexpr float inside = 1e-3F;
+        if (rim.empty()) return false;
+        const auto found = surface.closest(point);
+        for (std::size_t i = 0; i < 3; ++i)
+            if (found.shares[i] > inside && !rim[mesh.triangles[found.triangle][i]]) return false;
+        return *std::min_element(found.shares.begin(), found.shares.end()) <= inside;
+    }
+    // The same for points of a simplified border.
+    bool ends_near(const Point3f& point) const {
+        return along_rim && static_cast<double>(along_rim->nearest(point).squared_distance) <= rim_reach * rim_reach;
+    }
+};
+
+// Distances of the tracked mesh from the capture, one per vertex: of the vertex itself, or of the middles of the
+// triangles around it on average if that is more. What lies beyond the capture's border does not count: it may be there
+// and have been out of sight.
+std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& shown, const Capture& capture,
+                              const SurfacePatchOptions& options) {
+    const auto& points = shown.positions;
+    const auto& decoded = tracked.decoded;
+    std::vector<Point3f> samples(points), facing(shown.normals);
+    std::vector<std::uint32_t> near(tracked.near.begin(), tracked.near.end());
+    if (!near.empty())
+        for (const auto& t : decoded.triangles) near.push_back(near[t[0]]);
+    for (const auto& t : decoded.triangles) {
+        Vector3d middle{};
+        for (const auto v : t) middle = middle + to_vector(decoded.positions[v]) * (1.0 / 3);
+        samples.push_back(to_floats(middle));
+        facing.push_back(to_floats(normal_of(decoded.positions, t)));
+    }
+    const auto found = closest_on_same_side(capture.surface, samples, facing,
+                                            {options.reach, options.lost / 2, 0, options.threads}, std::move(near));
+    std::vector<double> error(samples.size());
+    parallel_for(samples.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            error[i] = distance_to(found[i], options.reach);
+            if (error[i] > options.lost / 2 && capture.ends_at(samples[i])) error[i] = 0;
+        }
+    });
+    std::vector<double> out(points.size(), 0);
+    for (std::size_t v = 0; v < out.size(); ++v) {
+        const auto triangles = shown.around.of(v);
+        if (triangles.empty()) continue;
+        double sum = 0;
+        for (const auto t : triangles) sum += error[points.size() + t];
+        out[v] = std::max(error[v], sum / static_cast<double>(triangles.size()));
+    }
+    return out;
+}
+
+// Vertices of the tracked mesh around captured surface that it does not cover: they are lost, so that the hole in which
+// the uncovered surface belongs opens there. Specks of it do not count.
+void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, const SurfacePatchOptions& options,
+                           std::vector<bool>& lost) {
+    const auto& mesh = capture.mesh;
+    std::vector<bool> uncovered(mesh.positions.size());
+    for (std::size_t v = 0; v < uncovered.size(); ++v)
+        uncovered[v] = !capture.on_decoded[v].found() || distance_to(capture.on_decoded[v], 0) > options.lost;
+    std::vector<Triangle> there;
+    std::copy_if(mesh.triangles.begin(), mesh.triangles.end(), std::back_inserter(there),
+                 [&](const Triangle& t) { return uncovered[t[0]] || uncovered[t[1]] || uncovered[t[2]]; });
+    DisjointSets regions(uncovered.size());
+    std::vector<double> area(uncovered.size(), 0);
+    for (const auto& t : there)
+        for (std::size_t i = 0; i < 3; ++i)
+            if (uncovered[t[i]] && uncovered[t[(i + 1) % 3]]) regions.join(t[i], t[(i + 1) % 3]);
+    for (const auto& t : there) {
+        const double third = area_of(mesh.positions, t) / 3;
+        for (const auto v : t)
+            if (uncovered[v]) area[regions.of(v)] += third;
+    }
+    for (const auto& t : there)
+        for (const auto from : t)
+            for (const auto to : t)
+                if (uncovered[from] && !uncovered[to] && area[regions.of(from)] > options.speck * options.speck)
+                    for (const auto corner : decoded.triangles[capture.on_decoded[to].triangle]) lost[corner] = true;
+}
+
+// Marks the corners of triangles that are stretched, or turned against a neighbour beside which they lay flat.
+std::vector<bool> distorted(const LatticeMesh& decoded, std::span<const LatticePoint> rest, const Sides& sides,
+                            const SurfacePatchOptions& options) {
+    constexpr double folded = -0.5, flat = 0.5;
+    std::vector<bool> out(decoded.positions.size(), false);
+    if (rest.size() != decoded.positions.size()) return out;
+    const auto mark = [&](std::uint32_t triangle) {
+        for (const auto v : decoded.triangles[triangle]) out[v] = true;
+    };
+    const auto side_length = [&](std::span<const LatticePoint> positions, std::uint32_t s) {
+        return length(to_vector(positions[sides.to(s)]) - to_vector(positions[sides.from(s)]));
+    };
+    for (std::uint32_t s = 0; s < sides.count(); ++s) {
+        if (side_length(decoded.positions, s) > options.stretch * std::max(side_length(rest, s), 1.0)) mark(s / 3);
+        const auto twin = sides.twin(s);
+        if (twin == none || twin < s) continue;
+        const auto &t = decoded.triangles[s / 3], &u = decoded.triangles[twin / 3];
+        if (dot(normal_of(decoded.positions, t), normal_of(decoded.positions, u)) < folded &&
+            dot(normal_of(rest, t), normal_of(rest, u)) > flat)
+            mark(s / 3), mark(twin / 3);
+    }
+    return out;
+}
+
+// All vertices that share a triangle with a marked one are marked too.
+void grow(std::vector<bool>& marked, std::span<const Triangle> triangles) {
+    const auto before = marked;
+    for (const auto& t : triangles)
+        if (before[t[0]] || before[t[1]] || before[t[2]])
+            for (const auto v : t) marked[v] = true;
+}
+
+// How far the surfaces are apart around each vertex of the tracked mesh: the RMS distance in its cube of space, of
+// either surface's vertices from the other.
+std::vector<double> errors_around(std::span<const Point3f> points, std::span<const double> error,
+                                  const Capture& capture, const SurfacePatchOptions& options) {
+    constexpr std::ptrdiff_t fewest = 4;
+    std::vector<double> squared, of_capture;
+    for (const double distance : error) squared.push_back(distance * distance);
+    for (const auto& found : capture.on_decoded) {
+        const double distance = distance_to(found, options.reach);
+        of_capture.push_back(distance * distance);
+    }
+    const auto back = cube_errors(points, squared, options.region, fewest),
+               forth = cube_errors(capture.points, of_capture, options.region, fewest);
+    std::vector<double> out;
+    for (const auto& point : points) out.push_back(std::max(back.at(point), forth.at(point)));
+    return out;
+}
+
+// Of each vertex of the tracked mesh.
+struct LossSigns {
+    std::span<const double> error, error_around;
+    const std::vector<bool>&rims, &bad_shape;
+};
+
+// A region is lost as far as the error is over half the limit, if enough of it is over the limit. Where any cube of
+// space is lost, only regions that reach into lost cubes are.
+std::vector<bool> find_lost(const LatticeMesh& decoded, const Sides& sides, const LossSigns& signs, double region_lost,
+                            const SurfacePatchOptions& options) {
+    constexpr double hardly_seen = 0.25;  // how much a triangle of bad shape counts that lies on the surface
+    const std::size_t vertices = decoded.positions.size();
+    const auto& [error, around, rims, bad_shape] = signs;
+    const auto doubtful = [&](std::uint32_t v) {
+        return signs.error[v] > options.lost / 2 || signs.rims[v] || signs.bad_shape[v];
+    };
+    DisjointSets regions(vertices);
+    std::vector<double> area(vertices, 0);
+    for (std::uint32_t s = 0; s < sides.count(); ++s)
+        if (doubtful(sides.from(s)) && doubtful(sides.to(s))) regions.join(sides.from(s), sides.to(s));
+    for (const auto& t : decoded.triangles) {
+        const double third = area_of(decoded.positions, t) / 3;
+        for (const auto v : t)
+            if (error[v] > options.lost)
+                area[regions.of(v)] += third;
+            else if (bad_shape[v])
+                area[regions.of(v)] += hardly_seen * third;
+    }
+    const double enough = options.speck * options.speck;
+    for (std::uint32_t v = 0; v < vertices; ++v)
+        if (rims[v]) area[regions.of(v)] += enough;
+    std::vector<bool> reaches(vertices, true);
+    const auto in_lost_cube = [&](std::uint32_t v) { return signs.error_around[v] > region_lost; };
+    if (std::any_of(around.begin(), around.end(), [&](double rms) { return rms > region_lost; })) {
+        reaches.assign(vertices, false);
+        for (std::uint32_t v = 0; v < vertices; ++v)
+            if (in_lost_cube(v)) reaches[regions.of(v)] = true;
+    }
+    std::vector<bool> lost(vertices);
+    for (std::uint32_t v = 0; v < vertices; ++v) {
+        const auto region = regions.of(v);
+        lost[v] = doubtful(v) && area[region] >= enough && reaches[region];
+    }
+    if (std::find(lost.begin(), lost.end(), true) == lost.end()) return lost;
+    for (int ring = 0; ring < options.margin; ++ring) grow(lost, decoded.triangles);
+    return lost;
+}
+
+// ---- 2. What stays --------------------------------------------------------------------------------------------------
+
+// A part of the open border: from one vertex to the next, the surface that stays to the left.
+struct Chain {
+    std::vector<std::uint32_t> sides;  // of the decoded mesh
+    bool closed = false;
+};
+
+struct Remainder {
+    std::vector<Triangle> triangles;
+    std::vector<Chain> chains;
+    std::vector<bool> open;  // vertices on the open border
+};
+
+// Lets go of what would be left as a notch, a bridge one triangle wide, or an island, until nothing changes.
+void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& sides,
+          const SurfacePatchOptions& options) {
+    constexpr int rounds = 12, smoothing = 3;
+    constexpr double most_gone = 0.6;
+    const std::size_t vertices = removed.size();
+    std::vector<double> area_of_triangle;
+    for (const auto& t : decoded.triangles) area_of_triangle.push_back(area_of(decoded.positions, t));
+    for (int round = 0; round < rounds; ++round) {
+        std::vector<std::uint32_t> kept(vertices, 0), gone(vertices, 0), lost_corners(vertices, 0),
+            corners(vertices, 0);
+        std::vector<std::uint32_t> staying;
+        std::vector<char> stays_as_whole(decoded.triangles.size());
+        DisjointSets parts(vertices);
+        for (std::uint32_t index = 0; index < decoded.triangles.size(); ++index) {
+            const auto& t = decoded.triangles[index];
+            const bool stays = !removed[t[0]] && !removed[t[1]] && !removed[t[2]];
+            stays_as_whole[index] = stays ? 1 : 0;
+            for (std::size_t i = 0; i < 3; ++i) {
+                ++(stays ? kept : gone)[t[i]];
+                for (const std::size_t other : {(i + 1) % 3, (i + 2) % 3}) {
+                    ++corners[t[i]];
+                    if (removed[t[other]]) ++lost_corners[t[i]];
+                }
+                parts.join(t[i], stays ? t[(i + 1) % 3] : t[i]);
+            }
+            if (stays) staying.push_back(index);
+        }
+        std::vector<double> area(vertices, 0);
+        std::vector<bool> opened(vertices, false);
+        for (const auto index : staying) {
+            const auto& t = decoded.triangles[index];
+            area[parts.of(t[0])] += area_of_triangle[index];
+            for (const auto v : t)
+                if (gone[v] > 0) opened[parts.of(v)] = true;
+        }
+        const auto stays = [&](std::uint32_t triangle) { return stays_as_whole[triangle] != 0; };
+        std::vector<std::uint32_t> borders(vertices, 0);
+        for (std::uint32_t s = 0; s < sides.count(); ++s)
+            if (stays(s / 3) && (sides.twin(s) == none || !stays(sides.twin(s) / 3))) ++borders[sides.from(s)];
+        std::vector<std::uint32_t> more;
+        for (std::uint32_t v = 0; v < vertices; ++v) {
+            if (removed[v] || gone[v] == 0) {
+                if (!removed[v] && kept[v] > 0 && opened[parts.of(v)] &&
+                    area[parts.of(v)] < 4 * options.speck * options.speck)
+                    more.push_back(v);
+                continue;
+            }
+            const bool notch = round < smoothing && lost_corners[v] > most_gone * corners[v];
+            const bool island = area[parts.of(v)] < 4 * options.speck * options.speck;
+            if (kept[v] == 0 || borders[v] > 1 || notch || island) more.push_back(v);
+        }
+        for (const auto v : more) removed[v] = true;
+        if (more.empty()) return;  // nor will a later round find any, which looks for no more than this one
+    }
+}
+
+Remainder remainder_of(const LatticeMesh& decoded, const Sides& sides, const std::vector<bool>& removed) {
+    const auto stays = [&](std::uint32_t triangle) {
+        const auto& t = decoded.triangles[triangle];
+        return !removed[t[0]] && !removed[t[1]] && !removed[t[2]];
+    };
+    Remainder out;
+    for (std::uint32_t t = 0; t < decoded.triangles.size(); ++t)
+        if (stays(t)) out.triangles.push_back(decoded.triangles[t]);
+    out.open.assign(removed.size(), false);
+    const auto natural = [&](std::uint32_t side) { return sides.twin(side) == none; };
+    for (auto& loop : border_loops(sides, stays)) {
+        const auto end = std::find_if(loop.begin(), loop.end(), natural);
+        const bool closed = end == loop.end();
+        if (!closed) std::rotate(loop.begin(), end, loop.end());
+        bool goes_on = false;
+        for (const auto side : loop) {
+            if (!natural(side)) {
+                if (!goes_on) out.chains.emplace_back().closed = closed;
+                out.chains.back().sides.push_back(side);
+                out.open[sides.from(side)] = out.open[sides.to(side)] = true;
+            }
+            goes_on = !natural(side);
+        }
+    }
+    return out;
+}
+
+// ---- 3. The piece ---------------------------------------------------------------------------------------------------
+
+// How far each captured vertex lies outside of the open border, in edges of the mesh there; negative where the mesh
+// stays. Large where no mesh is near.
+struct Outside {
+    std::vector<double> edges;
+    std::vector<bool> at_opening;  // the nearest point is on the open border
+};
+
+Outside outside_of(const Remainder& stays, const LatticeMesh& decoded, const std::vector<bool>& removed,
+                   std::span<const double> edge, const Capture& capture, const SurfacePatchOptions& options) {
+    constexpr double far = 2;
+    constexpr float none_of_it = 1e-3F;
+    std::vector<std::uint32_t> number(removed.size(), none), queries;
+    std::vector<Point3f> points, query_points, query_normals;
+    auto triangles = stays.triangles;
+    for (auto& t : triangles)
+        for (auto& v : t) {
+            if (number[v] == none) {
+                number[v] = static_cast<std::uint32_t>(points.size());
+                points.push_back(point_of(decoded.positions[v]));
+            }
+            v = number[v];
+        }
+    const auto nearest_stays = [&](const SurfacePoint& p) {
+        if (!p.found()) return false;
+        const auto& t = decoded.triangles[p.triangle];
+        return !removed[t[0]] && !removed[t[1]] && !removed[t[2]];
+    };
+    for (std::uint32_t v = 0; v < capture.points.size(); ++v) {
+        if (nearest_stays(capture.on_decoded[v])) continue;
+        queries.push_back(v);
+        query_points.push_back(capture.points[v]);
+        query_normals.push_back(capture.normals[v]);
+    }
+    const double mean = mean_edge(decoded.positions, stays.triangles);
+    const SurfaceIndex index(points, triangles,
+                             {.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
+    const auto found =
+        closest_on_same_side(index, query_points, query_normals, {options.reach, 0, 0.2, options.threads});
+    Outside out;
+    out.edges.assign(capture.points.size(), far);
+    out.at_opening.assign(capture.points.size(), false);
+    const auto judge = [&](std::uint32_t v, const SurfacePoint& p, const Triangle& t) {
+        double depth = 0, local = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            local += static_cast<double>(p.shares[i]) * edge[t[i]];
+            if (p.shares[i] > none_of_it && !stays.open[t[i]]) depth += static_cast<double>(p.shares[i]);
+        }
+        const double distance = distance_to(p, options.reach);
+        if (depth > 0) {
+            out.edges[v] = distance > options.lost ? far : -depth;
+            return;
+        }
+        out.at_opening[v] = true;
+        out.edges[v] = std::min(far, distance / std::max(local, 1.0));
+    };
+    for (std::uint32_t v = 0; v < capture.points.size(); ++v)
+        if (nearest_stays(capture.on_decoded[v]))
+            judge(v, capture.on_decoded[v], decoded.triangles[capture.on_decoded[v].triangle]);
+    for (std::size_t i = 0; i < queries.size(); ++i)
+        if (found[i].found()) judge(queries[i], found[i], stays.triangles[found[i].triangle]);
+    return out;
+}
+
+// The captured triangles where `outside` is more than the gap, those that cross it cut along it. Parts that do not
+// reach the open border are none of this patch's, nor are crumbs.
+LatticeMesh cut_piece(const Outside& outside, const Capture& capture, const SurfacePatchOptions& options) {
+    constexpr double least_share = 0.1;  // of an edge, so that no triangle gets too thin for the lattice
+    constexpr double crumb = 0.25;       // side of a square, in specks
+    const auto& mesh = capture.mesh;
+    LatticeMesh all;
+    std::vector<std::uint32_t> number(mesh.positions.size(), none);
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> cuts;
+    std::vector<bool> joins;
+    const auto inside = [&](std::uint32_t v) { return outside.edges[v] > options.gap; };
+    const auto whole = [&](std::uint32_t v) {
+        if (number[v] == none) {
+            number[v] = static_cast<std::uint32_t>(all.positions.size());
+            all.positions.push_back(mesh.positions[v]);
+            if (!mesh.colours.empty()) all.colours.push_back(mesh.colours[v]);
+            joins.push_back(false);
+        }
+        return number[v];
+    };
+    const auto cut = [&](std::uint32_t in, std::uint32_t out) {
+        const auto [at, fresh] = cuts.try_emplace({in, out}, static_cast<std::uint32_t>(all.positions.size()));
+        if (!fresh) return at->second;
+        const double span = outside.edges[in] - outside.edges[out];
+        const double share = std::clamp((outside.edges[in] - options.gap) / span, least_share, 1 - least_share);
+        const auto a = to_vector(mesh.positions[in]), b = to_vector(mesh.positions[out]);
+        const auto p = a + (b - a) * share;
+        const auto coordinate = [&](std::size_t axis) { return static_cast<std::int32_t>(std::lround(p[axis])); };
+        all.positions.push_back({coordinate(0), coordinate(1), coordinate(2)});
+        if (!mesh.colours.empty()) {
+            Colour colour{};
+            for (std::size_t c = 0; c < 3; ++c)
+                colour[c] = static_cast<std::uint8_t>(
+                    std::lround(mesh.colours[in][c] + (mesh.colours[out][c] - mesh.colours[in][c]) * share));
+            all.colours.push_back(colour);
+        }
+        joins.push_back(outside.at_opening[in] || outside.at_opening[out]);
+        return at->second;
+    };
+    for (const auto& t : mesh.triangles) {
+        const int count = int{inside(t[0])} + int{inside(t[1])} + int{inside(t[2])};
+        if (count == 0) continue;
+        if (count == 3) {
+            all.triangles.push_back({whole(t[0]), whole(t[1]), whole(t[2])});
+            continue;
+        }
+        // The corner that is alone on its side comes first.
+        std::size_t alone = 0;
+        while (inside(t[alone]) != (count == 1)) ++alone;
+        const auto a = t[alone], b = t[(alone + 1) % 3], c = t[(alone + 2) % 3];
+        if (count == 1) {
+            all.triangles.push_back({whole(a), cut(a, b), cut(a, c)});
+        } else {
+            const auto at_b = cut(b, a), at_c = cut(c, a);
+            all.triangles.push_back({at_b, whole(b), whole(c)});
+            all.triangles.push_back({at_b, whole(c), at_c});
+        }
+    }
+    DisjointSets parts(all.positions.size());
+    std::vector<double> area(all.positions.size(), 0);
+    for (const auto& t : all.triangles) parts.join(t[0], t[1]), parts.join(t[1], t[2]);
+    for (const auto& t : all.triangles) area[parts.of(t[0])] += area_of(all.positions, t);
+    std::vector<bool> wanted(all.positions.size(), false);
+    for (std::uint32_t v = 0; v < joins.size(); ++v)
+        if (joins[v]) wanted[parts.of(v)] = true;
+    const double least = crumb * crumb * options.speck * options.speck;
+    LatticeMesh out;
+    std::fill(number.begin(), number.end(), none);
+    number.resize(std::max(number.size(), all.positions.size()), none);
+    for (auto t : all.triangles) {
+        const auto part = parts.of(t[0]);
+        if (!wanted[part] || area[part] < least) continue;
+        for (auto& v : t) {
+            if (number[v] == none) {
+                number[v] = static_cast<std::uint32_t>(out.positions.size());
+                out.positions.push_back(all.positions[v]);
+                if (!all.colours.empty()) out.colours.push_back(all.colours[v]);
+            }
+            v = number[v];
+        }
+        out.triangles.push_back(t);
+    }
+    return out;
+}
+
+// ---- 4. The join ----------------------------------------------------------------------------------------------------
+
+// A vertex of a border, as the strip sees it. The piece's vertices are numbered behind the decoded mesh's.
+struct StripVertex {
+    std::uint32_t number = 0;
+    Vector3d position{}, normal{};
+};
+
+// The triangles between two paths that run the same way, the mesh that stays to the left of `left`, the piece to the
+// right of `right`. Of all strips, the one with the shortest crossings whose triangles face as the borders do: found
+// row by row, since going by the shorter diagonal alone falls behind where one border is longer. Nothing if the paths
+// are too long for that or do not face each other.
+std::optional<std::vector<Triangle>> strip_between(const std::vector<StripVertex>& left,
+                                                   const std::vector<StripVertex>& right) {
+    constexpr std::size_t most = std::size_t{1} << 21;
+    constexpr double turned = 8;  // what a triangle that faces the other way costs, against one that faces right
+    const std::size_t n = left.size(), m = right.size();
+    if (n == 0 || m == 0 || n + m < 3 || n * m > most) return std::nullopt;
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    std::vector<double> cost(n * m, infinite);
+    std::vector<bool> along_left(n * m, false);
+    const auto price = [&](const StripVertex& a, const StripVertex& b, const StripVertex& c, double crossing) {
+        const auto across = area_vector(a.position, b.position, c.position);
+        const double size = length(across);
+        const auto facing = normalised(a.normal + b.normal + c.normal);
+        const double agreement = size > 0 ? dot(across, facing) / size : -1;
+        return crossing * (1 + turned * (1 - agreement) / 2) + (size > 0 ? 0 : 1e12);
+    };
+    cost[0] = 0;
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < m; ++j) {
+            const auto apart = left[i].position - right[j].position;
+            const double crossing = dot(apart, apart);
+            auto& best = cost[i * m + j];
+            if (i > 0) {
+                const double by_left = cost[(i - 1) * m + j] + price(left[i], left[i - 1], right[j], crossing);
+                if (by_left < best) best = by_left, along_left[i * m + j] = true;
+            }
+            if (j > 0) {
+                const double by_right = cost[i * m + j - 1] + price(right[j - 1], right[j], left[i], crossing);
+                if (by_right < best) best = by_right, along_left[i * m + j] = false;
+            }
+        }
+    std::vector<Triangle> out;
+    for (std::size_t i = n - 1, j = m - 1; i > 0 || j > 0;) {
+        if (along_left[i * m + j]) {
+            out.push_back({left[i].number, left[i - 1].number, right[j].number});
+            --i;
+        } else {
+            out.push_back({right[j - 1].number, right[j].number, left[i].number});
+            --j;
+        }
+    }
+    std::reverse(out.begin(), out.end());
+    return out;
+}
+
+// The nearest point of the side ab to p, squared.
+double squared_distance_to_side(const Vector3d& p, const Vector3d& a, const Vector3d& b) {
+    const auto along = b - a, from = p - a;
+    const double size = dot(along, along);
+    const auto off = from - along * (size > 0 ? std::clamp(dot(from, along) / size, 0.0, 1.0) : 0.0);
+    return dot(off, off);
+}
+
+struct Join {
+    std::vector<Triangle> triangles;
+    std::vector<bool> unclear;  // vertices of the decoded mesh at which no partner was found; empty: all is joined
+};
+
+// The side of the open border that a side of the piece's border runs along.
+struct Partner {
+    std::uint32_t chain = none, side = 0;
+};
+
+class Joiner {
+public:
+    Joiner(const LatticeMesh& decoded, const Sides& sides, const Remainder& stays, const LatticeMesh& piece,
+           std::span<const double> edge, const Capture& capture, const SurfacePatchOptions& options)
+        : decoded_(decoded),
+          sides_(sides),
+          stays_(stays),
+          piece_(piece),
+          piece_sides_(piece.positions, piece.triangles),
+          edge_(edge),
+          capture_(capture),
+          options_(options),
+          normals_(vertex_normals(decoded.positions, stays.triangles)),
+          piece_normals_(vertex_normals(piece.positions, piece.triangles)),
+          unclear_(decoded.positions.size(), false) {
+        for (const auto& chain : stays.chains) taken_.emplace_back(chain.sides.size(), false);
+    }
+
+    Join run() {
+        for (const auto& loop : border_loops(piece_sides_, [](std::uint32_t) { return true; })) join_loop(loop);
+        check_what_is_left();
+        const bool clear = std::find(unclear_.begin(), unclear_.end(), true) == unclear_.end();
+        return {std::move(triangles_), clear ? std::vector<bool>{} : std::move(unclear_)};
+    }
+
+private:
+    const LatticeMesh& decoded_;
+    const Sides& sides_;
+    const Remainder& stays_;
+    const LatticeMesh& piece_;
+    Sides piece_sides_;
+    std::span<const double> edge_;
+    const Capture& capture_;
+    const SurfacePatchOptions& options_;
+    std::vector<Vector3d> normals_, piece_normals_;
+    std::vector<std::vector<bool>> taken_;  // sides of the chains that are joined
+    std::vector<Triangle> triangles_;
+    std::vector<bool> unclear_;
+
+    Vector3d piece_point(std::uint32_t v) const { return to_vector(piece_.positions[v]); }
+    Vector3d middle_of(std::uint32_t side) const {
+        return (piece_point(piece_sides_.from(side)) + piece_point(piece_sides_.to(side))) * 0.5;
+    }
+
+    Partner partner_of(std::uint32_t side) const {
+        constexpr double most_gaps = 3;
+        const auto middle = middle_of(side);
+        const auto along = piece_point(piece_sides_.to(side)) - piece_point(piece_sides_.from(side));
+        const auto facing = normal_of(piece_.positions, piece_.triangles[side / 3]);
+        Partner out;
+        double least = std::numeric_limits<double>::infinity();
+        for (std::uint32_t c = 0; c < stays_.chains.size(); ++c)
+            for (std::uint32_t s = 0; s < stays_.chains[c].sides.size(); ++s) {
+                const auto from = sides_.from(stays_.chains[c].sides[s]), to = sides_.to(stays_.chains[c].sides[s]);
+                const auto a = to_vector(decoded_.positions[from]), b = to_vector(decoded_.positions[to]);
+                const double squared = squared_distance_to_side(middle, a, b);
+                const double near = most_gaps * options_.gap * std::max(edge_[from], edge_[to]);
+                if (squared >= least || squared > near * near) continue;
+                if (dot(along, b - a) > 0 || dot(facing, normals_[from] + normals_[to]) <= 0) continue;
+                least = squared;
+                out = {c, s};
+            }
+        return out;
+    }
+
+    StripVertex staying(std::uint32_t v) const { return {v, to_vector(decoded_.positions[v]), normals_[v]}; }
+    StripVertex coming(std::uint32_t v) const {
+        return {static_cast<std::uint32_t>(decoded_.positions.size()) + v, to_vector(piece_.positions[v]),
+                piece_normals_[v]};
+    }
+
+    void give_up_staying(std::uint32_t side) { unclear_[sides_.from(side)] = unclear_[sides_.to(side)] = true; }
+    void give_up(const Chain& chain) {
+        for (const auto side : chain.sides) give_up_staying(side);
+    }
+    void give_up_coming(std::uint32_t side) {
+        const auto near = middle_of(side);
+        double least = std::numeric_limits<double>::infinity();
+        std::uint32_t nearest = none;
+        for (const auto& t : stays_.triangles)
+            for (const auto v : t) {
+                const auto apart = to_vector(decoded_.positions[v]) - near;
+                if (dot(apart, apart) < least) least = dot(apart, apart), nearest = v;
+            }
+        if (nearest != none) unclear_[nearest] = true;
+    }
+
+    // A whole loop of the piece along a whole loop of the open border, from where they are nearest to each other.
+    void join_closed(std::uint32_t number, const std::vector<std::uint32_t>& loop) {
+        const auto& chain = stays_.chains[number].sides;
+        std::size_t start = 0, start_of_loop = 0;
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < chain.size(); ++i)
+            for (std::size_t j = 0; j < loop.size(); ++j) {
+                const auto apart =
+                    to_vector(decoded_.positions[sides_.from(chain[i])]) - piece_point(piece_sides_.from(loop[j]));
+                if (dot(apart, apart) < least) least = dot(apart, apart), start = i, start_of_loop = j;
+            }
+        std::vector<StripVertex> left, right;
+        for (std::size_t i = 0; i <= chain.size(); ++i)
+            left.push_back(staying(sides_.from(chain[(start + i) % chain.size()])));
+        for (std::size_t j = 0; j <= loop.size(); ++j)
+            right.push_back(coming(piece_sides_.from(loop[(start_of_loop + loop.size() - j) % loop.size()])));
+        add_strip(left, right, number);
+        taken_[number].assign(chain.size(), true);
+    }
+
+    void add_strip(const std::vector<StripVertex>& left, const std::vector<StripVertex>& right, std::uint32_t number) {
+        const auto strip = strip_between(left, right);
+        if (!strip)
+            give_up(stays_.chains[number]);
+        else
+            triangles_.insert(triangles_.end(), strip->begin(), strip->end());
+    }
+
+    void join_loop(const std::vector<std::uint32_t>& loop) {
+        constexpr double most = 0.8;
+        const std::size_t size = loop.size();
+        std::vector<Partner> partners;
+        for (const auto& side : loop) partners.push_back(partner_of(side));
+        std::map<std::uint32_t, std::size_t> votes;
+        for (const auto& p : partners) ++votes[p.chain];
+        if (votes.size() == 1 && votes.count(none) > 0) return check_loose(loop);
+        for (const auto& [chain, count] : votes) {
+            if (chain == none || !stays_.chains[chain].closed) continue;
+            if (static_cast<double>(count) < most * static_cast<double>(size)) continue;
+            if (std::find(taken_[chain].begin(), taken_[chain].end(), true) != taken_[chain].end())
+                give_up(stays_.chains[chain]);
+            else
+                join_closed(chain, loop);
+            return;
+        }
+        join_runs(loop, partners);
+    }
+
+    // Sides of the piece's border that are joined to nothing must be the capture's own border.
+    void check_loose(std::span<const std::uint32_t> sides) {
+        for (const auto side : sides)
+            if (!capture_.ends_near(to_floats(middle_of(side)))) {
+                give_up_coming(side);
+            }
+    }
+
+    // Where a border of the capture interrupts the cut, or one of the mesh the open border: each run of sides with
+    // partners in one chain is joined for itself.
+    void join_runs(const std::vector<std::uint32_t>& loop, std::vector<Partner>& partners) {
+        constexpr std::size_t bridged = 2, fewest = 2;
+        const std::size_t size = loop.size();
+        for (std::size_t i = 0; i < size; ++i) {  // single sides between two of one chain go with them
+            if (partners[i].chain == none) continue;
+            for (std::size_t gap = 1; gap <= bridged; ++gap) {
+                const auto& end = partners[(i + gap + 1) % size];
+                if (end.chain != partners[i].chain) continue;
+                for (std::size_t k = 1; k <= gap; ++k)
+                    if (partners[(i + k) % size].chain != end.chain) partners[(i + k) % size] = partners[i];
+            }
+        }
+        std::vector<std::uint32_t> loose;
+        std::size_t start = 0;
+        while (start < size && partners[start].chain == partners[(start + size - 1) % size].chain) ++start;
+        if (start == size) start = 0;
+        for (std::size_t i = 0; i < size;) {
+            const auto chain = partners[(start + i) % size].chain;
+            std::size_t end = i;
+            while (end < size && partners[(start + end) % size].chain == chain) ++end;
+            if (chain != none && end - i >= fewest)
+                join_run(loop, partners, (start + i) % size, end - i);
+            else
+                for (std::size_t k = i; k < end; ++k) loose.push_back(loop[(start + k) % size]);
+            i = end;
+        }
+        check_loose(loose);
+    }
+
+    void join_run(const std::vector<std::uint32_t>& loop, const std::vector<Partner>& partners, std::size_t first,
+                  std::size_t count) {
+        constexpr std::size_t to_the_end = 2;
+        const auto number = partners[first].chain;
+        const auto& chain = stays_.chains[number];
+        const std::size_t size = chain.sides.size();
+        // The piece's border runs the other way.
+        std::size_t from = partners[(first + count - 1) % loop.size()].side, to = partners[first].side;
+        if (!chain.closed) {
+            if (from <= to_the_end) from = 0;
+            if (to + to_the_end + 1 >= size) to = size - 1;
+            if (from > to) return give_up(chain);
+        }
+        const std::size_t sides = (to + size - from) % size + 1;
+        std::vector<StripVertex> left, right;
+        for (std::size_t i = 0; i < sides; ++i) {
+            const std::size_t s = (from + i) % size;
+            if (taken_[number][s]) give_up_staying(chain.sides[s]);
+            taken_[number][s] = true;
+            left.push_back(staying(sides_.from(chain.sides[s])));
+        }
+        left.push_back(staying(sides_.to(chain.sides[to])));
+        right.push_back(coming(piece_sides_.to(loop[(first + count - 1) % loop.size()])));
+        for (std::size_t i = count; i-- > 0;)
+            right.push_back(coming(piece_sides_.from(loop[(first + i) % loop.size()])));
+        add_strip(left, right, number);
+    }
+
+    // An open border may stay open only where the capture ends.
+    void check_what_is_left() {
+        for (std::uint32_t c = 0; c < stays_.chains.size(); ++c) {
+            const auto& sides = stays_.chains[c].sides;
+            for (std::size_t i = 0; i < sides.size(); ++i)
+                if (!taken_[c][i] && !capture_.ends_near(point_of(decoded_.positions[sides_.from(sides[i])]))) {
+                    give_up_staying(sides[i]);
+                }
+        }
+    }
+};
+
+}  // namespace
+
+struct SurfacePatchSearch::Measured {
+    const LatticeMesh &decoded, &captured;
+    const SurfaceIndex& surface;
+    SurfacePatchOptions options;
+    std::optional<Sides> sides;
+    std::optional<Capture> capture;
+    std::vector<double> error;          // of each vertex of the tracked mesh
+    std::vector<double> error_around;   // RMS in its cube of space
+    std::vector<double> edge;           // mean length of the sides at it
+    std::vector<bool> rims, bad_shape;  // what is lost whatever the error: around uncovered surface, and distorted
+    double area = 0;                    // of the tracked mesh
+
+    Measured(const TrackedMesh& tracked, const LatticeMesh& mesh, const SurfaceIndex& index,
+             const SurfacePatchOptions& wanted);
+    void measure_sides();  // edge and area
+};
+
+namespace {
+
+// The captured mesh with its border.
+Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, const SurfacePatchOptions& options) {
+    auto merging = at_same_place(captured);
+    auto mesh = welded(captured, merging);
+    Capture capture{.merging = std::move(merging), .mesh = std::move(mesh), .surface = surface};
+    const bool as_indexed = capture.mesh.positions.size() == surface.positions.size();
+    capture.points = as_indexed ? surface.positions : points_of(capture.mesh.positions);
+    capture.normals =
+        as_indexed ? surface.normals : points_of(vertex_normals(capture.mesh.positions, capture.mesh.triangles));
+    // The sides of a border have both ends on it, so that of most captures hardly any triangles are looked at.
+    std::vector<char> inside(capture.points.size(), 1);
+    for (std::uint32_t v = 0; v < surface.positions.size(); ++v)
+        if (!surface.is_inside(v)) inside[capture.merging.number[v]] = 0;
+    std::vector<Triangle> at_border;
+    for (const auto& t : capture.mesh.triangles)
+        if (inside[t[0]] + inside[t[1]] + inside[t[2]] < 2) at_border.push_back(t);
+    const Sides sides(capture.mesh.positions, at_border);
+    std::vector<Point3f> along_rim;
+    double rim_length = 0;
+    for (std::uint32_t s = 0; s < sides.count(); ++s) {
+        if (sides.twin(s) != none) continue;
+        if (inside[sides.from(s)] != 0 || inside[sides.to(s)] != 0) continue;
+        if (capture.rim.empty()) capture.rim.assign(capture.points.size(), false);
+        const auto a = sides.from(s), b = sides.to(s);
+        capture.rim[a] = capture.rim[b] = true;
+        const auto from = to_vector(capture.points[a]), to = to_vector(capture.points[b]);
+        along_rim.push_back(capture.points[a]);
+        along_rim.push_back(to_floats((from + to) * 0.5));
+        rim_length += length(to - from);
+    }
+    if (along_rim.empty()) return capture;
+    capture.along_rim.emplace(along_rim);
+    capture.rim_reach = 2 * options.simplification.surface_error + rim_length / static_cast<double>(along_rim.size());
+    return capture;
+}
+
+}  // namespace
+
+SurfacePatchSearch::Measured::Measured(const TrackedMesh& tracked, const LatticeMesh& mesh, const SurfaceIndex& index,
+                                       const SurfacePatchOptions& wanted)
+    : decoded(tracked.decoded), captured(mesh), surface(index), options(wanted) {
+    std::optional<SurfaceIndex> shown;
+    const auto look_at_tracked = [&] {
+        sides.emplace(decoded.positions, decoded.triangles);
+        const double mean = mean_edge(decoded.positions, decoded.triangles);
+        shown.emplace(
+            points_of(decoded.positions), decoded.triangles,
+            SurfaceIndexOptions{.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
+        bad_shape = distorted(decoded, tracked.rest, *sides, options);
+        measure_sides();
+    };
+    parallel_invoke(
+        options.threads, [&] { capture.emplace(make_capture(mesh, index, wanted)); }, look_at_tracked);
+    std::vector<std::uint32_t> beside(tracked.near.empty() ? 0 : capture->points.size(), OrientedPoints::no_point);
+    for (std::uint32_t v = 0; v < tracked.near.size(); ++v)
+        if (tracked.near[v] != OrientedPoints::no_point) beside[capture->merging.number[tracked.near[v]]] = v;
+    capture->on_decoded =
+        closest_on_same_side(*shown, capture->points, capture->normals,
+                             {options.reach, options.lost / 2, 0.2, options.threads}, std::move(beside));
+    error = errors_of(tracked, *shown, *capture, options);
+    error_around = errors_around(shown->positions, error, *capture, options);
+    rims.assign(decoded.positions.size(), false);
+    add_rims_of_uncovered(*capture, decoded, options, rims);
+}
+
+void SurfacePatchSearch::Measured::measure_sides() {
+    edge.assign(decoded.positions.size(), 0);
+    std::vector<double> count(edge.size(), 0);
+    for (std::uint32_t s = 0; s < sides->count(); ++s) {
+        const auto a = sides->from(s), b = sides->to(s);
+        const double size = length(to_vector(decoded.positions[b]) - to_vector(decoded.positions[a]));
+        for (const auto v : {a, b}) edge[v] += size, count[v] += 1;
+    }
+    for (std::size_t v = 0; v < edge.size(); ++v) edge[v] /= std::max(count[v], 1.0);
+    for (const auto& t : decoded.triangles) area += area_of(decoded.positions, t);
+}
+
+SurfacePatchSearch::SurfacePatchSearch(const TrackedMesh& tracked, const LatticeMesh& captured,
+                                       const SurfaceIndex& surface, const SurfacePatchOptions& options) {
+    if (!captured.texcoords.empty() || captured.triangles.empty() || tracked.decoded.triangles.empty()) return;
+    measured_ = std::make_unique<const Measured>(tracked, captured, surface, options);
+}
+SurfacePatchSearch::SurfacePatchSearch(SurfacePatchSearch&&) noexcept = default;
+SurfacePatchSearch& SurfacePatchSearch::operator=(SurfacePatchSearch&&) noexcept = default;
+SurfacePatchSearch::~SurfacePatchSearch() = default;
+
+std::optional<SurfacePatch> SurfacePatchSearch::find(double region_lost) const {
+    if (!measured_) return std::nullopt;
+    const auto& m = *measured_;
+    const auto& options = m.options;
+    const std::size_t vertices = m.decoded.positions.size();
+    auto removed = find_lost(m.decoded, *m.sides, {m.error, m.error_around, m.rims, m.bad_shape}, region_lost, options);
+    if (std::find(removed.begin(), removed.end(), true) == removed.end()) return std::nullopt;
+    for (int attempt = 0; attempt < options.attempts; ++attempt) {
+        tidy(removed, m.decoded, *m.sides, options);
+        const auto stays = remainder_of(m.decoded, *m.sides, removed);
+        double area = 0;
+        for (const auto& t : stays.triangles) area += area_of(m.decoded.positions, t);
+        if (m.area - area > options.most_share * m.area) return std::nullopt;
+        const auto outside = outside_of(stays, m.decoded, removed, m.edge, *m.capture, options);
+        const auto piece =
+            simplified_piece(cut_piece(outside, *m.capture, options), m.captured, m.surface, options.simplification);
+        auto join = Joiner(m.decoded, *m.sides, stays, piece, m.edge, *m.capture, options).run();
+        if (join.unclear.empty()) {
+            SurfacePatch out;
+            out.removed = std::move(removed);
+            out.positions = piece.positions;
+            out.colours = piece.colours;
+            for (auto t : piece.triangles) {
+                for (auto& v : t) v += static_cast<std::uint32_t>(vertices);
+                out.triangles.push_back(t);
+            }
+            out.triangles.insert(out.triangles.end(), join.triangles.begin(), join.triangles.end());
+            return out;
+        }
+        grow(join.unclear, m.decoded.triangles);
+        for (std::size_t v = 0; v < vertices; ++v)
+            if (join.unclear[v]) removed[v] = true;
+    }
+    return std::nullopt;
+}
+
+std::optional<SurfacePatch> find_surface_patch(const TrackedMesh& tracked, const LatticeMesh& captured,
+                                               const SurfaceIndex& surface, const SurfacePatchOptions& options) {
+    return SurfacePatchSearch(tracked, captured, surface, options).find(options.region_lost);
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,66 @@
+// Where tracking is lost in one region, as when a hand comes out of a pocket: what of the tracked mesh goes, and the
+// piece of the captured surface that comes in its place, already joined to what stays.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "codec/encoder/tracked/captured_surface.h"
+#include "codec/tracked/surface_patch.h"
+#include "core/lattice.h"
+#include "core/thread.h"
+#include "surface/surface_index.h"
+
+namespace htvm::internal {
+
+// Lengths are in lattice units; the defaults suit an adult at 16 units a millimetre.
+struct SurfacePatchOptions {
+    double lost = 96;         // a region is lost where the surfaces are farther apart than this, as far as they are
+                              // apart by half of it
+    double reach = 480;       // how far to search for the other surface
+    double speck = 320;       // side of a square: lost regions of a smaller area are left alone
+    double region = 1600;     // side of the cubes of space by which a frame is judged: see TrackedFitOptions
+    double region_lost = 0;   // RMS distance from which on a cube is lost; 0: regions are lost by themselves
+    int margin = 1;           // rings of triangles around a lost region that go as well, >= 0
+    double stretch = 3;       // a triangle is lost, too, where a side is longer than at rest by this factor
+    double gap = 0.5;         // between what stays and the piece, before they are joined: in mean edges there
+    double most_share = 0.3;  // of the tracked mesh's area that may go
+    int attempts = 5;         // where the two borders do not fit together, more goes around them and they are cut again
+    SimplifiedReferenceOptions simplification;  // of the piece
+    Threads threads = {};                       // their number does not change the result
+};
+
+// A tracked mesh to be patched.
+struct TrackedMesh {
+    const LatticeMesh& decoded;                // as the decoder has it
+    std::span<const LatticePoint> rest = {};   // its vertices in the mesh that it refers to, by which stretched and
+                                               // folded triangles are told; or none
+    std::span<const std::uint32_t> near = {};  // TrackedTargets::near, where searches begin; or none
+};
+
+// Looks for patches of one tracked mesh. What is lost is measured once, then it may be tried to replace more or less.
+class SurfacePatchSearch {
+public:
+    // surface: index by direction of `captured`. All must outlive this object.
+    SurfacePatchSearch(const TrackedMesh& tracked, const LatticeMesh& captured, const SurfaceIndex& surface,
+                       const SurfacePatchOptions& options);
+    SurfacePatchSearch(SurfacePatchSearch&&) noexcept;
+    SurfacePatchSearch& operator=(SurfacePatchSearch&&) noexcept;
+    ~SurfacePatchSearch();
+
+    // region_lost: as in the options, in place of theirs. The result is nothing if nothing is lost, too much is lost,
+    // the borders cannot be joined clearly, or the capture has texture coordinates: an I-frame is what is left then.
+    std::optional<SurfacePatch> find(double region_lost) const;
+
+private:
+    struct Measured;
+    std::unique_ptr<const Measured> measured_;  // null where no patch is possible
+};
+
+// The same in one call.
+std::optional<SurfacePatch> find_surface_patch(const TrackedMesh& tracked, const LatticeMesh& captured,
+                                               const SurfaceIndex& surface, const SurfacePatchOptions& options);
+
+}  // namespace htvm::internal

@@ -1,0 +1,258 @@
+#include "codec/encoder/tracked/tracked_frame.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/encoder/bones/motion.h"
+#include "codec/encoder/stage_clock.h"
+#include "codec/encoder/tracked/captured_surface.h"
+#include "codec/encoder/tracked/node_motion.h"
+#include "core/parallel.h"
+#include "surface/limb_starts.h"
+
+namespace htvm::internal {
+namespace {
+
+std::vector<HandlePair> pairs_of(const TrackedReference& reference) {
+    std::vector<HandlePair> out;
+    for (const auto& pair : reference.nodes.neighbours) {
+        const auto a = point_of(reference.graph.pivots[pair.first]), b = point_of(reference.graph.pivots[pair.second]);
+        HandlePair handles;
+        handles.first = pair.first;
+        handles.second = pair.second;
+        handles.point = {(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0, (a[2] + b[2]) / 2.0};
+        out.push_back(handles);
+    }
+    return out;
+}
+
+std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, std::span<const LatticePoint> pivots) {
+    std::vector<QuantisedTransform> out;
+    for (std::size_t i = 0; i < motion.size(); ++i) out.push_back(quantise_motion(motion[i], pivots[i]));
+    return out;
+}
+
+// For shifts, half the step of the displacement; for turns steps that shrink somewhat faster than that step does:
+// measured, see docs/algorithm.md.
+NodeMotionSteps motion_steps(double geometry_step, double millimetre) {
+    const auto exponent = [](double step, double slope, double more, int most) {
+        return std::clamp(static_cast<int>(std::lround(slope * std::log2(std::max(step, 1.0)) + more)), 0, most);
+    };
+    return {.rotation_exponent = exponent(16 * geometry_step / millimetre, 1.25, 1.4, NodeMotionSteps::most_rotation),
+            .shift_exponent = exponent(geometry_step, 1, -1, NodeMotionSteps::most_shift)};
+}
+
+// A bit of node motion is worth 0.3 of what a bit of the displacement is worth to each sample that a node moves: most
+// of what a node leaves the displacement takes up in a few differences.
+double price_of_motion(const DeformationForm& form, const TrackedFrameOptions& options) {
+    constexpr double share = 0.3;
+    const double samples = form.weight / static_cast<double>(std::max<std::size_t>(form.diagonal.size(), 1));
+    return share * options.lambda * options.geometry_step * options.geometry_step * samples;
+}
+
+// What was taken off, as long as the values can be coded without it.
+void take_off(std::vector<std::int32_t>& values, const std::vector<std::int32_t>& noise) {
+    for (std::size_t i = 0; i < noise.size(); ++i)
+        values[i] = std::clamp(values[i] - noise[i], -field_limit, field_limit);
+}
+
+}  // namespace
+
+TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
+                               std::size_t least_run) {
+    TrackedRuns out;
+    std::vector<std::uint8_t> colour_run;
+    if (decisions.colour) colour_run = decisions.colour->run();
+    if (colour_run.size() < least_run) colour_run.clear();
+    head.colour_run = static_cast<std::uint32_t>(colour_run.size());
+    RangeEncoder run;
+    write_tracked_head(run, head, known);
+    TrackedRunEnds ends;
+    ends.head = run.position();
+    decisions.motion.write(run);
+    ends.motion = run.position();
+    decisions.displacement.write(run);
+    ends.displacement = run.position();
+    if (decisions.colour && colour_run.empty()) decisions.colour->write(run);
+    ends.colour = run.position();
+    out.payload = run.finish();
+    // The four bytes that are read ahead of the head must not be the colours'.
+    if (!colour_run.empty()) out.payload.resize(std::max(out.payload.size(), ends.head + 4));
+    out.payload.insert(out.payload.end(), colour_run.begin(), colour_run.end());
+    out.shares = layer_shares(ends, out.payload.size(), colour_run.size());
+    return out;
+}
+
+DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options,
+                                       std::span<const Colour> colours) {
+    std::vector<Eigen::Vector3d> handles;
+    for (const auto pivot : reference.graph.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
+    return make_deformable(points_of(reference.mesh.positions), reference.mesh.triangles, reference.nodes.weights,
+                           handles, pairs_of(reference), options,
+                           colours.empty() ? std::span<const Colour>(reference.mesh.colours) : colours);
+}
+
+namespace {
+
+using NodeMotions = std::vector<RigidMotion>;
+
+std::vector<NodeMotions> motions_of(const NodeStarts& starts, const DeformableMesh& deformable) {
+    std::vector<NodeMotions> out;
+    if (starts.last.empty())
+        out.emplace_back(deformable.handles.size());
+    else
+        out.emplace_back(starts.last.begin(), starts.last.end());
+    if (!starts.before_last.empty()) out.push_back(moved_on(deformable, starts.before_last, starts.last));
+    if (!starts.gone_on.empty()) out.emplace_back(starts.gone_on.begin(), starts.gone_on.end());
+    if (!starts.skeletal.empty()) out.emplace_back(starts.skeletal.begin(), starts.skeletal.end());
+    return out;
+}
+
+std::size_t nearest_of(const std::vector<NodeMotions>& starts, const DeformableMesh& deformable,
+                       const SurfaceIndex& surface, const DeformationOptions& options) {
+    if (starts.size() < 2) return 0;
+    std::vector<double> error(starts.size());
+    parallel_for(starts.size(), options.threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) error[i] = deformation_error(deformable, surface, starts[i], options);
+    });
+    return static_cast<std::size_t>(std::min_element(error.begin(), error.end()) - error.begin());
+}
+
+}  // namespace
+
+NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                                const DeformationOptions& options) {
+    const auto from = motions_of(starts, deformable);
+    NodeRegistration out;
+    out.start = nearest_of(from, deformable, surface, options);
+    out.motion = register_deformation(deformable, surface, from[out.start], options, &out.form);
+    return out;
+}
+
+bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                       const DeformationOptions& options, NodeRegistration& registered) {
+    const auto from = motions_of(starts, deformable);
+    // To tell where a limb comes to lie, rounds that settle it are not needed; what is taken is settled afterwards.
+    auto roughly = options;
+    roughly.fine_rounds = std::min(options.fine_rounds, 2);
+    roughly.colour_rounds = roughly.surface_rounds = 0;
+    std::vector<NodeMotions> others(from.size());
+    parallel_for(from.size(), options.threads, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+            if (i != registered.start)
+                others[i] = register_deformation(deformable, surface, from[i], roughly, nullptr, registered.motion);
+    });
+    bool any = false;
+    for (std::size_t i = 0; i < others.size(); ++i)
+        if (i != registered.start &&
+            take_nearer_limbs(deformable, surface, others[i], options, registered.motion, &registered.form))
+            any = true;
+    const auto reached = reached_for_extremities(deformable, surface, registered.motion, starts.last,
+                                                 {.millimetre = options.millimetre});
+    if (reached.empty()) return any;
+    auto near = options;  // the body is where it should be already
+    near.coarse_rounds = 0;
+    const auto other = register_deformation(deformable, surface, reached, near);
+    return take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form) || any;
+}
+
+Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
+                                                 const TrackedReference& reference, const NodeRegistration& registered,
+                                                 const TrackedState* before, const TargetHistory& targets_before,
+                                                 const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    const auto& triangles = reference.mesh.triangles;
+    EncodedTrackedFrame out;
+    NodeMotionOptions of_motion;
+    of_motion.steps = options.motion.value_or(motion_steps(options.geometry_step, options.millimetre));
+    of_motion.form = &registered.form;
+    of_motion.price = price_of_motion(registered.form, options);
+    auto coded_motion = encode_node_motion(
+        quantised(registered.motion, reference.graph.pivots), reference.graph,
+        before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
+        of_motion);
+    const auto moved = moved_by_nodes(reference, coded_motion.transforms, options.threads);
+    const auto normals = vertex_normals(moved, triangles);
+    TrackedTargets targets;
+    if (options.motion_alone) {
+        targets.displacement.resize(moved.size());
+        if (!reference.mesh.colours.empty()) targets.colours.resize(3 * moved.size());
+    } else {
+        targets = find_tracked_targets(
+            {moved, normals, triangles, reference.mesh.colours}, mesh, surface,
+            {.reach = options.reach, .samples = options.target_samples, .threads = options.threads},
+            options.near.empty() ? registered.form.matches
+                                 : std::vector<std::uint32_t>(options.near.begin(), options.near.end()));
+        out.near = std::move(targets.near);
+    }
+    clock.done("targets");
+    if (options.denoise) {
+        if (options.keeps_noise) out.noise.targets = targets;
+        if (options.motion_alone)
+            out.targets = targets_before;
+        else
+            out.targets = filter_targets(targets, triangles, targets_before, *options.denoise);
+        if (options.keeps_noise) {
+            take_off(out.noise.targets.displacement, targets.displacement);
+            take_off(out.noise.targets.colours, targets.colours);
+        }
+        clock.done("denoising");
+    } else if (options.noise) {
+        take_off(targets.displacement, options.noise->targets.displacement);
+        take_off(targets.colours, options.noise->targets.colours);
+    }
+
+    // A step so large that every difference from the prediction becomes zero.
+    const double displacement_step = options.motion_alone ? field_limit : options.geometry_step;
+    const double colour_step = options.motion_alone ? field_limit : options.colour_step;
+    FieldOptions geometry;
+    geometry.step = {displacement_step, displacement_step, displacement_step};
+    const double price = options.noise ? options.noise->price : price_of_bits(out.targets, displacement_step);
+    if (options.keeps_noise) out.noise.price = price;
+    geometry.lambda = options.lambda * price;
+    FieldOptions colour;
+    colour.step = {colour_step, colour_step, colour_step};
+    colour.lambda = options.lambda;
+    colour.turned = true;
+    Result<EncodedField> displacement, colours;
+    const auto code_displacement = [&] {
+        displacement = encode_field(reference.hierarchy, targets.displacement, 1, geometry,
+                                    before ? &before->displacement : nullptr);
+        if (displacement) out.mesh.positions = displaced(moved, normals, displacement->values);
+    };
+    if (reference.mesh.colours.empty())
+        code_displacement();
+    else
+        colours = encode_field(reference.hierarchy, targets.colours, 3, colour, before ? &before->colour : nullptr,
+                               options.threads, code_displacement);
+    if (!reference.mesh.colours.empty() && !colours) return tl::unexpected(colours.error());
+    if (!displacement) return tl::unexpected(displacement.error());
+    clock.done("fields");
+
+    out.mesh.triangles = triangles;
+    out.mesh.texcoords = reference.mesh.texcoords;
+    if (!reference.mesh.normals.empty())
+        out.mesh.normals = quantised_normals(vertex_normals(out.mesh.positions, triangles));
+    out.state.transforms = std::move(coded_motion.transforms);
+    out.state.displacement = std::move(displacement->history);
+    auto& head = out.state.head;
+    head.captured = {static_cast<std::uint32_t>(mesh.positions.size()),
+                     static_cast<std::uint32_t>(mesh.triangles.size())};
+    head.motion = of_motion.steps;
+    head.displacement = displacement->steps;
+    const bool coloured = !reference.mesh.colours.empty();
+    if (coloured) {
+        out.mesh.colours = recoloured(reference.mesh.colours, colours->values);
+        out.state.colour = std::move(colours->history);
+        head.colour = colours->steps;
+    }
+    // A run takes four bytes beside its decisions: from here on less than a hundredth.
+    constexpr std::size_t least_run = 400;
+    out.runs = write_tracked_runs(
+        head, {before ? &before->head : nullptr, reference.captured, coloured},
+        {coded_motion.decisions, displacement->decisions, coloured ? &colours->decisions : nullptr}, least_run);
+    clock.done("reconstruction");
+    return out;
+}
+
+}  // namespace htvm::internal

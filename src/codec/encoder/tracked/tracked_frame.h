@@ -1,0 +1,95 @@
+// Tracked frames, encoder side. First the reference is registered to the captured surface; this depends on no quantiser
+// step and is done once per frame. Then the motion of its nodes is quantised, and the remaining differences along the
+// normals and in the colours are coded as fields.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "codec/encoder/tracked/target_filter.h"
+#include "codec/tracked/tracked_frame.h"
+#include "core/thread.h"
+#include "entropy/decision_log.h"
+#include "htvm/encoder.hpp"
+#include "surface/tracked_registration.h"
+
+namespace htvm::internal {
+
+// What filtering took off a frame's targets, for when the frame is coded once more from others.
+struct RemovedNoise {
+    TrackedTargets targets;  // to take off what is found; empty without filtering
+    double price = 1;        // by how much less a bit should cost: price_of_bits()
+};
+
+struct TrackedFrameOptions {
+    double millimetre = 16;     // lattice units: see Configuration::adult_millimetre
+    double geometry_step = 32;  // lattice units: for the displacement along the normal
+    double colour_step = 11;    // levels
+    double lambda = 0.12;       // squared steps that one bit is worth
+    double reach = 480;         // lattice units: how far from the moved reference to search for the captured surface
+    std::optional<NodeMotionSteps> motion;       // none: those that suit the geometry step
+    std::optional<TargetFilterOptions> denoise;  // filters the targets over time
+    const RemovedNoise* noise = nullptr;         // else: what to take off them
+    bool keeps_noise = false;                    // whether to tell what filtering took off
+    TargetSamples target_samples = TargetSamples::middles;
+    std::span<const std::uint32_t> near = {};  // EncodedTrackedFrame::near of another attempt, where searches begin;
+                                               // none: they begin at the registration's matches
+    bool motion_alone = false;  // displacement and colours stay as predicted: the smallest frame possible
+    Threads threads = {};
+};
+
+// The reference, prepared for registration; made once per I-frame.
+DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options,
+                                       std::span<const Colour> colours = {});
+
+// Possible starts of a registration, each one motion per node, or empty. last, before_last: of the two previous frames.
+// gone_on: behind a TP-frame, as the surface moved before it. skeletal: where the skeleton moves each node.
+struct NodeStarts {
+    std::span<const RigidMotion> last, before_last, gone_on, skeletal;
+};
+struct NodeRegistration {
+    std::vector<RigidMotion> motion;  // of each node, reference -> frame
+    DeformationForm form;             // how well the captured surface determines it
+    std::size_t start = 0;            // which of the starts it began at
+};
+// From the start that lies nearest to the surface.
+NodeRegistration register_nodes(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                                const DeformationOptions& options);
+// Registers from the other starts, too, and with limbs that end nowhere turned towards the capture's extremities; takes
+// each limb from where it lies nearest to the surface: a start that is best for the whole may lose a hand. registered:
+// by register_nodes(). Gives whether any limb was taken from elsewhere.
+bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& surface, const NodeStarts& starts,
+                       const DeformationOptions& options, NodeRegistration& registered);
+
+struct TrackedRuns {
+    std::vector<std::uint8_t> payload;
+    LayerBytes shares;  // of the payload
+};
+struct TrackedDecisions {
+    const DecisionLog &motion, &displacement;
+    const DecisionLog* colour = nullptr;  // null where the reference has no colours
+};
+// The payload of decisions. least_run: bytes from which on the colours are a run of their own; sets head.colour_run.
+TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, const TrackedDecisions& decisions,
+                               std::size_t least_run);
+
+struct EncodedTrackedFrame {
+    TrackedRuns runs;
+    LatticeMesh mesh;  // the mesh that the decoder will have
+    TrackedState state;
+    TargetHistory targets;            // empty without filtering
+    RemovedNoise noise;               // empty unless it was to be told
+    std::vector<std::uint32_t> near;  // of each vertex, the captured vertex beside it: TrackedTargets::near
+};
+
+// mesh: as captured; surface: its index, see captured_surface(). registered: to this surface. before: state of the
+// frame that this one refers to; null if that is the I-frame. targets: what filtering left of the last frame.
+Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
+                                                 const TrackedReference& reference, const NodeRegistration& registered,
+                                                 const TrackedState* before, const TargetHistory& targets,
+                                                 const TrackedFrameOptions& options, std::vector<StageTime>& stages);
+
+}  // namespace htvm::internal

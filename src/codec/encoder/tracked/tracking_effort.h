@@ -1,0 +1,30 @@
+// How much is searched for a T-frame, from live to archive: what an effort of 1 to 9 stands for. The numbers are those
+// that paid at their place: docs/performance.md has what each level takes and gives.
+#pragma once
+
+#include "codec/encoder/tracked/captured_surface.h"
+#include "surface/tracked_registration.h"
+
+namespace htvm::internal {
+
+inline constexpr int usual_effort = 5, most_effort = 9;
+
+struct TrackingEffort {
+    double samples = 1;     // registration's samples, relative to DeformationOptions'
+    int coarse_rounds = 6;  // see DeformationOptions, as what follows
+    int fine_rounds = 3;
+    int surface_rounds = 3;
+    int solver_iterations = 25;
+    TargetSamples target_samples = TargetSamples::middles;  // see TargetSearch
+    bool always_other_starts = false;  // other starts are registered for every frame, not for lost ones alone
+    int group = 1;                     // TrackedOptions::group where that is not given
+    bool motion_alone = false;  // nothing but the motion of the nodes is coded, nor is it judged how well it fits
+};
+
+// effort: 0 to most_effort. 0 is what a frame gets that would be late: see Encoder::set_effort().
+TrackingEffort tracking_effort(int effort);
+
+// options with what the effort says in place of its own.
+DeformationOptions with_effort(DeformationOptions options, const TrackingEffort& effort);
+
+}  // namespace htvm::internal

@@ -1,0 +1,36 @@
+// What a decoder accepts: everything that a header claims is held against its options before memory is taken for it.
+#pragma once
+
+#include <cstdint>
+
+#include "codec/format/sequence.h"
+#include "htvm/decoder.hpp"
+
+namespace htvm::internal {
+
+struct MeshCounts {
+    std::uint64_t vertices = 0, triangles = 0;
+};
+
+// The most memory, bytes, that meshes of so many vertices and triangles take, with all attributes, of any
+// connectivity: about half as much again as was measured of the worst (tests/memory).
+std::uint64_t memory_of_reference(MeshCounts mesh);      // what an I-frame leaves for the frames that refer to it
+std::uint64_t memory_of_charts(MeshCounts mesh);         // what charts add to it
+std::uint64_t memory_of_tracking(MeshCounts mesh);       // what T-frames add to it
+std::uint64_t memory_of_tracked_frame(MeshCounts mesh);  // one that is kept for others of its group
+
+// What decoding a frame of some kind takes besides, the frame itself included; in frame_kinds.cpp for each kind.
+struct MemoryBound {
+    std::uint64_t coded_vertex, coded_triangle;          // bytes for each that the frame's header says
+    std::uint64_t reference_vertex, reference_triangle;  // for each of what it refers to
+};
+std::uint64_t memory_of_frame(const MemoryBound& bound, MeshCounts coded, MeshCounts reference);
+
+// Each an error of kind limit that says which option is too low for what.
+Result<void> check_limits(const Packet& packet, const DecoderOptions& options);
+Result<void> check_limits(const SequenceHeader& header, const DecoderOptions& options);
+// A frame's. reference: empty where it refers to nothing. kept: bytes that the decoder holds besides.
+Result<void> check_limits(const MemoryBound& bound, MeshCounts coded, MeshCounts reference, std::uint64_t kept,
+                          const DecoderOptions& options);
+
+}  // namespace htvm::internal

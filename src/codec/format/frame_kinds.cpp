@@ -1,0 +1,87 @@
+#include "codec/format/frame_kinds.h"
+
+#include "htvm/decoder.hpp"
+
+namespace htvm {
+namespace internal {
+
+using enum Layer;
+
+// Memory limits: about one and a half times what was measured on the worst meshes (tests/memory), in bytes per coded
+// vertex and triangle, and per vertex and triangle of the reference.
+constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
+    {.type = FrameType::intra,
+     .packet = PacketKind::intra,
+     .layers = {pose, geometry, colour, normals, texcoords, fans, external_intra, charts},
+     .refers_to = RefersTo::nothing,
+     .codebooks = false,
+     .referred = true,
+     .renews = true,
+     .codes_mesh = true,
+     .memory = {384, 368, 0, 0},
+     .rate = RateClass::intra,
+     .decode = decode_intra},
+    {.type = FrameType::enhanced,
+     .packet = PacketKind::enhanced,
+     .layers = {transforms, geometry, colour, normals, texcoords, mapping, fans, distance_orders, coded_bones},
+     .refers_to = RefersTo::reference,
+     .codebooks = true,
+     .referred = false,
+     .codes_mesh = true,
+     .memory = {384, 320, 256, 96},
+     .rate = RateClass::between,
+     .decode = decode_enhanced},
+    {.type = FrameType::predicted,
+     .packet = PacketKind::predicted,
+     .layers = {transforms},
+     .refers_to = RefersTo::reference,
+     .codebooks = false,
+     .referred = false,
+     .codes_mesh = false,
+     .memory = {0, 0, 224, 32},
+     .rate = RateClass::moved,
+     .decode = decode_predicted},
+    {.type = FrameType::tracked,
+     .packet = PacketKind::tracked,
+     .layers = {transforms, geometry, colour},
+     .refers_to = RefersTo::reference_or_before,
+     .codebooks = false,
+     .referred = true,
+     .codes_mesh = false,
+     .memory = {0, 0, 384, 192},
+     .rate = RateClass::between,
+     .decode = decode_tracked},
+    {.type = FrameType::patched,
+     .packet = PacketKind::patched,
+     .layers = {pose, tracked, removed, border, fans, geometry, colour, charts},
+     .refers_to = RefersTo::reference,
+     .codebooks = false,
+     .referred = true,
+     .renews = true,
+     .codes_mesh = true,
+     .memory = {384, 368, 768, 384},
+     .rate = RateClass::between,
+     .decode = decode_patched},
+}};
+
+namespace {
+
+// Rows are indexed by FrameType.
+constexpr bool in_order() {
+    for (std::size_t i = 0; i < frame_type_count; ++i)
+        if (frame_kinds[i].type != static_cast<FrameType>(i) || frame_rules[i].type != static_cast<FrameType>(i))
+            return false;
+    return true;
+}
+static_assert(in_order());
+
+}  // namespace
+}  // namespace internal
+
+std::optional<FrameType> frame_type(PacketKind kind) {
+    for (const auto& rules : internal::frame_rules)
+        if (rules.packet == kind) return rules.type;
+    return std::nullopt;
+}
+
+}  // namespace htvm
