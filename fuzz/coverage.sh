@@ -21,8 +21,8 @@ done
 
 # The decoder's library: core, entropy, and the codec without what only the encoder has.
 cd "$sources/.."
-mapfile -t files < <(find src/core src/entropy src/codec -name "*.cpp" -o -name "*.h" | LC_ALL=C sort |
-    grep -Ev '_enc\.(cpp|h)$|/encoder[a-z_]*\.(cpp|h)$|/choice/|_draco\.cpp$|entropy/cost\.')
+mapfile -t files < <(find src/core src/entropy src/codec/{format,reference,intra,tracked,bones,charts,decoder} \
+    -name "*.cpp" -o -name "*.h" | LC_ALL=C sort | grep -v 'entropy/cost\.')
 report() {
     local name=$1
     shift

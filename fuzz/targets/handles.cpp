@@ -76,8 +76,8 @@ void check_tracked(const fuzz::SmallMesh& mesh, fuzz::FuzzInput& input) {
     LatticeMesh lattice_mesh;
     lattice_mesh.positions = mesh.positions;
     lattice_mesh.triangles = mesh.triangles;
-    const auto reference = make_tracked_reference(lattice_mesh, 1 + std::abs(input.number(lattice_limit)),
-                                                  1 + std::abs(input.number(1 << 24)));
+    const auto reference = make_node_reference(lattice_mesh, 1 + std::abs(input.number(lattice_limit)),
+                                               1 + std::abs(input.number(1 << 24)));
     if (!reference) return;
     require(fuzz::all_on_lattice(reference->mesh.positions), "smoothed vertices are on the lattice");
     std::vector<QuantisedTransform> transforms(reference->graph.pivots.size());

@@ -60,7 +60,7 @@ void check_group(std::span<const std::uint8_t> bytes) {
 }
 
 // The first frame of a group of two, between the reference and its last.
-void check_between(const TrackedReference& reference, const TrackedState& last, std::span<const std::uint8_t> payload) {
+void check_between(const NodeReference& reference, const TrackedState& last, std::span<const std::uint8_t> payload) {
     const auto state = state_between(reference, {nullptr, &last, &last.head}, path_to(1, 2).back());
     DecodedTrackedFrame between;
     if (!decode_tracked_frame(payload, reference, &state, {}, between)) return;
@@ -77,7 +77,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     mesh.triangles = small.triangles;
     if (input.flag()) mesh.colours.resize(mesh.positions.size());
     if (input.flag()) mesh.normals.resize(mesh.positions.size());
-    auto reference = make_tracked_reference(mesh, 1 + static_cast<std::int32_t>(input.below(2000)), 16);
+    auto reference = make_node_reference(mesh, 1 + static_cast<std::int32_t>(input.below(2000)), 16);
     require(reference.has_value(), "any mesh can be a reference");
     reference->captured = {any_count(input), any_count(input)};
     DecodedTrackedFrame last, next;

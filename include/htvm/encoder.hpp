@@ -25,6 +25,7 @@
 #include "htvm/result.hpp"
 #include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
+#include "htvm/stage_time.hpp"
 
 namespace htvm {
 
@@ -36,12 +37,6 @@ struct CalibrationOptions {
 // T-pose and its skeleton. Bones that no vertex projects onto get 0.
 Result<std::vector<double>> calibrate(const Mesh& mesh, const Skeleton& skeleton, const Pose& pose,
                                       const CalibrationOptions& options = {});
-
-// How long the stages of a frame took, milliseconds.
-struct StageTime {
-    const char* stage;
-    double milliseconds;
-};
 
 // A frame whose packet was queued.
 struct EncodedFrame {

@@ -155,7 +155,7 @@ TEST(GroupPayload, WhatCannotBeIsAnError) {
 // ---- Between two frames ---------------------------------------------------------------------------------------------
 
 TEST(FrameGroup, WhatStandsBetweenIsTheMeanWeightedByTime) {
-    const TrackedReference reference;
+    const NodeReference reference;
     TrackedState later;
     later.transforms.resize(1);
     later.transforms[0].shift = {400, -400, 3};

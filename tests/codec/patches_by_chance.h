@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "codec/reference/quantiser_cells.h"
 #include "codec/tracked/surface_patch.h"
 #include "codec/tracked_sequences.h"
 
@@ -78,7 +79,7 @@ inline std::vector<Packet> with_patched_frames(const std::vector<Packet>& intra,
         auto mesh = out.add_intra(packet, coded);
         KeptNodes kept;
         for (int patches = 0;; ++patches) {
-            auto reference = *make_tracked_reference(mesh, node_spacing, 1, {}, kept);
+            auto reference = *make_node_reference(mesh, node_spacing, 1, {}, kept);
             reference.captured = captured;
             TrackedState before;
             for (int t = 0; t < 1 + patches % 2; ++t) {

@@ -12,6 +12,7 @@
 #include "codec/format/sequence.h"
 #include "codec/hostile_bytes.h"
 #include "codec/intra/intra_frame.h"
+#include "codec/reference/quantiser_cells.h"
 #include "codec/reference/reference.h"
 #include "codec/test_sequences.h"
 #include "surface/surface_distance.h"
@@ -174,7 +175,7 @@ TEST(TrackedFrames, GiveWayToAnIntraFrameWhereTheSurfaceIsAnother) {
 // The first two frames of a stream, an I-frame and a T-frame that refers to it, in the form in which the decoder
 // processes them.
 struct FirstTrackedFrame {
-    TrackedReference reference;
+    NodeReference reference;
     std::vector<std::uint8_t> payload;
 };
 
@@ -184,12 +185,12 @@ FirstTrackedFrame first_tracked_frame() {
     const auto intra = read_frame_payload(coded.packets[1].payload).value();
     auto mesh = decode_intra_frame(intra, nullptr).value();
     smooth_as_shown(mesh, static_cast<std::int32_t>(intra.header.geometry_step), false, header);
-    auto reference = make_tracked_reference(mesh, header.node_spacing, 1).value();
+    auto reference = make_node_reference(mesh, header.node_spacing, 1).value();
     reference.captured = {intra.header.source_vertices, intra.header.source_triangles};
     return {std::move(reference), coded.packets[2].payload};
 }
 
-void expect_on_lattice(const DecodedTrackedFrame& frame, const TrackedReference& reference) {
+void expect_on_lattice(const DecodedTrackedFrame& frame, const NodeReference& reference) {
     ASSERT_EQ(frame.positions.size(), reference.mesh.positions.size());
     for (const auto p : frame.positions) ASSERT_TRUE(on_lattice(p)) << p.x << " " << p.y << " " << p.z;
 }

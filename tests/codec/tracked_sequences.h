@@ -23,7 +23,7 @@ struct ChanceMotion {
 };
 
 // The payload. before: state of the frame that it refers to, or null.
-inline std::vector<std::uint8_t> tracked_by_chance(const TrackedReference& reference, const TrackedState* before,
+inline std::vector<std::uint8_t> tracked_by_chance(const NodeReference& reference, const TrackedState* before,
                                                    const ChanceMotion& motion, std::mt19937& random) {
     const auto number = [&](double size) {
         std::uniform_real_distribution<double> any(-size, size);
@@ -114,7 +114,7 @@ inline std::vector<Packet> with_tracked_frames(const std::vector<Packet>& intra,
         if (packet.kind != PacketKind::intra) continue;
         const auto payload = *read_frame_payload(packet.payload);
         const std::uint32_t key = out.frame;
-        auto reference = *make_tracked_reference(out.add_intra(packet, payload), node_spacing, 1);
+        auto reference = *make_node_reference(out.add_intra(packet, payload), node_spacing, 1);
         reference.captured = {payload.header.source_vertices, payload.header.source_triangles};
         TrackedState state;
         for (const bool refers_to_last : {false, true, true, false}) {

@@ -13,8 +13,7 @@ wasi="--target=wasm32-wasi -I$out/include"
 
 # The decoder's sources: those of CMakeLists.txt.
 sources() {
-    find src/core src/entropy src/codec -name '*.cpp' | LC_ALL=C sort |
-        grep -vE '(_enc|/encoder[a-z_]*|/choice/[a-z_]*|_draco)\.cpp$'
+    find src/core src/entropy src/codec/{format,reference,intra,tracked,bones,charts,decoder} -name '*.cpp' | LC_ALL=C sort
 }
 
 # build NAME COMPILER FLAGS LINK_FLAGS SOURCES...: objects in NAME, and NAME/digests.

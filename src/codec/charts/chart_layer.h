@@ -2,9 +2,6 @@
 // of their corners onto a plane, so that no texture coordinate is sent: the stream tells which triangles belong
 // together, and of each chart which way its plane faces, its size and its place in the picture. Both sides derive the
 // coordinates from decoded positions, in integers.
-//
-// A vertex on a seam has other coordinates in each chart. What frames refer to is the mesh without seams; what is shown
-// repeats such vertices behind it.
 #pragma once
 
 #include <array>
@@ -12,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "codec/reference/textured_surface.h"
 #include "codec/reference/transforms.h"
 #include "core/lattice.h"
 #include "htvm/mesh.hpp"
@@ -20,9 +18,6 @@
 
 namespace htvm::internal {
 
-// The texture coordinates of charts are whole numbers: the picture's sides are 2^picture_bits.
-inline constexpr int picture_bits = 16;
-inline constexpr double chart_texcoord_unit = 1 << picture_bits;
 // Projected coordinates are in texels times 2^texel_bits.
 inline constexpr int texel_bits = 4;
 // Components of a chart's rotation are multiples of this.
@@ -31,8 +26,8 @@ inline constexpr int coarse_rotation = 128;
 inline constexpr int usual_size = 16, largest_size = 64;
 inline constexpr std::uint32_t largest_scale = (1u << 24) - 1;
 inline constexpr std::uint32_t no_chart = 0xFFFFFFFF;
-// Of a layer; and coordinates that a vertex may have. They bound the time that few bytes can make a decoder take.
-inline constexpr std::size_t most_charts = 255, most_texcoords_of_vertex = 255;
+// A layer has at most so many: this bounds the time that few bytes can make a decoder take.
+inline constexpr std::size_t most_charts = 255;
 
 struct Chart {
     QuantisedRotation rotation;      // turns the picture's x into the first axis, y (up) into the second, the direction
@@ -47,8 +42,6 @@ struct ChartLayout {
     std::vector<Chart> charts;  // in the order in which the triangles name them first
     std::vector<std::uint32_t> chart_of_triangle;  // of each such triangle, from 0
 };
-
-using CornerTexcoords = std::array<QuantisedTexcoord, 3>;
 
 // positions: of the mesh, as shown. triangles: those that the layout is of; they may name any of the positions.
 std::vector<std::uint8_t> encode_charts(const ChartLayout& layout, std::span<const LatticePoint> positions,
@@ -65,28 +58,5 @@ std::vector<CornerTexcoords> projected_corners(const ChartLayout& layout, std::s
 Result<std::vector<CornerTexcoords>> chart_texcoords(const ChartLayout& layout, const StreamTexture& picture,
                                                      std::span<const LatticePoint> positions,
                                                      std::span<const Triangle> triangles);
-
-// A reference's surface with its texture coordinates, and as it is shown.
-struct TexturedSurface {
-    std::vector<CornerTexcoords> corners;  // of each triangle of the reference; empty: there are none
-    std::vector<std::uint32_t> copied;     // of each vertex that is repeated behind the reference's, which one it is
-    std::vector<Triangle> triangles;       // as shown, in the order of the reference's
-    std::vector<QuantisedTexcoord> texcoords;  // of each vertex as shown, in 2^-picture_bits of the picture
-    bool empty() const { return corners.empty(); }
-};
-
-// The first coordinates of a vertex, in the order of triangles, are its own; each other pair that it has gets a copy.
-// vertices: of the reference. Errors: corrupt_stream if a vertex has more than most_texcoords_of_vertex.
-Result<TexturedSurface> textured_surface(std::size_t vertices, std::span<const Triangle> triangles,
-                                         std::vector<CornerTexcoords> corners);
-
-// After a patch: triangles that stay keep their coordinates. stays: the vertices of the mesh before that stay,
-// ascending; the triangles of these come first in the new mesh. before: the coordinates of all triangles before.
-std::vector<CornerTexcoords> corners_that_stay(std::span<const CornerTexcoords> before,
-                                               std::span<const Triangle> triangles_before, std::size_t vertices_before,
-                                               std::span<const std::uint32_t> stays);
-
-// A mesh that has the reference's vertices, as it is shown; itself if the reference has no texture coordinates.
-LatticeMesh shown_mesh(const LatticeMesh& mesh, const TexturedSurface& textured);
 
 }  // namespace htvm::internal

@@ -1,7 +1,7 @@
 // Decodes EP- and P-frames: the I-frame's mesh, moved by its bones and corrected.
 #include "codec/bones/animated_frame.h"
 #include "codec/bones/enhanced_frame.h"
-#include "codec/decoder/decoder_state.h"
+#include "codec/decoder/frame_decoders.h"
 #include "codec/format/frame_kinds.h"
 
 namespace htvm::internal {

@@ -2,12 +2,13 @@
 #include "htvm/decoder.hpp"
 
 #include <algorithm>
-#include <new>
-#include <stdexcept>
+#include <array>
 
-#include "codec/decoder/decoder_state.h"
+#include "codec/charts/chart_layer.h"
+#include "codec/decoder/frame_decoders.h"
 #include "codec/format/decoder_limits.h"
 #include "codec/format/frame_kinds.h"
+#include "core/memory_guard.h"
 #include "core/parallel.h"
 
 namespace htvm {
@@ -115,6 +116,11 @@ Result<void> check_reference(const DecoderState& state, const Packet& packet) {
 
 namespace {
 
+// By FrameType.
+constexpr std::array<FrameDecoder*, frame_type_count> frame_decoders = {
+    decode_intra, decode_enhanced, decode_predicted, decode_tracked, decode_patched,
+};
+
 SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
     SequenceInfo info;
     info.version = header.version;
@@ -137,7 +143,7 @@ SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
 }
 
 // Everything that can fail or run out of memory comes first, so that the state is unchanged on failure.
-Result<void> take_header(DecoderState& state, const Packet& packet) {
+Result<void> apply_header(DecoderState& state, const Packet& packet) {
     auto header = read_sequence_header(packet.payload);
     if (!header) return tl::unexpected(header.error());
     if (auto ok = check_limits(*header, state.options); !ok) return tl::unexpected(ok.error());
@@ -150,15 +156,15 @@ Result<void> take_header(DecoderState& state, const Packet& packet) {
     state.highest_frame.reset();
     state.reference.reset();
     state.bones = {};
-    state.tracked = {};
-    state.alone.reset();
+    state.nodes = {};
+    state.unreferred.reset();
     state.info = std::move(info);
     state.header = std::move(*header);
     state.header_payload = std::move(payload);
     return {};
 }
 
-Result<void> take_codebook(DecoderState& state, const Packet& packet) {
+Result<void> apply_codebook(DecoderState& state, const Packet& packet) {
     auto codebook = read_codebook_payload(packet.payload);
     if (!codebook) return tl::unexpected(codebook.error());
     if (!state.reference || state.reference->number != packet.reference) return {};
@@ -173,7 +179,7 @@ MeshCounts counts(const LatticeMesh& mesh) { return {mesh.positions.size(), mesh
 // How many frames of groups there may be at once while this packet is decoded: those of the group in force, of its own,
 // and the mean of two of them.
 std::size_t hidden_frames(const DecoderState& state, const Packet& packet) {
-    const std::size_t held = state.tracked.group.length;
+    const std::size_t held = state.nodes.group.length;
     if (packet.kind != PacketKind::tracked || state.header->version < grouped_version) return held;
     const auto place = read_group_place(packet.payload);
     return place && place->length > 1 ? held + place->length + 1 : held;
@@ -183,18 +189,18 @@ std::size_t hidden_frames(const DecoderState& state, const Packet& packet) {
 std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const FrameRules& rules, MeshCounts coded) {
     const auto held = state.reference ? counts(state.reference->mesh()) : MeshCounts{};
     std::uint64_t kept = state.reference ? memory_of_reference(held) : 0;
-    const bool nodes = state.reference && state.reference->tracked;
+    const bool nodes = state.reference && state.reference->by_nodes;
     // A patch adds to the mesh that it is put on.
     const bool adds = rules.renews && rules.refers_to != RefersTo::nothing;
     if (nodes || adds || rules.refers_to == RefersTo::reference_or_before) kept += memory_of_tracking(held);
     const MeshCounts renewed{coded.vertices + (adds ? held.vertices : 0),
                              coded.triangles + (adds ? held.triangles : 0)};
     if (rules.renews && state.header->node_spacing > 0) kept += memory_of_tracking(renewed);
-    if (state.alone) kept += memory_of_reference(counts(state.alone->mesh));
+    if (state.unreferred) kept += memory_of_reference(counts(state.unreferred->mesh));
     if (state.header->texture.layout == TextureLayout::charts) {
         kept += memory_of_charts(held);
         if (rules.renews) kept += memory_of_charts(renewed);
-        if (state.alone) kept += memory_of_charts(counts(state.alone->mesh));
+        if (state.unreferred) kept += memory_of_charts(counts(state.unreferred->mesh));
     }
     kept += hidden_frames(state, packet) * memory_of_tracked_frame(held);
     return kept;
@@ -203,8 +209,8 @@ std::uint64_t kept_memory(const DecoderState& state, const Packet& packet, const
 // The payload of a frame, once its header shows that this decoder may decode it.
 Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& packet, const FrameRules& rules) {
     if (!state.header) return fail(ErrorKind::corrupt_stream, "a frame came before any sequence header");
-    // A T-frame's own has no header: its counts are its reference's.
-    const bool is_run = rules.type == FrameType::tracked && state.header->version >= tracked_run_version;
+    // A run has no header: the frame's counts are those of its reference.
+    const bool is_run = rules.is_run && state.header->version >= tracked_run_version;
     auto payload = is_run ? Result<FramePayloadView>() : read_frame_payload(packet.payload);
     if (!payload) return payload;
     const auto& header = payload->header;
@@ -224,35 +230,13 @@ Result<FramePayloadView> read_frame(const DecoderState& state, const Packet& pac
     return payload;
 }
 
-// What the packet itself says.
-FrameInfo describe(const Packet& packet, FrameType type) {
-    FrameInfo out;
-    out.type = type;
-    out.frame = packet.frame;
-    out.reference = packet.reference;
-    out.timestamp_us = packet.timestamp_us;
-    out.bytes.overhead = packet.payload.size() + packet_overhead;
-    return out;
-}
-
-FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload) {
-    auto out = describe(packet, type);
-    out.source_vertices = payload.header.source_vertices;
-    out.source_triangles = payload.header.source_triangles;
-    out.vertices = payload.header.vertices;
-    out.triangles = payload.header.triangles;
-    LayerBytes layers;
-    for (const auto& [layer, name] : frame_layers) layers[layer] = payload.of(layer).size();
-    out.bytes = with_overhead(layers, packet);
-    return out;
-}
-
-FrameInfo describe(const Packet& packet, const DecoderState& state) {
-    auto out = describe(packet, FrameType::tracked);
-    const auto& captured = state.tracked.newest->state.head.captured;
+// A run, which was decoded.
+FrameInfo describe(const Packet& packet, FrameType type, const DecoderState& state) {
+    auto out = internal::describe(packet, type);
+    const auto& captured = state.nodes.newest->state.head.captured;
     out.source_vertices = captured.vertices;
     out.source_triangles = captured.triangles;
-    out.bytes = with_overhead(state.tracked.shares, packet);
+    out.bytes = with_overhead(state.nodes.shares, packet);
     if (state.header->version >= grouped_version) {
         const auto place = *read_group_place(packet.payload);
         out.group = static_cast<std::uint8_t>(place.length);
@@ -274,39 +258,37 @@ FrameView lend(const ShownFrame& shown, const FrameInfo& info) {
 }
 
 // Frees the arrays that only the frame on loan needs, so that there are never two sets of them.
-void take_back(ShownFrame& shown) {
+void free_lent(ShownFrame& shown) {
     shown.topology = 0;
     shown.own = {};
 }
 
-Result<std::optional<FrameView>> take(DecoderState& state, const Packet& packet) {
-    using Taken = std::optional<FrameView>;
-    take_back(state.shown);
+Result<std::optional<FrameView>> decode_packet(DecoderState& state, const Packet& packet) {
+    using Decoded = std::optional<FrameView>;
+    free_lent(state.shown);
     if (auto ok = check_limits(packet, state.options); !ok) return tl::unexpected(ok.error());
     if (const auto type = frame_type(packet.kind)) {
         const auto& rules = rules_of(*type);
         if (state.header) state.highest_frame = std::max(state.highest_frame.value_or(0), packet.frame);
         const auto payload = read_frame(state, packet, rules);
         if (!payload) return tl::unexpected(payload.error());
-        if (auto ok = rules.decode(state, packet, *payload); !ok) return tl::unexpected(ok.error());
-        if (!stands_alone(*type)) state.alone.reset();
-        auto info = *type == FrameType::tracked ? describe(packet, state) : describe(packet, *type, *payload);
+        if (auto ok = frame_decoders[static_cast<std::size_t>(*type)](state, packet, *payload); !ok)
+            return tl::unexpected(ok.error());
+        if (!stands_alone(*type)) state.unreferred.reset();
+        auto info = rules.is_run ? describe(packet, *type, state) : internal::describe(packet, *type, *payload);
         info.sequence = state.sequences - 1;
-        return Taken{lend(state.shown, info)};
+        return Decoded{lend(state.shown, info)};
     }
-    Result<void> taken;
-    if (packet.kind == PacketKind::sequence) taken = take_header(state, packet);
-    if (packet.kind == PacketKind::codebook) taken = take_codebook(state, packet);
-    if (!taken) return tl::unexpected(taken.error());
-    return Taken{};  // skip what this version does not know
+    Result<void> applied;
+    if (packet.kind == PacketKind::sequence) applied = apply_header(state, packet);
+    if (packet.kind == PacketKind::codebook) applied = apply_codebook(state, packet);
+    if (!applied) return tl::unexpected(applied.error());
+    return Decoded{};  // skip what this version does not know
 }
 
-tl::unexpected<Error> out_of_memory(const Packet& packet) {
-    try {
-        return fail(ErrorKind::limit, "out of memory at frame " + std::to_string(packet.frame));
-    } catch (const std::bad_alloc&) {
-        return fail(ErrorKind::limit, "out of memory");  // this message is short enough to need no memory
-    }
+tl::unexpected<Error> out_of_memory_at(const Packet& packet) {
+    return within_memory(
+        [&] { return fail(ErrorKind::limit, "out of memory at frame " + std::to_string(packet.frame)); });
 }
 
 }  // namespace
@@ -325,64 +307,46 @@ Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 Decoder::~Decoder() = default;
 
 Result<std::optional<FrameView>> Decoder::decode(const Packet& packet) {
-    try {
-        return take(*state_, packet);
-    } catch (const std::bad_alloc&) {
-        return out_of_memory(packet);
-    } catch (const std::length_error&) {
-        return out_of_memory(packet);
-    }
+    return within_memory([&] { return decode_packet(*state_, packet); }, [&] { return out_of_memory_at(packet); });
 }
 
 Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
-    try {
-        const auto frame = take(*state_, packet);
+    const auto copied = [&]() -> Result<std::optional<DecodedFrame>> {
+        const auto frame = decode_packet(*state_, packet);
         if (!frame) return tl::unexpected(frame.error());
         return *frame ? std::optional(copy_of(**frame)) : std::nullopt;
-    } catch (const std::bad_alloc&) {
-        return out_of_memory(packet);
-    } catch (const std::length_error&) {
-        return out_of_memory(packet);
-    }
+    };
+    return within_memory(copied, [&] { return out_of_memory_at(packet); });
 }
 
-std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) try {
-    auto& state = *state_;
-    take_back(state.shown);
-    if (!show_intra_alone(state) && !show_hidden(state, frame) && !show_last_tracked(state) &&
-        !show_moved_by_bones(state))
-        return std::nullopt;
-    FrameInfo info;
-    info.sequence = state.sequences - 1;
-    info.type = FrameType::predicted;
-    info.frame = frame;
-    info.reference = state.alone ? state.alone->frame : state.reference->number;
-    info.timestamp_us = timestamp_us;
-    auto out = lend(state.shown, info);
-    out.concealed = true;
-    return out;
-} catch (const std::bad_alloc&) {
-    return std::nullopt;
-} catch (const std::length_error&) {
-    return std::nullopt;
+std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) {
+    const auto shown = [&]() -> std::optional<FrameView> {
+        auto& state = *state_;
+        free_lent(state.shown);
+        if (!show_unreferred_intra(state) && !show_hidden(state, frame) && !show_last_tracked(state) &&
+            !show_moved_by_bones(state))
+            return std::nullopt;
+        FrameInfo info;
+        info.sequence = state.sequences - 1;
+        info.type = FrameType::predicted;
+        info.frame = frame;
+        info.reference = state.unreferred ? state.unreferred->frame : state.reference->number;
+        info.timestamp_us = timestamp_us;
+        auto out = lend(state.shown, info);
+        out.concealed = true;
+        return out;
+    };
+    return within_memory(shown, [] { return std::nullopt; });
 }
 
-std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) try {
-    const auto lent = stand_in(frame, timestamp_us);
-    return lent ? std::optional(copy_of(*lent)) : std::nullopt;
-} catch (const std::bad_alloc&) {
-    return std::nullopt;
+std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) {
+    const auto copied = [&]() -> std::optional<DecodedFrame> {
+        const auto lent = stand_in(frame, timestamp_us);
+        return lent ? std::optional(copy_of(*lent)) : std::nullopt;
+    };
+    return within_memory(copied, [] { return std::nullopt; });
 }
 
 const std::optional<SequenceInfo>& Decoder::sequence() const { return state_->info; }
-
-Result<FrameInfo> inspect(const Packet& packet) {
-    const auto type = frame_type(packet.kind);
-    if (!type) return fail(ErrorKind::bad_input, "the packet is not a frame");
-    if (*type == FrameType::tracked) return describe(packet, *type);
-    const auto payload = read_frame_payload(packet.payload);
-    if (!payload) return tl::unexpected(payload.error());
-    return describe(packet, *type, *payload);
-}
 
 }  // namespace htvm

@@ -74,7 +74,7 @@ struct DecodedNodes {
 };
 
 // An I-frame that nothing refers to: kept only to be shown again where the frame behind it is missing.
-struct IntraAlone {
+struct UnreferredIntra {
     std::uint32_t frame = 0, topology = 0;
     LatticeMesh mesh;
     TexturedSurface textured;
@@ -94,8 +94,8 @@ struct DecoderState {
     std::uint32_t reference_topology = 0;
     std::uint32_t topologies = 0;  // how many numbers were given out
     DecodedBones bones;
-    DecodedNodes tracked;
-    std::optional<IntraAlone> alone;  // where that is the newest frame
+    DecodedNodes nodes;
+    std::optional<UnreferredIntra> unreferred;  // where that is the newest frame
     ShownFrame shown;
 };
 
@@ -122,7 +122,7 @@ Pose to_pose(const CodedPose& pose, const Lattice& lattice);
 Rotation product(const Rotation& a, const Rotation& b);
 
 // Stand-ins for a missing frame, shown as if decoded. False if there is nothing to derive one from.
-bool show_intra_alone(DecoderState& state);
+bool show_unreferred_intra(DecoderState& state);
 bool show_hidden(DecoderState& state, std::uint32_t frame);  // the frame itself: an earlier packet brought it
 bool show_last_tracked(DecoderState& state);
 bool show_moved_by_bones(DecoderState& state);

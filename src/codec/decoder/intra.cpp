@@ -1,5 +1,5 @@
 // Decodes I-frames: complete meshes that later frames refer to unless the packet tells otherwise.
-#include "codec/decoder/decoder_state.h"
+#include "codec/decoder/frame_decoders.h"
 #include "codec/format/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
 
@@ -13,7 +13,7 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     // What is derived for T-frames takes much memory, so it is freed before the next I-frame is decoded; without this,
     // a stream of many I-frames would need half as much memory again as a stream with one. It can be rebuilt from the
     // mesh: if this frame turns out to be bad, the next T-frame does so.
-    if (state.reference && referred) state.reference->tracked.reset(), state.reference->ahead.reset();
+    if (state.reference && referred) state.reference->by_nodes.reset(), state.reference->ahead.reset();
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(payload, external ? &*external : nullptr, state.threads);
     if (!mesh) return tl::unexpected(mesh.error());
@@ -24,9 +24,9 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     auto shown = to_pose(*pose, header.lattice);
     const auto topology = new_topology(state);
     if (!referred) {
-        IntraAlone alone{packet.frame, topology, std::move(*mesh), std::move(*textured), std::move(shown)};
-        show(state, view_of(alone.mesh, &alone.textured), topology, alone.pose);
-        state.alone = std::move(alone);
+        UnreferredIntra unreferred{packet.frame, topology, std::move(*mesh), std::move(*textured), std::move(shown)};
+        show(state, view_of(unreferred.mesh, &unreferred.textured), topology, unreferred.pose);
+        state.unreferred = std::move(unreferred);
         return {};
     }
     // What depends on bones or nodes is built when a frame asks for it, so that no frame has to do the work of two. Of
@@ -44,14 +44,15 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     state.reference = std::move(*reference);
     state.reference_topology = topology;
     state.bones = {};
-    state.tracked = {};
-    state.alone.reset();
+    state.nodes = {};
+    state.unreferred.reset();
     return {};
 }
 
-bool show_intra_alone(DecoderState& state) {
-    if (!state.alone) return false;
-    show(state, view_of(state.alone->mesh, &state.alone->textured), state.alone->topology, state.alone->pose);
+bool show_unreferred_intra(DecoderState& state) {
+    if (!state.unreferred) return false;
+    show(state, view_of(state.unreferred->mesh, &state.unreferred->textured), state.unreferred->topology,
+         state.unreferred->pose);
     return true;
 }
 

@@ -1,5 +1,5 @@
 // Decodes TP-frames: a T-frame of which a part is replaced. The patched mesh is the reference of what follows.
-#include "codec/decoder/decoder_state.h"
+#include "codec/decoder/frame_decoders.h"
 #include "codec/format/frame_kinds.h"
 #include "codec/tracked/surface_patch.h"
 
@@ -13,12 +13,12 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
         return fail(ErrorKind::corrupt_stream, "a patched frame that nothing may refer to");
     auto pose = decode_pose(payload.of(Layer::pose), header.skeleton.joint_names.size(), header.skeleton.bones.size());
     if (!pose) return tl::unexpected(pose.error());
-    const bool derives_for_itself = !state.reference->tracked;
+    const bool derives_for_itself = !state.reference->by_nodes;
     if (auto ok = derive_nodes(*state.reference, header, state.threads); !ok) return tl::unexpected(ok.error());
-    const auto& reference = *state.reference->tracked;
+    const auto& reference = *state.reference->by_nodes;
     if (!reference.mesh.texcoords.empty())
         return fail(ErrorKind::corrupt_stream, "a patched frame whose reference has texture coordinates");
-    auto& history = state.tracked;
+    auto& history = state.nodes;
     if (history.newest == &history.next)
         history.newest = history.frame ? &history.last : nullptr;  // it is written over
     auto& tracked = history.next;
@@ -56,7 +56,7 @@ Result<void> decode_patched(DecoderState& state, const Packet& packet, const Fra
     state.reference = std::move(*renewed);
     state.reference_topology = topology;
     state.bones = {};
-    state.tracked = {};
+    state.nodes = {};
     return {};
 }
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-#include "codec/decoder/decoder_state.h"
+#include "codec/decoder/frame_decoders.h"
 #include "codec/format/frame_kinds.h"
 
 namespace htvm::internal {
@@ -12,7 +12,7 @@ namespace {
 // The I-frame's joints, each moved like the node nearest to it.
 Pose tracked_pose(const DecoderState& state, std::span<const QuantisedTransform> transforms) {
     const auto& reference = state.reference->skinned;
-    const auto& pivots = state.reference->tracked->graph.pivots;
+    const auto& pivots = state.reference->by_nodes->graph.pivots;
     const auto& bones = state.header->skeleton.bones;
     std::vector<std::size_t> node_of_joint;
     Pose pose;
@@ -44,7 +44,7 @@ void show_tracked(DecoderState& state, const DecodedTrackedFrame& frame, Pose po
 
 // Shows a frame that is decoded, and remembers it to be shown again. Throws only std::bad_alloc.
 void show_newest(DecoderState& state, const DecodedTrackedFrame& frame) {
-    auto& history = state.tracked;
+    auto& history = state.nodes;
     auto pose = tracked_pose(state, frame.state.transforms);
     show_tracked(state, frame, pose);
     history.pose = std::move(pose);
@@ -53,7 +53,7 @@ void show_newest(DecoderState& state, const DecodedTrackedFrame& frame) {
 
 // Whether the packet refers to the last T-frame. An error if it does not refer to the reference either.
 Result<bool> refers_to_last(const DecoderState& state, const Packet& packet) {
-    const auto& last = state.tracked.frame;
+    const auto& last = state.nodes.frame;
     if (last && *last == packet.reference) return true;
     if (auto ok = check_reference(state, packet); !ok) return tl::unexpected(ok.error());
     return false;
@@ -62,13 +62,13 @@ Result<bool> refers_to_last(const DecoderState& state, const Packet& packet) {
 // layers: of the payload, in streams before tracked_run_version; else run: all of it.
 Result<void> decode_single(DecoderState& state, const Packet& packet, const FramePayloadView& layers,
                            std::span<const std::uint8_t> run) {
-    auto& history = state.tracked;
+    auto& history = state.nodes;
     const auto of_last = refers_to_last(state, packet);
     if (!of_last) return tl::unexpected(of_last.error());
     if (auto ok = derive_nodes(*state.reference, *state.header, state.threads); !ok) return tl::unexpected(ok.error());
     if (history.newest == &history.next)
         history.newest = history.frame ? &history.last : nullptr;  // it is written over
-    const auto& reference = *state.reference->tracked;
+    const auto& reference = *state.reference->by_nodes;
     const auto* before = *of_last ? &history.last.state : nullptr;
     if (auto ok = state.header->version >= tracked_run_version
                       ? decode_tracked_frame(run, reference, before, state.threads, history.next)
@@ -90,7 +90,7 @@ Result<void> decode_single(DecoderState& state, const Packet& packet, const Fram
 // The frames that a packet brings. known: those of the group that were there before, by number, 0 for what is before
 // it; null where that is the reference.
 template <class Known>
-Result<std::vector<DecodedTrackedFrame>> decode_brought(const TrackedReference& reference, const GroupPayload& payload,
+Result<std::vector<DecodedTrackedFrame>> decode_brought(const NodeReference& reference, const GroupPayload& payload,
                                                         const Known& known, Threads threads) {
     const auto brought = brought_by(payload.place.frame, payload.place.length);
     std::vector<DecodedTrackedFrame> out(brought.size());
@@ -135,14 +135,14 @@ void keep_brought(DecodedNodes& nodes, const GroupPlace& place, std::vector<Deco
 }
 
 Result<void> begin_group(DecoderState& state, const Packet& packet, const GroupPayload& payload) {
-    auto& history = state.tracked;
+    auto& history = state.nodes;
     const auto of_last = refers_to_last(state, packet);
     if (!of_last) return tl::unexpected(of_last.error());
     if (!is_referred(packet, rules_of(FrameType::tracked)))
         return fail(ErrorKind::corrupt_stream, "a group of tracked frames that nothing may refer to");
     if (auto ok = derive_nodes(*state.reference, *state.header, state.threads); !ok) return tl::unexpected(ok.error());
     auto brought = decode_brought(
-        *state.reference->tracked, payload, [&](std::size_t) { return *of_last ? &history.last : nullptr; },
+        *state.reference->by_nodes, payload, [&](std::size_t) { return *of_last ? &history.last : nullptr; },
         state.threads);
     if (!brought) return tl::unexpected(brought.error());
     DecodedGroup group;
@@ -160,7 +160,7 @@ Result<void> begin_group(DecoderState& state, const Packet& packet, const GroupP
 }
 
 Result<void> continue_group(DecoderState& state, const Packet& packet, const GroupPayload& payload) {
-    auto& history = state.tracked;
+    auto& history = state.nodes;
     const auto& group = history.group;
     const auto frame = payload.place.frame, length = payload.place.length;
     const auto needed = needed_by(frame, length);
@@ -171,7 +171,7 @@ Result<void> continue_group(DecoderState& state, const Packet& packet, const Gro
                                                    ", one of a group, refers to frame " +
                                                    std::to_string(packet.reference) + ", which is not there");
     auto brought = decode_brought(
-        *state.reference->tracked, payload,
+        *state.reference->by_nodes, payload,
         [&](std::size_t known) -> const DecodedTrackedFrame* {
             if (known > 0) return &frame_of_group(history, known);
             return group.of_reference ? nullptr : &group.earlier;
@@ -197,18 +197,18 @@ Result<void> decode_tracked(DecoderState& state, const Packet& packet, const Fra
 }
 
 bool show_last_tracked(DecoderState& state) {
-    const auto& history = state.tracked;
+    const auto& history = state.nodes;
     if (!history.newest) return false;
     show_tracked(state, *history.newest, history.pose);
     return true;
 }
 
 bool show_hidden(DecoderState& state, std::uint32_t frame) {
-    const auto& group = state.tracked.group;
+    const auto& group = state.nodes.group;
     if (frame < group.first || frame - group.first >= group.length) return false;
     const std::size_t in_group = frame - group.first + 1;
     if (in_group < group.length && !group.is_there[in_group]) return false;
-    show_newest(state, frame_of_group(state.tracked, in_group));
+    show_newest(state, frame_of_group(state.nodes, in_group));
     return true;
 }
 

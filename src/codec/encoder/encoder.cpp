@@ -1,26 +1,27 @@
-// The encoder at a glance. A captured mesh and its pose are put on the lattice. The frame's work derives from them, the
-// configuration and the sequence so far. The choice codes the frame in one or several ways and returns the candidate to
-// send. The sequence advances by it, and its packets are numbered and queued. Where T-frames are coded in groups, those
-// chosen are held until their group is whole, which then is coded anew.
+// The encoder at a glance: what happens to a mesh that is pushed. It is put on the lattice, with its pose. The strategy
+// of the options' profile, tracked or by bones, finds what can be found of it before it is coded. Control has the
+// strategy code it, at the quality that is asked for or that a rate or an error leaves, and beside that other threads
+// go on with frames that wait. The sequence advances by what was chosen; the strategy hands out frames whose packets
+// are ready, and these are queued.
 #include "htvm/encoder.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <deque>
 #include <iterator>
-#include <new>
-#include <stdexcept>
 #include <utility>
+#include <variant>
 
-#include "codec/encoder/frame_choice.h"
-#include "codec/encoder/frame_work.h"
-#include "codec/encoder/frames_in_flight.h"
+#include "codec/encoder/bones/bones_strategy.h"
+#include "codec/encoder/configuration.h"
+#include "codec/encoder/control/quality_control.h"
 #include "codec/encoder/options_check.h"
 #include "codec/encoder/pose_tracker.h"
-#include "codec/encoder/tracked/group_coder.h"
+#include "codec/encoder/tracked/tracked_strategy.h"
 #include "codec/format/frame_kinds.h"
 #include "codec/format/sequence.h"
-#include "htvm/decoder.hpp"
+#include "core/memory_guard.h"
+#include "core/parallel.h"
 
 namespace htvm {
 
@@ -36,10 +37,10 @@ struct Output {
     std::uint32_t header_sent = 0;  // number of the frame with which the sequence header was last sent
 };
 
-// A mesh as the decoder shows it.
-struct ShownMesh {
-    LatticeMesh mesh;
-    std::vector<std::uint32_t> repeated;  // at the seams of charts: which vertices the last ones are
+// About the frames whose packets a call queued.
+struct Queued {
+    std::vector<EncodedFrame> coded;
+    std::vector<ShownMesh> decoded;
 };
 
 }  // namespace
@@ -50,287 +51,51 @@ struct Encoder::State {
     bool configured = false;  // by Encoder::begin(), or a frame that waits
     bool begun = false, finished = false;
     PoseTracker poses;
-    Sequence sequence;
+    std::variant<TrackedStrategy, BonesStrategy> strategy;
     QualityControl control;
     int effort = usual_effort;         // for the next frame
     std::function<bool()> may_repair;  // Encoder::set_repair()
     Output output;
     std::optional<std::int64_t> last_timestamp;
-    std::vector<PushedFrame> waiting;   // the last ones, in their order, with EncoderOptions::latency_frames
-    std::vector<HeldFrame> held;        // T-frames of the group that is not whole yet
-    std::optional<GroupAnchor> anchor;  // what the next group may refer to; none: the reference alone
-    // Of the frames whose packets the last call queued; if it queued none, of the last one before.
-    std::vector<EncodedFrame> coded;
-    std::vector<ShownMesh> decoded;
-    bool coded_none = true;
+    Queued queued;  // by the last call; if it queued none, by the last one before
+    bool queued_none = true;
     std::vector<StageTime> stages;
-    std::vector<std::uint32_t> distance_order_counts;
 };
 
 namespace {
 
 using State = Encoder::State;
 
-// The length on this subject that corresponds to a millimetre on an adult, in millimetres. Reaches, spacings and
-// thresholds are known for adults; those for a doll or a giant follow from its size. The extent of an adult depends on
-// the pose, so a subject from 1.1 to 2.5 m counts as an adult.
-double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
-    constexpr double adult = 1750, shortest = 1100, longest = 2500;
-    double size = options.subject_size;
-    if (!(size > 0)) {
-        for (std::size_t axis = 0; axis < 3 && !mesh.positions.empty(); ++axis) {
-            const auto [low, high] =
-                std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
-                                    [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
-            size = std::max(size, static_cast<double>((*high)[axis]) - (*low)[axis]);
-        }
-    }
-    return size <= 0 || (size >= shortest && size <= longest) ? 1 : size / adult;
+std::size_t waiting_frames(const State& state) {
+    return std::visit([](const auto& strategy) { return strategy.waiting.size(); }, state.strategy);
 }
 
-// 1/16 mm on an adult and on whoever is larger, or finer if needed for a step of at least eight units. As much finer on
-// a smaller subject as it is smaller, but not below a 64th of a step: the first frame may show little of a subject, and
-// a fine lattice does not reach far.
-int lattice_bits(const EncoderOptions& options, double adult) {
-    if (options.lattice_bits > 0) return options.lattice_bits;
-    const bool controlled = options.rate.bits_per_second > 0 || options.rate.target_error > 0;
-    const double finest = controlled ? quality_steps(100).geometry_step : options.geometry_step;
-    const auto bits_for = [&](double units) { return static_cast<int>(std::ceil(std::log2(units / finest))); };
-    const int of_size = 4 - static_cast<int>(std::lround(std::log2(adult)));
-    return std::clamp(std::max(bits_for(8), std::min(of_size, bits_for(64))), 4, 16);
+std::size_t frames_of_group(const State& state) {
+    const auto* tracked = std::get_if<TrackedStrategy>(&state.strategy);
+    return tracked ? tracked->held.size() : 0;
 }
 
-// Short enough to need no memory itself.
-tl::unexpected<Error> out_of_memory() { return fail(ErrorKind::limit, "out of memory"); }
-
-// What the work gives, or that there is not enough memory for it.
-template <class Work>
-Result<void> guarded(const Work& work) {
-    try {
-        return work();
-    } catch (const std::bad_alloc&) {
-        return out_of_memory();
-    } catch (const std::length_error&) {
-        return out_of_memory();
-    }
+std::uint32_t next_frame(const State& state) {
+    return std::visit([](const auto& strategy) { return strategy.sequence.next_frame; }, state.strategy);
 }
 
-// Completes the configuration from the first frame: the origin of the lattice, the subject's size and, where not given,
-// the skeleton and the radii.
+// ---- 1. Onto the lattice --------------------------------------------------------------------------------------------
+
 Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
-    auto& configuration = state.configuration;
-    const auto& options = configuration.options;
-    auto& header = configuration.header;
-    const auto origin = lattice_origin(mesh);
-    if (!origin) return tl::unexpected(origin.error());
-    header.lattice.origin = *origin;
-    const double adult = adult_millimetre(options, mesh);
-    header.lattice.bits = lattice_bits(options, adult);
-    auto tracker = make_pose_tracker(options.skeleton, mesh, pose);
-    if (!tracker) return tl::unexpected(tracker.error());
-    state.poses = std::move(*tracker);
-    header.skeleton = state.poses.skeleton;
-    header.skeleton_tracked = state.poses.tracked;
-    auto radii = options.radii;
-    if (radii.empty()) {
-        auto calibrated = calibrate(mesh, header.skeleton, state.poses.last);
-        if (!calibrated) return tl::unexpected(calibrated.error());
-        radii = std::move(*calibrated);
-    }
-    const double units = configuration.units = 1.0 / header.lattice.step();
-    configuration.adult_millimetre = adult * units;
-    const auto on_lattice = [](double length) {
-        return static_cast<std::int32_t>(std::lround(std::min(length, 1.0 * lattice_limit)));
-    };
-    header.radii.clear();
-    for (const auto r : radii) header.radii.push_back(on_lattice(r * units));
-    header.fps_numerator = options.fps_numerator;
-    header.fps_denominator = options.fps_denominator;
-    header.unit_micrometres = options.unit_micrometres;
-    header.session = options.session;
-    header.up = options.up;
-    header.metadata = options.metadata;
-    if (options.floor) {
-        const auto origin_up = static_cast<double>(header.lattice.origin[axis_of(options.up)]);
-        const double floor = std::round((*options.floor - origin_up) * units);
-        if (!(std::abs(floor) <= lattice_limit))
-            return fail(ErrorKind::bad_input, "the floor is too far from the first frame's mesh");
-        header.floor = static_cast<std::int32_t>(floor);
-    }
-    if (options.tracked.group > 1) header.version = grouped_version;
-    header.texture = options.texture;
-    if (options.texture.layout != TextureLayout::none) header.version = textured_version;
-    header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
-    header.weight_width = on_lattice(options.topology.weight_width * units);
-    if (configuration.tracked()) {
-        constexpr double spacing_on_adults = 80;  // mm
-        const double spacing =
-            options.tracked.node_spacing > 0 ? options.tracked.node_spacing : spacing_on_adults * adult;
-        header.node_spacing = std::max(on_lattice(spacing * units), 1);
-    }
+    auto poses = complete(state.configuration, mesh, pose);
+    if (!poses) return tl::unexpected(poses.error());
+    state.poses = std::move(*poses);
     return {};
 }
 
-// The sequence header is sent before the first frame and repeated before some I-frames, so that a receiver that joins
-// later, or lost it, can begin there.
-bool brings_header(const State& state, const Candidate& candidate) {
-    constexpr std::uint32_t repeated_after = 10;  // frames
-    return !state.begun ||
-           (stands_alone(candidate.type) && state.sequence.next_frame - state.output.header_sent >= repeated_after);
-}
-
-double bits_of(const State& state, const Candidate& candidate) {
-    const std::size_t header = brings_header(state, candidate)
-                                   ? write_sequence_header(state.configuration.header).size() + packet_overhead
-                                   : 0;
-    return 8.0 * static_cast<double>(candidate.bytes() + header);
-}
-
-void send(Output& output, Packet packet) {
-    output.stream_bytes += packet.payload.size() + packet_overhead;
-    output.packets.push_back(std::move(packet));
-}
-
-void send_header(State& state, std::int64_t timestamp_us) {
-    auto header = sequence_packet(state.configuration.header);
-    header.frame = state.output.header_sent = state.sequence.next_frame;
-    header.timestamp_us = timestamp_us;
-    send(state.output, std::move(header));
-}
-
-std::uint8_t flags_of(const Candidate& candidate) {
-    using namespace packet_flag;
-    return static_cast<std::uint8_t>((candidate.referred ? referred : droppable) | (candidate.access ? access : 0) |
-                                     (candidate.renewal ? settled : 0));
-}
-
-// What a call codes, until nothing can fail any more.
-struct Outcome {
-    std::vector<EncodedFrame> coded;
-    std::vector<ShownMesh> decoded;
-    std::optional<GroupAnchor> anchor;  // none: as it was
-};
-
-// A candidate's mesh as the decoder shows it. reference: that the candidate refers to, or null.
-ShownMesh shown(Candidate& candidate, const Reference* reference) {
-    const bool refers = candidate.type == FrameType::tracked || candidate.type == FrameType::predicted;
-    const auto& textured = refers && reference ? reference->textured : candidate.textured;
-    if (textured.empty()) return {std::move(candidate.decoded), {}};
-    return {shown_mesh(candidate.decoded, textured), textured.copied};
-}
-
-// Numbers and queues a frame's packets, and counts their bytes by layer.
-void send_frame(State& state, Candidate& candidate, const Reference* reference, std::int64_t timestamp_us,
-                const FrameCost& cost, Outcome& outcome) {
-    auto decoded = shown(candidate, reference);
-    FrameInfo info;
-    LayerBytes codebooks;
-    for (auto& packet : candidate.packets) {
-        packet.frame = state.sequence.next_frame;
-        packet.reference = candidate.reference;
-        packet.timestamp_us = timestamp_us;
-        packet.flags |= packet_flag::told;
-        if (packet.kind == PacketKind::codebook) {
-            codebooks.overhead += packet_overhead;
-            codebooks[packet.payload[0] == codebook_for_geometry ? Layer::geometry : Layer::colour] +=
-                packet.payload.size();
-            continue;
-        }
-        packet.flags |= flags_of(candidate);
-        info = *inspect(packet);
-        if (info.type == FrameType::tracked) {
-            info.source_vertices = candidate.captured.vertices;
-            info.source_triangles = candidate.captured.triangles;
-            info.bytes = with_overhead(candidate.shares, packet);
-        }
-        info.vertices = static_cast<std::uint32_t>(decoded.mesh.positions.size());
-        info.triangles = static_cast<std::uint32_t>(decoded.mesh.triangles.size());
-        info.bytes += codebooks;
-        // Where nothing refers to it while others are referred to, it is no place to start from.
-        if (stands_alone(candidate.type) && (candidate.referred || state.configuration.intra_alone()))
-            state.output.index.push_back({packet.frame, packet.timestamp_us, state.output.stream_bytes});
-    }
-    for (auto& packet : candidate.packets) send(state.output, std::move(packet));
-    outcome.coded.push_back({info, cost});
-    outcome.decoded.push_back(std::move(decoded));
-}
-
-// Codes these frames as a group. Returns what the next one may refer to.
-Result<GroupAnchor> send_group(State& state, const GroupAnchor* before, std::span<const HeldFrame> held,
-                               Outcome& outcome) {
-    auto group = code_group(state.configuration, *state.sequence.reference, before, held, state.stages);
-    if (!group) return tl::unexpected(group.error());
-    for (std::size_t i = 0; i < held.size(); ++i) {
-        auto& frame = group->frames[i];
-        const auto& captured = held[i].work.mesh;
-        auto info = *inspect(frame.packet);
-        info.source_vertices = static_cast<std::uint32_t>(captured.positions.size());
-        info.source_triangles = static_cast<std::uint32_t>(captured.triangles.size());
-        const auto& textured = state.sequence.reference->decoded.textured;
-        ShownMesh decoded{shown_mesh(frame.decoded, textured), textured.copied};
-        info.vertices = static_cast<std::uint32_t>(decoded.mesh.positions.size());
-        info.triangles = static_cast<std::uint32_t>(decoded.mesh.triangles.size());
-        info.bytes = with_overhead(frame.shares, frame.packet);
-        info.group = static_cast<std::uint8_t>(held.size());
-        info.place = static_cast<std::uint8_t>(i + 1);
-        FrameCost cost;
-        cost.type = info.type;
-        cost.bits = 8.0 * static_cast<double>(info.bytes.total());
-        send(state.output, std::move(frame.packet));
-        outcome.coded.push_back({info, cost});
-        outcome.decoded.push_back(std::move(decoded));
-    }
-    return std::move(group->anchor);
-}
-
-// Codes the frames held, if there are any, as a group of what came before.
-Result<void> send_held(State& state, std::span<const HeldFrame> held, Outcome& outcome) {
-    if (held.empty()) return {};
-    auto anchor = send_group(state, state.anchor ? &*state.anchor : nullptr, held, outcome);
-    if (!anchor) return tl::unexpected(anchor.error());
-    outcome.anchor = std::move(*anchor);
-    return {};
-}
-
-// Nothing can fail here.
-void commit(State& state, Outcome outcome) {
-    if (outcome.anchor) state.anchor = std::move(outcome.anchor);
-    state.coded_none = outcome.coded.empty();
-    if (state.coded_none) return;
-    state.coded = std::move(outcome.coded);
-    state.decoded = std::move(outcome.decoded);
-}
-
-// Holds a T-frame, and codes its group once that has all its frames. Where the frame refers to the reference alone, for
-// decoding to start there, the group before ends, and it is one by itself.
-Result<void> hold(State& state, FrameWork& work, Candidate& chosen, std::int64_t timestamp_us) {
-    Outcome outcome;
-    auto& held = state.held;
-    const bool place_to_start = chosen.access && (state.anchor || !held.empty());
-    held.push_back({state.sequence.next_frame, timestamp_us, work.give_up(), chosen.steps, std::move(chosen.noise)});
-    const std::span<const HeldFrame> all = held;
-    const auto own = all.last(1);
-    if (place_to_start) {
-        if (auto sent = send_held(state, all.first(all.size() - 1), outcome); !sent) return sent;
-        auto anchor = send_group(state, nullptr, own, outcome);
-        if (!anchor) return tl::unexpected(anchor.error());
-        outcome.anchor = std::move(*anchor);
-    } else if (all.size() == static_cast<std::size_t>(state.configuration.options.tracked.group)) {
-        if (auto sent = send_held(state, all, outcome); !sent) return sent;
-    }
-    if (!outcome.coded.empty()) held.clear();
-    commit(state, std::move(outcome));
-    return {};
-}
-
-Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* pose) {
+Result<CapturedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* pose) {
     StageClock clock(state.stages);
     auto on_lattice = to_lattice(mesh, state.configuration.header.lattice);
     if (!on_lattice) return tl::unexpected(on_lattice.error());
     auto coded_pose = state.poses.next(mesh, pose, state.configuration.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");
-    PushedFrame out;
+    CapturedFrame out;
     if (state.configuration.options.texture.layout == TextureLayout::charts) {
         if (!mesh.texcoords.empty())
             return fail(ErrorKind::bad_input,
@@ -345,46 +110,104 @@ Result<PushedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* p
     return out;
 }
 
-Result<void> code_frame_of(State& state, PushedFrame frame) {
-    const auto timestamp_us = frame.timestamp_us;
-    FrameWork work(state.configuration, state.sequence, frame.effort, std::move(frame.mesh), std::move(frame.colours),
-                   std::move(frame.pose), state.stages);
-    work.take(std::move(frame.ahead));
-    work.may_repair = std::move(frame.may_repair);
-    const auto bits = [&](const Candidate& candidate) { return bits_of(state, candidate); };
-    auto chosen = choose_beside(work, frame.force_intra, enhanced_steps(state.configuration), state.waiting,
-                                [&] { return choose_frame(work, state.control, bits, frame.force_intra); });
+// ---- 2. Coded as the strategy chooses, at the quality that control finds --------------------------------------------
+
+// The sequence header is sent before the first frame and repeated before some I-frames, so that a receiver that joins
+// later, or lost it, can begin there.
+bool brings_header(const State& state, FrameType type) {
+    constexpr std::uint32_t repeated_after = 10;  // frames
+    return !state.begun || (stands_alone(type) && next_frame(state) - state.output.header_sent >= repeated_after);
+}
+
+HeaderBits header_bits(const State& state) {
+    const double bits =
+        8.0 * static_cast<double>(write_sequence_header(state.configuration.header).size() + packet_overhead);
+    const auto of = [&](FrameType type) { return brings_header(state, type) ? bits : 0; };
+    return {.if_alone = of(FrameType::intra), .otherwise = of(FrameType::predicted)};
+}
+
+// Beside it, other threads go on with the frames that wait.
+template <class Strategy, class Work>
+Result<typename Work::Frame> code_in_flight(State& state, Strategy& strategy, const Work& work,
+                                            typename Work::Progress& progress, const HeaderBits& header) {
+    auto& waiting = strategy.waiting;
+    if (waiting.empty()) return code_under_control(work, progress, state.control, header);
+    const auto assumed = assume(work, progress);
+    std::optional<Result<typename Work::Frame>> chosen;
+    std::vector<StageTime> ahead;
+    parallel_invoke(
+        state.configuration.threads, [&] { chosen = code_under_control(work, progress, state.control, header); },
+        [&] { work_ahead(work, progress, assumed, waiting, ahead); });
+    state.stages.insert(state.stages.end(), ahead.begin(), ahead.end());
+    keep_what_holds(progress, *chosen ? &**chosen : nullptr, waiting);
+    return std::move(*chosen);
+}
+
+// ---- 3. Queued ------------------------------------------------------------------------------------------------------
+
+void queue(Output& output, Packet packet) {
+    output.stream_bytes += packet.payload.size() + packet_overhead;
+    output.packets.push_back(std::move(packet));
+}
+
+// frames: in the order of the stream, the one that is coded last, if it is among them.
+void queue(State& state, std::vector<OutgoingFrame> frames, std::int64_t timestamp_us, Queued& queued) {
+    auto& output = state.output;
+    for (auto& frame : frames) {
+        if (brings_header(state, frame.info.type)) {
+            auto header = sequence_packet(state.configuration.header);
+            header.frame = output.header_sent = next_frame(state);
+            header.timestamp_us = timestamp_us;
+            queue(output, std::move(header));
+        }
+        if (frame.starts_decoding)
+            output.index.push_back({frame.info.frame, frame.info.timestamp_us, output.stream_bytes});
+        for (auto& packet : frame.packets) queue(output, std::move(packet));
+        queued.coded.push_back({frame.info, frame.cost});
+        queued.decoded.push_back(std::move(frame.shown));
+    }
+}
+
+// Nothing can fail here.
+void keep(State& state, Queued queued) {
+    state.queued_none = queued.coded.empty();
+    if (!state.queued_none) state.queued = std::move(queued);
+}
+
+// ---- A frame's way --------------------------------------------------------------------------------------------------
+
+template <class Strategy>
+Result<void> code_frame(State& state, Strategy& strategy, typename Strategy::Waiting frame) {
+    const auto timestamp_us = frame.captured.timestamp_us;
+    const auto header = header_bits(state);
+    typename Strategy::Work::Progress progress;
+    typename Strategy::Work work = begin_work(state.configuration, strategy, std::move(frame), progress, state.stages);
+    auto chosen = code_in_flight(state, strategy, work, progress, header);
     if (!chosen) return tl::unexpected(chosen.error());
-    const FrameCost cost{rate_type(*chosen), chosen->quality, bits_of(state, *chosen), chosen->renewed};
+    const auto& coded = coded_frame(*chosen);
+    const FrameCost cost{rate_type(coded), coded.quality, bits_of(coded, header), coded.renewed};
     StageClock derivation(state.stages);
-    auto sequence = advance(state.configuration, state.sequence, *chosen);
+    auto sequence = sequence_after(work, *chosen);
     if (!sequence) return tl::unexpected(sequence.error());
     derivation.done("reference");
-    if (chosen->type == FrameType::tracked && state.configuration.options.tracked.group > 1) {
-        if (auto done = hold(state, work, *chosen, timestamp_us); !done) return done;
-    } else {
-        Outcome outcome;
-        if (auto sent = send_held(state, state.held, outcome); !sent) return sent;
-        if (brings_header(state, *chosen)) send_header(state, timestamp_us);
-        const auto* reference = state.sequence.reference ? &state.sequence.reference->decoded : nullptr;
-        send_frame(state, *chosen, reference, timestamp_us, cost, outcome);
-        // Nothing can fail from here on.
-        state.held.clear();
-        commit(state, std::move(outcome));
-        if (sequence->reference != state.sequence.reference) state.anchor.reset();
-        state.distance_order_counts = std::move(chosen->distance_order_counts);
-    }
-    state.sequence = std::move(*sequence);
+    auto handout = hand_out(strategy, work, progress, std::move(*chosen), cost);
+    if (!handout) return tl::unexpected(handout.error());
+    Queued queued;
+    queue(state, std::move(handout->frames), timestamp_us, queued);
+    keep(state, std::move(queued));
+    commit(strategy, *handout, std::move(*sequence));
     state.begun = true;
     state.last_timestamp = std::max(timestamp_us, state.last_timestamp.value_or(timestamp_us));
     if (state.control.rate) state.control.rate->coded(cost);
     return {};
 }
 
-Result<void> code_first_waiting(State& state) {
-    auto frame = std::move(state.waiting.front());
-    state.waiting.erase(state.waiting.begin());
-    return code_frame_of(state, std::move(frame));
+// The first of the frames that wait.
+template <class Strategy>
+Result<void> code_first_waiting(State& state, Strategy& strategy) {
+    auto frame = std::move(strategy.waiting.front());
+    strategy.waiting.erase(strategy.waiting.begin());
+    return code_frame(state, strategy, std::move(frame));
 }
 
 Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
@@ -392,38 +215,56 @@ Result<void> push_frame(State& state, const Mesh& mesh, const Pose* pose, std::i
     if (!frame) return tl::unexpected(frame.error());
     frame->timestamp_us = timestamp_us;
     frame->force_intra = force_intra;
-    if (state.configuration.options.latency_frames == 0) return code_frame_of(state, std::move(*frame));
-    state.configured = true;
-    state.last_timestamp = timestamp_us;
-    state.waiting.push_back(std::move(*frame));
-    if (state.waiting.size() > static_cast<std::size_t>(state.configuration.options.latency_frames))
-        return code_first_waiting(state);
-    state.coded_none = true;
-    return {};
+    const auto latency = static_cast<std::size_t>(state.configuration.options.latency_frames);
+    const auto push_to = [&](auto& strategy) -> Result<void> {
+        if (latency == 0) return code_frame(state, strategy, {std::move(*frame)});
+        state.configured = true;
+        state.last_timestamp = timestamp_us;
+        strategy.waiting.push_back({std::move(*frame)});
+        if (strategy.waiting.size() > latency) return code_first_waiting(state, strategy);
+        state.queued_none = true;
+        return {};
+    };
+    return std::visit(push_to, state.strategy);
 }
 
 // Marks where a frame's packets begin in the queue. If the frame fails, packets queued since are removed, the sequence
 // stays as it was, and frames that wait are no longer behind it.
-struct Queued {
+struct Mark {
     std::size_t packets, index;
     std::uint64_t stream_bytes;
     std::uint32_t header_sent;
     std::size_t held;
 };
 
-Queued queued(const State& state) {
+Mark mark(const State& state) {
     const auto& output = state.output;
-    return {output.packets.size(), output.index.size(), output.stream_bytes, output.header_sent, state.held.size()};
+    return {output.packets.size(), output.index.size(), output.stream_bytes, output.header_sent,
+            frames_of_group(state)};
 }
 
-void take_back(State& state, const Queued& before) {
+void return_to(State& state, const Mark& before) {
     auto& output = state.output;
     output.packets.resize(before.packets);
     output.index.resize(before.index);
     output.stream_bytes = before.stream_bytes;
     output.header_sent = before.header_sent;
-    state.held.erase(state.held.begin() + static_cast<std::ptrdiff_t>(before.held), state.held.end());
-    for (auto& frame : state.waiting) frame.ahead = {};
+    if (auto* tracked = std::get_if<TrackedStrategy>(&state.strategy))
+        tracked->held.erase(tracked->held.begin() + static_cast<std::ptrdiff_t>(before.held), tracked->held.end());
+    std::visit(
+        [](auto& strategy) {
+            for (auto& frame : strategy.waiting) frame.ahead = {};
+        },
+        state.strategy);
+}
+
+// Does the work, or leaves the state as it was.
+template <class Work>
+Result<void> whole_or_not(State& state, const Work& work) {
+    const auto before = mark(state);
+    auto done = within_memory(work);
+    if (!done) return_to(state, before);
+    return done;
 }
 
 RateControlOptions rate_options(const EncoderOptions& options) {
@@ -452,21 +293,21 @@ QualitySteps quality_steps(double quality) {
     return {16 * std::exp2(-6 * q), 32 * std::exp2(-5 * q)};
 }
 
-Result<Encoder> Encoder::create(const EncoderOptions& options) try {
-    if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
-    auto state = std::make_unique<State>();
-    state->configuration.options = options;
-    state->configuration.options.tracked.group = frames_in_group(options);
-    state->effort = options.tracked.effort;
-    state->pool = ThreadPool(options.threads, options.runner);
-    state->configuration.threads = state->pool.threads();
-    if (options.rate.bits_per_second > 0) state->control.rate.emplace(rate_options(options), options.rate.first_pass);
-    if (options.rate.target_error > 0) state->control.error.emplace(options.rate.target_error);
-    return Encoder(std::move(state));
-} catch (const std::bad_alloc&) {
-    return out_of_memory();
-} catch (const std::length_error&) {
-    return out_of_memory();
+Result<Encoder> Encoder::create(const EncoderOptions& options) {
+    return within_memory([&]() -> Result<Encoder> {
+        if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
+        auto state = std::make_unique<State>();
+        state->configuration.options = options;
+        state->configuration.options.tracked.group = frames_in_group(options);
+        if (options.profile != Profile::tracked) state->strategy = BonesStrategy();
+        state->effort = options.tracked.effort;
+        state->pool = ThreadPool(options.threads, options.runner);
+        state->configuration.threads = state->pool.threads();
+        if (options.rate.bits_per_second > 0)
+            state->control.rate.emplace(rate_options(options), options.rate.first_pass);
+        if (options.rate.target_error > 0) state->control.error.emplace(options.rate.target_error);
+        return Encoder(std::move(state));
+    });
 }
 
 Encoder::Encoder(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -474,33 +315,28 @@ Encoder::Encoder(Encoder&&) noexcept = default;
 Encoder& Encoder::operator=(Encoder&&) noexcept = default;
 Encoder::~Encoder() = default;
 
-Result<void> Encoder::begin(const Mesh& first, const Pose* pose) try {
-    auto& state = *state_;
-    if (state.begun || !state.waiting.empty()) return fail(ErrorKind::bad_input, "the first frame was pushed already");
-    auto done = configure(state, first, pose);
-    state.configured = done.has_value();
-    return done;
-} catch (const std::bad_alloc&) {
-    return out_of_memory();
-} catch (const std::length_error&) {
-    return out_of_memory();
+Result<void> Encoder::begin(const Mesh& first, const Pose* pose) {
+    return within_memory([&]() -> Result<void> {
+        auto& state = *state_;
+        if (state.begun || waiting_frames(state) > 0)
+            return fail(ErrorKind::bad_input, "the first frame was pushed already");
+        auto done = configure(state, first, pose);
+        state.configured = done.has_value();
+        return done;
+    });
 }
 
 Result<void> Encoder::push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra) {
     auto& state = *state_;
     state.stages.clear();
-    const auto before = queued(state);
-    const auto code = [&]() -> Result<void> {
+    return whole_or_not(state, [&]() -> Result<void> {
         if (state.finished) return fail(ErrorKind::bad_input, "the sequence was finished; start a new encoder");
         if (state.last_timestamp && timestamp_us <= *state.last_timestamp)
             return fail(ErrorKind::bad_input, "timestamps must ascend");
         if (!state.begun && !state.configured)
             if (auto ok = configure(state, mesh, pose); !ok) return ok;
         return push_frame(state, mesh, pose, timestamp_us, force_intra);
-    };
-    auto done = guarded(code);
-    if (!done) take_back(state, before);
-    return done;
+    });
 }
 
 Result<void> Encoder::set_bitrate(double bits_per_second) {
@@ -534,49 +370,47 @@ Result<void> Encoder::set_repair(std::function<bool()> may_repair) {
 
 Result<void> Encoder::finish() {
     auto& state = *state_;
-    if (state.finished || (!state.begun && state.waiting.empty())) return {};
+    if (state.finished || (!state.begun && waiting_frames(state) == 0)) return {};
     state.stages.clear();
-    Outcome all;
-    const auto add = [&](std::vector<EncodedFrame>& coded, std::vector<ShownMesh>& decoded) {
-        std::ranges::move(coded, std::back_inserter(all.coded));
-        std::ranges::move(decoded, std::back_inserter(all.decoded));
+    Queued all;
+    const auto add = [&](Queued& queued) {
+        std::ranges::move(queued.coded, std::back_inserter(all.coded));
+        std::ranges::move(queued.decoded, std::back_inserter(all.decoded));
     };
     // One after the other, so that an error in one leaves those before it as they are.
     auto done = Result<void>();
-    const auto code = [&](const auto& work) {
-        const auto before = queued(state);
-        done = guarded(work);
-        if (!done) take_back(state, before);
-    };
-    while (done && !state.waiting.empty())
-        code([&]() -> Result<void> {
-            auto coded = code_first_waiting(state);
-            if (coded && !state.coded_none) add(state.coded, state.decoded);
+    while (done && waiting_frames(state) > 0)
+        done = whole_or_not(state, [&]() -> Result<void> {
+            auto coded =
+                std::visit([&](auto& strategy) { return code_first_waiting(state, strategy); }, state.strategy);
+            if (coded && !state.queued_none) add(state.queued);
             return coded;
         });
-    if (done)
-        code([&]() -> Result<void> {
-            Outcome rest;
-            if (auto sent = send_held(state, state.held, rest); !sent) return sent;
-            add(rest.coded, rest.decoded);
-            state.held.clear();
+    if (auto* tracked = std::get_if<TrackedStrategy>(&state.strategy); done && tracked)
+        done = whole_or_not(state, [&]() -> Result<void> {
+            auto rest = hand_out_held(*tracked, state.configuration, state.stages);
+            if (!rest) return tl::unexpected(rest.error());
+            Queued queued;
+            queue(state, std::move(rest->frames), 0, queued);
+            add(queued);
+            tracked->held.clear();
             return {};
         });
-    commit(state, std::move(all));
+    keep(state, std::move(all));
     if (!done) return done;
     if (!state.begun) return {};
     state.finished = true;
-    try {
+    // A stream may end without an index, where there is no memory for it.
+    static_cast<void>(within_memory([&]() -> Result<void> {
         Packet packet;
         packet.kind = PacketKind::index;
         packet.flags = packet_flag::told;
-        packet.frame = state.sequence.next_frame;
+        packet.frame = next_frame(state);
         packet.timestamp_us = *state.last_timestamp;
         packet.payload = write_sequence_index(state.output.index);
-        send(state.output, std::move(packet));
-    } catch (const std::bad_alloc&) {
-        // A stream may end without an index.
-    }
+        queue(state.output, std::move(packet));
+        return {};
+    }));
     return {};
 }
 
@@ -589,20 +423,22 @@ std::optional<Packet> Encoder::pull() {
 }
 
 std::span<const EncodedFrame> Encoder::coded_frames() const {
-    return state_->coded_none ? std::span<const EncodedFrame>() : state_->coded;
+    return state_->queued_none ? std::span<const EncodedFrame>() : state_->queued.coded;
 }
-std::size_t Encoder::held_frames() const { return state_->held.size() + state_->waiting.size(); }
+std::size_t Encoder::held_frames() const { return frames_of_group(*state_) + waiting_frames(*state_); }
 
 const FrameInfo& Encoder::last_frame() const {
     static const FrameInfo none;
-    return state_->coded.empty() ? none : state_->coded.back().info;
+    return state_->queued.coded.empty() ? none : state_->queued.coded.back().info;
 }
-FrameCost Encoder::last_cost() const { return state_->coded.empty() ? FrameCost() : state_->coded.back().cost; }
+FrameCost Encoder::last_cost() const {
+    return state_->queued.coded.empty() ? FrameCost() : state_->queued.coded.back().cost;
+}
 
 std::optional<SpaceBounds> Encoder::bounds() const {
     // Rounding to single precision keeps the order, so the corners can be found on the lattice.
     std::optional<std::vector<LatticePoint>> corners;
-    for (const auto& decoded : state_->decoded)
+    for (const auto& decoded : state_->queued.decoded)
         for (const auto& p : decoded.mesh.positions) {
             if (!corners) corners.emplace(2, p);
             auto &low = corners->front(), &high = corners->back();
@@ -616,20 +452,25 @@ std::optional<SpaceBounds> Encoder::bounds() const {
 }
 
 Mesh Encoder::reconstruction() const {
-    return state_->decoded.empty() ? Mesh() : reconstruction(state_->decoded.size() - 1);
+    return state_->queued.decoded.empty() ? Mesh() : reconstruction(state_->queued.decoded.size() - 1);
 }
 Mesh Encoder::reconstruction(std::size_t coded) const {
     const bool charts = state_->configuration.options.texture.layout == TextureLayout::charts;
-    return to_mesh(state_->decoded[coded].mesh, state_->configuration.header.lattice,
+    return to_mesh(state_->queued.decoded[coded].mesh, state_->configuration.header.lattice,
                    charts ? chart_texcoord_unit : captured_texcoord_unit);
 }
 std::span<const std::uint32_t> Encoder::repeated_vertices() const {
-    return state_->decoded.empty() ? std::span<const std::uint32_t>() : repeated_vertices(state_->decoded.size() - 1);
+    return state_->queued.decoded.empty() ? std::span<const std::uint32_t>()
+                                          : repeated_vertices(state_->queued.decoded.size() - 1);
 }
 std::span<const std::uint32_t> Encoder::repeated_vertices(std::size_t coded) const {
-    return state_->decoded[coded].repeated;
+    return state_->queued.decoded[coded].repeated;
 }
 const std::vector<StageTime>& Encoder::stage_times() const { return state_->stages; }
-const std::vector<std::uint32_t>& Encoder::distance_order_counts() const { return state_->distance_order_counts; }
+const std::vector<std::uint32_t>& Encoder::distance_order_counts() const {
+    static const std::vector<std::uint32_t> none;
+    const auto* bones = std::get_if<BonesStrategy>(&state_->strategy);
+    return bones ? bones->distance_order_counts : none;
+}
 
 }  // namespace htvm

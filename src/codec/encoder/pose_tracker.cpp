@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "codec/encoder/bones/motion.h"
+#include "codec/encoder/lattice_motion.h"
 #include "core/orientation.h"
 
 namespace htvm::internal {

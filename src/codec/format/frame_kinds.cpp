@@ -1,7 +1,5 @@
 #include "codec/format/frame_kinds.h"
 
-#include "htvm/decoder.hpp"
-
 namespace htvm {
 namespace internal {
 
@@ -19,8 +17,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .renews = true,
      .codes_mesh = true,
      .memory = {384, 368, 0, 0},
-     .rate = RateClass::intra,
-     .decode = decode_intra},
+     .rate = RateClass::intra},
     {.type = FrameType::enhanced,
      .packet = PacketKind::enhanced,
      .layers = {transforms, geometry, colour, normals, texcoords, mapping, fans, distance_orders, coded_bones},
@@ -29,8 +26,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .referred = false,
      .codes_mesh = true,
      .memory = {384, 320, 256, 96},
-     .rate = RateClass::between,
-     .decode = decode_enhanced},
+     .rate = RateClass::between},
     {.type = FrameType::predicted,
      .packet = PacketKind::predicted,
      .layers = {transforms},
@@ -39,18 +35,17 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .referred = false,
      .codes_mesh = false,
      .memory = {0, 0, 224, 32},
-     .rate = RateClass::moved,
-     .decode = decode_predicted},
+     .rate = RateClass::moved},
     {.type = FrameType::tracked,
      .packet = PacketKind::tracked,
      .layers = {transforms, geometry, colour},
+     .is_run = true,
      .refers_to = RefersTo::reference_or_before,
      .codebooks = false,
      .referred = true,
      .codes_mesh = false,
      .memory = {0, 0, 384, 192},
-     .rate = RateClass::between,
-     .decode = decode_tracked},
+     .rate = RateClass::between},
     {.type = FrameType::patched,
      .packet = PacketKind::patched,
      .layers = {pose, tracked, removed, border, fans, geometry, colour, charts},
@@ -60,8 +55,7 @@ constexpr std::array<FrameRules, frame_type_count> frame_rules = {{
      .renews = true,
      .codes_mesh = true,
      .memory = {384, 368, 768, 384},
-     .rate = RateClass::between,
-     .decode = decode_patched},
+     .rate = RateClass::between},
 }};
 
 namespace {

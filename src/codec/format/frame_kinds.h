@@ -1,6 +1,7 @@
-// The table of frame kinds: everything the codec must know about each, in the order of FrameType. Names and letters are
-// in htvm/frame.hpp. A new kind needs a row in both, a packet kind, its decoder, and a chapter of docs/bitstream.md;
-// the encoder's tables are indexed by FrameType too.
+// The table of frame kinds: everything that both sides must know about each, in the order of FrameType. It does not
+// hold names and letters (htvm/frame.hpp), how a kind is decoded (decoder/frame_decoders.h), nor when and how it is
+// coded: that is a strategy's (encoder/tracked, encoder/bones). A new kind needs a row here and in the first two, a
+// packet kind, and a chapter of docs/bitstream.md.
 #pragma once
 
 #include <array>
@@ -11,11 +12,8 @@
 #include "codec/format/frame_payload.h"
 #include "htvm/frame.hpp"
 #include "htvm/packet.hpp"
-#include "htvm/result.hpp"
 
 namespace htvm::internal {
-
-struct DecoderState;
 
 // What must have been decoded before a frame can be, besides the sequence header.
 enum class RefersTo : std::uint8_t {
@@ -43,7 +41,9 @@ struct LayerSet {
 struct FrameRules {
     FrameType type;
     PacketKind packet;
-    LayerSet layers;  // the layers that it may have; others are ignored
+    LayerSet layers;      // the layers that it may have; others are ignored
+    bool is_run = false;  // whether from tracked_run_version on its payload is one run of the range coder, which has
+                          // neither a header nor a table of layers
     RefersTo refers_to;
     bool codebooks;       // whether it names codebooks, which come in packets of their own
     bool referred;        // whether later frames may refer to it, unless its packet tells otherwise
@@ -53,10 +53,6 @@ struct FrameRules {
                           // must say so
     MemoryBound memory;   // for decoding it
     RateClass rate;
-    // Decodes and shows the frame. Called once the payload's header is known to be within all limits; if the frame
-    // refers to the reference alone, that is known to exist. After an error the state is unchanged, except for what
-    // helps to conceal the frame.
-    Result<void> (*decode)(DecoderState&, const Packet&, const FramePayloadView&);
 };
 
 extern const std::array<FrameRules, frame_type_count> frame_rules;
@@ -70,12 +66,5 @@ inline bool stands_alone(FrameType type) { return rules_of(type).refers_to == Re
 inline bool is_referred(const PacketHeader& packet, const FrameRules& rules) {
     return rules.referred && (!packet.has(packet_flag::told) || packet.has(packet_flag::referred));
 }
-
-// The decoders of the rows; each is in decoder_NAME.cpp.
-Result<void> decode_intra(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
-Result<void> decode_enhanced(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
-Result<void> decode_predicted(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
-Result<void> decode_tracked(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
-Result<void> decode_patched(DecoderState& state, const Packet& packet, const FramePayloadView& payload);
 
 }  // namespace htvm::internal

@@ -1,6 +1,8 @@
 #include "codec/format/frame_payload.h"
 
+#include "codec/format/frame_kinds.h"
 #include "core/bytes.h"
+#include "htvm/decoder.hpp"
 
 namespace htvm::internal {
 
@@ -88,4 +90,41 @@ Result<FramePayloadView> read_frame_payload(std::span<const std::uint8_t> bytes)
     return out;
 }
 
+FrameInfo describe(const Packet& packet, FrameType type) {
+    FrameInfo out;
+    out.type = type;
+    out.frame = packet.frame;
+    out.reference = packet.reference;
+    out.timestamp_us = packet.timestamp_us;
+    out.bytes.overhead = packet.payload.size() + packet_overhead;
+    return out;
+}
+
+FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload) {
+    auto out = describe(packet, type);
+    out.source_vertices = payload.header.source_vertices;
+    out.source_triangles = payload.header.source_triangles;
+    out.vertices = payload.header.vertices;
+    out.triangles = payload.header.triangles;
+    LayerBytes layers;
+    for (const auto& [layer, name] : frame_layers) layers[layer] = payload.of(layer).size();
+    out.bytes = with_overhead(layers, packet);
+    return out;
+}
+
 }  // namespace htvm::internal
+
+namespace htvm {
+
+using namespace internal;
+
+Result<FrameInfo> inspect(const Packet& packet) {
+    const auto type = frame_type(packet.kind);
+    if (!type) return fail(ErrorKind::bad_input, "the packet is not a frame");
+    if (rules_of(*type).is_run) return describe(packet, *type);
+    const auto payload = read_frame_payload(packet.payload);
+    if (!payload) return tl::unexpected(payload.error());
+    return describe(packet, *type, *payload);
+}
+
+}  // namespace htvm

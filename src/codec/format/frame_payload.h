@@ -59,6 +59,11 @@ FramePayload copy_of(const FramePayloadView& payload);
 // The layers' bytes of a packet, and as overhead all its other bytes.
 LayerBytes with_overhead(LayerBytes layers, const Packet& packet);
 
+// What a packet of this kind says by itself; and what it says with its payload, where that is no run
+// (FrameRules::is_run).
+FrameInfo describe(const Packet& packet, FrameType type);
+FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload);
+
 // The fewest bytes that the payload of an I- or EP-frame of so many vertices and triangles may have: it bounds what a
 // few bytes can make a decoder do.
 inline std::uint64_t least_payload(std::uint64_t vertices, std::uint64_t triangles) {

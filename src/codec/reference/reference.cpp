@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "codec/reference/quantiser_cells.h"
+
 namespace htvm::internal {
 
 std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, bool settled, const SequenceHeader& header) {
@@ -18,22 +20,22 @@ void derive_bones(Reference& reference, const SequenceHeader& header, Threads th
 }
 
 void derive_hierarchy(Reference& reference, const SequenceHeader& header) {
-    if (header.node_spacing == 0 || reference.step != 1 || reference.tracked || reference.ahead) return;
+    if (header.node_spacing == 0 || reference.step != 1 || reference.by_nodes || reference.ahead) return;
     const auto& mesh = reference.mesh();
     auto around = vertices_around(mesh.positions.size(), mesh.triangles);
     auto hierarchy = build_vertex_hierarchy(mesh.positions, mesh.triangles, &around);
     if (hierarchy)
         reference.ahead =
-            TrackedAhead{std::move(around), std::move(*hierarchy)};  // else derive_nodes() says what is wrong
+            NodesAhead{std::move(around), std::move(*hierarchy)};  // else derive_nodes() says what is wrong
 }
 
 Result<void> derive_nodes(Reference& reference, const SequenceHeader& header, Threads threads) {
-    if (reference.tracked) return {};
-    auto tracked = make_tracked_reference(reference.mesh(), header.node_spacing, reference.step, threads,
-                                          reference.kept, std::exchange(reference.ahead, std::nullopt));
-    if (!tracked) return tl::unexpected(tracked.error());
-    reference.tracked = std::move(*tracked);
-    reference.tracked->captured = reference.captured;
+    if (reference.by_nodes) return {};
+    auto nodes = make_node_reference(reference.mesh(), header.node_spacing, reference.step, threads, reference.kept,
+                                     std::exchange(reference.ahead, std::nullopt));
+    if (!nodes) return tl::unexpected(nodes.error());
+    reference.by_nodes = std::move(*nodes);
+    reference.by_nodes->captured = reference.captured;
     return {};
 }
 

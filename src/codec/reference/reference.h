@@ -6,11 +6,11 @@
 #include <cstdint>
 #include <optional>
 
-#include "codec/charts/chart_layer.h"
 #include "codec/format/sequence.h"
+#include "codec/reference/node_reference.h"
 #include "codec/reference/skinning.h"
+#include "codec/reference/textured_surface.h"
 #include "codec/reference/transforms.h"
-#include "codec/tracked/tracked_frame.h"
 #include "core/thread.h"
 
 namespace htvm::internal {
@@ -22,9 +22,9 @@ struct Reference {
     TexturedSurface textured;  // where the stream has charts: of the mesh
     ReferenceMesh skinned;     // the mesh and its pose; what depends on bones is filled in only if it was derived
     bool has_bones = false;    // whether it was derived
-    std::optional<TrackedReference> tracked;  // what depends on the nodes, if it was derived
-    KeptNodes kept;                           // of a patched mesh: what it takes over of the nodes before
-    std::optional<TrackedAhead> ahead;        // of what depends on the nodes, if only this was derived so far
+    std::optional<NodeReference> by_nodes;  // what depends on the nodes, if it was derived
+    KeptNodes kept;                         // of a patched mesh: what it takes over of the nodes before
+    std::optional<NodesAhead> ahead;        // of what depends on the nodes, if only this was derived so far
     const LatticeMesh& mesh() const { return skinned.mesh; }
 };
 
@@ -48,7 +48,7 @@ struct ReferenceFacts {
 // its positions. Returns the step of the reference that the mesh becomes.
 std::int32_t smooth_as_shown(LatticeMesh& mesh, std::int32_t step, bool settled, const SequenceHeader& header);
 
-// mesh: as decoded. Errors: those of make_tracked_reference().
+// mesh: as decoded. Errors: those of make_node_reference().
 Result<Reference> make_reference(const SequenceHeader& header, ReferenceFacts facts, LatticeMesh mesh, CodedPose pose,
                                  Derived derived, Threads threads);
 

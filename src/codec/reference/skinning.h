@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "codec/bones/mapping.h"
+#include "codec/reference/mapping_prior.h"
 #include "codec/reference/transforms.h"
 #include "core/lattice.h"
 #include "core/thread.h"

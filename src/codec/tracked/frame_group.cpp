@@ -164,7 +164,7 @@ FieldSteps coarser(FieldSteps steps) {
 
 }  // namespace
 
-TrackedState state_between(const TrackedReference& reference, const FramesAround& around, const GroupFrame& frame) {
+TrackedState state_between(const NodeReference& reference, const FramesAround& around, const GroupFrame& frame) {
     const Mean mean{static_cast<std::int64_t>(frame.later - frame.frame),
                     static_cast<std::int64_t>(frame.frame - frame.earlier)};
     const auto* earlier = around.earlier;

@@ -65,6 +65,6 @@ struct FramesAround {
     const TrackedState* later = nullptr;
     const TrackedHead* above = nullptr;
 };
-TrackedState state_between(const TrackedReference& reference, const FramesAround& around, const GroupFrame& frame);
+TrackedState state_between(const NodeReference& reference, const FramesAround& around, const GroupFrame& frame);
 
 }  // namespace htvm::internal

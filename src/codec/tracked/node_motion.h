@@ -13,19 +13,12 @@
 #include <span>
 #include <vector>
 
+#include "codec/reference/node_reference.h"
 #include "codec/reference/transforms.h"
-#include "core/geometry.h"
 #include "entropy/range_coder.h"
 #include "htvm/result.hpp"
 
 namespace htvm::internal {
-
-// What both sides know of the nodes, one entry per node.
-struct NodeGraph {
-    std::vector<LatticePoint> pivots;               // where the nodes sit
-    std::vector<std::vector<std::uint32_t>> lower;  // neighbours with a lower number, ascending
-    std::vector<Vector3d> normals;                  // of the surface at the pivots, unit length or zero
-};
 
 // How motion is quantised, which the decoder must know.
 struct NodeMotionSteps {

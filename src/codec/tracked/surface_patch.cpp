@@ -12,6 +12,7 @@
 #include "codec/intra/neighbours.h"
 #include "codec/intra/positions.h"
 #include "codec/intra/tfan.h"
+#include "codec/reference/quantiser_cells.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/geometry.h"
 #include "entropy/range_coder.h"

@@ -8,11 +8,11 @@
 #include "codec/bones/mapping.h"
 #include "codec/bones/mtfan.h"
 #include "codec/bones/zipper.h"
-#include "codec/encoder/stage_clock.h"
 #include "codec/intra/attribute_values.h"
 #include "codec/intra/duplicates.h"
 #include "codec/reference/transforms.h"
 #include "core/parallel.h"
+#include "core/stage_clock.h"
 
 namespace htvm::internal {
 namespace {

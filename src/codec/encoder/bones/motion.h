@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "codec/encoder/lattice_motion.h"
 #include "codec/reference/skinning.h"
 #include "codec/reference/transforms.h"
 #include "core/thread.h"
@@ -20,21 +21,12 @@ struct ReferenceSearch {
 };
 ReferenceSearch make_reference_search(const ReferenceMesh& reference);
 
-// eq. 4: the motion of each bone from the pose of the reference to that of this frame.
-std::vector<RigidMotion> skeletal_motion(const ReferenceMesh& reference, const std::vector<Bone>& bones,
-                                         const CodedPose& pose);
-
 // eq. 5: starts each bone from the better of its skeletal motion and its motion in the previous frame (empty at first),
 // and registers the reference's sub-mesh to the frame's. frame_sub_meshes: the vertices of the frame, by bone.
 std::vector<RigidMotion> register_bones(const ReferenceSearch& reference, std::span<const LatticePoint> frame,
                                         const SubMeshes& frame_sub_meshes, std::span<const RigidMotion> skeletal,
                                         std::span<const RigidMotion> before, const RegistrationOptions& options,
                                         Threads threads);
-
-QuantisedTransform quantise_motion(const RigidMotion& motion, LatticePoint pivot);
-RigidMotion motion_of(const QuantisedTransform& transform, LatticePoint pivot);
-QuantisedRotation quantise_orientation(const Rotation& orientation);
-Eigen::Matrix3d matrix_of(const QuantisedRotation& rotation);
 
 // How a frame moved relative to its reference: the part that is common to P- and EP-frames.
 struct FrameMotion {

@@ -71,8 +71,9 @@ public:
     void tried(const FrameCost& frame) { learn(model_, frame); }
     // Whether no frame of this type has been coded yet, so that quality() is a guess that tried() improves.
     bool is_guess(FrameType type) const;
-    // The frame as finally coded; a dropped frame takes 0 bits.
+    // The frame as finally coded; or that it was dropped, which takes no bits.
     void coded(const FrameCost& frame);
+    void dropped(double quality) { coded({FrameType::predicted, quality, 0}); }
     // The line carries so many bits a second from the next frame on. The quality follows at once, as far as the model
     // knows how, and then in larger steps than usual for half a second. What was planned from a first pass is dropped.
     void change_rate(double bits_per_second);

@@ -4,14 +4,14 @@
 #include <cmath>
 #include <optional>
 
-#include "codec/encoder/frame_coders.h"
+#include "codec/encoder/tracked/tracked_coders.h"
 #include "codec/tracked/frame_group.h"
 
 namespace htvm::internal {
 namespace {
 
 // How much finer than asked for the frames are that a group's others are predicted from, so that with steps a fifth
-// coarser from level to level the whole has about the error asked for: see docs/algorithm.md.
+// coarser from level to level the whole has about the error asked for: see docs/tracked_frames.md.
 double finer_anchor(int group) {
     constexpr double a_level = 1.2, levels = 3;
     return std::pow(a_level, -static_cast<double>(std::bit_width(static_cast<unsigned>(group - 1))) / levels);
@@ -19,10 +19,10 @@ double finer_anchor(int group) {
 
 class GroupCoder {
 public:
-    GroupCoder(const Configuration& configuration, const ReferenceInUse& reference, const TrackedState* before,
+    GroupCoder(const Configuration& configuration, const TrackedReference& reference, const TrackedState* before,
                std::span<const HeldFrame> held, std::vector<StageTime>& stages)
         : configuration_(configuration),
-          reference_(*reference.decoded.tracked),
+          reference_(*reference.decoded.by_nodes),
           before_(before),
           held_(held),
           stages_(stages),
@@ -46,7 +46,7 @@ public:
             options.geometry_step *= finer;
             options.colour_step *= finer;
         }
-        auto encoded = encode_tracked_frame(held.work.mesh, held.work.surface, reference_, held.work.registered,
+        auto encoded = encode_tracked_frame(held.mesh, held.surface, reference_, held.registered,
                                             between ? &*between : before_, {}, options, stages_);
         if (!encoded) return tl::unexpected(encoded.error());
         coded[frame.frame - 1] = std::move(*encoded);
@@ -57,7 +57,7 @@ private:
     const TrackedState* state_of(std::size_t frame) const { return frame == 0 ? before_ : &coded[frame - 1].state; }
 
     const Configuration& configuration_;
-    const TrackedReference& reference_;
+    const NodeReference& reference_;
     const TrackedState* before_;
     std::span<const HeldFrame> held_;
     std::vector<StageTime>& stages_;
@@ -68,36 +68,42 @@ public:
 
 }  // namespace
 
-Result<CodedGroup> code_group(const Configuration& configuration, const ReferenceInUse& reference,
+Result<CodedGroup> code_group(const Configuration& configuration, const TrackedReference& reference,
                               const GroupAnchor* before, std::span<const HeldFrame> held,
                               std::vector<StageTime>& stages) {
-    using namespace packet_flag;
     const std::size_t length = held.size();
     GroupCoder coder(configuration, reference, before ? &before->state : nullptr, held, stages);
-    CodedGroup out;
-    for (std::size_t frame = 1; frame <= length; ++frame) {
+    std::vector<CodedFrame> frames(length);
+    for (std::size_t place = 1; place <= length; ++place) {
+        auto& frame = frames[place - 1];
         std::vector<std::vector<std::uint8_t>> payloads;
-        GroupedFrame grouped;
-        for (const auto& brought : brought_by(frame, length)) {
+        for (const auto& brought : brought_by(place, length)) {
             if (auto ok = coder.code(brought); !ok) return tl::unexpected(ok.error());
             auto& runs = coder.coded[brought.frame - 1].runs;
-            grouped.shares += runs.shares;
+            frame.shares += runs.shares;
             payloads.push_back(std::move(runs.payload));
         }
-        auto& packet = grouped.packet;
-        packet.kind = PacketKind::tracked;
-        packet.payload = write_group_payload({length, frame}, payloads);
-        const bool alone = frame == 1 && !before;
-        packet.flags =
-            static_cast<std::uint8_t>(told | (is_needed(frame, length) ? referred : droppable) | (alone ? access : 0));
-        packet.frame = held[frame - 1].number;
-        packet.reference = frame > 1 ? held[needed_by(frame, length) - 1].number
-                           : before  ? before->frame
-                                     : reference.decoded.number;
-        packet.timestamp_us = held[frame - 1].timestamp_us;
-        out.frames.push_back(std::move(grouped));
+        frame.type = FrameType::tracked;
+        frame.packets.push_back(frame_packet(PacketKind::tracked, write_group_payload({length, place}, payloads)));
+        frame.referred = is_needed(place, length);
+        frame.access = place == 1 && !before;
+        frame.reference = place > 1 ? held[needed_by(place, length) - 1].number
+                          : before  ? before->frame
+                                    : reference.decoded.number;
+        frame.captured = counts_of(held[place - 1].mesh);
     }
-    for (std::size_t i = 0; i < length; ++i) out.frames[i].decoded = std::move(coder.coded[i].mesh);
+    CodedGroup out;
+    for (std::size_t i = 0; i < length; ++i) {
+        auto& frame = frames[i];
+        frame.decoded = std::move(coder.coded[i].mesh);
+        FrameCost cost;
+        cost.type = frame.type;
+        cost.bits = 8.0 * static_cast<double>(frame.bytes());
+        out.frames.push_back(outgoing(configuration, std::move(frame), &reference.decoded.textured, held[i].number,
+                                      held[i].timestamp_us, cost));
+        out.frames.back().info.group = static_cast<std::uint8_t>(length);
+        out.frames.back().info.place = static_cast<std::uint8_t>(i + 1);
+    }
     out.anchor = {held.front().number, std::move(coder.coded.back().state)};
     return out;
 }

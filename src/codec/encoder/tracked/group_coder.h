@@ -6,15 +6,17 @@
 #include <span>
 #include <vector>
 
-#include "codec/encoder/frame_work.h"
+#include "codec/encoder/tracked/tracked_work.h"
 
 namespace htvm::internal {
 
-// A T-frame that waits for its group.
+// A T-frame that waits for its group, with what it takes to code it again.
 struct HeldFrame {
     std::uint32_t number = 0;
     std::int64_t timestamp_us = 0;
-    TrackedWork work;
+    LatticeMesh mesh;  // as captured
+    SurfaceIndex surface;
+    NodeRegistration registered;
     FrameSteps steps;    // asked for
     RemovedNoise noise;  // of the capture
 };
@@ -25,19 +27,13 @@ struct GroupAnchor {
     TrackedState state;       // of the last frame of the group before
 };
 
-struct GroupedFrame {
-    Packet packet;
-    LayerBytes shares;    // its layers', of its packet
-    LatticeMesh decoded;  // the mesh that the decoder will have
-};
-
 struct CodedGroup {
-    std::vector<GroupedFrame> frames;  // in the order of showing
-    GroupAnchor anchor;                // for the next group
+    std::vector<OutgoingFrame> frames;  // in the order of showing
+    GroupAnchor anchor;                 // for the next group
 };
 
 // held: one to most_in_group frames in a row. before: null where the group is to refer to the reference alone.
-Result<CodedGroup> code_group(const Configuration& configuration, const ReferenceInUse& reference,
+Result<CodedGroup> code_group(const Configuration& configuration, const TrackedReference& reference,
                               const GroupAnchor* before, std::span<const HeldFrame> held,
                               std::vector<StageTime>& stages);
 

@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "codec/encoder/bones/motion.h"
-#include "codec/encoder/stage_clock.h"
+#include "codec/encoder/lattice_motion.h"
 #include "codec/encoder/tracked/captured_surface.h"
 #include "codec/encoder/tracked/node_motion.h"
 #include "core/parallel.h"
+#include "core/stage_clock.h"
 #include "surface/limb_starts.h"
 
 namespace htvm::internal {
 namespace {
 
-std::vector<HandlePair> pairs_of(const TrackedReference& reference) {
+std::vector<HandlePair> pairs_of(const NodeReference& reference) {
     std::vector<HandlePair> out;
     for (const auto& pair : reference.nodes.neighbours) {
         const auto a = point_of(reference.graph.pivots[pair.first]), b = point_of(reference.graph.pivots[pair.second]);
@@ -83,7 +83,7 @@ TrackedRuns write_tracked_runs(TrackedHead& head, const KnownOfHead& known, cons
     return out;
 }
 
-DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options,
+DeformableMesh make_tracked_deformable(const NodeReference& reference, const DeformationOptions& options,
                                        std::span<const Colour> colours) {
     std::vector<Eigen::Vector3d> handles;
     for (const auto pivot : reference.graph.pivots) handles.emplace_back(pivot.x, pivot.y, pivot.z);
@@ -157,7 +157,7 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
 }
 
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
-                                                 const TrackedReference& reference, const NodeRegistration& registered,
+                                                 const NodeReference& reference, const NodeRegistration& registered,
                                                  const TrackedState* before, const TargetHistory& targets_before,
                                                  const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);

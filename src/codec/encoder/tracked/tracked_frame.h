@@ -42,7 +42,7 @@ struct TrackedFrameOptions {
 };
 
 // The reference, prepared for registration; made once per I-frame.
-DeformableMesh make_tracked_deformable(const TrackedReference& reference, const DeformationOptions& options,
+DeformableMesh make_tracked_deformable(const NodeReference& reference, const DeformationOptions& options,
                                        std::span<const Colour> colours = {});
 
 // Possible starts of a registration, each one motion per node, or empty. last, before_last: of the two previous frames.
@@ -88,7 +88,7 @@ struct EncodedTrackedFrame {
 // mesh: as captured; surface: its index, see captured_surface(). registered: to this surface. before: state of the
 // frame that this one refers to; null if that is the I-frame. targets: what filtering left of the last frame.
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
-                                                 const TrackedReference& reference, const NodeRegistration& registered,
+                                                 const NodeReference& reference, const NodeRegistration& registered,
                                                  const TrackedState* before, const TargetHistory& targets,
                                                  const TrackedFrameOptions& options, std::vector<StageTime>& stages);
 

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <vector>
 
-#include "htvm/encoder.hpp"
+#include "htvm/stage_time.hpp"
 
 namespace htvm::internal {
 

@@ -1,0 +1,109 @@
+#include "codec/encoder/configuration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace htvm::internal {
+namespace {
+
+// The length on this subject that corresponds to a millimetre on an adult, in millimetres. Reaches, spacings and
+// thresholds are known for adults; those for a doll or a giant follow from its size. The extent of an adult depends on
+// the pose, so a subject from 1.1 to 2.5 m counts as an adult.
+double adult_millimetre(const EncoderOptions& options, const Mesh& mesh) {
+    constexpr double adult = 1750, shortest = 1100, longest = 2500;
+    double size = options.subject_size;
+    if (!(size > 0)) {
+        for (std::size_t axis = 0; axis < 3 && !mesh.positions.empty(); ++axis) {
+            const auto [low, high] =
+                std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
+                                    [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
+            size = std::max(size, static_cast<double>((*high)[axis]) - (*low)[axis]);
+        }
+    }
+    return size <= 0 || (size >= shortest && size <= longest) ? 1 : size / adult;
+}
+
+// 1/16 mm on an adult and on whoever is larger, or finer if needed for a step of at least eight units. As much finer on
+// a smaller subject as it is smaller, but not below a 64th of a step: the first frame may show little of a subject, and
+// a fine lattice does not reach far.
+int lattice_bits(const EncoderOptions& options, double adult) {
+    if (options.lattice_bits > 0) return options.lattice_bits;
+    const bool controlled = options.rate.bits_per_second > 0 || options.rate.target_error > 0;
+    const double finest = controlled ? quality_steps(100).geometry_step : options.geometry_step;
+    const auto bits_for = [&](double units) { return static_cast<int>(std::ceil(std::log2(units / finest))); };
+    const int of_size = 4 - static_cast<int>(std::lround(std::log2(adult)));
+    return std::clamp(std::max(bits_for(8), std::min(of_size, bits_for(64))), 4, 16);
+}
+
+FrameSteps steps_of(const Configuration& configuration, const QualitySteps& steps) {
+    return {static_cast<std::int32_t>(std::clamp(std::lround(steps.geometry_step * configuration.units), 1L,
+                                                 static_cast<long>(lattice_limit))),
+            static_cast<std::int32_t>(std::lround(steps.colour_step))};
+}
+
+}  // namespace
+
+Result<PoseTracker> complete(Configuration& configuration, const Mesh& mesh, const Pose* pose) {
+    const auto& options = configuration.options;
+    auto& header = configuration.header;
+    const auto origin = lattice_origin(mesh);
+    if (!origin) return tl::unexpected(origin.error());
+    header.lattice.origin = *origin;
+    const double adult = adult_millimetre(options, mesh);
+    header.lattice.bits = lattice_bits(options, adult);
+    auto tracker = make_pose_tracker(options.skeleton, mesh, pose);
+    if (!tracker) return tl::unexpected(tracker.error());
+    header.skeleton = tracker->skeleton;
+    header.skeleton_tracked = tracker->tracked;
+    auto radii = options.radii;
+    if (radii.empty()) {
+        auto calibrated = calibrate(mesh, header.skeleton, tracker->last);
+        if (!calibrated) return tl::unexpected(calibrated.error());
+        radii = std::move(*calibrated);
+    }
+    const double units = configuration.units = 1.0 / header.lattice.step();
+    configuration.adult_millimetre = adult * units;
+    const auto on_lattice = [](double length) {
+        return static_cast<std::int32_t>(std::lround(std::min(length, 1.0 * lattice_limit)));
+    };
+    header.radii.clear();
+    for (const auto r : radii) header.radii.push_back(on_lattice(r * units));
+    header.fps_numerator = options.fps_numerator;
+    header.fps_denominator = options.fps_denominator;
+    header.unit_micrometres = options.unit_micrometres;
+    header.session = options.session;
+    header.up = options.up;
+    header.metadata = options.metadata;
+    if (options.floor) {
+        const auto origin_up = static_cast<double>(header.lattice.origin[axis_of(options.up)]);
+        const double floor = std::round((*options.floor - origin_up) * units);
+        if (!(std::abs(floor) <= lattice_limit))
+            return fail(ErrorKind::bad_input, "the floor is too far from the first frame's mesh");
+        header.floor = static_cast<std::int32_t>(floor);
+    }
+    if (options.tracked.group > 1) header.version = grouped_version;
+    header.texture = options.texture;
+    if (options.texture.layout != TextureLayout::none) header.version = textured_version;
+    header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
+    header.weight_width = on_lattice(options.topology.weight_width * units);
+    if (options.profile == Profile::tracked) {
+        constexpr double spacing_on_adults = 80;  // mm
+        const double spacing =
+            options.tracked.node_spacing > 0 ? options.tracked.node_spacing : spacing_on_adults * adult;
+        header.node_spacing = std::max(on_lattice(spacing * units), 1);
+    }
+    return tracker;
+}
+
+FrameSteps steps_asked_for(const Configuration& configuration) {
+    return steps_of(configuration, {configuration.options.geometry_step, configuration.options.colour_step});
+}
+
+FrameSteps steps_of_quality(const Configuration& configuration, double quality) {
+    auto steps = quality_steps(quality);
+    steps.geometry_step *= configuration.adult_millimetre / configuration.units;
+    return steps_of(configuration, steps);
+}
+
+}  // namespace htvm::internal

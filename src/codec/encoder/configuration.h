@@ -1,0 +1,41 @@
+// What is fixed with a sequence's first frame: options, header and scale; and how coarsely frames are quantised.
+#pragma once
+
+#include <cstdint>
+
+#include "codec/encoder/pose_tracker.h"
+#include "codec/format/sequence.h"
+#include "core/thread.h"
+#include "htvm/encoder.hpp"
+
+namespace htvm::internal {
+
+struct Configuration {
+    EncoderOptions options;
+    SequenceHeader header;
+    Threads threads = {};
+    double units = 16;             // lattice units per millimetre
+    double adult_millimetre = 16;  // the length on this subject that corresponds to a millimetre on an adult, in
+                                   // lattice units
+    bool intra_only() const { return options.key_interval == 1; }  // no frame refers to another
+    double to_millimetres(double lattice_units) const { return lattice_units / units; }
+};
+
+// Completes the configuration, whose options and threads are set, from the first frame: the origin of the lattice, the
+// subject's size and, where the options do not give them, the skeleton and the radii. Gives what tracks the poses from
+// then on. Errors: bad_input, as of Encoder::push().
+Result<PoseTracker> complete(Configuration& configuration, const Mesh& first, const Pose* pose);
+
+// How coarsely a frame is quantised, as asked for.
+struct FrameSteps {
+    std::int32_t geometry = 32;  // lattice units
+    std::int32_t colour = 6;     // levels
+    bool operator==(const FrameSteps&) const = default;
+};
+
+// The steps of the options, where neither a rate nor an error decides.
+FrameSteps steps_asked_for(const Configuration& configuration);
+// For quality that is derived, 0..100, which means the same for every subject, whatever its size.
+FrameSteps steps_of_quality(const Configuration& configuration, double quality);
+
+}  // namespace htvm::internal

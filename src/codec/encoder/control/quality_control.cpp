@@ -1,0 +1,33 @@
+#include "codec/encoder/control/quality_control.h"
+
+#include <array>
+#include <cstdio>
+#include <string>
+
+namespace htvm::internal {
+
+double bits_of(const CodedFrame& frame, const HeaderBits& header) {
+    return 8.0 * static_cast<double>(frame.bytes()) + (stands_alone(frame.type) ? header.if_alone : header.otherwise);
+}
+
+tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, double bits) {
+    const double capacity = options.bits_per_second * options.buffer_seconds;
+    const auto number = [](double x) {
+        std::array<char, 32> text{};
+        std::snprintf(text.data(), text.size(), "%.3g", x);
+        return std::string(text.data());
+    };
+    std::string message = "the frame takes " + number(bits / 8000) +
+                          " kB even at the lowest quality, and the buffer has room for " + number(room / 8000) +
+                          " kB of its " + number(capacity / 8000) + " kB; give ";
+    // Rounded up, so that the numbers in the message suffice.
+    const auto enough = [&](double x) { return number(1.01 * x); };
+    if (bits > capacity)
+        message += "a bitrate of at least " + enough(bits / options.buffer_seconds / 1e6) +
+                   " Mbit/s or a buffer of at least " + enough(bits / options.bits_per_second) + " s";
+    else
+        message += "a higher bitrate or a larger buffer";
+    return fail(ErrorKind::limit, message);
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,298 @@
+#include "codec/encoder/tracked/tracked_choice.h"
+
+#include <algorithm>
+
+#include "codec/encoder/tracked/surface_patch.h"
+#include "codec/encoder/tracked/texcoord_layout.h"
+#include "codec/encoder/tracked/tracked_coders.h"
+#include "core/parallel.h"
+
+namespace htvm::internal {
+namespace {
+
+using Frame = TrackedWork::Frame;
+
+// ---- Is tracking lost? ----------------------------------------------------------------------------------------------
+
+// How far off a region of 10 cm may be. best: RMS of the best T-frame.
+double allowed_in_region(const TrackedWork& work, double best) {
+    constexpr double region_to_best = 5, region_to_intra = 1.5;
+    constexpr double visible = 3.5, visible_in_edges = 0.42;  // mm on an adult; in mean edges of the capture
+    const auto& origin = work.reference().origin;
+    return std::max({region_to_best * best, region_to_intra * origin.fit.worst_region,
+                     visible * work.configuration.adult_millimetre, visible_in_edges * origin.edge});
+}
+
+// The same of the whole surface. On a clean, smooth capture the best T-frame may be far better than quantisation lets
+// an I-frame or a patch be.
+double allowed_over_all(const TrackedWork& work, double best) {
+    constexpr double worst_to_best = 2.2, quantised = 0.75;  // steps
+    return std::max(worst_to_best * best, quantised * static_cast<double>(work.reference().origin.steps.geometry));
+}
+
+// Whether so much is lost that the picture falls apart: most of the person, as where a capture is cut, or all of a
+// limb.
+bool falls_apart(const TrackedWork& work, const TrackedFit& fit) {
+    constexpr double most_of_all = 4, most_in_region = 30;  // mm on an adult
+    constexpr double to_lost = 3;                           // times what already counts as lost
+    const double millimetre = work.configuration.adult_millimetre, best = work.sequence.history.best_fit;
+    const double allowed = std::max(allowed_over_all(work, best), work.reference().origin.fit.rms);
+    return fit.rms > std::max(most_of_all * millimetre, to_lost * allowed) ||
+           fit.worst_region > std::max(most_in_region * millimetre, to_lost * allowed_in_region(work, best));
+}
+
+// Whether a T-frame fits visibly worse than the T-frames of its I-frame can: over the whole surface, or in one region,
+// such as a hand.
+bool is_lost(const TrackedWork& work, const TrackedFit& fit) {
+    constexpr double more_strays = 0.004;
+    const double best_fit = work.sequence.history.best_fit;
+    const double best = best_fit > 0 ? best_fit : fit.rms;
+    return fit.stray_share > work.reference().origin.fit.stray_share + more_strays ||
+           fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best);
+}
+
+TrackedFit fit_of(const TrackedWork& work, const EncodedTrackedFrame& encoded) {
+    const auto& origin = work.reference().origin;
+    return fit_of(work, encoded.mesh, origin.edge, encoded.near, origin.fit.squared);
+}
+
+// ---- What may follow ------------------------------------------------------------------------------------------------
+
+// Whether the capture's texture atlas is laid out anew since the I-frame, whose texture coordinates a T-frame shows.
+bool texture_is_laid_out_anew(const TrackedWork& work, const LatticeMesh& tracked) {
+    if (work.mesh().texcoords.empty()) return false;
+    // Tracking slips along the surface by less than this, mm on an adult, unless it is lost. Measured on a studio's
+    // capture: without a new layout no vertex has other coordinates, with one 92 % have.
+    constexpr double slip = 30, most_others = 0.1;
+    StageClock clock(work.stages);
+    const double others = share_with_other_texcoords(tracked, work.mesh(), slip * work.configuration.adult_millimetre);
+    clock.done("layout of the texture");
+    return others > most_others;
+}
+
+// Whoever joins late needs all patches since the I-frame.
+bool patches_have_grown(const TrackedWork& work) {
+    constexpr int most_patches = 24;
+    constexpr double most_bytes = 4;  // times the I-frame's
+    const auto& reference = work.reference();
+    return reference.patches >= most_patches || reference.patch_bytes > most_bytes * reference.intra_bytes;
+}
+
+// Whether an I-frame of the tracked mesh is as good as one of the capture: it does not have many more vertices, nor was
+// it made for much coarser or finer steps. (Where an error is asked for, the steps of I- and T-frames are far apart.)
+bool may_be_renewed(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
+    constexpr double most_vertices = 1.3, most_steps = 1.5;
+    const auto& origin = work.reference().origin;
+    const double ratio = static_cast<double>(steps.geometry) / origin.steps.geometry;
+    return work.configuration.options.rate.target_error <= 0 &&
+           static_cast<double>(tracked.positions.size()) <= most_vertices * static_cast<double>(origin.vertices) &&
+           ratio <= most_steps && ratio >= 1 / most_steps;
+}
+
+// ---- Patches --------------------------------------------------------------------------------------------------------
+
+SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& steps) {
+    const auto& configuration = work.configuration;
+    const double millimetre = configuration.adult_millimetre;
+    SurfacePatchOptions out;
+    out.lost = std::max(6 * millimetre, 0.42 * work.reference().origin.edge);
+    out.region = region_side(configuration);
+    out.reach = 30 * millimetre;
+    out.speck = 20 * millimetre;
+    out.most_share = configuration.options.tracked.patch_share;
+    out.simplification = simplification_options(configuration, steps);
+    out.threads = configuration.threads;
+    return out;
+}
+
+// The T-frame with the lost regions replaced; nothing if that is not possible, does not help, or costs about as much as
+// an I-frame. Where regions alone do not help, as where much is a little off, all that is lost is replaced.
+Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeRegistration& registered,
+                                          const FrameSteps& steps, const EncodedTrackedFrame& tracked) {
+    using Patched = std::optional<TrackedPatch>;
+    constexpr double most_bytes = 0.8;  // of the I-frame's
+    // At fine steps a bit brings more where less is wrong.
+    constexpr double lost_in_steps = 1.75;
+    const auto& reference = work.reference();
+    const double lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
+                                 lost_in_steps * static_cast<double>(steps.geometry));
+    StageClock measuring(work.stages);
+    const SurfacePatchSearch search({tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near},
+                                    work.mesh(), work.surface, patch_options(work, steps));
+    measuring.done("patch");
+    for (const double region_lost : {lost, 0.0}) {
+        StageClock clock(work.stages);
+        const auto found = search.find(region_lost);
+        clock.done("patch");
+        if (!found) continue;
+        auto coded = code_patch(work, registered, steps, tracked, *found);
+        if (!coded) return tl::unexpected(coded.error());
+        auto& out = *coded;
+        if (!out) continue;
+        auto& fit = out->origin.fit;
+        if (static_cast<double>(out->frame.bytes()) > most_bytes * reference.intra_bytes || is_lost(work, fit))
+            continue;
+        fit = least_of(std::move(fit), reference.origin.fit);
+        out->best_fit = work.sequence.history.best_fit;
+        return Patched(std::move(*out));
+    }
+    return Patched();
+}
+
+// ---- The steps of a choice ------------------------------------------------------------------------------------------
+
+// A T-frame and how well it fits.
+struct JudgedMotion {
+    CodedMotion coded;
+    TrackedFit fit;
+    bool lost = false;
+    // What patches are planned on, if the frame is lost and may be patched, and that is not what was coded.
+    std::optional<EncodedTrackedFrame> for_patches = {};
+    const EncodedTrackedFrame& alone() const { return for_patches ? *for_patches : coded.encoded; }
+};
+
+Result<JudgedMotion> code_and_judge(const TrackedWork& work, const NodeRegistration& registered,
+                                    const FrameSteps& steps) {
+    auto coded = code_motion(work, registered, steps, MotionParts::all);
+    if (!coded) return tl::unexpected(coded.error());
+    auto fit = fit_of(work, coded->encoded);
+    const bool lost = is_lost(work, fit);
+    return JudgedMotion{std::move(*coded), std::move(fit), lost};
+}
+
+bool may_be_patched(const TrackedWork& work, bool due) {
+    return !due && work.configuration.options.tracked.patch_share > 0 &&
+           work.reference().decoded.mesh().texcoords.empty();
+}
+
+// Looks for limbs that another start finds, and beside it codes what patches are planned on. Limbs are rarely found;
+// where they are, what was coded meanwhile is coded again, and the T-frame with it, unless it stays lost.
+Result<void> look_for_limbs(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps, bool patches,
+                            JudgedMotion& motion) {
+    const auto code_alone = [&](const NodeRegistration& registered) {
+        return code_for_patches(work, registered, steps, motion.coded.encoded.near);
+    };
+    const bool to_code = patches && !motion.coded.of_reference;
+    std::optional<Result<EncodedTrackedFrame>> alone;
+    FoundLimbs limbs;
+    std::vector<StageTime> of_limbs;
+    if (tracking.searched_limbs) {
+        if (to_code) alone = code_alone(*tracking.registered);
+    } else {
+        parallel_invoke(
+            work.configuration.threads, [&] { limbs = find_lost_limbs(work, *tracking.registered, of_limbs); },
+            [&] {
+                if (to_code) alone = code_alone(*tracking.registered);
+            });
+        work.stages.insert(work.stages.end(), of_limbs.begin(), of_limbs.end());
+        tracking.searched_limbs = true;
+        tracking.registered = std::move(limbs.registered);
+        tracking.moved_limbs = tracking.moved_limbs || limbs.any;
+    }
+    if (patches && limbs.any) alone = code_alone(*tracking.registered);
+    if (alone) {
+        if (!*alone) return tl::unexpected(alone->error());
+        motion.for_patches = std::move(**alone);
+    }
+    if (!limbs.any || (patches && is_lost(work, fit_of(work, motion.alone())))) return {};
+    auto again = code_and_judge(work, *tracking.registered, steps);
+    if (!again) return tl::unexpected(again.error());
+    again->for_patches = std::move(motion.for_patches);
+    motion = std::move(*again);
+    return {};
+}
+
+// What looks for limbs in every frame, before it is coded.
+void follow_limbs_anyway(const TrackedWork& work, Tracking& tracking) {
+    if (std::exchange(tracking.searched_limbs, true)) return;
+    auto limbs = find_lost_limbs(work, *tracking.registered, work.stages);
+    tracking.registered = std::move(limbs.registered);
+    tracking.moved_limbs = limbs.any;
+}
+
+Result<Frame> as_frame(Result<TrackedIntra> intra) {
+    if (!intra) return tl::unexpected(intra.error());
+    return Frame(std::move(*intra));
+}
+
+// A T-frame, as long as it fits the capture. If a hand has left a pocket or an arm was lost, the reference's mesh can
+// no longer follow, so that part of it is replaced, or an I-frame is sent. An I-frame is also sent once a T-frame takes
+// more bits than the last I-frame did, if the shortest key interval has passed. Where one is due for those who join
+// late, it is made of the tracked mesh, so that nothing jumps. A frame that may not be repaired is sent as it is, and
+// so is one whose motion alone is wanted, unless it falls apart.
+Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
+    const bool due = intra_is_due(work);
+    const double best_before = work.sequence.history.best_fit;
+    const auto send = [&](CodedMotion coded, double best) {
+        return Frame(chosen_motion(work, *tracking.registered, std::move(coded), best));
+    };
+    registered(work, tracking);
+
+    // 1. Its motion alone, where no more is wanted.
+    if (work.effort.motion_alone && !due) {
+        auto alone = code_motion(work, *tracking.registered, steps, MotionParts::motion_alone);
+        if (!alone) return tl::unexpected(alone.error());
+        if (!falls_apart(work, fit_of(work, alone->encoded))) return send(std::move(*alone), best_before);
+    }
+
+    // 2. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
+    // all are motion alone, it never is.
+    if (work.effort.always_other_starts) follow_limbs_anyway(work, tracking);
+    auto motion = code_and_judge(work, *tracking.registered, steps);
+    if (!motion) return tl::unexpected(motion.error());
+    const bool must_be_repaired = (motion->lost || work.effort.motion_alone) && falls_apart(work, motion->fit);
+    motion->lost = motion->lost || must_be_repaired;
+    const auto& may_repair = work.captured.may_repair;
+    if (motion->lost && !due && !must_be_repaired && may_repair && !may_repair())
+        return send(std::move(motion->coded), best_before);
+
+    // 3. Where tracking is lost: limbs from another start.
+    const bool patches = may_be_patched(work, due);
+    const bool was_lost = motion->lost;
+    if (was_lost) {
+        tracking.lost = true;
+        if (auto ok = look_for_limbs(work, tracking, steps, patches, *motion); !ok) return tl::unexpected(ok.error());
+    }
+
+    // 4. Where it still is: a patch.
+    const auto& tracked = motion->coded.encoded;
+    const bool expensive =
+        may_be_intra(work) && static_cast<double>(motion->coded.bytes()) > work.reference().intra_bytes;
+    const bool anew = expensive || texture_is_laid_out_anew(work, tracked.mesh);
+    if (!anew && motion->lost && was_lost && patches) {
+        auto patched = patch(work, *tracking.registered, steps, motion->alone());
+        if (!patched) return tl::unexpected(patched.error());
+        if (*patched) return Frame(std::move(**patched));
+    }
+
+    // 5. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
+    const bool best = !motion->lost && (best_before == 0 || motion->fit.rms < best_before);
+    const double best_fit = best ? motion->fit.rms : best_before;
+    if (!anew && !motion->lost && !due && !patches_have_grown(work)) return send(std::move(motion->coded), best_fit);
+    const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
+    auto intra = renewed ? code_renewal(work, steps, tracked.mesh) : code_intra(work, steps);
+    if (intra && !motion->lost) intra->best_fit = best_fit;
+    return as_frame(std::move(intra));
+}
+
+}  // namespace
+
+FrameType expected_type(const TrackedWork& work) { return intra_is_due(work) ? FrameType::intra : FrameType::tracked; }
+
+Result<Frame> choose(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
+    if (!carries_surface(work.mesh())) return as_frame(code_unreferred_intra(work, steps));
+    if (can_refer(work)) return choose_by_fit(work, tracking, steps);
+    return as_frame(work.configuration.intra_only() ? code_unreferred_intra(work, steps) : code_intra(work, steps));
+}
+
+Result<Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
+    auto coded = code_motion(work, registered(work, tracking), steps, MotionParts::motion_alone);
+    if (!coded) return tl::unexpected(coded.error());
+    return Frame(chosen_motion(work, *tracking.registered, std::move(*coded), work.sequence.history.best_fit));
+}
+
+SurfaceErrors errors_of(const TrackedWork& work, const LatticeMesh& decoded) {
+    return errors_between(work.mesh(), work.surface, decoded, work.configuration.threads);
+}
+
+}  // namespace htvm::internal

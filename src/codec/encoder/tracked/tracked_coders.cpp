@@ -1,0 +1,284 @@
+#include "codec/encoder/tracked/tracked_coders.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "codec/encoder/charts/chart_packing.h"
+#include "codec/tracked/frame_group.h"
+
+namespace htvm::internal {
+namespace {
+
+enum class IntraUse : std::uint8_t { reference, none };  // whether later frames may refer to it
+
+// The steps at which the simplified I-frame and its T-frames have about the same error as other frames have at the
+// steps asked for; docs/tracked_frames.md gives the measurements.
+FrameSteps tracked_steps(const FrameSteps& steps) {
+    constexpr double finer = 0.55, coarser_colours = 1.3;
+    const auto scaled = [](double factor, std::int32_t step) {
+        return std::max(1, static_cast<std::int32_t>(std::lround(factor * step)));
+    };
+    constexpr std::int32_t coarsest_colours = 255;  // the largest step that a frame header can hold
+    return {scaled(finer, steps.geometry), std::min(scaled(coarser_colours, steps.colour), coarsest_colours)};
+}
+
+LatticeMesh simplified(const TrackedWork& work, const FrameSteps& steps) {
+    StageClock clock(work.stages);
+    auto out = simplified_reference(work.mesh(), work.surface, simplification_options(work.configuration, steps));
+    clock.done("simplification");
+    return out;
+}
+
+struct Charts {
+    TexturedSurface textured;  // empty where the stream has no charts, or the mesh no triangles
+    std::uint32_t scale = 0;
+};
+
+Result<Charts> add_charts(const LatticeMesh& mesh, const StreamTexture& texture, FramePayload& payload) {
+    if (texture.layout != TextureLayout::charts || mesh.triangles.empty()) return Charts();
+    auto placed = lay_out(mesh.positions, mesh.triangles, texture);
+    if (!placed) return tl::unexpected(placed.error());
+    payload.set(Layer::charts, std::move(placed->layer));
+    auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(placed->corners));
+    if (!textured) return tl::unexpected(textured.error());
+    return Charts{std::move(*textured), placed->scale};
+}
+
+// The patched mesh with the charts of what stays and new ones for the piece; nothing if the picture has no room.
+std::optional<TexturedSurface> add_charts_of_piece(const PatchedSurface& patched, const Reference& before,
+                                                   const StreamTexture& texture, std::uint32_t scale,
+                                                   FramePayload& payload) {
+    if (before.textured.empty()) return TexturedSurface();
+    const auto& mesh = patched.mesh;
+    auto corners = corners_that_stay(before.textured.corners, before.mesh().triangles, before.mesh().positions.size(),
+                                     patched.stays);
+    const auto piece = std::span(mesh.triangles).subspan(corners.size());
+    if (!piece.empty()) {
+        auto placed = lay_out_beside(mesh.positions, piece, texture, corners, scale);
+        if (!placed) return std::nullopt;
+        payload.set(Layer::charts, std::move(placed->layer));
+        corners.insert(corners.end(), placed->corners.begin(), placed->corners.end());
+    }
+    auto textured = textured_surface(mesh.positions.size(), mesh.triangles, std::move(corners));
+    return textured ? std::optional(std::move(*textured)) : std::nullopt;
+}
+
+// made_of: the mesh that is coded, the capture, simplified or not, or the tracked mesh. steps: asked for.
+Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& made_of, const FrameSteps& steps,
+                                   FrameSteps quantised, IntraUse use, bool renewal) {
+    const auto& configuration = work.configuration;
+    const auto captured = counts_of(work.mesh());
+    const bool referred_to = use == IntraUse::reference;
+    StageClock clock(work.stages);
+    if (referred_to)
+        quantised.geometry = step_for_reference(mean_edge(made_of.positions, made_of.triangles), quantised.geometry);
+    auto coded = code_intra_mesh(configuration, made_of, quantised, renewal, captured, work.captured.pose);
+    if (!coded) return tl::unexpected(coded.error());
+    auto charts = add_charts(coded->decoded, configuration.options.texture, coded->payload);
+    if (!charts) return tl::unexpected(charts.error());
+    TrackedIntra out;
+    out.step = coded->step;
+    out.pose = work.captured.pose;
+    auto& frame = out.frame;
+    frame.type = FrameType::intra;
+    frame.reference = work.sequence.next_frame;
+    frame.textured = std::move(charts->textured);
+    frame.decoded = std::move(coded->decoded);
+    frame.captured = captured;
+    frame.renewal = renewal;
+    // Under rate control also what stands in for a frame that does not fit may refer to it.
+    frame.referred = carries_surface(work.mesh()) && !frame.decoded.triangles.empty() &&
+                     (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);
+    frame.packets.push_back(frame_packet(PacketKind::intra, coded->payload));
+    auto& origin = out.origin;
+    origin.edge = mean_edge(work.mesh().positions, work.mesh().triangles);
+    origin.steps = steps;
+    origin.chart_scale = charts->scale;
+    origin.vertices = frame.decoded.positions.size();
+    if (referred_to) origin.colours = colours_at(work, frame.decoded);
+    clock.done("intra coding");
+    if (referred_to && frame.referred) origin.fit = fit_of(work, frame.decoded, origin.edge, {}, {});
+    return out;
+}
+
+Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use) {
+    const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.mesh());
+    const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
+    return code_intra_of(work, simplify ? simple : work.mesh(), steps, tracked_steps(steps), use, false);
+}
+
+// Not where frames are to have an error that is measured against the capture, noise and all.
+bool denoises(const Configuration& configuration) {
+    return configuration.options.tracked.denoise == Denoising::automatic &&
+           configuration.options.rate.target_error <= 0;
+}
+
+TargetFilterOptions filter_options(const TrackedWork& work) {
+    const auto& origin = work.reference().origin;
+    const auto steps = tracked_steps(origin.steps);
+    return {1.0 * steps.geometry, 1.0 * steps.colour, origin.edge};
+}
+
+// before: state of the frame that it refers to; null if that is the reference.
+Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistration& registered, const FrameSteps& steps,
+                                   MotionParts parts, const TrackedState* before,
+                                   std::span<const std::uint32_t> near = {}) {
+    const auto& configuration = work.configuration;
+    auto options = tracked_frame_options(configuration, steps);
+    if (denoises(configuration)) options.denoise = filter_options(work);
+    options.keeps_noise = configuration.options.tracked.group > 1;
+    options.motion_alone = parts == MotionParts::motion_alone;
+    options.target_samples = work.effort.target_samples;
+    options.near = near;
+    return encode_tracked_frame(work.mesh(), work.surface, *work.reference().decoded.by_nodes, registered, before,
+                                work.sequence.history.targets, options, work.stages);
+}
+
+}  // namespace
+
+TrackedFrameOptions tracked_frame_options(const Configuration& configuration, const FrameSteps& steps) {
+    // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
+    constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
+    TrackedFrameOptions out;
+    out.millimetre = configuration.adult_millimetre;
+    out.geometry_step = tracked_steps(steps).geometry;
+    out.colour_step = coarser_colours * steps.colour;
+    out.lambda = configuration.options.lambda;
+    out.reach = reach * configuration.adult_millimetre;
+    out.threads = configuration.threads;
+    return out;
+}
+
+SimplifiedReferenceOptions simplification_options(const Configuration& configuration, const FrameSteps& steps) {
+    constexpr double longest_edge = 40, reach = 30;  // mm on an adult
+    constexpr double colour_steps = 2.5;
+    SimplifiedReferenceOptions out;
+    out.surface_error = configuration.options.tracked.simplify * steps.geometry;
+    out.colour_error = colour_steps * steps.colour;
+    out.longest_edge = longest_edge * configuration.adult_millimetre;
+    out.reach = reach * configuration.adult_millimetre;
+    out.threads = configuration.threads;
+    return out;
+}
+
+Result<TrackedIntra> code_intra(const TrackedWork& work, const FrameSteps& steps) {
+    return code_intra_of_capture(work, steps, IntraUse::reference);
+}
+
+Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameSteps& steps) {
+    return code_intra_of_capture(work, steps, IntraUse::none);
+}
+
+Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
+    // What is quantised already would err twice as far, and jump.
+    constexpr double finer_again = 0.5;
+    auto quantised = tracked_steps(steps);
+    quantised.geometry = std::max(1, static_cast<std::int32_t>(std::lround(finer_again * quantised.geometry)));
+    auto out = code_intra_of(work, tracked, steps, quantised, IntraUse::reference, true);
+    if (!out) return out;
+    const auto& before = work.reference().origin;
+    out->origin.fit = least_of(std::move(out->origin.fit), before.fit);
+    out->origin.vertices = before.vertices;
+    return out;
+}
+
+Result<CodedMotion> code_motion(const TrackedWork& work, const NodeRegistration& registered, const FrameSteps& steps,
+                                MotionParts parts) {
+    const auto& options = work.configuration.options.tracked;
+    const auto& history = work.sequence.history;
+    // Now and then a place to start from, for whoever has the reference.
+    const auto since = work.sequence.next_frame - std::max(work.reference().decoded.number, history.access.value_or(0));
+    const bool from_last = history.frame && options.references == TrackedReferences::previous &&
+                           std::int64_t{since} < options.access_interval;
+    auto encoded = encode(work, registered, steps, parts, from_last ? &history.state : nullptr);
+    if (!encoded) return tl::unexpected(encoded.error());
+    const auto& payload = encoded->runs.payload;
+    const bool grouped = work.configuration.header.version >= grouped_version;
+    auto packet = frame_packet(PacketKind::tracked,
+                               grouped ? write_group_payload({.length = 1, .frame = 1}, {&payload, 1}) : payload);
+    return CodedMotion{std::move(*encoded), std::move(packet), steps, !from_last};
+}
+
+TrackedMotion chosen_motion(const TrackedWork& work, const NodeRegistration& registered, CodedMotion coded,
+                            double best_fit) {
+    const auto& before = work.sequence.history;
+    TrackedMotion out;
+    auto& frame = out.frame;
+    frame.type = FrameType::tracked;
+    frame.reference = coded.of_reference ? work.reference().decoded.number : *before.frame;
+    frame.referred = work.configuration.options.tracked.references == TrackedReferences::previous;
+    frame.access = coded.of_reference;
+    frame.packets.push_back(std::move(coded.packet));
+    frame.decoded = std::move(coded.encoded.mesh);
+    frame.captured = counts_of(work.mesh());
+    frame.shares = coded.encoded.runs.shares;
+    out.steps = coded.steps;
+    out.noise = std::move(coded.encoded.noise);
+    auto& history = out.history;
+    history.frame = work.sequence.next_frame;
+    history.access = coded.of_reference ? history.frame : before.access;
+    history.before_last = before.last;
+    history.last = registered.motion;
+    history.state = std::move(coded.encoded.state);
+    history.targets = std::move(coded.encoded.targets);
+    history.best_fit = best_fit;
+    return out;
+}
+
+Result<EncodedTrackedFrame> code_for_patches(const TrackedWork& work, const NodeRegistration& registered,
+                                             const FrameSteps& steps, std::span<const std::uint32_t> near) {
+    return encode(work, registered, steps, MotionParts::all, nullptr, near);
+}
+
+Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const NodeRegistration& registered,
+                                               const FrameSteps& steps, const EncodedTrackedFrame& tracked,
+                                               const SurfacePatch& patch) {
+    const auto& reference = work.reference();
+    const auto& by_nodes = *reference.decoded.by_nodes;
+    StageClock clock(work.stages);
+    const auto quantised = tracked_steps(steps);
+    FramePayload payload;
+    const auto& mesh = tracked.mesh;
+    auto patched = encode_patch({mesh.positions, mesh.triangles, mesh.colours}, by_nodes.hierarchy, patch,
+                                {quantised.geometry, quantised.colour}, payload);
+    if (!patched) return tl::unexpected(patched.error());
+    const auto captured = counts_of(work.mesh());
+    const auto vertices = patched->mesh.positions.size();
+    payload.header.source_vertices = captured.vertices;
+    payload.header.source_triangles = captured.triangles;
+    payload.set(Layer::tracked, tracked.runs.payload);
+    payload.set(Layer::pose, encode_pose(work.captured.pose));
+    smooth_what_is_new(*patched, quantised.geometry, !mesh.normals.empty());
+    auto textured = add_charts_of_piece(*patched, reference.decoded, work.configuration.options.texture,
+                                        reference.origin.chart_scale, payload);
+    if (!textured) return std::optional<TrackedPatch>();
+    TrackedPatch out;
+    auto& frame = out.frame;
+    frame.type = FrameType::patched;
+    frame.reference = reference.decoded.number;
+    frame.referred = true;
+    frame.textured = std::move(*textured);
+    frame.renewed =
+        vertices > 0 ? static_cast<double>(vertices - patched->stays.size()) / static_cast<double>(vertices) : 0;
+    frame.decoded = std::move(patched->mesh);
+    frame.captured = captured;
+    frame.packets.push_back(frame_packet(PacketKind::patched, payload));
+    if (denoises(work.configuration))
+        out.targets = on_new_reference(tracked.targets, patched->stays, vertices, filter_options(work));
+    out.kept = keep_nodes(by_nodes.nodes, patched->stays);
+    out.pose = work.captured.pose;
+    out.before_last = work.sequence.history.last;
+    if (out.before_last.empty()) out.before_last.resize(registered.motion.size());
+    out.last = registered.motion;
+    auto& origin = out.origin = reference.origin;
+    origin.steps = steps;
+    origin.edge = mean_edge(work.mesh().positions, work.mesh().triangles);
+    origin.colours = colours_at(work, frame.decoded);
+    clock.done("patch coding");
+    std::vector<std::uint32_t> near(vertices, OrientedPoints::no_point);
+    for (std::size_t i = 0; i < patched->stays.size(); ++i) near[i] = tracked.near[patched->stays[i]];
+    origin.fit = fit_of(work, frame.decoded, origin.edge, near, {});
+    return std::optional(std::move(out));
+}
+
+}  // namespace htvm::internal

@@ -1,0 +1,211 @@
+#include "codec/encoder/tracked/tracked_strategy.h"
+
+#include <iterator>
+#include <utility>
+
+#include "core/parallel.h"
+
+namespace htvm::internal {
+
+TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy& strategy,
+                       TrackedStrategy::Waiting frame, Tracking& tracking, std::vector<StageTime>& stages) {
+    auto& [captured, ahead] = frame;
+    if (!ahead.surface) ahead.surface = surface_of(configuration, captured, stages);
+    tracking.registered = std::move(ahead.registered);
+    const auto effort = tracking_effort(captured.effort);
+    return {configuration, strategy.sequence, stages, std::move(captured), effort, std::move(*ahead.surface)};
+}
+
+// ---- Frames in flight -----------------------------------------------------------------------------------------------
+
+TrackedAssumption assume(const TrackedWork& work, Tracking& tracking) {
+    TrackedAssumption out;
+    if (can_refer(work)) out.nodes = registered(work, tracking);
+    return out;
+}
+
+namespace {
+
+void find_surface(const Configuration& configuration, TrackedStrategy::Waiting& frame, std::vector<StageTime>& stages) {
+    if (!frame.ahead.surface) frame.ahead.surface = surface_of(configuration, frame.captured, stages);
+}
+
+void register_next(const TrackedWork& work, const Tracking& tracking, const TrackedAssumption& assumed,
+                   TrackedStrategy::Waiting& next, std::vector<StageTime>& stages) {
+    find_surface(work.configuration, next, stages);
+    if (assumed.nodes && !tracking.lost && can_be_moved(work.sequence, next.captured.mesh))
+        next.ahead.registered =
+            register_frame(work.configuration, work.reference(), *next.ahead.surface, next.captured,
+                           {assumed.nodes->motion, work.sequence.history.last, {}, {}}, stages, &tracking.lost);
+}
+
+}  // namespace
+
+void work_ahead(const TrackedWork& work, const Tracking& tracking, const TrackedAssumption& assumed,
+                std::span<TrackedStrategy::Waiting> waiting, std::vector<StageTime>& stages) {
+    std::vector<StageTime> of_last;
+    parallel_invoke(
+        work.configuration.threads, [&] { register_next(work, tracking, assumed, waiting.front(), stages); },
+        [&] {
+            if (waiting.size() > 1) find_surface(work.configuration, waiting.back(), of_last);
+        });
+    stages.insert(stages.end(), of_last.begin(), of_last.end());
+}
+
+void keep_what_holds(const Tracking& tracking, const TrackedWork::Frame* chosen,
+                     std::span<TrackedStrategy::Waiting> waiting) {
+    const bool as_assumed = chosen && std::holds_alternative<TrackedMotion>(*chosen) && tracking.registered &&
+                            !tracking.moved_limbs && !tracking.lost;
+    if (as_assumed) return;
+    for (auto& frame : waiting) frame.ahead.registered.reset();
+}
+
+// ---- The sequence goes on -------------------------------------------------------------------------------------------
+
+namespace {
+
+// The reference that this frame becomes. step: Reference::step. kept: what it takes over of the one before.
+Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, const CodedFrame& frame,
+                                                       ReferenceOrigin origin, CodedPose pose, std::int32_t step,
+                                                       KeptNodes kept) {
+    const auto& configuration = work.configuration;
+    // Under rate control a stand-in for a frame that does not fit also refers to the I-frame. A tracked skeleton gives
+    // a start for the motion of the nodes.
+    const bool referred_to = !configuration.intra_only() || configuration.options.rate.bits_per_second > 0;
+    auto decoded = make_reference(
+        configuration.header, {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured},
+        frame.decoded, std::move(pose),
+        {.bones = referred_to && configuration.header.skeleton_tracked, .nodes = referred_to}, configuration.threads);
+    if (!decoded) return tl::unexpected(decoded.error());
+    auto out = std::make_shared<TrackedReference>();
+    out->decoded = std::move(*decoded);
+    out->origin = std::move(origin);
+    if (out->decoded.by_nodes)
+        out->deformable =
+            make_tracked_deformable(*out->decoded.by_nodes, deformation_options(configuration), out->origin.colours);
+    return out;
+}
+
+Result<TrackedSequence> after(const TrackedWork& work, TrackedMotion& motion) {
+    return TrackedSequence{work.sequence.next_frame + 1, work.sequence.reference, std::move(motion.history)};
+}
+
+Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
+    const auto& before = work.sequence;
+    if (!intra.frame.referred) return TrackedSequence{before.next_frame + 1, before.reference, before.history};
+    auto reference = reference_of(work, intra.frame, std::move(intra.origin), std::move(intra.pose), intra.step, {});
+    if (!reference) return tl::unexpected(reference.error());
+    auto& in_use = **reference;
+    in_use.intra_frame = before.next_frame;
+    in_use.intra_bytes = static_cast<double>(intra.frame.bytes());
+    TrackedSequence out;
+    out.next_frame = before.next_frame + 1;
+    out.history.best_fit = intra.best_fit;
+    out.history.targets = on_new_reference(before.history.targets, {}, 0, {});
+    out.reference = std::move(*reference);
+    return out;
+}
+
+Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
+    const auto& before = work.reference();
+    auto reference =
+        reference_of(work, patch.frame, std::move(patch.origin), std::move(patch.pose), 1, std::move(patch.kept));
+    if (!reference) return tl::unexpected(reference.error());
+    auto& in_use = **reference;
+    in_use.intra_frame = before.intra_frame;
+    in_use.intra_bytes = before.intra_bytes;
+    in_use.patches = before.patches + 1;
+    in_use.patch_bytes = before.patch_bytes + static_cast<double>(patch.frame.bytes());
+    TrackedSequence out;
+    out.next_frame = work.sequence.next_frame + 1;
+    out.history.best_fit = patch.best_fit;
+    out.history.targets = std::move(patch.targets);
+    if (!patch.before_last.empty())
+        out.history.gone_on = moved_on(before.deformable, patch.before_last, patch.last, in_use.deformable.handles);
+    out.reference = std::move(*reference);
+    return out;
+}
+
+}  // namespace
+
+Result<TrackedSequence> sequence_after(const TrackedWork& work, TrackedWork::Frame& chosen) {
+    return std::visit([&](auto& of_kind) { return after(work, of_kind); }, chosen);
+}
+
+// ---- What is sent ---------------------------------------------------------------------------------------------------
+
+namespace {
+
+// Codes these frames as a group. before: null where it is to refer to the reference alone.
+Result<void> add_group(const Configuration& configuration, const TrackedReference& reference, const GroupAnchor* before,
+                       std::span<const HeldFrame> held, std::vector<StageTime>& stages, TrackedHandout& handout) {
+    auto group = code_group(configuration, reference, before, held, stages);
+    if (!group) return tl::unexpected(group.error());
+    std::ranges::move(group->frames, std::back_inserter(handout.frames));
+    handout.anchor = std::move(group->anchor);
+    return {};
+}
+
+// The held frames, if there are any, as a group of what came before.
+Result<void> add_held(const TrackedStrategy& strategy, const Configuration& configuration,
+                      std::span<const HeldFrame> held, std::vector<StageTime>& stages, TrackedHandout& handout) {
+    if (held.empty()) return {};
+    return add_group(configuration, *strategy.sequence.reference, strategy.anchor ? &*strategy.anchor : nullptr, held,
+                     stages, handout);
+}
+
+// Holds a T-frame, and codes its group once that has all its frames. Where the frame refers to the reference alone, for
+// decoding to start there, the group before ends, and it is one by itself.
+Result<TrackedHandout> hold(TrackedStrategy& strategy, TrackedWork& work, Tracking& tracking, TrackedMotion& motion) {
+    const auto& configuration = work.configuration;
+    auto& held = strategy.held;
+    const bool place_to_start = motion.frame.access && (strategy.anchor || !held.empty());
+    held.push_back({work.sequence.next_frame, work.captured.timestamp_us, std::move(work.captured.mesh),
+                    std::move(work.surface), std::move(*tracking.registered), motion.steps, std::move(motion.noise)});
+    const std::span<const HeldFrame> all = held;
+    TrackedHandout out;
+    if (place_to_start) {
+        if (auto ok = add_held(strategy, configuration, all.first(all.size() - 1), work.stages, out); !ok)
+            return tl::unexpected(ok.error());
+        if (auto ok = add_group(configuration, *strategy.sequence.reference, nullptr, all.last(1), work.stages, out);
+            !ok)
+            return tl::unexpected(ok.error());
+    } else if (all.size() == static_cast<std::size_t>(configuration.options.tracked.group)) {
+        if (auto ok = add_held(strategy, configuration, all, work.stages, out); !ok) return tl::unexpected(ok.error());
+    }
+    out.keeps_held = out.frames.empty();
+    return out;
+}
+
+}  // namespace
+
+Result<TrackedHandout> hand_out(TrackedStrategy& strategy, TrackedWork& work, Tracking& tracking,
+                                TrackedWork::Frame chosen, const FrameCost& cost) {
+    const auto& configuration = work.configuration;
+    if (auto* motion = std::get_if<TrackedMotion>(&chosen); motion && configuration.options.tracked.group > 1)
+        return hold(strategy, work, tracking, *motion);
+    TrackedHandout out;
+    if (auto ok = add_held(strategy, configuration, strategy.held, work.stages, out); !ok)
+        return tl::unexpected(ok.error());
+    const auto& reference = strategy.sequence.reference;
+    out.frames.push_back(outgoing(configuration, std::move(coded_frame(chosen)),
+                                  reference ? &reference->decoded.textured : nullptr, strategy.sequence.next_frame,
+                                  work.captured.timestamp_us, cost));
+    return out;
+}
+
+Result<TrackedHandout> hand_out_held(const TrackedStrategy& strategy, const Configuration& configuration,
+                                     std::vector<StageTime>& stages) {
+    TrackedHandout out;
+    if (auto ok = add_held(strategy, configuration, strategy.held, stages, out); !ok) return tl::unexpected(ok.error());
+    return out;
+}
+
+void commit(TrackedStrategy& strategy, TrackedHandout& handout, TrackedSequence sequence) {
+    if (!handout.keeps_held) strategy.held.clear();
+    if (handout.anchor) strategy.anchor = std::move(handout.anchor);
+    if (sequence.reference != strategy.sequence.reference) strategy.anchor.reset();
+    strategy.sequence = std::move(sequence);
+}
+
+}  // namespace htvm::internal

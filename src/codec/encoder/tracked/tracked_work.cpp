@@ -1,0 +1,137 @@
+#include "codec/encoder/tracked/tracked_work.h"
+
+#include <algorithm>
+
+#include "codec/encoder/lattice_motion.h"
+
+namespace htvm::internal {
+namespace {
+
+// Where the skeleton moves each node: with the bone of the vertex that the node sits on.
+std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration, const Reference& reference,
+                                              const CodedPose& pose) {
+    if (!configuration.header.skeleton_tracked) return {};
+    const auto bones = skeletal_motion(reference.skinned, configuration.header.skeleton.bones, pose);
+    std::vector<RigidMotion> out;
+    for (const auto v : reference.by_nodes->nodes.vertex) out.push_back(bones[reference.skinned.bone_of_vertex[v]]);
+    return out;
+}
+
+std::int64_t frames_since_intra(const TrackedWork& work) {
+    return std::int64_t{work.sequence.next_frame} - work.reference().intra_frame;
+}
+
+}  // namespace
+
+bool carries_surface(const LatticeMesh& captured) { return !captured.triangles.empty(); }
+
+bool can_be_moved(const TrackedSequence& sequence, const LatticeMesh& captured) {
+    if (!sequence.reference) return false;
+    const auto& reference = sequence.reference->decoded;
+    return reference.by_nodes && !reference.mesh().positions.empty() && carries_surface(captured) &&
+           same_attributes(captured, reference.mesh());
+}
+
+bool can_refer(const TrackedWork& work) { return !work.configuration.intra_only() && can_be_moved(work); }
+
+bool intra_is_due(const TrackedWork& work) {
+    return work.captured.force_intra || !can_refer(work) ||
+           frames_since_intra(work) >= work.configuration.options.key_interval;
+}
+
+bool may_be_intra(const TrackedWork& work) {
+    return frames_since_intra(work) >= work.configuration.options.least_key_interval;
+}
+
+SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame& captured,
+                        std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    auto out = captured_surface(captured.mesh, deformation_options(configuration));
+    if (!captured.colours.empty()) out.colours = captured.colours;
+    clock.done("search structures");
+    return out;
+}
+
+NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
+                                const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
+                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain) {
+    StageClock clock(stages);
+    const auto skeletal = skeletal_node_motion(configuration, reference.decoded, captured.pose);
+    starts.skeletal = skeletal;
+    auto options = deformation_options(configuration, tracking_effort(captured.effort));
+    options.in_vain = in_vain;
+    auto out = register_nodes(reference.deformable, surface, starts, options);
+    clock.done("registration");
+    return out;
+}
+
+const NodeRegistration& registered(const TrackedWork& work, Tracking& tracking) {
+    if (!tracking.registered) {
+        const auto& history = work.sequence.history;
+        tracking.registered = register_frame(work.configuration, work.reference(), work.surface, work.captured,
+                                             {history.last, history.before_last, history.gone_on, {}}, work.stages);
+    }
+    return *tracking.registered;
+}
+
+FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered, std::vector<StageTime>& stages) {
+    StageClock clock(stages);
+    const auto& history = work.sequence.history;
+    const auto skeletal = skeletal_node_motion(work.configuration, work.reference().decoded, work.captured.pose);
+    FoundLimbs out{std::move(registered)};
+    out.any = follow_lost_limbs(work.reference().deformable, work.surface,
+                                {history.last, history.before_last, history.gone_on, skeletal},
+                                deformation_options(work.configuration, work.effort), out.registered);
+    clock.done("registration");
+    return out;
+}
+
+TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge,
+                  std::span<const std::uint32_t> near, std::span<const double> intra_squared) {
+    constexpr double stray_in_edges = 2, reach = 25;  // in mean edges; mm on an adult
+    StageClock clock(work.stages);
+    TrackedFitOptions options;
+    options.stray = std::max(stray_in_edges * reference_edge, 1.0);
+    options.reach = std::max(reach * work.configuration.adult_millimetre, options.stray);
+    options.region = region_side(work.configuration);
+    options.threads = work.configuration.threads;
+    auto out = measure_tracked_fit(work.surface, decoded, near, intra_squared, options);
+    clock.done("fit of the tracking");
+    return out;
+}
+
+std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decoded) {
+    const auto& colours = work.captured.colours;
+    if (colours.empty()) return {};
+    const auto points = points_of(decoded.positions);
+    const auto normals = points_of(vertex_normals(decoded.positions, decoded.triangles));
+    const auto found = closest_facing(work.surface, points, normals,
+                                      {.reach = static_cast<float>(30 * work.configuration.adult_millimetre)},
+                                      work.configuration.threads);
+    std::vector<Colour> out;
+    for (const auto& at : found) {
+        Colour colour{};
+        for (std::size_t c = 0; c < 3 && at.found(); ++c) {
+            float level = 0;
+            for (std::size_t i = 0; i < 3; ++i)
+                level += at.shares[i] * static_cast<float>(colours[work.mesh().triangles[at.triangle][i]][c]);
+            colour[c] = static_cast<std::uint8_t>(std::clamp(level + 0.5F, 0.0F, 255.0F));
+        }
+        out.push_back(colour);
+    }
+    return out;
+}
+
+double region_side(const Configuration& configuration) { return 100 * configuration.adult_millimetre; }
+
+DeformationOptions deformation_options(const Configuration& configuration, const TrackingEffort& effort) {
+    DeformationOptions out;
+    out.millimetre = configuration.adult_millimetre;
+    out.threads = configuration.threads;
+    return with_effort(out, effort);
+}
+DeformationOptions deformation_options(const Configuration& configuration) {
+    return deformation_options(configuration, tracking_effort(configuration.options.tracked.effort));
+}
+
+}  // namespace htvm::internal

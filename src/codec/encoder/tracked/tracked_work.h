@@ -1,0 +1,166 @@
+// The tracked strategy's values: what its frames refer to, what is found of a frame before it is coded, and what coding
+// it in one way gives. Frames are I, T or TP: docs/tracked_frames.md. Lengths are in lattice units.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "codec/encoder/coded_frame.h"
+#include "codec/encoder/tracked/captured_surface.h"
+#include "codec/encoder/tracked/tracked_frame.h"
+#include "codec/encoder/tracked/tracking_effort.h"
+#include "codec/reference/reference.h"
+
+namespace htvm::internal {
+
+// What the encoder knows about where a reference came from, and the decoder does not.
+struct ReferenceOrigin {
+    FrameSteps steps;               // asked for
+    double edge = 0;                // mean edge of the captured mesh
+    std::size_t vertices = 0;       // of the last I-frame that was made of the capture; later ones may be renewals
+    std::uint32_t chart_scale = 0;  // ChartLayout::scale, if the stream has charts
+    std::vector<Colour> colours;    // of the reference's vertices, for tracking alone: where frames have none; or none
+    TrackedFit fit;                 // of the reference itself
+};
+
+// The current reference, and what the encoder derives from it.
+struct TrackedReference {
+    Reference decoded;
+    ReferenceOrigin origin;
+    std::uint32_t intra_frame = 0;  // number of the I-frame; patched since, the reference has another
+    double intra_bytes = 0;         // size of the I-frame
+    int patches = 0;                // how many TP-frames led from the I-frame to this reference
+    double patch_bytes = 0;         // their size
+    DeformableMesh deformable;
+};
+
+// What the T-frames since the reference leave for the next one.
+struct MotionHistory {
+    std::optional<std::uint32_t> frame;          // number of the last one
+    std::optional<std::uint32_t> access;         // number of the last one that refers to the reference alone
+    std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
+    TrackedState state;                          // of the last one
+    TargetHistory targets;                       // what filtering left of the last one
+    std::vector<RigidMotion> gone_on;  // where each node goes next if it goes on as it did before a patch made
+                                       // it; empty but after a TP-frame
+    double best_fit = 0;               // RMS of the best so far; 0: none yet
+};
+
+// The strategy's state between two frames.
+struct TrackedSequence {
+    std::uint32_t next_frame = 0;
+    std::shared_ptr<const TrackedReference> reference;  // null before the first I-frame
+    MotionHistory history;
+};
+
+// What was found of a frame that waits, while others were coded.
+struct TrackedAhead {
+    std::optional<SurfaceIndex> surface;
+    std::optional<NodeRegistration> registered;  // as if the frame before had been a T-frame
+};
+
+// How the reference lies on a frame, and what attempts at coding it have found out so far: rate and error control make
+// several.
+struct Tracking {
+    std::optional<NodeRegistration> registered;
+    bool searched_limbs = false, moved_limbs = false;  // whether lost limbs were looked for, and any was found
+    std::atomic<bool> lost = false;  // that tracking is lost; read by whoever works ahead on the frame behind
+};
+
+// A T-frame.
+struct TrackedMotion {
+    CodedFrame frame;
+    MotionHistory history;  // that it leaves
+    FrameSteps steps;       // asked for
+    RemovedNoise noise;     // what filtering took off, if it is to be coded again in a group
+};
+// An I-frame. It becomes the reference if it is referred to.
+struct TrackedIntra {
+    CodedFrame frame;
+    ReferenceOrigin origin;
+    std::int32_t step = 1;  // Reference::step
+    CodedPose pose;
+    double best_fit = 0;  // MotionHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
+};
+// A TP-frame, which becomes the reference.
+struct TrackedPatch {
+    CodedFrame frame;
+    ReferenceOrigin origin;
+    CodedPose pose;
+    KeptNodes kept;                              // what it takes over of the reference before
+    TargetHistory targets;                       // on the reference that it becomes
+    std::vector<RigidMotion> before_last, last;  // of each node of the reference before, up to this frame
+    double best_fit = 0;                         // as of an I-frame
+};
+
+// The frame that is coded, and what is found of it before that. Attempts share it and leave it as it is.
+struct TrackedWork {
+    using Progress = Tracking;
+    using Frame = std::variant<TrackedIntra, TrackedMotion, TrackedPatch>;
+
+    const Configuration& configuration;
+    const TrackedSequence& sequence;
+    std::vector<StageTime>& stages;  // where times are added
+    CapturedFrame captured;
+    TrackingEffort effort;
+    SurfaceIndex surface;  // the captured surface, indexed by direction too; empty where there are no triangles
+
+    const LatticeMesh& mesh() const { return captured.mesh; }
+    const TrackedReference& reference() const { return *sequence.reference; }  // there must be one
+};
+
+// A frame without triangles is an I-frame that nothing refers to, and leaves the reference as it was.
+bool carries_surface(const LatticeMesh& captured);
+// Whether the nodes of the reference can move it to this captured frame, by what both have.
+bool can_be_moved(const TrackedSequence& sequence, const LatticeMesh& captured);
+inline bool can_be_moved(const TrackedWork& work) { return can_be_moved(work.sequence, work.mesh()); }
+// Whether the frame may also refer to it.
+bool can_refer(const TrackedWork& work);
+// Whether an I-frame is wanted: it is asked for, there is nothing to refer to, or the longest key interval has passed.
+bool intra_is_due(const TrackedWork& work);
+// Whether the shortest key interval has passed: an I-frame is allowed if it saves bits.
+bool may_be_intra(const TrackedWork& work);
+
+inline CodedFrame& coded_frame(TrackedWork::Frame& frame) {
+    return std::visit([](auto& of_kind) -> CodedFrame& { return of_kind.frame; }, frame);
+}
+
+// The captured surface, with the colours that serve tracking.
+SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame& captured,
+                        std::vector<StageTime>& stages);
+
+// Registers the reference's nodes to a captured surface. starts: but for the skeleton's. in_vain: may end it early.
+NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
+                                const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
+                                std::vector<StageTime>& stages, const std::atomic<bool>* in_vain = nullptr);
+// The same of the frame that is coded, once.
+const NodeRegistration& registered(const TrackedWork& work, Tracking& tracking);
+
+// Where tracking was lost: the registration with the limbs that another start finds, and whether there are any.
+struct FoundLimbs {
+    NodeRegistration registered;
+    bool any = false;
+};
+FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered, std::vector<StageTime>& stages);
+
+// Whether a decoded mesh still represents the captured one. near, intra_squared: see measure_tracked_fit().
+TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge,
+                  std::span<const std::uint32_t> near, std::span<const double> intra_squared);
+
+// What is seen of CapturedFrame::colours at the vertices of a decoded mesh; none without those.
+std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decoded);
+
+// Side of the cubes of space by which it is judged whether a region is lost.
+double region_side(const Configuration& configuration);
+
+// The registration's options, scaled to this subject, with the effort that the encoder was asked for, or a frame's. The
+// reference's samples are as many as were chosen with it, whatever the effort since.
+DeformationOptions deformation_options(const Configuration& configuration);
+DeformationOptions deformation_options(const Configuration& configuration, const TrackingEffort& effort);
+
+}  // namespace htvm::internal
