@@ -43,7 +43,7 @@ std::int32_t step_for_reference(double edge, std::int32_t step) {
 }
 
 // The steps at which the simplified I-frame and its T-frames have about the same error as other frames have at the
-// steps asked for; docs/algorithm.md gives the measurements.
+// steps asked for; docs/experiments/colour_steps.md has measurements.
 FrameSteps tracked_steps(const FrameSteps& steps) {
     constexpr double finer = 0.55, coarser_colours = 1.3;
     const auto scaled = [](double factor, std::int32_t step) {
