@@ -57,6 +57,8 @@ set_tests_properties(real_captures command_line captures PROPERTIES COST 90)
 add_test(NAME c_examples COMMAND ${PROJECT_SOURCE_DIR}/tests/c_api/examples.sh $<TARGET_FILE:example_encode>
                                  $<TARGET_FILE:example_decode> ${PROJECT_SOURCE_DIR}/tests/data/conformance)
 add_test(NAME pages COMMAND ${PROJECT_SOURCE_DIR}/tests/install/pages.sh $<TARGET_FILE:htvm> $<TARGET_FILE:htvm-lab>)
+# Every link in the documents leads to a file and a heading.
+add_test(NAME docs_links COMMAND ${PROJECT_SOURCE_DIR}/tests/docs/links.py ${PROJECT_SOURCE_DIR})
 add_test(NAME bench COMMAND ${PROJECT_SOURCE_DIR}/tests/bench/run.sh)
 set_tests_properties(bench PROPERTIES SKIP_RETURN_CODE 77)
 # Builds programs against an installation of this build.

@@ -13,8 +13,8 @@
 namespace htvm::app {
 namespace {
 
-// How long a frame takes at each effort, against the usual one: docs/performance.md. Roughly is enough, since what is
-// learned of each frame corrects it.
+// How long a frame takes at each effort, against the usual one: docs/experiments/efforts.md. Roughly is enough, since
+// what is learned of each frame corrects it.
 constexpr std::array<double, 10> shares = {0.45, 0.88, 0.94, 0.98, 0.99, 1, 1.6, 1.7, 1.8, 2.6};
 
 double share_of(int effort) { return shares[static_cast<std::size_t>(std::clamp(effort, 0, 9))]; }

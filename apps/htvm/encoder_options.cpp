@@ -314,9 +314,11 @@ std::string options_in_markdown() {
     std::string out =
         "# Options of the encoder\n\n"
         "Printed by `htvm encode --help-options`, from the one list by which all of them are checked\n"
-        "([encoder_options.cpp](../src/codec/encoder_options.cpp)). Names are those of the C++ struct's fields\n"
+        "([encoder_options.cpp](../src/codec/encoder/encoder_options.cpp)). Names are those of the C++ struct's "
+        "fields\n"
         "([encoder_options.hpp](../include/htvm/encoder_options.hpp)) and of the C interface\n"
-        "(`htvm_encoder_options_set`). Details and measurements: [algorithm.md](algorithm.md).\n";
+        "(`htvm_encoder_options_set`). Details: [the published method](published_method.md), [tracked "
+        "frames](tracked_frames.md).\n";
     for (const auto group : {OptionGroup::common, OptionGroup::rate, OptionGroup::tracked, OptionGroup::topology}) {
         out += fmt::format("\n## {}\n\n| option | `htvm encode` | range | default | meaning |\n|---|---|---|---|---|\n",
                            group == OptionGroup::common ? "Every profile" : heading(group));

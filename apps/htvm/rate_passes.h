@@ -8,7 +8,7 @@
 
 namespace htvm::app {
 
-// Farther off the rate than this, another pass is worth its time. Measured: docs/algorithm.md, "Two passes".
+// Farther off the rate than this, another pass is worth its time. Measured: docs/experiments/rate_control.md.
 inline constexpr double rate_tolerance = 0.05;
 // Passes over a capture, the first included.
 inline constexpr int most_passes = 6;

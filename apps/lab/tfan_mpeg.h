@@ -6,7 +6,7 @@
 // and the operations and indices that no configuration covers are five streams, each under one adaptive model without
 // contexts. Positions, quantised to a number of bits over the longest side of the bounding box, are predicted by one
 // parallelogram; colours by one neighbour. Not byte-compatible with ISO/IEC 14496-16, but near its rate:
-// docs/algorithm.md.
+// docs/experiments/intra_frames.md.
 #pragma once
 
 #include <cstdint>

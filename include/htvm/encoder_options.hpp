@@ -84,7 +84,7 @@ struct TopologyOptions {
     bool merge_duplicates = true;  // merge vertices that decode to the same values, drop triangles that collapse
     int nearest_vertices = 16;     // m of the distance order, 1..64 (paper: 8, 16, 32)
     ReferenceVertices reference_vertices = ReferenceVertices::any;  // measured to be better than the paper's, see
-                                                                    // docs/algorithm.md
+                                                                    // docs/published_method.md
     double weight_width = 30;  // mm, 0..1000: width over which bones blend at their borders; 0: rigid, as in the paper
     BoneRegistration registration = BoneRegistration::plane;
 };

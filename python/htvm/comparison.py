@@ -19,7 +19,7 @@ from .mesh import Mesh, write_mesh
 
 Meshes = Union[str, "os.PathLike[str]", Mesh, Iterable[Mesh]]
 
-# Exit codes of the program (README.md).
+# Exit codes of the program (docs/use.md).
 _kinds = {
     1: errors.BadInput, 2: errors.BadInput, 3: errors.CorruptStream, 4: errors.Unsupported, 5: errors.LimitExceeded,
 }

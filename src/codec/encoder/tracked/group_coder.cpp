@@ -11,7 +11,7 @@ namespace htvm::internal {
 namespace {
 
 // How much finer than asked for the frames are that a group's others are predicted from, so that with steps a fifth
-// coarser from level to level the whole has about the error asked for: see docs/tracked_frames.md.
+// coarser from level to level the whole has about the error asked for: see docs/experiments/groups.md.
 double finer_anchor(int group) {
     constexpr double a_level = 1.2, levels = 3;
     return std::pow(a_level, -static_cast<double>(std::bit_width(static_cast<unsigned>(group - 1))) / levels);

@@ -7,7 +7,7 @@ namespace htvm::internal {
 namespace {
 
 constexpr std::size_t components = 4, fields = 2;
-// Tuned on synthetic captures, whose true surface is known: docs/algorithm.md has figures.
+// Tuned on synthetic captures, whose true surface is known: docs/experiments/noise.md has figures.
 constexpr int rounds = 4;               // of smoothing: detail is what is left beyond them, 20 mm or so
 constexpr float longest_memory = 12;    // frames over which noise is averaged
 constexpr float usual_counts = 4;       // frames that the whole surface's noise counts beside that of a place

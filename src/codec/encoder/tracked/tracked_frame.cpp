@@ -33,7 +33,7 @@ std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, s
 }
 
 // For shifts, half the step of the displacement; for turns steps that shrink somewhat faster than that step does:
-// measured, see docs/algorithm.md.
+// docs/experiments/node_motion.md has measurements.
 NodeMotionSteps motion_steps(double geometry_step, double millimetre) {
     const auto exponent = [](double step, double slope, double more, int most) {
         return std::clamp(static_cast<int>(std::lround(slope * std::log2(std::max(step, 1.0)) + more)), 0, most);

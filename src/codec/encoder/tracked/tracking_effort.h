@@ -1,5 +1,5 @@
 // How much is searched for a T-frame, from live to archive: what an effort of 1 to 9 stands for. The numbers are those
-// that paid at their place: docs/performance.md has what each level takes and gives.
+// that paid at their place: docs/experiments/efforts.md has what each level takes and gives.
 #pragma once
 
 #include "codec/encoder/tracked/captured_surface.h"
