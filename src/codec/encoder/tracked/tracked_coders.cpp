@@ -12,7 +12,7 @@ namespace {
 enum class IntraUse : std::uint8_t { reference, none };  // whether later frames may refer to it
 
 // The steps at which the simplified I-frame and its T-frames have about the same error as other frames have at the
-// steps asked for; docs/tracked_frames.md gives the measurements.
+// steps asked for; docs/experiments/colour_steps.md has measurements.
 FrameSteps tracked_steps(const FrameSteps& steps) {
     constexpr double finer = 0.55, coarser_colours = 1.3;
     const auto scaled = [](double factor, std::int32_t step) {
