@@ -526,8 +526,8 @@ namespace Htvm
         readonly int joints, bones;
 
         // options: by the names in docs/options.md, such as { "key_interval", "60" }; with a decimal point, whatever the
-        // culture. quality: 0 to 100, as of `htvm encode`; null: the options' steps.
-        public Encoder(Profile profile = Profile.Tracked, double? quality = 42, Skeleton skeleton = null,
+        // culture. quality: 0 to 100; null: 42, as of `htvm encode`.
+        public Encoder(Profile profile = Profile.Tracked, double? quality = null, Skeleton skeleton = null,
                        IDictionary<string, string> options = null, IDictionary<string, string> metadata = null,
                        double? floor = null)
         {
@@ -536,13 +536,7 @@ namespace Htvm
             if (status != Status.Ok) throw new HtvmException(status, null);
             try
             {
-                if (quality.HasValue)
-                {
-                    double geometry, colour;
-                    Native.htvm_quality_steps(quality.Value, out geometry, out colour);
-                    Set(set, "geometry_step", Number(geometry));
-                    Set(set, "colour_step", Number(colour));
-                }
+                if (quality.HasValue) Set(set, "quality", Number(quality.Value));
                 if (options != null)
                     foreach (var option in options) Set(set, option.Key, option.Value);
                 if (metadata != null)

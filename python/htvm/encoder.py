@@ -138,7 +138,7 @@ class Encoder:
     output: None; a path, where the complete stream is put with its index in front: until then it is beside it, and what
         fails leaves the file that was there; or a binary file object, which gets the packets and is not closed
     profile: "tracked", "topology" or "paper"
-    quality: 0 to 100, sets geometry_step and colour_step; None: they keep their defaults
+    quality: 0 to 100, see docs/options.md; None: 42, as of ``htvm encode``
     fps: frames per second: a number, a Fraction or a text such as "30000/1001"
     skeleton: of the poses that come with the meshes; None: one bone stands in
     metadata: "title", "rights", "timecode" and other texts
@@ -154,7 +154,7 @@ class Encoder:
         output: Union[None, str, "os.PathLike[str]", BinaryIO] = None,
         *,
         profile: str = "tracked",
-        quality: Optional[float] = 42,
+        quality: Optional[float] = None,
         fps: Union[int, float, str, Fraction] = 30,
         skeleton: Optional[Skeleton] = None,
         metadata: Optional[Mapping[str, str]] = None,
@@ -374,12 +374,7 @@ def _set_options(
 ) -> _Options:
     out = _Options(profile)
     if quality is not None:
-        if not 0 <= quality <= 100:
-            raise BadInput(f"quality is from 0 to 100, not {quality}")
-        geometry, colour = ctypes.c_double(), ctypes.c_double()
-        c.library.htvm_quality_steps(quality, geometry, colour)
-        out.set("geometry_step", geometry.value)
-        out.set("colour_step", colour.value)
+        out.set("quality", quality)
     out.set("fps_numerator", rate.numerator)
     out.set("fps_denominator", rate.denominator)
     names: Dict[str, str] = {option.name.replace(".", "_"): option.name for option in encoder_options(profile)}
