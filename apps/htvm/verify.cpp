@@ -92,7 +92,7 @@ void check_dependencies(Verification& v, const Packet& packet, std::uint32_t num
     const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
     if (packet.reference != packet.frame && v.droppable.contains(packet.reference))
         problem(fmt::format("it refers to frame {}, which is marked as droppable", v.numbers.of(packet.reference)));
-    if (!packet.has(packet_flag::told)) return;
+    if (!packet.has(packet_flag::flags_valid)) return;
     if (packet.has(packet_flag::droppable) && packet.has(packet_flag::referred))
         problem("it is marked as droppable, and as one that others may refer to");
     if (packet.has(packet_flag::droppable)) v.droppable.insert(packet.frame);

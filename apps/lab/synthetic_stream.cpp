@@ -96,7 +96,7 @@ Result<SyntheticFrame> SyntheticStream::next(bool with_truth) {
         shown = true;
         out.type = told->type;
         out.renewal =
-            out.type == FrameType::intra && packet->has(packet_flag::told) && packet->has(packet_flag::settled);
+            out.type == FrameType::intra && packet->has(packet_flag::flags_valid) && packet->has(packet_flag::settled);
         out.topology = (*frame)->topology;
         out.decoded = std::move((*frame)->mesh);
         out.kept_triangles = kept_triangles(view_of(out.decoded), *told);

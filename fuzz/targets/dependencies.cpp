@@ -23,7 +23,7 @@ Packet any_packet(fuzz::FuzzInput& input) {
     packet.flags = input.u8();
     packet.frame = input.below(16);
     packet.reference = input.below(16);
-    if (!packet.has(packet_flag::told)) packet.payload.assign(input.below(2), input.u8());
+    if (!packet.has(packet_flag::flags_valid)) packet.payload.assign(input.below(2), input.u8());
     return packet;
 }
 

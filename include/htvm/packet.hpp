@@ -35,7 +35,7 @@ inline constexpr std::uint8_t droppable = 4;  // frames, audio, pictures: it may
 inline constexpr std::uint8_t colour = 8;     // codebooks: it is for colours, not for geometry
 inline constexpr std::uint8_t session = 16;   // sequence headers: the session is not 0
 inline constexpr std::uint8_t settled = 32;   // I-frames: of a tracked mesh, which is not smoothed once more
-inline constexpr std::uint8_t told = 128;     // the other bits are valid; encoders of version 1 wrote 0
+inline constexpr std::uint8_t flags_valid = 128;  // the other bits are valid; encoders of version 1 wrote 0
 }  // namespace packet_flag
 
 // A packet without its payload: what dependency.hpp works on.

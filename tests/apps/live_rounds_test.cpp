@@ -48,7 +48,7 @@ TEST(LiveRounds, EachSequenceOfEachRoundHasASessionOfItsOwn) {
         const auto header = internal::read_sequence_header(packet.payload);
         ASSERT_TRUE(header);
         EXPECT_EQ(packet.reference, internal::sequence_packet(*header).reference);
-        EXPECT_TRUE(packet.has(packet_flag::session) && packet.has(packet_flag::told));
+        EXPECT_TRUE(packet.has(packet_flag::session) && packet.has(packet_flag::flags_valid));
         if (sessions.empty() || sessions.back() != header->session) sessions.push_back(header->session);
     }
     ASSERT_GE(sessions.size(), 4u);

@@ -114,7 +114,7 @@ TEST(IntraFramesAlone, AreShownAndLeaveAllAsItWas) {
     EXPECT_TRUE(decoded.errors.empty());
     EXPECT_EQ(decoded.frames.size(), 5u);
     // The same frame, but told to be referred to, or by an encoder of version 1, which told nothing.
-    for (const int flags : {packet_flag::told | packet_flag::referred, 0}) {
+    for (const int flags : {packet_flag::flags_valid | packet_flag::referred, 0}) {
         packets[3].flags = static_cast<std::uint8_t>(flags);
         decoded = decode_packets(packets);
         EXPECT_EQ(decoded.errors.size(), 2u);
@@ -139,7 +139,7 @@ TEST(TrackedFramesAlone, AreShownAndLeaveTheFrameBeforeAsItWas) {
     auto packets = coded.packets;
     auto between = packets[3];
     between.frame = 77;
-    between.flags = packet_flag::told | packet_flag::droppable;
+    between.flags = packet_flag::flags_valid | packet_flag::droppable;
     packets.insert(packets.begin() + 3, between);
     const auto decoded = decode_packets(packets);
     EXPECT_TRUE(decoded.errors.empty());

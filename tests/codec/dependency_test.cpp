@@ -157,7 +157,7 @@ TEST(Closure, OfStreamsOfVersion1DecodesTheFrame) {
         SCOPED_TRACE(entry.path().filename().string());
         std::ifstream in(entry.path(), std::ios::binary);
         const auto packets = read_packets({std::istreambuf_iterator<char>(in), {}}, 100000);
-        if (packets[0].has(packet_flag::told)) continue;
+        if (packets[0].has(packet_flag::flags_valid)) continue;
         ++streams_of_version_1;
         const auto headers = headers_of(packets);
         for (const auto& [place, mesh] : frames_of(packets)) {
@@ -207,7 +207,7 @@ TEST(Dependencies, ForgetWhatCanNeverBeNeededAgain) {
 PacketHeader header_packet(std::uint32_t frame, std::uint32_t crc, std::uint8_t flags = 0) {
     PacketHeader out;
     out.kind = PacketKind::sequence;
-    out.flags = packet_flag::told | flags;
+    out.flags = packet_flag::flags_valid | flags;
     out.frame = frame;
     out.reference = crc;
     return out;
@@ -216,7 +216,7 @@ PacketHeader header_packet(std::uint32_t frame, std::uint32_t crc, std::uint8_t 
 PacketHeader frame_packet(PacketKind kind, std::uint32_t frame, std::uint32_t reference, bool referred = true) {
     PacketHeader out;
     out.kind = kind;
-    out.flags = packet_flag::told | (referred ? packet_flag::referred : packet_flag::droppable);
+    out.flags = packet_flag::flags_valid | (referred ? packet_flag::referred : packet_flag::droppable);
     out.frame = frame;
     out.reference = reference;
     return out;

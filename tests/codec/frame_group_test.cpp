@@ -383,7 +383,7 @@ TEST(GroupedStream, APacketThatIsNotOfTheGroupInForceIsAnError) {
     const auto of_other_length = [](Packet& packet) { packet.payload[0] = 6 | 1 << 3; };
     const auto of_other_number = [](Packet& packet) { packet.frame += 1; };
     const auto of_other_reference = [](Packet& packet) { packet.reference = 0; };
-    const auto that_nothing_refers_to = [](Packet& packet) { packet.flags = packet_flag::told; };
+    const auto that_nothing_refers_to = [](Packet& packet) { packet.flags = packet_flag::flags_valid; };
     EXPECT_EQ(error_of(of_other_length, 2), "frame 2, one of a group, refers to frame 1, which is not there");
     EXPECT_EQ(error_of(of_other_number, 2), "frame 3, one of a group, refers to frame 1, which is not there");
     EXPECT_EQ(error_of(of_other_reference, 2), "frame 2, one of a group, refers to frame 0, which is not there");

@@ -137,7 +137,7 @@ TEST(PatchedFrames, ThatNothingMayReferToAreErrors) {
     Decoder decoder;
     for (auto& packet : coded.packets) {
         const bool patched = packet.kind == PacketKind::patched;
-        if (patched) packet.flags = packet_flag::told | packet_flag::droppable;
+        if (patched) packet.flags = packet_flag::flags_valid | packet_flag::droppable;
         EXPECT_EQ(decoder.push(packet).has_value(), !patched);
     }
 }

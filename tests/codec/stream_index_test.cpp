@@ -24,7 +24,7 @@ StreamIndex full_index() {
     out.bounds = SpaceBounds{{-1.5f, 0, -300}, {2, 1900, 300}};
     out.sequences = {{0, 0}, {500000, 500}};
     for (std::uint32_t i = 0; i < 30; ++i)
-        out.points.push_back({30 * i, -5 + 1000000 * std::int64_t{i}, 90 + 12345 * i, i % 3, packet_flag::told});
+        out.points.push_back({30 * i, -5 + 1000000 * std::int64_t{i}, 90 + 12345 * i, i % 3, packet_flag::flags_valid});
     return out;
 }
 

@@ -229,7 +229,7 @@ void send_frame(State& state, Candidate& candidate, const Reference* reference, 
         packet.frame = state.sequence.next_frame;
         packet.reference = candidate.reference;
         packet.timestamp_us = timestamp_us;
-        packet.flags |= packet_flag::told;
+        packet.flags |= packet_flag::flags_valid;
         if (packet.kind == PacketKind::codebook) {
             codebooks.overhead += packet_overhead;
             codebooks[packet.payload[0] == codebook_for_geometry ? Layer::geometry : Layer::colour] +=
@@ -567,7 +567,7 @@ Result<void> Encoder::finish() {
     try {
         Packet packet;
         packet.kind = PacketKind::index;
-        packet.flags = packet_flag::told;
+        packet.flags = packet_flag::flags_valid;
         packet.frame = state.sequence.next_frame;
         packet.timestamp_us = *state.last_timestamp;
         packet.payload = write_sequence_index(state.output.index);

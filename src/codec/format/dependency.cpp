@@ -15,8 +15,8 @@ using namespace internal;
 
 PacketHeader told_header(const Packet& packet) {
     PacketHeader out = packet;
-    if (out.has(packet_flag::told)) return out;
-    out.flags = packet_flag::told;
+    if (out.has(packet_flag::flags_valid)) return out;
+    out.flags = packet_flag::flags_valid;
     if (packet.kind == PacketKind::sequence) out.reference = crc32(packet.payload);
     if (packet.kind == PacketKind::codebook && !packet.payload.empty() && packet.payload[0] == codebook_for_colour)
         out.flags |= packet_flag::colour;
@@ -55,8 +55,8 @@ void Dependencies::forget_reference() {
 }
 
 void Dependencies::take_header(const PacketHeader& header, std::uint64_t place) {
-    HeaderInForce taken{place, {}, header.has(packet_flag::told) && header.has(packet_flag::session)};
-    if (header.has(packet_flag::told)) taken.crc = header.reference;
+    HeaderInForce taken{place, {}, header.has(packet_flag::flags_valid) && header.has(packet_flag::session)};
+    if (header.has(packet_flag::flags_valid)) taken.crc = header.reference;
     const bool same = header_ && header_->crc == taken.crc;
     if (begins_sequence(same, taken.session, header.frame, highest_frame_)) begin_sequence();
     header_ = taken;
@@ -64,7 +64,7 @@ void Dependencies::take_header(const PacketHeader& header, std::uint64_t place) 
 
 void Dependencies::take_codebook(const PacketHeader& header, std::uint64_t place) {
     if (references_.empty() || references_.back().number != header.reference) return;
-    if (header.has(packet_flag::told)) {
+    if (header.has(packet_flag::flags_valid)) {
         codebooks_.told[header.has(packet_flag::colour)] = place;
         return;
     }
@@ -113,7 +113,7 @@ void Dependencies::take_picture(const PacketHeader& header, std::uint64_t place)
     if (!key && named == pictures_.end()) return;
     const auto before = key ? std::size_t{0} : static_cast<std::size_t>(named - pictures_.begin()) + 1;
     newest_picture_ = {place, before};
-    if (header.has(packet_flag::told) && !header.has(packet_flag::referred)) return;
+    if (header.has(packet_flag::flags_valid) && !header.has(packet_flag::referred)) return;
     pictures_.resize(before);
     pictures_.push_back({header.frame, place});
     if (pictures_.size() <= most_) return;

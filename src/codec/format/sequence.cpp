@@ -170,7 +170,7 @@ Packet sequence_packet(const SequenceHeader& header) {
     Packet out;
     out.payload = write_sequence_header(header);
     out.reference = crc32(out.payload);
-    out.flags = packet_flag::told;
+    out.flags = packet_flag::flags_valid;
     if (header.session != 0) out.flags |= packet_flag::session;
     return out;
 }

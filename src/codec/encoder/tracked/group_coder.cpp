@@ -88,8 +88,8 @@ Result<CodedGroup> code_group(const Configuration& configuration, const Referenc
         packet.kind = PacketKind::tracked;
         packet.payload = write_group_payload({length, frame}, payloads);
         const bool alone = frame == 1 && !before;
-        packet.flags =
-            static_cast<std::uint8_t>(told | (is_needed(frame, length) ? referred : droppable) | (alone ? access : 0));
+        packet.flags = static_cast<std::uint8_t>(flags_valid | (is_needed(frame, length) ? referred : droppable) |
+                                                 (alone ? access : 0));
         packet.frame = held[frame - 1].number;
         packet.reference = frame > 1 ? held[needed_by(frame, length) - 1].number
                            : before  ? before->frame
