@@ -95,8 +95,8 @@ Result<SyntheticFrame> SyntheticStream::next(bool with_truth) {
         if (!told) return tl::unexpected(told.error());
         shown = true;
         out.type = told->type;
-        out.renewal =
-            out.type == FrameType::intra && packet->has(packet_flag::flags_valid) && packet->has(packet_flag::settled);
+        out.renewal = out.type == FrameType::intra && packet->has(packet_flag::flags_valid) &&
+                      packet->has(packet_flag::of_tracked_mesh);
         out.topology = (*frame)->topology;
         out.decoded = std::move((*frame)->mesh);
         out.kept_triangles = kept_triangles(view_of(out.decoded), *told);

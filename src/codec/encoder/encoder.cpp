@@ -201,7 +201,7 @@ void send_header(State& state, std::int64_t timestamp_us) {
 std::uint8_t flags_of(const Candidate& candidate) {
     using namespace packet_flag;
     return static_cast<std::uint8_t>((candidate.referred ? referred : droppable) | (candidate.access ? access : 0) |
-                                     (candidate.renewal ? settled : 0));
+                                     (candidate.renewal ? of_tracked_mesh : 0));
 }
 
 // What a call codes, until nothing can fail any more.
