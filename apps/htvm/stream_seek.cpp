@@ -38,7 +38,7 @@ std::optional<SeekableStream::Place> SeekableStream::at(std::uint64_t offset) {
     if (!header->has(packet_flag::flags_valid) && by_payload) {
         const auto whole = read(out);
         if (!whole) return std::nullopt;
-        out.header = told_header(*whole);
+        out.header = header_with_flags(*whole);
     }
     return out;
 }

@@ -23,7 +23,7 @@ namespace htvm {
 
 // The header of the packet with all flags set. Streams of version 1 do not have them; there they are derived from the
 // kind of packet and the payload.
-PacketHeader told_header(const Packet& packet);
+PacketHeader header_with_flags(const Packet& packet);
 
 // Takes the headers of a stream's packets one at a time, in order, and knows at any time what the newest frame needs
 // and what later frames may need. Memory is bounded, since an I-frame makes all before it obsolete.
@@ -37,7 +37,7 @@ public:
     // sequence is recognised only by frame numbers that start again; nor does it tell codebooks apart, so all since the
     // I-frame count.
     std::uint64_t push(const PacketHeader& header);
-    std::uint64_t push(const Packet& packet) { return push(told_header(packet)); }
+    std::uint64_t push(const Packet& packet) { return push(header_with_flags(packet)); }
 
     // Number of sequences that have begun; the last packet belongs to the last of them.
     std::uint32_t sequences() const { return sequences_; }

@@ -67,7 +67,7 @@ htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_inf
         one.push({packet, size});
         const auto whole = one.pull();
         if (!whole || one.damaged_bytes() > 0 || one.pending_bytes() > 0) return htvm_status{HTVM_CORRUPT_STREAM};
-        return describe(htvm::told_header(*whole), size, info, info_size);
+        return describe(htvm::header_with_flags(*whole), size, info, info_size);
     });
 }
 

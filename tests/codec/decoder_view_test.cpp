@@ -96,7 +96,7 @@ TEST(TopologyNumber, ChangesAtFramesThatCodeAMeshAlone) {
             }
             EXPECT_GT((*frame)->topology, most) << packet.frame;
             most = (*frame)->topology;
-            if (told_header(packet).has(packet_flag::referred)) of_intra = most;
+            if (header_with_flags(packet).has(packet_flag::referred)) of_intra = most;
         }
     }
 }

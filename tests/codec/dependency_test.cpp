@@ -68,7 +68,7 @@ const std::vector<NamedStream>& streams() {
 
 std::vector<PacketHeader> headers_of(const std::vector<Packet>& packets) {
     std::vector<PacketHeader> out;
-    for (const auto& packet : packets) out.push_back(told_header(packet));
+    for (const auto& packet : packets) out.push_back(header_with_flags(packet));
     return out;
 }
 

@@ -13,7 +13,7 @@ namespace htvm {
 
 using namespace internal;
 
-PacketHeader told_header(const Packet& packet) {
+PacketHeader header_with_flags(const Packet& packet) {
     PacketHeader out = packet;
     if (out.has(packet_flag::flags_valid)) return out;
     out.flags = packet_flag::flags_valid;

@@ -23,7 +23,7 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
         reference_.reset();
     }
     const auto& rules = rules_of(*type);
-    const auto header = told_header(packet);
+    const auto header = header_with_flags(packet);
     const bool alone = stands_alone(*type), referred = is_referred(header, rules);
     if (!alone && !(referred && header.has(packet_flag::access))) return;
     if (!index_.points.empty() && number <= index_.points.back().frame) return;
