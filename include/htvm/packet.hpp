@@ -34,9 +34,8 @@ inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but t
 inline constexpr std::uint8_t droppable = 4;  // frames, audio, pictures: it may be left out without affecting others
 inline constexpr std::uint8_t colour = 8;     // codebooks: it is for colours, not for geometry
 inline constexpr std::uint8_t session = 16;   // sequence headers: the session is not 0
-inline constexpr std::uint8_t of_tracked_mesh =
-    32;                                           // I-frames: made of the tracked mesh, which is not smoothed once more
-inline constexpr std::uint8_t flags_valid = 128;  // the other bits are valid; encoders of version 1 wrote 0
+inline constexpr std::uint8_t of_tracked_mesh = 32;  // I-frames: made of the tracked mesh, and not smoothed again
+inline constexpr std::uint8_t flags_valid = 128;     // the other bits are valid; encoders of version 1 wrote 0
 }  // namespace packet_flag
 
 // A packet without its payload: what dependency.hpp works on.
