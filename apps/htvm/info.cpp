@@ -296,8 +296,8 @@ Result<void> info(const Options& options) {
     if (options.megabits > 0) buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
     while (auto packet = input->next()) {
         if (buffer) buffer->add(*packet);
-        numbers.take(*packet);
-        time.take(*packet, numbers.begins_sequence());
+        numbers.push(*packet);
+        time.push(*packet, numbers.begins_sequence());
         bytes += packet->payload.size() + packet_overhead;
         if (packet->kind == PacketKind::sequence) {
             const bool first = !headers.sequence();

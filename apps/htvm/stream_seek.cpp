@@ -82,7 +82,7 @@ struct Walk {
     std::optional<SeekableStream::Place> take(std::uint64_t offset) {
         auto place = stream.at(offset);
         if (!place) return place;
-        numbers.take_told(place->header);
+        numbers.push(place->header);
         places.push_back(*place);
         return place;
     }

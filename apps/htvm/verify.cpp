@@ -170,7 +170,7 @@ void take(Verification& v, const Packet& packet) {
             v.problems.push_back({{}, index.error().message});
         return;
     }
-    v.numbers.take(packet);
+    v.numbers.push(packet);
     v.indexer.add(packet, v.offset);
     v.offset += packet.payload.size() + packet_overhead;
     const auto number = v.numbers.of(packet.frame);

@@ -13,8 +13,8 @@ namespace htvm {
 class FrameNumbers {
 public:
     // Takes every packet of the stream, in order.
-    void take(const Packet& packet) { take_told(header_with_flags(packet)); }
-    void take_told(const PacketHeader& header);
+    void push(const Packet& packet) { push(header_with_flags(packet)); }
+    void push(const PacketHeader& header);
     // To begin in the middle of a stream: the next frame, with its own number `frame`, has the number `number`.
     void begin(std::uint32_t frame, std::uint32_t number) { offset_ = number - frame; }
 

@@ -15,7 +15,7 @@ double seconds_of_frames(std::int64_t first_us, std::int64_t last_us, std::uint6
 class RunningTime {
 public:
     // Takes every packet of the stream, in order. begins_sequence: FrameNumbers::begins_sequence() of this packet.
-    void take(const Packet& packet, bool begins_sequence);
+    void push(const Packet& packet, bool begins_sequence);
     // To begin in the middle of the stream's first sequence, whose first frame has this timestamp. Then only
     // microseconds() is known.
     void begin(std::int64_t first_timestamp_us);

@@ -138,7 +138,7 @@ htvm_status htvm_dependencies_push(htvm_dependencies* dependencies, const htvm_p
         header.frame = given.frame;
         header.reference = given.reference;
         header.timestamp_us = given.timestamp_us;
-        dependencies->numbers.take_told(header);
+        dependencies->numbers.push(header);
         dependencies->frame.reset();
         if (htvm::frame_type(header.kind)) dependencies->frame = header.frame;
         if (place) *place = dependencies->pushed;

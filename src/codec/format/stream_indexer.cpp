@@ -10,8 +10,8 @@ namespace htvm {
 using namespace internal;
 
 void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
-    numbers_.take(packet);
-    time_.take(packet, numbers_.begins_sequence());
+    numbers_.push(packet);
+    time_.push(packet, numbers_.begins_sequence());
     if (packet.kind == PacketKind::sequence) header_offset_ = offset;
     const auto type = frame_type(packet.kind);
     if (!type) return;
