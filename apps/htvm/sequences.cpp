@@ -96,7 +96,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             const auto sequences = numbers.dependencies().sequences();
             numbers.push(*packet);
             if (numbers.dependencies().sequences() != sequences) pictures.reset();
-            if (packet->kind == PacketKind::texture) (void)pictures.take(*packet);
+            if (packet->kind == PacketKind::texture) (void)pictures.decode(*packet);
             auto frame = decoder.push(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (!*frame || numbers.of((*frame)->info.frame) != number) continue;
@@ -107,7 +107,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             };
             while ((ahead = stream.next()) && is_beside(ahead->kind)) {
                 numbers.push(*ahead);
-                if (ahead->kind == PacketKind::texture && !pictures.take(*ahead))
+                if (ahead->kind == PacketKind::texture && !pictures.decode(*ahead))
                     return fail(ErrorKind::corrupt_stream,
                                 fmt::format("{}: the picture of frame {} cannot be decoded", self.name, number));
             }

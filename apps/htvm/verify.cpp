@@ -134,7 +134,7 @@ void check_picture(Verification& v, const Packet& packet, std::uint32_t number) 
     if (v.last_picture && packet.frame <= *v.last_picture) problem("it has a second picture");
     v.last_picture = packet.frame;
     const bool goes_on = v.lost_picture && !is_key_picture(packet);
-    const auto decoded = v.shown.take(packet);
+    const auto decoded = v.shown.decode(packet);
     if (decoded) v.lost_picture.reset();
     if (decoded || goes_on) return;  // said once of those behind each other
     v.lost_picture = decoded.error().message;

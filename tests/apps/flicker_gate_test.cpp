@@ -162,7 +162,7 @@ Coded code_textured(const SynthOptions& capture) {
             if (decoded && *decoded) shown.mesh = std::move((*decoded)->mesh);
             const auto picture = track->behind(*packet, packet->payload.size());
             EXPECT_TRUE(picture.has_value());
-            if (picture && *picture && !pictures.take(**picture)) ADD_FAILURE() << "a picture cannot be decoded";
+            if (picture && *picture && !pictures.decode(**picture)) ADD_FAILURE() << "a picture cannot be decoded";
         }
         shown.texture = pictures.image();
         if (!shown.texture) {
