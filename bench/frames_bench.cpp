@@ -183,12 +183,12 @@ htvm::Decoder primed_decoder(const std::vector<htvm::Packet>& packets, unsigned 
     options.threads = threads;
     htvm::Decoder decoder(options);
     for (const auto& packet : packets)
-        if (!decoder.push(packet)) std::abort();
+        if (!decoder.decode_copy(packet)) std::abort();
     return decoder;
 }
 
 void decode_frame(htvm::Decoder& decoder, const htvm::Packet& packet) {
-    auto frame = decoder.push(packet);
+    auto frame = decoder.decode_copy(packet);
     if (!frame || !*frame) std::abort();
     benchmark::DoNotOptimize((*frame)->mesh.positions.data());
 }
@@ -200,7 +200,8 @@ void decode(benchmark::State& state, Kind kind) {
     for (auto _ : state) decode_frame(decoder, measured);
     report(state, std::map<std::string, double>{});
     state.counters["captured vertices"] = static_cast<double>(capture()[2].mesh.positions.size());
-    state.counters["decoded vertices"] = static_cast<double>(decoder.push(measured)->value().mesh.positions.size());
+    state.counters["decoded vertices"] =
+        static_cast<double>(decoder.decode_copy(measured)->value().mesh.positions.size());
 }
 
 void decode_two_threads(benchmark::State& state, Kind kind) {

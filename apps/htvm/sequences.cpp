@@ -97,7 +97,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
             numbers.push(*packet);
             if (numbers.dependencies().sequences() != sequences) pictures.reset();
             if (packet->kind == PacketKind::texture) (void)pictures.decode(*packet);
-            auto frame = decoder.push(*packet);
+            auto frame = decoder.decode_copy(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (!*frame || numbers.of((*frame)->info.frame) != number) continue;
             TexturedMesh out(std::move((*frame)->mesh));

@@ -42,7 +42,7 @@ Result<CodedFrame> decode_pending(Codec& codec) {
     while (auto packet = codec.encoder.pull()) {
         sent += packet->payload.size() + packet_overhead;
         const Stopwatch watch(codec.threads);
-        auto frame = codec.decoder.push(*packet);
+        auto frame = codec.decoder.decode_copy(*packet);
         *out.decode_ms += watch.milliseconds();
         if (!frame) return tl::unexpected(frame.error());
         if (!*frame) continue;

@@ -88,7 +88,7 @@ Result<SyntheticFrame> SyntheticStream::next(bool with_truth) {
     bool shown = false;
     while (auto packet = encoder_.pull()) {
         out.bytes += packet->payload.size() + packet_overhead;
-        auto frame = decoder_.push(*packet);
+        auto frame = decoder_.decode_copy(*packet);
         if (!frame) return tl::unexpected(frame.error());
         if (!*frame) continue;
         const auto told = inspect(*packet);

@@ -4,8 +4,8 @@
 //   for each packet:  auto frame = decoder.decode(packet);   // Result<std::optional<FrameView>>
 //                     if (frame && *frame) draw((*frame)->mesh, (*frame)->topology);
 //
-// decode() lends the frame: its arrays belong to the decoder, which reuses them for the next frame. push() returns a
-// copy.
+// decode() lends the frame: its arrays belong to the decoder, which reuses them for the next frame. decode_copy()
+// returns a copy that the caller owns.
 //
 // What a frame needs, and what may be left out, is in dependency.hpp: EP- and P-frames refer only to I-frames (and to
 // codebook packets), so any of them may be left out; a lost codebook costs the frames that use it, until the next one.
@@ -105,10 +105,10 @@ public:
     // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh, moved as this frame says
     // if that much of it could be read, else as the last frame; after T-frames, the last of them again; after an
     // I-frame that nothing refers to, that one. Nothing before an I-frame, or if memory ran out.
-    std::optional<FrameView> stand_in(std::uint32_t frame, std::int64_t timestamp_us);
-    // Like decode() and stand_in(), but with a copy.
-    Result<std::optional<DecodedFrame>> push(const Packet& packet);
-    std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us);
+    std::optional<FrameView> conceal(std::uint32_t frame, std::int64_t timestamp_us);
+    // The same as copies that the caller owns.
+    Result<std::optional<DecodedFrame>> decode_copy(const Packet& packet);
+    std::optional<DecodedFrame> conceal_copy(std::uint32_t frame, std::int64_t timestamp_us);
     // Known once a sequence header has been decoded.
     const std::optional<SequenceInfo>& sequence() const;
 

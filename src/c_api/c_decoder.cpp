@@ -243,7 +243,7 @@ htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t 
                                  size_t info_size) {
     if (!decoder) return HTVM_BAD_INPUT;
     return guarded(decoder->error, [&] {
-        decoder->current = decoder->decoder.stand_in(frame, timestamp_us);
+        decoder->current = decoder->decoder.conceal(frame, timestamp_us);
         return decoder->current ? describe_current(*decoder, info, info_size) : htvm_status{HTVM_AGAIN};
     });
 }

@@ -60,7 +60,7 @@ std::vector<std::uint64_t> digests_of(const std::vector<Packet>& packets) {
     Decoder decoder;
     std::vector<std::uint64_t> out;
     for (const auto& packet : packets) {
-        auto frame = decoder.push(packet);
+        auto frame = decoder.decode_copy(packet);
         EXPECT_TRUE(frame) << frame.error().message;
         if (!frame || !*frame) continue;
         auto& digest = out.emplace_back(1);

@@ -168,7 +168,7 @@ TEST(CDecoder, ConcealsAsTheCppDecoder) {
     ASSERT_EQ(htvm_decoder_conceal(decoder.get(), 9, 300000, &info, sizeof info), HTVM_OK);
     EXPECT_EQ(info.frame, 9u);
     EXPECT_EQ(info.concealed, 1u);
-    expect_same_frame(decoder.get(), info, *cpp.conceal(9, 300000));
+    expect_same_frame(decoder.get(), info, *cpp.conceal_copy(9, 300000));
 }
 
 TEST(CDecoder, DamagedPacketsAreErrorsWithASentenceAndCostThemselvesOnly) {

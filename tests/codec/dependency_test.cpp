@@ -77,7 +77,7 @@ std::optional<DecodedFrame> last_of(const std::vector<Packet>& packets, const st
     Decoder decoder;
     std::optional<DecodedFrame> out;
     for (const auto place : places) {
-        auto frame = decoder.push(packets[place]);
+        auto frame = decoder.decode_copy(packets[place]);
         out = frame ? std::move(*frame) : std::nullopt;
     }
     return out;
@@ -93,7 +93,7 @@ std::map<std::size_t, Mesh> frames_of(const std::vector<Packet>& packets) {
     Decoder decoder;
     std::map<std::size_t, Mesh> out;
     for (std::size_t place = 0; place < packets.size(); ++place) {
-        auto frame = decoder.push(packets[place]);
+        auto frame = decoder.decode_copy(packets[place]);
         EXPECT_TRUE(frame.has_value()) << frame.error().message;
         if (frame && *frame) out[place] = std::move((*frame)->mesh);
     }
@@ -178,9 +178,9 @@ TEST(Dependencies, WhatIsKeptIsEnoughForAllThatComes) {
         for (std::size_t joined = 0; joined < packets.size(); ++joined) {
             EXPECT_EQ(dependencies.push(packets[joined]), joined);
             Decoder decoder;
-            for (const auto place : dependencies.kept()) EXPECT_TRUE(decoder.push(packets[place]).has_value());
+            for (const auto place : dependencies.kept()) EXPECT_TRUE(decoder.decode_copy(packets[place]).has_value());
             for (std::size_t place = joined + 1; place < std::min(joined + 4, packets.size()); ++place) {
-                const auto frame = decoder.push(packets[place]);
+                const auto frame = decoder.decode_copy(packets[place]);
                 ASSERT_TRUE(frame.has_value()) << frame.error().message;
                 if (*frame) {
                     EXPECT_TRUE(same_mesh((*frame)->mesh, all.at(place)));

@@ -47,7 +47,7 @@ TEST(AccessFrames, NeedTheReferenceAndNothingElse) {
     Decoder decoder;
     for (const auto& packet : coded.packets) {
         if (frame_type(packet.kind) && packet.frame > 0 && packet.frame < 4) continue;
-        const auto decoded = decoder.push(packet);
+        const auto decoded = decoder.decode_copy(packet);
         ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
         if (!*decoded) continue;
         EXPECT_EQ((*decoded)->mesh.positions, coded.reconstructions[packet.frame].positions);

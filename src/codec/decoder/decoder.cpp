@@ -334,7 +334,7 @@ Result<std::optional<FrameView>> Decoder::decode(const Packet& packet) {
     }
 }
 
-Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
+Result<std::optional<DecodedFrame>> Decoder::decode_copy(const Packet& packet) {
     try {
         const auto frame = take(*state_, packet);
         if (!frame) return tl::unexpected(frame.error());
@@ -346,7 +346,7 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
     }
 }
 
-std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) try {
+std::optional<FrameView> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) try {
     auto& state = *state_;
     take_back(state.shown);
     if (!show_intra_alone(state) && !show_hidden(state, frame) && !show_last_tracked(state) &&
@@ -367,8 +367,8 @@ std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t tim
     return std::nullopt;
 }
 
-std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) try {
-    const auto lent = stand_in(frame, timestamp_us);
+std::optional<DecodedFrame> Decoder::conceal_copy(std::uint32_t frame, std::int64_t timestamp_us) try {
+    const auto lent = conceal(frame, timestamp_us);
     return lent ? std::optional(copy_of(*lent)) : std::nullopt;
 } catch (const std::bad_alloc&) {
     return std::nullopt;
