@@ -56,7 +56,7 @@ struct SequenceInfo {
     double lattice_step = 0;    // mm: decoded positions are the origin plus multiples of this
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
     std::uint32_t unit_micrometres = 1000;  // the unit in which the capture was given
-    bool skeleton_tracked = true;           // false: the capture has no skeleton, and one bone stands in for it
+    bool has_skeleton = true;               // false: the capture has no skeleton, and one bone stands in for it
     Skeleton skeleton;
     std::vector<double> radii;  // mm, one per bone
     int nearest_vertices = 16;  // m of the distance order

@@ -175,7 +175,7 @@ TEST(Decoder, SaysWhatTheHeaderSays) {
     EXPECT_EQ(info->skeleton.bones.size(), synth_skeleton().bones.size());
     EXPECT_EQ(info->skeleton.joint_names, synth_skeleton().joint_names);
     EXPECT_EQ(info->radii.size(), info->skeleton.bones.size());
-    EXPECT_TRUE(info->skeleton_tracked);
+    EXPECT_TRUE(info->has_skeleton);
 }
 
 TEST(Decoder, LargerFramesThanAllowedAreRefused) {

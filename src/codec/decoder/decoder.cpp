@@ -129,7 +129,7 @@ SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
     info.fps_numerator = header.fps_numerator;
     info.fps_denominator = header.fps_denominator;
     info.unit_micrometres = header.unit_micrometres;
-    info.skeleton_tracked = header.skeleton_tracked;
+    info.has_skeleton = header.has_skeleton;
     info.skeleton = header.skeleton;
     for (const auto r : header.radii) info.radii.push_back(r * info.lattice_step);
     info.nearest_vertices = header.nearest_vertices;

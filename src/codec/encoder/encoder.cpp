@@ -130,7 +130,7 @@ Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
     if (!tracker) return tl::unexpected(tracker.error());
     state.poses = std::move(*tracker);
     header.skeleton = state.poses.skeleton;
-    header.skeleton_tracked = state.poses.tracked;
+    header.has_skeleton = state.poses.has_skeleton;
     auto radii = options.radii;
     if (radii.empty()) {
         auto calibrated = calibrate(mesh, header.skeleton, state.poses.last);

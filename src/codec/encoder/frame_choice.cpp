@@ -127,7 +127,7 @@ Result<Candidate> choose_the_cheaper(FrameWork& work, const FrameSteps& steps) {
         // A single bone that stands in for a skeleton leaves larger residuals, which have a larger error at the same
         // steps: 0.75 instead of 0.65 mm on a man who talks. At the same error, EP-frames still take 28 % fewer bits
         // there.
-        const double share = work.configuration.header.skeleton_tracked ? 1 : 0.9;
+        const double share = work.configuration.header.has_skeleton ? 1 : 0.9;
         if (bytes_in_the_long_run(*enhanced) < share * intra) {
             enhanced->trial = EnhancedTrial{};
             return enhanced;

@@ -195,7 +195,7 @@ Result<Candidate> code_intra(FrameWork& work, const FrameSteps& steps, IntraUse 
     if (renewed) asked.geometry = std::max(1, static_cast<std::int32_t>(std::lround(finer_again * asked.geometry)));
     const bool simplify = tracked && !renewed && configuration.options.tracked.simplify > 0 && work.carries_surface();
     // Without a skeleton EP-frames may never pay off, and then the bits of a finer I-frame would be wasted.
-    const bool finer = referred_to && (configuration.header.skeleton_tracked || tracked ||
+    const bool finer = referred_to && (configuration.header.has_skeleton || tracked ||
                                        configuration.options.topology.frame_choice != FrameChoice::cheaper);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
     const auto& mesh = renewed ? *renewed : simplify ? simple : work.mesh;

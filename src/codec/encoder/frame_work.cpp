@@ -23,14 +23,14 @@ RegistrationOptions registration_options(const EncoderOptions& options) {
 Derived derived_of(const Configuration& configuration) {
     // Under rate control a stand-in for a frame that does not fit also refers to the I-frame.
     const bool referred_to = !configuration.intra_alone() || configuration.options.rate.bits_per_second > 0;
-    return {.bones = referred_to && (configuration.header.skeleton_tracked || !configuration.tracked()),
+    return {.bones = referred_to && (configuration.header.has_skeleton || !configuration.tracked()),
             .nodes = referred_to && configuration.tracked()};
 }
 
 // Where the skeleton moves each node: with the bone of the vertex that the node sits on.
 std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration, const Reference& reference,
                                               const CodedPose& pose) {
-    if (!configuration.header.skeleton_tracked) return {};
+    if (!configuration.header.has_skeleton) return {};
     const auto bones = skeletal_motion(reference.skinned, configuration.header.skeleton.bones, pose);
     std::vector<RigidMotion> out;
     for (const auto v : reference.tracked->nodes.vertex) out.push_back(bones[reference.skinned.bone_of_vertex[v]]);
