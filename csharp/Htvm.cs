@@ -663,15 +663,15 @@ namespace Htvm
             return Receive();
         }
 
-        // From the next frame on the line carries so many bits a second; the quality follows within half a second. For an
-        // encoder that was made with a bitrate.
+        // Sets the bits per second that the line carries from the next frame on; the quality follows within half a second.
+        // For an encoder that was made with a bitrate.
         public void SetBitrate(double bitsPerSecond)
         {
             Check(Native.htvm_encoder_set_bitrate(handle, bitsPerSecond));
         }
 
-        // From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort; 0: its motion alone
-        // is coded, for a frame that would be late otherwise.
+        // Sets how much is searched for each frame from the next on: 1 to 9, as the option tracked.effort. 0, for a frame
+        // that would be late otherwise: its motion alone is coded.
         public void SetEffort(uint effort)
         {
             Check(Native.htvm_encoder_set_effort(handle, effort));

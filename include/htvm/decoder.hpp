@@ -31,7 +31,7 @@
 namespace htvm {
 
 struct DecoderOptions {
-    // A frame larger than this is refused (ErrorKind::limit) before memory is allocated for it.
+    // A frame larger than these is refused (ErrorKind::limit) before memory is allocated for it.
     std::uint32_t max_vertices = 1u << 22;   // of a frame
     std::uint32_t max_triangles = 1u << 23;  // of a frame
     std::uint32_t max_joints = 1024;         // of the skeleton; the format allows no more
@@ -119,8 +119,9 @@ private:
 // The type of the frame in a packet; nothing if the packet is not a frame.
 std::optional<FrameType> frame_type(PacketKind kind);
 
-// A frame packet's layer sizes, without decoding. Of an EP-frame with motion-based coding, the counts are of what is
-// coded; of a T-frame neither they nor its layers can be told, and all is overhead. DecodedFrame::info has the whole.
+// A frame packet's counts and layer sizes, without decoding it. For an EP-frame with motion-based coding they count
+// what is coded; for a T-frame they are unknown: counts are 0, and all bytes are overhead. DecodedFrame::info has
+// everything.
 Result<FrameInfo> inspect(const Packet& packet);
 
 }  // namespace htvm

@@ -21,8 +21,8 @@
 
 namespace htvm {
 
-// The header of the packet with all flags set. Streams of version 1 do not have them; there they are derived from the
-// kind of packet and the payload.
+// The packet's header with its flags. Packets of version 1 have none: there they are derived from the kind of packet
+// and the payload.
 PacketHeader header_with_flags(const Packet& packet);
 
 // Takes the headers of a stream's packets one at a time, in order, and knows at any time what the newest frame needs

@@ -21,7 +21,7 @@ enum class PacketKind : std::uint8_t {
     predicted = 6,    // P-frame: the I-frame's mesh moved
     tracked = 7,      // T-frame: the I-frame's mesh laid on the captured surface
     front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
-    audio = 10,       // (9 is not used) sound of the time from a frame to the next (audio.hpp); optional
+    audio = 10,       // sound of the time from a frame to the next (audio.hpp); optional. 9 is not used
     patched = 11,     // TP-frame: a T-frame of which a part is replaced; a reference itself
     texture = 12,     // the picture of a frame (texture.hpp); optional
 };
@@ -42,7 +42,7 @@ inline constexpr std::uint8_t flags_valid = 128;     // the other bits are valid
 struct PacketHeader {
     PacketKind kind = PacketKind::sequence;
     std::uint8_t flags = 0;               // of packet_flag
-    std::uint16_t reference_version = 0;  // version of the reference; 0 for now
+    std::uint16_t reference_version = 0;  // always 0
     std::uint32_t frame = 0;              // number of the frame that it holds, or came with
     std::uint32_t reference = 0;          // number of the frame that it refers to; for an I-frame, its own; for a
                                           // sequence header, the CRC-32 of its payload

@@ -35,7 +35,7 @@ public:
     PictureDecoder& operator=(PictureDecoder&&) noexcept;
     ~PictureDecoder();
 
-    // Decodes the picture of a packet of PacketKind::texture, which becomes the one that is lent. After an error the
+    // Decodes the picture of a packet of PacketKind::texture, which image() and planes() then lend. After an error the
     // last one stays, and the next key picture is the next that can be decoded.
     Result<void> decode(const Packet& packet);
     // Forgets everything, as for another sequence of the stream.

@@ -221,7 +221,7 @@ class Encoder:
         return packets
 
     def set_bitrate(self, bits_per_second: float) -> None:
-        """From the next frame on the line carries so many bits a second; the quality follows within half a second.
+        """Sets the bits per second that the line carries from the next frame on; the quality follows in half a second.
 
         For an encoder that was made with a bitrate; else BadInput.
         """
@@ -233,9 +233,9 @@ class Encoder:
         self._check(c.library.htvm_encoder_set_bitrate(self._handle, rate))
 
     def set_effort(self, effort: int) -> None:
-        """From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort.
+        """Sets how much is searched for each frame from the next on: 1 to 9, as the option tracked.effort.
 
-        With 0 a frame's motion alone is coded, for one that would be late otherwise.
+        0 is for a frame that would be late otherwise: its motion alone is coded.
         """
         self._check_open()
         if not isinstance(effort, int) or not 0 <= effort <= 9:
