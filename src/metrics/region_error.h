@@ -27,7 +27,7 @@ struct RegionError {
 
 // Regions are spread so that every point of the original is within the radius of a centre. The distance is that of
 // points of the original within the region to the decoded surface; and of points of the decoded surface to the original
-// whose nearest point on the original lies within it. An original without triangles gives no distance; a decoded
+// whose nearest point on the original lies within it. An original without triangles has no regions; a decoded
 // mesh without any is infinitely far away. Both meshes must be measurable. Errors: limit, if memory runs out.
 Result<RegionError> worst_region(const Mesh& original, const Mesh& decoded, const RegionErrorOptions& options = {});
 
