@@ -25,9 +25,7 @@ const std::vector<htvm::SynthFrame>& capture() { return htvm::bench::synthetic_f
 
 htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
     htvm::EncoderOptions options = htvm::default_options(htvm::Profile::topology);
-    const auto steps = htvm::quality_steps(quality);
-    options.geometry_step = steps.geometry_step;
-    options.colour_step = steps.colour_step;
+    options.quality = quality;
     options.threads = threads;
     options.skeleton = htvm::synth_skeleton();
     options.key_interval = 1000;
