@@ -249,9 +249,9 @@ Rotation blend(const Rotation& a, const Rotation& b, double fraction) {
     return orthonormalised(mean);
 }
 
-// Takes the orientations that the track has; bones without any in all frames stay unknown. Returns how many bones have
-// some.
-std::size_t take_orientations(const SkeletonTrack& track, const std::vector<double>& times, std::vector<Pose>& poses) {
+// Blends the orientations that the track has, at these times; bones without any in all frames stay unknown. Returns how
+// many bones have some.
+std::size_t blend_orientations(const SkeletonTrack& track, const std::vector<double>& times, std::vector<Pose>& poses) {
     const std::size_t bones = track.skeleton.bones.size();
     std::size_t given = 0;
     std::vector<std::size_t> samples;
@@ -304,7 +304,7 @@ Result<AlignedPoses> align(const SkeletonTrack& track, const MeshClock& mesh, co
         aligned.notes.push_back("The skeleton goes on for " + number(track.timestamps.back() - times.back()) +
                                 " s after the last mesh frame: not used.");
 
-    const std::size_t given = take_orientations(track, times, aligned.poses);
+    const std::size_t given = blend_orientations(track, times, aligned.poses);
     if (given < track.skeleton.bones.size() && options.derive_orientations)
         derive_missing_orientations(track.skeleton, aligned.poses);
     return aligned;
