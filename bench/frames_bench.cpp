@@ -25,9 +25,7 @@ const std::vector<htvm::SynthFrame>& capture() { return htvm::bench::synthetic_f
 
 htvm::EncoderOptions encoder_options(double quality, unsigned threads) {
     htvm::EncoderOptions options = htvm::default_options(htvm::Profile::topology);
-    const auto steps = htvm::quality_steps(quality);
-    options.geometry_step = steps.geometry_step;
-    options.colour_step = steps.colour_step;
+    options.quality = quality;
     options.threads = threads;
     options.skeleton = htvm::synth_skeleton();
     options.key_interval = 1000;
@@ -183,12 +181,12 @@ htvm::Decoder primed_decoder(const std::vector<htvm::Packet>& packets, unsigned 
     options.threads = threads;
     htvm::Decoder decoder(options);
     for (const auto& packet : packets)
-        if (!decoder.push(packet)) std::abort();
+        if (!decoder.decode_copy(packet)) std::abort();
     return decoder;
 }
 
 void decode_frame(htvm::Decoder& decoder, const htvm::Packet& packet) {
-    auto frame = decoder.push(packet);
+    auto frame = decoder.decode_copy(packet);
     if (!frame || !*frame) std::abort();
     benchmark::DoNotOptimize((*frame)->mesh.positions.data());
 }
@@ -200,7 +198,8 @@ void decode(benchmark::State& state, Kind kind) {
     for (auto _ : state) decode_frame(decoder, measured);
     report(state, std::map<std::string, double>{});
     state.counters["captured vertices"] = static_cast<double>(capture()[2].mesh.positions.size());
-    state.counters["decoded vertices"] = static_cast<double>(decoder.push(measured)->value().mesh.positions.size());
+    state.counters["decoded vertices"] =
+        static_cast<double>(decoder.decode_copy(measured)->value().mesh.positions.size());
 }
 
 void decode_two_threads(benchmark::State& state, Kind kind) {

@@ -20,9 +20,6 @@ constexpr std::size_t frames = 300;
 void encode_sustained(benchmark::State& state) {
     auto& capture = htvm::bench::whole_capture();
     auto options = htvm::default_options(htvm::Profile::tracked);
-    const auto steps = htvm::quality_steps(42);  // the command line's default
-    options.geometry_step = steps.geometry_step;
-    options.colour_step = steps.colour_step;
     options.tracked.effort = static_cast<int>(state.range(0));
     options.threads = static_cast<unsigned>(state.range(1));
     options.latency_frames = static_cast<int>(state.range(2));

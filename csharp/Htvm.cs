@@ -526,8 +526,8 @@ namespace Htvm
         readonly int joints, bones;
 
         // options: by the names in docs/options.md, such as { "key_interval", "60" }; with a decimal point, whatever the
-        // culture. quality: 0 to 100, as of `htvm encode`; null: the options' steps.
-        public Encoder(Profile profile = Profile.Tracked, double? quality = 42, Skeleton skeleton = null,
+        // culture. quality: 0 to 100; null: 42, as of `htvm encode`.
+        public Encoder(Profile profile = Profile.Tracked, double? quality = null, Skeleton skeleton = null,
                        IDictionary<string, string> options = null, IDictionary<string, string> metadata = null,
                        double? floor = null)
         {
@@ -536,13 +536,7 @@ namespace Htvm
             if (status != Status.Ok) throw new HtvmException(status, null);
             try
             {
-                if (quality.HasValue)
-                {
-                    double geometry, colour;
-                    Native.htvm_quality_steps(quality.Value, out geometry, out colour);
-                    Set(set, "geometry_step", Number(geometry));
-                    Set(set, "colour_step", Number(colour));
-                }
+                if (quality.HasValue) Set(set, "quality", Number(quality.Value));
                 if (options != null)
                     foreach (var option in options) Set(set, option.Key, option.Value);
                 if (metadata != null)
@@ -669,15 +663,15 @@ namespace Htvm
             return Receive();
         }
 
-        // From the next frame on the line carries so many bits a second; the quality follows within half a second. For an
-        // encoder that was made with a bitrate.
+        // Sets the bits per second that the line carries from the next frame on; the quality follows within half a second.
+        // For an encoder that was made with a bitrate.
         public void SetBitrate(double bitsPerSecond)
         {
             Check(Native.htvm_encoder_set_bitrate(handle, bitsPerSecond));
         }
 
-        // From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort; 0: its motion alone
-        // is coded, for a frame that would be late otherwise.
+        // Sets how much is searched for each frame from the next on: 1 to 9, as the option tracked.effort. 0, for a frame
+        // that would be late otherwise: its motion alone is coded.
         public void SetEffort(uint effort)
         {
             Check(Native.htvm_encoder_set_effort(handle, effort));

@@ -50,7 +50,6 @@ int main(int argc, char** argv) {
     static uint32_t indices[3 * triangles];
     htvm_encoder_options* options = NULL;
     htvm_encoder* encoder = NULL;
-    double geometry_step, colour_step;
     htvm_mesh mesh;
     char problem[256];
     int frame, fine = 1;
@@ -59,10 +58,8 @@ int main(int argc, char** argv) {
         fprintf(stderr, "usage: encode FILE.htvm (a file that can be written)\n");
         return 2;
     }
-    htvm_quality_steps(60, &geometry_step, &colour_step);
     if (htvm_encoder_options_create(HTVM_PROFILE_TRACKED, NULL, &options) != HTVM_OK) return 2;
-    if (htvm_encoder_options_set_number(options, "geometry_step", geometry_step) != HTVM_OK ||
-        htvm_encoder_options_set_number(options, "colour_step", colour_step) != HTVM_OK ||
+    if (htvm_encoder_options_set(options, "quality", "60") != HTVM_OK ||
         htvm_encoder_options_set(options, "key_interval", "60") != HTVM_OK) {
         fprintf(stderr, "%s\n", htvm_encoder_options_last_error(options));
         return 2;

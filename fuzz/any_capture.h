@@ -109,7 +109,7 @@ inline Pose any_pose(const Skeleton& skeleton, FuzzInput& input) {
         } else {
             out.joints.push_back({1.0 * input.between(-128, 127), 10, 60.0 * static_cast<double>(j)});
         }
-        if (kind & 2) out.tracked.push_back(input.flag());
+        if (kind & 2) out.found.push_back(input.flag());
     }
     if (kind & 4)
         for (std::size_t b = 0; b < skeleton.bones.size(); ++b) {

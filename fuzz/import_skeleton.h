@@ -24,7 +24,7 @@ inline void require_sound(const SkeletonTrack& track) {
     require(track.radii.empty() || track.radii.size() == bones, "one radius a bone, or none");
     for (const auto& pose : track.poses) {
         if (pose.joints.empty()) continue;
-        require(pose.joints.size() == joints && (pose.tracked.empty() || pose.tracked.size() == joints), "all joints");
+        require(pose.joints.size() == joints && (pose.found.empty() || pose.found.size() == joints), "all joints");
         require(pose.orientations.empty() || pose.orientations.size() == bones, "all bones, or none");
         for (const auto& joint : pose.joints)
             for (const double c : joint) require(std::isfinite(c), "positions are finite");

@@ -53,7 +53,7 @@ inline void decode_all(const std::vector<Packet>& packets, const DecoderOptions&
         const auto frame = decoder.decode(packet);
         if (!frame) {
             require(!frame.error().message.empty(), "an error says what is wrong");
-            if (const auto stand_in = decoder.conceal(packet.frame, packet.timestamp_us)) {
+            if (const auto stand_in = decoder.conceal_copy(packet.frame, packet.timestamp_us)) {
                 require_sound(stand_in->mesh, options);
                 require(stand_in->concealed, "a stand-in says that it is one");
             }

@@ -75,7 +75,7 @@ std::int64_t AudioTrack::time_us(std::uint64_t sample) const {
 
 std::vector<Packet> AudioTrack::before(const Packet& packet) {
     std::vector<Packet> out;
-    if (packet.kind == PacketKind::sequence) time_.take(packet, false);
+    if (packet.kind == PacketKind::sequence) time_.push(packet, false);
     if (!frame_type(packet.kind)) return out;
     if (first_us_) out = up_to(packet.timestamp_us, false);
     if (!first_us_) {

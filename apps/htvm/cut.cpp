@@ -137,8 +137,8 @@ Result<bool> take(Cut& cut, Packet packet) {
         if (auto ok = start(cut); !ok) return tl::unexpected(ok.error());
         if (decides) return true;
     }
-    cut.numbers.take(packet);
-    cut.time.take(packet, cut.numbers.begins_sequence());
+    cut.numbers.push(packet);
+    cut.time.push(packet, cut.numbers.begins_sequence());
     if (cut.numbers.begins_sequence()) cut.has_key = false, cut.later.reset();
     cut.output.add_bounds_of(packet);
     if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return true;

@@ -241,7 +241,7 @@ constexpr std::size_t most_concealed_in_a_row = 300;
 // Writes a stand-in for a frame. False if there is none.
 Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_us) {
     if (d.options.conceal != "animate" || d.summary.concealed_in_a_row >= most_concealed_in_a_row) return false;
-    auto frame = d.decoder.conceal(number, timestamp_us);
+    auto frame = d.decoder.conceal_copy(number, timestamp_us);
     if (!frame) return false;
     if (auto ok = write(d, std::move(*frame)); !ok) return tl::unexpected(ok.error());
     ++d.summary.concealed;
@@ -349,7 +349,7 @@ Result<bool> decode_next(Decoding& d) {
         if (auto ok = d.sound->take(*packet); !ok) return tl::unexpected(ok.error());
     const bool is_frame = frame_type(packet->kind).has_value();
     const auto sequences = d.numbers.dependencies().sequences();
-    d.numbers.take(*packet);
+    d.numbers.push(*packet);
     if (d.numbers.dependencies().sequences() != sequences) d.textures.begin_sequence();
     if (d.numbers.begins_sequence()) d.summary.timestamp_us.reset();  // frames before its first one never existed
     if (is_frame || packet->kind == PacketKind::index) {              // the index gives the number of frames
@@ -367,7 +367,7 @@ Result<bool> decode_next(Decoding& d) {
         d.summary.due = std::max(d.summary.due, d.next_number);
     }
     const auto start = std::chrono::steady_clock::now();
-    auto frame = d.decoder.push(*packet);
+    auto frame = d.decoder.decode_copy(*packet);
     if (is_frame) d.summary.timestamp_us = packet->timestamp_us;
     if (is_earlier) return true;
     if (!frame) {

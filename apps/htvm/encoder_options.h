@@ -18,9 +18,6 @@ class App;
 
 namespace htvm::app {
 
-// Gives about 0.6 mm of surface error (M2).
-constexpr double default_quality = 42;
-
 struct EncodingOptions {
     double quality = default_quality;
     std::string profile = "tracked";

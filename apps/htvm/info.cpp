@@ -99,7 +99,7 @@ void print_sequence(const SequenceInfo& s, const std::string& input) {
     if (s.up != UpAxis::unknown)
         fmt::print("up: {}{}\n", axis_name(s.up), s.floor ? fmt::format(", the floor at {:g} mm", *s.floor) : "");
     for (const auto& [key, value] : s.metadata) fmt::print("{}: {}\n", key, value);
-    if (!s.skeleton_tracked) {
+    if (!s.has_skeleton) {
         fmt::print("no skeleton: one bone stands in, radius {:.0f} mm\n", s.radii[0]);
         return;
     }
@@ -121,7 +121,7 @@ nlohmann::json sequence_json(const SequenceInfo& s) {
             {"fps", static_cast<double>(s.fps_numerator) / s.fps_denominator},
             {"lattice_step_mm", s.lattice_step},
             {"unit_mm", s.unit_micrometres / 1000.0},
-            {"skeleton_tracked", s.skeleton_tracked},
+            {"skeleton_tracked", s.has_skeleton},
             {"joints", s.skeleton.joint_names},
             {"bones", bones},
             {"radii_mm", s.radii},
@@ -296,8 +296,8 @@ Result<void> info(const Options& options) {
     if (options.megabits > 0) buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
     while (auto packet = input->next()) {
         if (buffer) buffer->add(*packet);
-        numbers.take(*packet);
-        time.take(*packet, numbers.begins_sequence());
+        numbers.push(*packet);
+        time.push(*packet, numbers.begins_sequence());
         bytes += packet->payload.size() + packet_overhead;
         if (packet->kind == PacketKind::sequence) {
             const bool first = !headers.sequence();

@@ -41,8 +41,8 @@ Packet LiveRounds::in_time(Packet packet) const {
 Result<std::vector<Packet>> LiveRounds::take(Packet packet) {
     std::vector<Packet> out;
     if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return out;
-    numbers_.take(packet);
-    time_.take(packet, numbers_.begins_sequence());
+    numbers_.push(packet);
+    time_.push(packet, numbers_.begins_sequence());
     const bool frame = frame_type(packet.kind).has_value();
     if (packet.kind == PacketKind::sequence) {
         header_ = std::move(packet);

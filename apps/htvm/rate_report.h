@@ -23,7 +23,6 @@ public:
     BufferModel(double bits_per_second, double buffer_seconds);
     // Packets in the order of the stream.
     void add(const Packet& packet);
-    double capacity_bits() const { return capacity_; }
     double peak_percent() const { return 100 * peak_ / capacity_; }  // percent of the capacity
     std::uint32_t peak_frame() const {
         return peak_frame_;

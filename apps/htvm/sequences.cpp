@@ -36,7 +36,7 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
     std::uint64_t indexed = 0;  // frames of the indices in front
     bool bounded = true;
     while (const auto packet = input->next()) {
-        numbers.take(*packet);
+        numbers.push(*packet);
         if (packet->kind == PacketKind::sequence)
             if (auto ok = headers.push(*packet); !ok)
                 return fail(ok.error().kind, source.name + ": " + ok.error().message);
@@ -94,10 +94,10 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
         };
         while (const auto packet = next()) {
             const auto sequences = numbers.dependencies().sequences();
-            numbers.take(*packet);
+            numbers.push(*packet);
             if (numbers.dependencies().sequences() != sequences) pictures.reset();
-            if (packet->kind == PacketKind::texture) (void)pictures.take(*packet);
-            auto frame = decoder.push(*packet);
+            if (packet->kind == PacketKind::texture) (void)pictures.decode(*packet);
+            auto frame = decoder.decode_copy(*packet);
             if (!frame) return fail(frame.error().kind, self.name + ": " + frame.error().message);
             if (!*frame || numbers.of((*frame)->info.frame) != number) continue;
             TexturedMesh out(std::move((*frame)->mesh));
@@ -106,8 +106,8 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
                 return kind == PacketKind::texture || kind == PacketKind::audio;
             };
             while ((ahead = stream.next()) && is_beside(ahead->kind)) {
-                numbers.take(*ahead);
-                if (ahead->kind == PacketKind::texture && !pictures.take(*ahead))
+                numbers.push(*ahead);
+                if (ahead->kind == PacketKind::texture && !pictures.decode(*ahead))
                     return fail(ErrorKind::corrupt_stream,
                                 fmt::format("{}: the picture of frame {} cannot be decoded", self.name, number));
             }

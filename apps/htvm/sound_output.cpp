@@ -27,8 +27,8 @@ std::int64_t samples_of(double microseconds) {
 }  // namespace
 
 Result<void> SoundOutput::take(const Packet& packet) {
-    numbers_.take(packet);
-    time_.take(packet, numbers_.begins_sequence());
+    numbers_.push(packet);
+    time_.push(packet, numbers_.begins_sequence());
     if (is_enough()) return {};
     if (frame_type(packet.kind)) {
         const auto now = static_cast<double>(time_.microseconds());

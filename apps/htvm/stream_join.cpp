@@ -56,8 +56,8 @@ Result<void> StreamJoin::write_frame(Packet packet) {
 }
 
 Result<void> StreamJoin::take(Packet packet) {
-    stream_.numbers.take(packet);
-    stream_.time.take(packet, stream_.numbers.begins_sequence());
+    stream_.numbers.push(packet);
+    stream_.time.push(packet, stream_.numbers.begins_sequence());
     output_.add_bounds_of(packet);
     if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return {};
     if (packet.kind == PacketKind::sequence) {

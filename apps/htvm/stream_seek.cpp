@@ -35,10 +35,10 @@ std::optional<SeekableStream::Place> SeekableStream::at(std::uint64_t offset) {
         return std::nullopt;
     Place out{*header, offset, payload_bytes + packet_overhead};
     const bool by_payload = header->kind == PacketKind::sequence || header->kind == PacketKind::codebook;
-    if (!header->has(packet_flag::told) && by_payload) {
+    if (!header->has(packet_flag::flags_valid) && by_payload) {
         const auto whole = read(out);
         if (!whole) return std::nullopt;
-        out.header = told_header(*whole);
+        out.header = header_with_flags(*whole);
     }
     return out;
 }
@@ -82,7 +82,7 @@ struct Walk {
     std::optional<SeekableStream::Place> take(std::uint64_t offset) {
         auto place = stream.at(offset);
         if (!place) return place;
-        numbers.take_told(place->header);
+        numbers.push(place->header);
         places.push_back(*place);
         return place;
     }

@@ -21,7 +21,7 @@ public:
     static std::optional<SeekableStream> open(const std::string& path, std::uint64_t max_packet_bytes);
 
     struct Place {
-        PacketHeader header;  // as told_header() tells it
+        PacketHeader header;  // as header_with_flags() tells it
         std::uint64_t offset = 0, bytes = 0;
         std::uint64_t end() const { return offset + bytes; }
     };

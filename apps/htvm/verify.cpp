@@ -92,7 +92,7 @@ void check_dependencies(Verification& v, const Packet& packet, std::uint32_t num
     const auto problem = [&](const std::string& what) { v.problems.push_back({number, what}); };
     if (packet.reference != packet.frame && v.droppable.contains(packet.reference))
         problem(fmt::format("it refers to frame {}, which is marked as droppable", v.numbers.of(packet.reference)));
-    if (!packet.has(packet_flag::told)) return;
+    if (!packet.has(packet_flag::flags_valid)) return;
     if (packet.has(packet_flag::droppable) && packet.has(packet_flag::referred))
         problem("it is marked as droppable, and as one that others may refer to");
     if (packet.has(packet_flag::droppable)) v.droppable.insert(packet.frame);
@@ -134,7 +134,7 @@ void check_picture(Verification& v, const Packet& packet, std::uint32_t number) 
     if (v.last_picture && packet.frame <= *v.last_picture) problem("it has a second picture");
     v.last_picture = packet.frame;
     const bool goes_on = v.lost_picture && !is_key_picture(packet);
-    const auto decoded = v.shown.take(packet);
+    const auto decoded = v.shown.decode(packet);
     if (decoded) v.lost_picture.reset();
     if (decoded || goes_on) return;  // said once of those behind each other
     v.lost_picture = decoded.error().message;
@@ -170,7 +170,7 @@ void take(Verification& v, const Packet& packet) {
             v.problems.push_back({{}, index.error().message});
         return;
     }
-    v.numbers.take(packet);
+    v.numbers.push(packet);
     v.indexer.add(packet, v.offset);
     v.offset += packet.payload.size() + packet_overhead;
     const auto number = v.numbers.of(packet.frame);

@@ -144,9 +144,7 @@ Result<void> bake(const Options& options) {
         if (!encoder) {
             const int side = options.size > 0 ? options.size : picture_side_for(*captured);
             EncoderOptions settings;
-            const auto steps = quality_steps(options.quality);
-            settings.geometry_step = steps.geometry_step;
-            settings.colour_step = steps.colour_step;
+            settings.quality = options.quality;
             settings.texture = {TextureLayout::charts, side, side};
             auto made = Encoder::create(settings);
             if (!made) return tl::unexpected(made.error());

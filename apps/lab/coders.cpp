@@ -42,7 +42,7 @@ Result<CodedFrame> decode_pending(Codec& codec) {
     while (auto packet = codec.encoder.pull()) {
         sent += packet->payload.size() + packet_overhead;
         const Stopwatch watch(codec.threads);
-        auto frame = codec.decoder.push(*packet);
+        auto frame = codec.decoder.decode_copy(*packet);
         *out.decode_ms += watch.milliseconds();
         if (!frame) return tl::unexpected(frame.error());
         if (!*frame) continue;
@@ -81,8 +81,8 @@ Result<FrameCoder> start_codec(EncoderOptions options, const SequenceFacts& fact
 
 // Every option that has an effect in the profile, except those that the sweep sets.
 std::string settings_of(const EncoderOptions& options) {
-    constexpr std::array<std::string_view, 6> by_the_sweep = {"geometry_step", "colour_step",     "threads",
-                                                              "fps_numerator", "fps_denominator", "unit_micrometres"};
+    constexpr std::array<std::string_view, 7> by_the_sweep = {
+        "quality", "geometry_step", "colour_step", "threads", "fps_numerator", "fps_denominator", "unit_micrometres"};
     std::string out = profile_name(options.profile);
     for (const auto& option : option_list())
         if (serves(option.group, options.profile) &&

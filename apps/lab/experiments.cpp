@@ -392,7 +392,7 @@ Result<InternalFrame> run_frame(Encoder& encoder, Decoder& decoder, const Source
     out.info = encoder.last_frame();
     while (auto packet = encoder.pull()) {
         start = now_ms();
-        const auto decoded = decoder.push(*packet);
+        const auto decoded = decoder.decode_copy(*packet);
         out.decode_ms += now_ms() - start;
         if (!decoded) return tl::unexpected(decoded.error());
     }

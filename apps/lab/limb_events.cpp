@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 namespace htvm::lab {
 namespace {
@@ -27,7 +27,7 @@ Result<FrameOfLimbs> LimbMeter::add(const SyntheticFrame& frame) {
     FrameOfLimbs out{frame.number, frame.type, frame.renewal, {}};
     std::map<std::size_t, LimbMarks> by_limb;
     for (const LimbState& limb : frame.truth.limbs) by_limb[limb.part] = {};
-    const auto captured = SurfaceIndex::build(frame.surface), decoded = SurfaceIndex::build(frame.decoded);
+    const auto captured = TriangleIndex::build(frame.surface), decoded = TriangleIndex::build(frame.decoded);
     if (!captured) return tl::unexpected(captured.error());
     if (!decoded) return tl::unexpected(decoded.error());
     const double near2 = rule_.near_mm * rule_.near_mm, shown2 = rule_.shown_mm * rule_.shown_mm;

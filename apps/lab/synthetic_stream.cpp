@@ -88,15 +88,15 @@ Result<SyntheticFrame> SyntheticStream::next(bool with_truth) {
     bool shown = false;
     while (auto packet = encoder_.pull()) {
         out.bytes += packet->payload.size() + packet_overhead;
-        auto frame = decoder_.push(*packet);
+        auto frame = decoder_.decode_copy(*packet);
         if (!frame) return tl::unexpected(frame.error());
         if (!*frame) continue;
         const auto told = inspect(*packet);
         if (!told) return tl::unexpected(told.error());
         shown = true;
         out.type = told->type;
-        out.renewal =
-            out.type == FrameType::intra && packet->has(packet_flag::told) && packet->has(packet_flag::settled);
+        out.renewal = out.type == FrameType::intra && packet->has(packet_flag::flags_valid) &&
+                      packet->has(packet_flag::of_tracked_mesh);
         out.topology = (*frame)->topology;
         out.decoded = std::move((*frame)->mesh);
         out.kept_triangles = kept_triangles(view_of(out.decoded), *told);

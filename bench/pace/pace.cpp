@@ -84,9 +84,7 @@ int measure(const Options& options) {
     const bool tracked = options.profile == "tracked";
     auto encoding = htvm::default_options(tracked ? htvm::Profile::tracked : htvm::Profile::topology);
     if (!tracked && frames[0].pose) encoding.skeleton = htvm::synth_skeleton();
-    const auto steps = htvm::quality_steps(options.quality);
-    encoding.geometry_step = steps.geometry_step;
-    encoding.colour_step = steps.colour_step;
+    encoding.quality = options.quality;
     encoding.threads = options.threads;
     encoding.tracked.effort = options.effort;
     encoding.latency_frames = options.latency_frames;

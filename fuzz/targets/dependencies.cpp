@@ -23,7 +23,7 @@ Packet any_packet(fuzz::FuzzInput& input) {
     packet.flags = input.u8();
     packet.frame = input.below(16);
     packet.reference = input.below(16);
-    if (!packet.has(packet_flag::told)) packet.payload.assign(input.below(2), input.u8());
+    if (!packet.has(packet_flag::flags_valid)) packet.payload.assign(input.below(2), input.u8());
     return packet;
 }
 
@@ -37,7 +37,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     while (input.left() > 0 && headers.size() < 200) {
         const auto packet = any_packet(input);
         const bool whole = input.flag();
-        headers.push_back(whole ? told_header(packet) : PacketHeader(packet));
+        headers.push_back(whole ? header_with_flags(packet) : PacketHeader(packet));
         require(bounded.push(headers.back()) + 1 == headers.size(), "places count the packets");
         all.push(headers.back());
         check_places(bounded.kept(), headers.size());

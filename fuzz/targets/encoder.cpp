@@ -70,7 +70,7 @@ void check_options(EncoderOptions options, const fuzz::AnyCapture& capture) {
         while (const auto packet = encoder->pull()) {
             const auto packets = fuzz::read_packets(write_packet(*packet), 1 << 20);
             require(packets.size() == 1, "a written packet can be read");
-            const auto frame = decoder.push(packets[0]);
+            const auto frame = decoder.decode_copy(packets[0]);
             if (!frame) std::cerr << frame.error().message << '\n';
             require(frame.has_value(), "what the encoder sends can be decoded");
             if (!*frame) continue;

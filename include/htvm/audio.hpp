@@ -11,7 +11,7 @@
 namespace htvm {
 
 // What is heard from the time of one frame to the next. Samples are counted at 48 kHz, as all of Opus is decoded. A
-// packet's timestamp is the time of its first sample, be it heard or not.
+// packet's timestamp is the time of its first sample, whether it is heard or not.
 struct AudioPacket {
     std::uint8_t channels = 1;     // 1 or 2
     std::int16_t gain = 0;         // by which players raise the sound: 1/256 dB
@@ -19,14 +19,14 @@ struct AudioPacket {
     std::uint32_t skip_end = 0;    // the same at its end
     std::vector<std::vector<std::uint8_t>> opus;  // 1 to 255 packets
 
-    // All samples, heard or not; the Opus packets must be sound.
+    // All samples, heard or not; the Opus packets must be valid.
     std::uint64_t samples() const;
     bool operator==(const AudioPacket&) const = default;
 };
 
 inline constexpr std::uint32_t audio_samples_per_second = 48000;
 
-// frame: number of the frame that it follows.
+// frame: number of the frame that the packet follows.
 Packet write_audio(const AudioPacket& audio, std::uint32_t frame, std::int64_t timestamp_us);
 // corrupt_stream if the payload ends early or contradicts itself; unsupported if it is of another coder than Opus.
 Result<AudioPacket> read_audio(const Packet& packet);

@@ -4,8 +4,8 @@
 //   for each packet:  auto frame = decoder.decode(packet);   // Result<std::optional<FrameView>>
 //                     if (frame && *frame) draw((*frame)->mesh, (*frame)->topology);
 //
-// decode() lends the frame: its arrays belong to the decoder, which reuses them for the next frame. push() returns a
-// copy.
+// decode() lends the frame: its arrays belong to the decoder, which reuses them for the next frame. decode_copy()
+// returns a copy that the caller owns.
 //
 // What a frame needs, and what may be left out, is in dependency.hpp: EP- and P-frames refer only to I-frames (and to
 // codebook packets), so any of them may be left out; a lost codebook costs the frames that use it, until the next one.
@@ -31,7 +31,7 @@
 namespace htvm {
 
 struct DecoderOptions {
-    // A frame larger than this is refused (ErrorKind::limit) before memory is allocated for it.
+    // A frame larger than these is refused (ErrorKind::limit) before memory is allocated for it.
     std::uint32_t max_vertices = 1u << 22;   // of a frame
     std::uint32_t max_triangles = 1u << 23;  // of a frame
     std::uint32_t max_joints = 1024;         // of the skeleton; the format allows no more
@@ -56,7 +56,7 @@ struct SequenceInfo {
     double lattice_step = 0;    // mm: decoded positions are the origin plus multiples of this
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
     std::uint32_t unit_micrometres = 1000;  // the unit in which the capture was given
-    bool skeleton_tracked = true;           // false: the capture has no skeleton, and one bone stands in for it
+    bool has_skeleton = true;               // false: the capture has no skeleton, and one bone stands in for it
     Skeleton skeleton;
     std::vector<double> radii;  // mm, one per bone
     int nearest_vertices = 16;  // m of the distance order
@@ -105,10 +105,10 @@ public:
     // A stand-in for a frame that did not arrive or could not be decoded: the I-frame's mesh, moved as this frame says
     // if that much of it could be read, else as the last frame; after T-frames, the last of them again; after an
     // I-frame that nothing refers to, that one. Nothing before an I-frame, or if memory ran out.
-    std::optional<FrameView> stand_in(std::uint32_t frame, std::int64_t timestamp_us);
-    // Like decode() and stand_in(), but with a copy.
-    Result<std::optional<DecodedFrame>> push(const Packet& packet);
-    std::optional<DecodedFrame> conceal(std::uint32_t frame, std::int64_t timestamp_us);
+    std::optional<FrameView> conceal(std::uint32_t frame, std::int64_t timestamp_us);
+    // The same as copies that the caller owns.
+    Result<std::optional<DecodedFrame>> decode_copy(const Packet& packet);
+    std::optional<DecodedFrame> conceal_copy(std::uint32_t frame, std::int64_t timestamp_us);
     // Known once a sequence header has been decoded.
     const std::optional<SequenceInfo>& sequence() const;
 
@@ -119,8 +119,9 @@ private:
 // The type of the frame in a packet; nothing if the packet is not a frame.
 std::optional<FrameType> frame_type(PacketKind kind);
 
-// A frame packet's layer sizes, without decoding. Of an EP-frame with motion-based coding, the counts are of what is
-// coded; of a T-frame neither they nor its layers can be told, and all is overhead. DecodedFrame::info has the whole.
+// A frame packet's counts and layer sizes, without decoding it. For an EP-frame with motion-based coding they count
+// what is coded; for a T-frame they are unknown: counts are 0, and all bytes are overhead. DecodedFrame::info has
+// everything.
 Result<FrameInfo> inspect(const Packet& packet);
 
 }  // namespace htvm

@@ -21,9 +21,9 @@
 
 namespace htvm {
 
-// The header of the packet with all flags set. Streams of version 1 do not have them; there they are derived from the
-// kind of packet and the payload.
-PacketHeader told_header(const Packet& packet);
+// The packet's header with its flags. Packets of version 1 have none: there they are derived from the kind of packet
+// and the payload.
+PacketHeader header_with_flags(const Packet& packet);
 
 // Takes the headers of a stream's packets one at a time, in order, and knows at any time what the newest frame needs
 // and what later frames may need. Memory is bounded, since an I-frame makes all before it obsolete.
@@ -37,7 +37,7 @@ public:
     // sequence is recognised only by frame numbers that start again; nor does it tell codebooks apart, so all since the
     // I-frame count.
     std::uint64_t push(const PacketHeader& header);
-    std::uint64_t push(const Packet& packet) { return push(told_header(packet)); }
+    std::uint64_t push(const Packet& packet) { return push(header_with_flags(packet)); }
 
     // Number of sequences that have begun; the last packet belongs to the last of them.
     std::uint32_t sequences() const { return sequences_; }
@@ -57,8 +57,8 @@ private:
         std::uint64_t place;
     };
     struct Codebooks {
-        std::array<std::optional<std::uint64_t>, 2> told;  // in force: of geometry, of colours
-        std::size_t untold = 0;                            // of untold_codebooks_, as many as there were
+        std::array<std::optional<std::uint64_t>, 2> marked;  // in force: of geometry, of colours
+        std::size_t unmarked = 0;                            // how many of unmarked_codebooks_ there were
     };
     // What the newest frame needs of the packets held.
     struct Newest {
@@ -69,10 +69,10 @@ private:
         bool known = false;
     };
     void begin_sequence();
-    void take_header(const PacketHeader& header, std::uint64_t place);
-    void take_codebook(const PacketHeader& header, std::uint64_t place);
-    void take_frame(const PacketHeader& header, std::uint64_t place);
-    void take_picture(const PacketHeader& header, std::uint64_t place);
+    void push_header(const PacketHeader& header, std::uint64_t place);
+    void push_codebook(const PacketHeader& header, std::uint64_t place);
+    void push_frame(const PacketHeader& header, std::uint64_t place);
+    void push_picture(const PacketHeader& header, std::uint64_t place);
     void forget_reference();
     std::size_t chained_up_to(std::uint32_t number) const;
     std::vector<std::uint64_t> places(std::size_t references, const Codebooks& codebooks, std::size_t chained) const;
@@ -82,17 +82,17 @@ private:
     std::uint32_t sequences_ = 0;
     struct HeaderInForce {
         std::uint64_t place;
-        std::optional<std::uint32_t> crc;  // none: not told by the header
+        std::optional<std::uint32_t> crc;  // none: the header does not say
         bool session;
     };
     std::optional<HeaderInForce> header_;
     std::optional<std::uint32_t> highest_frame_;
-    std::vector<Frame> references_;                // the I-frame, and the frames that patched it, each referring to
-                                                   // the one before; the last is in force
-    std::vector<Frame> chain_;                     // T-frames since, each referring to the one before; the last group
-                                                   // may have some that the next one does not need
-    Codebooks codebooks_;                          // since the I-frame
-    std::vector<std::uint64_t> untold_codebooks_;  // of either purpose, all since the I-frame
+    std::vector<Frame> references_;                  // the I-frame, and the frames that patched it, each referring to
+                                                     // the one before; the last is in force
+    std::vector<Frame> chain_;                       // T-frames since, each referring to the one before; the last group
+                                                     // may have some that the next one does not need
+    Codebooks codebooks_;                            // since the I-frame
+    std::vector<std::uint64_t> unmarked_codebooks_;  // since the I-frame, whose flags do not say of what they are
     Newest newest_;
     std::vector<Frame> pictures_;  // that later ones may need: a key picture, then each referring to the one before
     struct NewestPicture {

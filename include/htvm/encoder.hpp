@@ -5,7 +5,7 @@
 //   while (auto packet = encoder->pull()) send(htvm::write_packet(*packet));
 //   encoder->finish();                                    // then pull the rest
 //
-// With EncoderOptions::latency_frames a push queues the packets of a frame before. Where T-frames are coded in groups
+// With EncoderOptions::latency_frames a push queues the packets of an earlier frame. Where T-frames are coded in groups
 // (TrackedOptions::group), frames are held until their group is whole: a push may queue the packets of none, or of
 // several. Memory is bounded by a few frames, whatever the length of the sequence.
 #pragma once
@@ -53,30 +53,30 @@ public:
     Encoder& operator=(Encoder&&) noexcept;
     ~Encoder();
 
-    // Before the first frame: takes from this one, which is not coded, what otherwise follows from the first one
-    // pushed, such as the lattice's origin, the subject's size and the bones' radii. So encoders of different parts of
-    // a capture write the same sequence header, and their streams can be joined to one sequence. Errors as of push().
+    // Fixes, before the first push(), what otherwise follows from the first frame pushed: the lattice's origin, the
+    // subject's size, the bones' radii. `first` is not coded. Encoders of different parts of a capture that begin with
+    // the same mesh write the same sequence header, so their streams can be joined to one sequence. Errors: as push().
     Result<void> begin(const Mesh& first, const Pose* pose);
-    // Codes one frame; with EncoderOptions::latency_frames one before, of which any error is then. pose: for the
-    // skeleton of the options; null if the tracker lost it, and then the last one is kept. Timestamps must ascend.
+    // Codes one frame; with EncoderOptions::latency_frames an earlier one, to which any error then belongs. pose: of
+    // the skeleton in the options; null if the tracker lost it, and then the last one is kept. Timestamps must ascend.
     // After an error the frame is not part of the stream, and the next may be pushed. Under rate control, a frame that
     // does not fit the buffer even at the lowest quality is a limit error.
     Result<void> push(const Mesh& mesh, const Pose* pose, std::int64_t timestamp_us, bool force_intra = false);
-    // From the next frame on the line carries so many bits a second; the quality follows within half a second. A buffer
-    // of rate.buffer_seconds then holds as much of the new rate. bad_input unless the options gave a rate, or if this
-    // is not a rate that they could have given.
+    // Sets the bits per second that the line carries from the next frame on; the quality follows within half a second.
+    // A buffer of rate.buffer_seconds then holds as much of the new rate. bad_input unless the options gave a rate, and
+    // if this is none that they could have given.
     Result<void> set_bitrate(double bits_per_second);
-    // From the next frame on so much is searched for each: 1 to 9, as TrackedOptions::effort; groups stay as long as
-    // they were. With 0 a frame's motion alone is coded, and what tracking loses there is mended by a later one, unless
-    // the picture would fall apart: for a frame that would be late otherwise. The same efforts for the same frames give
-    // the same bytes. bad_input if it is out of range, or with another profile than tracked.
+    // Sets how much is searched for each frame from the next on: 1 to 9, as TrackedOptions::effort; groups keep their
+    // length. 0 is for a frame that would be late otherwise: its motion alone is coded, and what tracking loses there
+    // is mended by a later one, unless the picture would fall apart. The same efforts for the same frames give the same
+    // bytes. bad_input if it is out of range, or with another profile than tracked.
     Result<void> set_effort(int effort);
-    // Of the frames pushed from now on. Asked while one of them is coded, from the thread that pushes or one of the
-    // encoder's, once tracking turns out to be lost in it: whether that is repaired at once, by a patch or an I-frame,
-    // which takes three to ten times as long as other frames. If not, the frame is sent as it was tracked, and a later
-    // one is asked anew. Not asked where the picture would fall apart, 4 mm off all over or 30 mm in a region of 10 cm
-    // of an adult: that is always repaired. Null: always. The same answers give the same bytes. bad_input with another
-    // profile than tracked.
+    // Sets who decides, for the frames pushed from here on, whether lost tracking is repaired at once, by a patch or an
+    // I-frame, which takes three to ten times as long as other frames. may_repair is called while a frame is coded,
+    // from the thread that pushes or one of the encoder's, once tracking turns out to be lost in it. On false the frame
+    // is sent as it was tracked, and a later one asks anew. Where the picture would fall apart, 4 mm off all over or 30
+    // mm in a region of 10 cm of an adult, it is not called, and the frame is repaired. Null: all are repaired. The
+    // same answers give the same bytes. bad_input with another profile than tracked.
     Result<void> set_repair(std::function<bool()> may_repair);
     // Ends the sequence: codes what is held, and queues the index of I-frames. After an error nothing has ended.
     Result<void> finish();
@@ -92,12 +92,12 @@ public:
     const FrameInfo& last_frame() const;
     FrameCost last_cost() const;
     Mesh reconstruction() const;
-    Mesh reconstruction(std::size_t coded) const;  // the same of one of coded_frames()
-    // Of the last vertices of the reconstruction, which its charts' seams repeat, which ones they are: they have the
-    // same positions. None without charts.
+    Mesh reconstruction(std::size_t coded) const;  // the same for one of coded_frames()
+    // Which vertices the last ones of the reconstruction repeat, at the seams of its charts: these lie at the same
+    // positions. Empty without charts.
     std::span<const std::uint32_t> repeated_vertices() const;
     std::span<const std::uint32_t> repeated_vertices(std::size_t coded) const;
-    // Of the reconstructions of all frames queued with that one; nothing if they have no vertices.
+    // Bounds of the reconstructions of all frames queued with the last one; nothing if they have no vertices.
     std::optional<SpaceBounds> bounds() const;
     // How long the stages of the last push() or finish() took.
     const std::vector<StageTime>& stage_times() const;

@@ -1,5 +1,5 @@
 // The encoder's options, each with its default and meaning. Their ranges, and their names elsewhere, are in one list
-// (option_list.hpp, docs/options.md).
+// (option_list.hpp, docs/options.md). A stream made with the defaults is the one that `htvm encode` makes with its own.
 #pragma once
 
 #include <cstdint>
@@ -99,10 +99,14 @@ struct RateOptions {
     double target_error = 0;  // mm (M2), > 0: the error that every frame should have; not together with bits_per_second
 };
 
+inline constexpr double default_quality = 42;  // about 0.6 mm of surface error (M2)
+
 struct EncoderOptions {
     Profile profile = Profile::tracked;
-    double geometry_step = 2.0;  // mm, > 0: cell size of the position quantiser; errors are about half of it
-    double colour_step = 6.0;    // levels of 255, >= 1: cell size of the colour quantiser
+    double quality = default_quality;  // 0 to 100: the steps of positions and colours, see quality_steps(); higher is
+                                       // finer. Under rate control it follows from the rate or the error instead
+    double geometry_step = 0;    // mm: cell size of the position quantiser, about twice its errors; 0: by the quality
+    double colour_step = 0;      // levels of 255, >= 1: cell size of the colour quantiser; 0: by the quality
     double lambda = 0.12;        // squared error that is worth one bit, in units of step^2; 0: always the nearest
                                  // codeword
     int key_interval = 300;      // largest distance between I-frames, in frames; 1: I-frames only. With EP-frames,
@@ -154,5 +158,7 @@ struct QualitySteps {
     double geometry_step, colour_step;
 };
 QualitySteps quality_steps(double quality);
+// The steps of an encoder with these options: its own, or where they are 0, those of its quality.
+QualitySteps quality_steps(const EncoderOptions& options);
 
 }  // namespace htvm

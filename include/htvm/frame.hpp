@@ -18,7 +18,7 @@ enum class FrameType : std::uint8_t {
     patched,    // the same, with a part replaced by a piece with connectivity of its own: a new reference
 };
 
-// How a kind is called. Everything else the codec must know about it is in src/codec/format/frame_kinds.cpp.
+// The names of a kind. Everything else the codec must know about it is in src/codec/format/frame_kinds.cpp.
 struct FrameKind {
     FrameType type;
     const char* letter;  // as used in tables and on the command line
@@ -39,7 +39,7 @@ constexpr const FrameKind* kind_of_letter(std::string_view letter) {
     return nullptr;
 }
 
-// The parts of a frame's payload. But for a T-frame's, each can be decoded by itself. The numbers are those of the
+// The parts of a frame's payload. Each can be decoded by itself, except a T-frame's. The numbers are those of the
 // stream; docs/bitstream.md, section 4, describes the contents for each kind of frame.
 enum class Layer : std::uint8_t {
     pose = 1,
@@ -105,8 +105,9 @@ struct FrameInfo {
     std::int64_t timestamp_us = 0;  // microseconds
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
     std::uint32_t vertices = 0, triangles = 0;                // of the decoded mesh
-    std::uint8_t group = 1, place = 1;  // T: of how many frames its group is, and the how many-eth of them it is. Its
-                                        // bytes are those of its packet, which may bring others of the group
+    // T-frames: how many its group has, and which of them it is, from 1. The bytes are those of its packet, which may
+    // bring others of the group.
+    std::uint8_t group = 1, place = 1;
     LayerBytes bytes;
 };
 

@@ -12,10 +12,10 @@ namespace htvm {
 
 class FrameNumbers {
 public:
-    // Takes every packet of the stream, in order.
-    void take(const Packet& packet) { take_told(told_header(packet)); }
-    void take_told(const PacketHeader& header);
-    // To begin in the middle of a stream: the next frame, with its own number `frame`, has the number `number`.
+    // Every packet of the stream must be pushed, in order. A header must have its flags: header_with_flags().
+    void push(const Packet& packet) { push(header_with_flags(packet)); }
+    void push(const PacketHeader& header);
+    // Begins in the middle of a stream: the next frame, with its own number `frame`, has the number `number`.
     void begin(std::uint32_t frame, std::uint32_t number) { offset_ = number - frame; }
 
     // The number in the stream of a frame, given its own number in the sequence of the last packet.

@@ -110,8 +110,7 @@ enum {
 };
 
 /* Name of a type: "intra" and "I", "enhanced" and "EP", "predicted" and "P", "tracked" and "T", "patched" and "TP";
- * "unknown" and
- * "?" for a number that this version does not know. Never NULL. */
+ * "unknown" and "?" for a number that this version does not know. Never NULL. */
 const char* htvm_frame_kind_name(uint32_t type);
 const char* htvm_frame_kind_letter(uint32_t type);
 
@@ -271,8 +270,8 @@ htvm_status htvm_decoder_joint_name(htvm_decoder* decoder, uint32_t joint, char*
 htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* first, uint32_t* second, double* radius);
 
 /* An entry of the metadata: a key and a value in UTF-8, each terminated by a 0. HTVM_BUFFER_TOO_SMALL below their
- * lengths
- * + 1; 256 for keys and 4096 for values is always enough. Players know the keys "title", "rights" and "timecode". */
+ * lengths + 1; 256 for keys and 4096 for values is always enough. Players know the keys "title", "rights" and
+ * "timecode". */
 htvm_status htvm_decoder_metadata(htvm_decoder* decoder, uint32_t entry, char* key, size_t key_capacity, char* value,
                                   size_t value_capacity);
 
@@ -323,11 +322,11 @@ enum { HTVM_PACKET_AUDIO = 10, HTVM_PACKET_PICTURE = 12 };
 
 /* what coded a picture */
 enum {
-    HTVM_PICTURE_AV1 = 1,   /* one temporal unit of low-overhead OBUs */
-    HTVM_PICTURE_VP9 = 2,   /* one frame */
-    HTVM_PICTURE_PNG = 16,  /* an image file; and so */
-    HTVM_PICTURE_JPEG = 17, /**/
-    HTVM_PICTURE_WEBP = 18  /**/
+    HTVM_PICTURE_AV1 = 1,  /* one temporal unit of low-overhead OBUs */
+    HTVM_PICTURE_VP9 = 2,  /* one frame */
+    HTVM_PICTURE_PNG = 16, /* image files */
+    HTVM_PICTURE_JPEG = 17,
+    HTVM_PICTURE_WEBP = 18
 };
 
 /* The picture of a frame of a textured stream, to be given to the platform's decoder of video or images. */
@@ -519,13 +518,14 @@ htvm_status htvm_skeleton_init(htvm_skeleton* skeleton, size_t struct_size);
 htvm_status htvm_mesh_init(htvm_mesh* mesh, size_t struct_size);
 htvm_status htvm_pose_init(htvm_pose* pose, size_t struct_size);
 
-/* The steps of a quality that means the same error for every capture: 16 mm at 0, 2 mm at 50, 0.25 mm at 100; values
+/* The steps of a quality, to which the option "quality" sets them: 16 mm at 0, 2 mm at 50, 0.25 mm at 100; values
  * outside of 0..100 are clamped. Either pointer may be NULL. */
 void htvm_quality_steps(double quality, double* geometry_step, double* colour_step);
 
-/* Makes an encoder. options: NULL for the defaults of the tracked profile; they are copied. *encoder is set to NULL
- * unless the status is HTVM_OK. Errors: HTVM_BAD_INPUT (options contradict each other or the skeleton; text, if not
- * NULL, receives an explanation of up to text_capacity characters, including the terminating 0), HTVM_OUT_OF_MEMORY. */
+/* Makes an encoder. options: NULL for the defaults of the tracked profile, which make the stream that `htvm encode`
+ * makes; they are copied. *encoder is set to NULL unless the status is HTVM_OK. Errors: HTVM_BAD_INPUT (options
+ * contradict each other or the skeleton; text, if not NULL, receives an explanation of up to text_capacity characters,
+ * including the terminating 0), HTVM_OUT_OF_MEMORY. */
 htvm_status htvm_encoder_create(const htvm_encoder_options* options, htvm_encoder** encoder, char* text,
                                 size_t text_capacity);
 void htvm_encoder_destroy(htvm_encoder* encoder);
@@ -538,24 +538,24 @@ const char* htvm_encoder_last_error(const htvm_encoder* encoder);
  * I-frame. HTVM_BAD_INPUT: the mesh or pose is invalid; HTVM_LIMIT: under rate control, a frame that does not fit the
  * buffer. After an error the frame is not part of the stream, and the next may be sent. With the option tracked.group,
  * frames are held until their group is whole: none or several packets come at once then. With latency_frames a call
- * codes a frame sent before, and an error may be of that one: it is not part of the stream then. */
+ * codes an earlier frame, and an error may belong to that one: it is not part of the stream then. */
 htvm_status htvm_encoder_send_mesh(htvm_encoder* encoder, const htvm_mesh* mesh, const htvm_pose* pose,
                                    int64_t timestamp_us, int force_intra);
 
-/* From the next frame on the line carries so many bits a second; the quality follows within half a second.
- * HTVM_BAD_INPUT: the options gave no rate.bits_per_second, or this is not one that they could have given. */
+/* Sets the bits per second that the line carries from the next frame on; the quality follows within half a second.
+ * HTVM_BAD_INPUT: the options gave no rate.bits_per_second, or this is none that they could have given. */
 htvm_status htvm_encoder_set_bitrate(htvm_encoder* encoder, double bits_per_second);
 
-/* From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort; 0: its motion alone is
- * coded, unless the picture would fall apart: for a frame that would be late otherwise. HTVM_BAD_INPUT: above 9, or
+/* Sets how much is searched for each frame from the next on: 1 to 9, as the option tracked.effort. 0, for a frame that
+ * would be late otherwise: its motion alone is coded, unless the picture would fall apart. HTVM_BAD_INPUT: above 9, or
  * another profile than the tracked one. */
 htvm_status htvm_encoder_set_effort(htvm_encoder* encoder, uint32_t effort);
 
-/* Of the meshes sent from now on. may_repair is asked, with user, while a frame is coded and tracking turns out to be
- * lost in it: whether that is repaired at once, which takes three to ten times as long as other frames; 0: the frame is
- * sent as it was tracked, and a later one is asked anew. Not asked where the picture would fall apart, 4 mm off all
- * over or 30 mm in a region of 10 cm of an adult: that is always repaired. It may be called from a thread of the
- * encoder's. NULL: always. HTVM_BAD_INPUT: another profile than the tracked one. */
+/* Sets who decides, for the meshes sent from here on, whether lost tracking is repaired at once, which takes three to
+ * ten times as long as other frames. may_repair is called, with user, while a frame is coded and tracking turns out to
+ * be lost in it, perhaps from a thread of the encoder's. On 0 the frame is sent as it was tracked, and a later one asks
+ * anew. Where the picture would fall apart, 4 mm off all over or 30 mm in a region of 10 cm of an adult, it is not
+ * called, and the frame is repaired. NULL: all are repaired. HTVM_BAD_INPUT: another profile than the tracked one. */
 typedef int (*htvm_may_repair)(void* user);
 htvm_status htvm_encoder_set_repair(htvm_encoder* encoder, htvm_may_repair may_repair, void* user);
 

@@ -21,7 +21,7 @@ enum class PacketKind : std::uint8_t {
     predicted = 6,    // P-frame: the I-frame's mesh moved
     tracked = 7,      // T-frame: the I-frame's mesh laid on the captured surface
     front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
-    audio = 10,       // (9 is not used) sound of the time from a frame to the next (audio.hpp); optional
+    audio = 10,       // sound of the time from a frame to the next (audio.hpp); optional. 9 is not used
     patched = 11,     // TP-frame: a T-frame of which a part is replaced; a reference itself
     texture = 12,     // the picture of a frame (texture.hpp); optional
 };
@@ -34,15 +34,15 @@ inline constexpr std::uint8_t access = 2;     // frames: it needs no frame but t
 inline constexpr std::uint8_t droppable = 4;  // frames, audio, pictures: it may be left out without affecting others
 inline constexpr std::uint8_t colour = 8;     // codebooks: it is for colours, not for geometry
 inline constexpr std::uint8_t session = 16;   // sequence headers: the session is not 0
-inline constexpr std::uint8_t settled = 32;   // I-frames: of a tracked mesh, which is not smoothed once more
-inline constexpr std::uint8_t told = 128;     // the other bits are valid; encoders of version 1 wrote 0
+inline constexpr std::uint8_t of_tracked_mesh = 32;  // I-frames: made of the tracked mesh, and not smoothed again
+inline constexpr std::uint8_t flags_valid = 128;     // the other bits are valid; encoders of version 1 wrote 0
 }  // namespace packet_flag
 
 // A packet without its payload: what dependency.hpp works on.
 struct PacketHeader {
     PacketKind kind = PacketKind::sequence;
     std::uint8_t flags = 0;               // of packet_flag
-    std::uint16_t reference_version = 0;  // version of the reference; 0 for now
+    std::uint16_t reference_version = 0;  // always 0
     std::uint32_t frame = 0;              // number of the frame that it holds, or came with
     std::uint32_t reference = 0;          // number of the frame that it refers to; for an I-frame, its own; for a
                                           // sequence header, the CRC-32 of its payload

@@ -2,7 +2,7 @@
 //
 //   htvm::PictureDecoder pictures;
 //   for each packet of the stream, behind the mesh decoder's:
-//       if (packet.kind == htvm::PacketKind::texture) pictures.take(packet);
+//       if (packet.kind == htvm::PacketKind::texture) pictures.decode(packet);
 //   draw(mesh, *pictures.image());
 //
 // Part of the library htvm::texture, which needs libaom, libvpx and libdav1d.
@@ -35,13 +35,13 @@ public:
     PictureDecoder& operator=(PictureDecoder&&) noexcept;
     ~PictureDecoder();
 
-    // Decodes the picture of a packet of PacketKind::texture, which becomes the one that is lent. After an error the
+    // Decodes the picture of a packet of PacketKind::texture, which image() and planes() then lend. After an error the
     // last one stays, and the next key picture is the next that can be decoded.
-    Result<void> take(const Packet& packet);
+    Result<void> decode(const Packet& packet);
     // Forgets everything, as for another sequence of the stream.
     void reset();
 
-    // The last picture with its gains, in red, green and blue; null before the first. On loan until the next take().
+    // The last picture with its gains, in red, green and blue; null before the first. On loan until the next decode().
     // Converted when it is asked for.
     std::shared_ptr<const Image> image();
     // Its planes, as decoded: gains are not applied. Null before the first, and of image files. On loan likewise.

@@ -32,15 +32,17 @@ struct CodedPicture {
 
 class PictureEncoder {
 public:
-    // bad_input: an option is out of its range; unsupported: the coder is none of video.
+    // bad_input: an option is out of its range; unsupported: the coder codes no video.
     static Result<PictureEncoder> create(const PictureEncoderOptions& options);
     PictureEncoder(PictureEncoder&&) noexcept;
     PictureEncoder& operator=(PictureEncoder&&) noexcept;
     ~PictureEncoder();
 
-    // The next picture, of the size given before. The first is a key picture, and so is one that is asked to be.
+    // Codes the next picture, of the size in the options. The first is a key picture, and so is one that is asked to
+    // be.
     Result<CodedPicture> encode(const PicturePlanes& picture, bool key = false);
-    // From the next picture on. Only where there was no rate, or one, from the beginning.
+    // Set the quantiser or the rate from the next picture on. bad_input: out of its range, or the options chose the
+    // other of the two.
     Result<void> set_quantiser(int quantiser);
     Result<void> set_bitrate(double bits_per_second);
 

@@ -29,9 +29,9 @@ struct PublisherOptions {
     std::vector<std::string> other_hubs{};  // addresses to go on with where the hub is lost; hubs tell of others, too
     std::string certificates{};             // PEM file of those who may vouch for a hub's; empty: the system's
     bool insecure = false;                  // takes any certificate: for tests alone
-    std::size_t queue_bytes = std::size_t{4} << 20;  // that may wait to be sent
-    std::chrono::milliseconds queue_time{2000};      // for how long
-    bool stamps = false;                             // tells when each frame was sent, for measurement
+    std::size_t queue_bytes = std::size_t{4} << 20;  // how much may wait to be sent
+    std::chrono::milliseconds queue_time{2000};      // and for how long
+    bool stamps = false;                             // whether to send the time of each frame, for measurement
 };
 
 struct PublisherState {
@@ -39,9 +39,9 @@ struct PublisherState {
     std::string hub;                                      // the address in use, without what is secret
     std::uint64_t connections = 0;                        // made so far
     std::uint64_t sent_packets = 0, sent_bytes = 0;       // handed to the line
-    std::uint64_t dropped_frames = 0;                     // that the line did not take in time, or that found none
-    std::size_t queue_bytes = 0;                          // that wait to be sent,
-    std::chrono::milliseconds queue_time{};               // and for how long the first of them has
+    std::uint64_t dropped_frames = 0;                     // not taken by the line in time, or while there was none
+    std::size_t queue_bytes = 0;                          // how much waits to be sent
+    std::chrono::milliseconds queue_time{};               // how long the first of it has waited
     std::optional<std::chrono::microseconds> round_trip;  // to the hub and back, once it is known
     std::optional<std::uint64_t> viewers;                 // by the hub's last heartbeat
     std::string trouble;                                  // why it is not connected, if so

@@ -8,23 +8,25 @@
 
 namespace htvm {
 
-// How long frames last, seconds: from the first timestamp to the last, and a mean frame; or, where only some are
-// missing from the grid of the frame rate, of_one, which is how long a frame lasts by the rate, and so a single one.
+// Seconds that frames last: from the first timestamp to the last, and then the last frame. This lasts as long as the
+// mean frame, or of_one, the duration by the frame rate, if it is the only frame, or if the timestamps are multiples of
+// of_one apart and fewer than half of them are missing.
 double seconds_of_frames(std::int64_t first_us, std::int64_t last_us, std::uint64_t frames, double of_one);
 
 class RunningTime {
 public:
-    // Takes every packet of the stream, in order. begins_sequence: FrameNumbers::begins_sequence() of this packet.
-    void take(const Packet& packet, bool begins_sequence);
-    // To begin in the middle of the stream's first sequence, whose first frame has this timestamp. Then only
+    // Every packet of the stream must be pushed, in order. begins_sequence: FrameNumbers::begins_sequence() of this
+    // one.
+    void push(const Packet& packet, bool begins_sequence);
+    // Begins in the middle of the stream's first sequence, whose first frame has this timestamp. Then only
     // microseconds() is known.
     void begin(std::int64_t first_timestamp_us);
     // When the last frame begins, microseconds from the first one.
     std::uint64_t microseconds() const;
     // When it ends.
     std::uint64_t total_us() const;
-    // How long a frame lasts by the frame rate of the sequence header in force, and so one that is alone in its
-    // sequence; 0 before any header.
+    // How long a frame lasts by the frame rate of the sequence header in force, as one that is alone in its sequence
+    // does; 0 before any header.
     std::uint64_t one_frame_us() const;
 
 private:

@@ -26,7 +26,7 @@ struct SpaceBounds {
     std::array<float, 3> low, high;
     bool operator==(const SpaceBounds&) const = default;
 };
-// Makes `all` hold `more` too, where there is any.
+// Extends `all` so that it contains `more`, if there is any.
 void extend(std::optional<SpaceBounds>& all, const std::optional<SpaceBounds>& more);
 // Nothing if there are no positions.
 std::optional<SpaceBounds> bounds_of(std::span<const Vector3f> positions);

@@ -1,4 +1,4 @@
-// The skeleton tracked with a mesh sequence: its bones, given once, and its pose in every frame.
+// The skeleton of a mesh sequence: its bones, given once, and its pose in every frame.
 #pragma once
 
 #include <array>
@@ -26,9 +26,9 @@ struct Skeleton {
 // S_t: the skeleton in one frame.
 struct Pose {
     std::vector<Vector3d> joints;  // mm, one per joint of the skeleton
-    // One per joint; false if the tracker lost it and its position is a guess (which is coded all the same); empty: all
-    // tracked.
-    std::vector<bool> tracked;
+    // One per joint; false: the tracker lost it, and its position is a guess, which is coded all the same. Empty: all
+    // were found.
+    std::vector<bool> found;
     std::vector<Rotation> orientations;  // T^i, one per bone; empty: derived from the joints
 };
 

@@ -14,11 +14,11 @@ namespace htvm {
 
 // What coded a picture, by the numbers of the stream.
 enum class PictureCoder : std::uint8_t {
-    av1 = 1,    // one temporal unit of low-overhead OBUs; key pictures begin with a sequence header OBU
-    vp9 = 2,    // one frame, or a superframe that shows one
-    png = 16,   // an image file as it came; and so
-    jpeg = 17,  //
-    webp = 18,  //
+    av1 = 1,   // one temporal unit of low-overhead OBUs; key pictures begin with a sequence header OBU
+    vp9 = 2,   // one frame, or a superframe that shows one
+    png = 16,  // image files as they came
+    jpeg = 17,
+    webp = 18,
 };
 // "AV1", "VP9", "PNG", "JPEG", "WebP".
 const char* name_of(PictureCoder coder);
@@ -36,7 +36,7 @@ struct TexturePicture {
     ColourMatrix matrix = ColourMatrix::bt709;  // none for image files
     bool full_range = false;                    // of the planes: 0..255, not 16..235 and 16..240
     std::uint32_t width = 0, height = 0;        // pixels, 1..most_picture_side
-    // Of red, green, blue: who shows the picture multiplies its values (sRGB, 0..255) by gain / picture_gain_one.
+    // For red, green, blue: whoever shows the picture multiplies its values (sRGB, 0..255) by gain / picture_gain_one.
     std::array<std::uint16_t, 3> gains = {picture_gain_one, picture_gain_one, picture_gain_one};
     std::span<const std::uint8_t> coded;  // what the coder wrote: on loan from whoever gave it out, at least one byte
 };

@@ -1,4 +1,4 @@
-// How the meshes of a stream wear a texture: what sequence headers say of it, and encoders are told.
+// How the meshes of a stream wear a texture.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ enum class TextureLayout : std::uint8_t {
                // projected onto a plane
 };
 
-// Of a stream: what its sequence header says.
+// What the sequence header says of a stream's texture.
 struct StreamTexture {
     TextureLayout layout = TextureLayout::none;
     int width = 0, height = 0;  // of the pictures, pixels, 1..most_picture_side (texture.hpp); 0 without a layout

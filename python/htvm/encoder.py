@@ -138,7 +138,7 @@ class Encoder:
     output: None; a path, where the complete stream is put with its index in front: until then it is beside it, and what
         fails leaves the file that was there; or a binary file object, which gets the packets and is not closed
     profile: "tracked", "topology" or "paper"
-    quality: 0 to 100, sets geometry_step and colour_step; None: they keep their defaults
+    quality: 0 to 100, see docs/options.md; None: 42, as of ``htvm encode``
     fps: frames per second: a number, a Fraction or a text such as "30000/1001"
     skeleton: of the poses that come with the meshes; None: one bone stands in
     metadata: "title", "rights", "timecode" and other texts
@@ -154,7 +154,7 @@ class Encoder:
         output: Union[None, str, "os.PathLike[str]", BinaryIO] = None,
         *,
         profile: str = "tracked",
-        quality: Optional[float] = 42,
+        quality: Optional[float] = None,
         fps: Union[int, float, str, Fraction] = 30,
         skeleton: Optional[Skeleton] = None,
         metadata: Optional[Mapping[str, str]] = None,
@@ -221,7 +221,7 @@ class Encoder:
         return packets
 
     def set_bitrate(self, bits_per_second: float) -> None:
-        """From the next frame on the line carries so many bits a second; the quality follows within half a second.
+        """Sets the bits per second that the line carries from the next frame on; the quality follows in half a second.
 
         For an encoder that was made with a bitrate; else BadInput.
         """
@@ -233,9 +233,9 @@ class Encoder:
         self._check(c.library.htvm_encoder_set_bitrate(self._handle, rate))
 
     def set_effort(self, effort: int) -> None:
-        """From the next frame on so much is searched for each: 1 to 9, as the option tracked.effort.
+        """Sets how much is searched for each frame from the next on: 1 to 9, as the option tracked.effort.
 
-        With 0 a frame's motion alone is coded, for one that would be late otherwise.
+        0 is for a frame that would be late otherwise: its motion alone is coded.
         """
         self._check_open()
         if not isinstance(effort, int) or not 0 <= effort <= 9:
@@ -374,12 +374,7 @@ def _set_options(
 ) -> _Options:
     out = _Options(profile)
     if quality is not None:
-        if not 0 <= quality <= 100:
-            raise BadInput(f"quality is from 0 to 100, not {quality}")
-        geometry, colour = ctypes.c_double(), ctypes.c_double()
-        c.library.htvm_quality_steps(quality, geometry, colour)
-        out.set("geometry_step", geometry.value)
-        out.set("colour_step", colour.value)
+        out.set("quality", quality)
     out.set("fps_numerator", rate.numerator)
     out.set("fps_denominator", rate.denominator)
     names: Dict[str, str] = {option.name.replace(".", "_"): option.name for option in encoder_options(profile)}

@@ -37,9 +37,22 @@ def test_an_intra_frame_can_be_asked_for():
 def test_options_have_their_names_with_underscores_for_dots():
     for option in htvm.encoder_options("tracked"):
         if option.serves and not option.name.startswith("rate."):
-            htvm.Encoder(quality=None, **{option.name.replace(".", "_"): option.default})
+            htvm.Encoder(**{option.name.replace(".", "_"): option.default})
     assert {o.name: o.default for o in htvm.encoder_options()}["key_interval"] == 300
     assert {o.name: o.words for o in htvm.encoder_options()}["tracked.references"] == ("intra", "previous")
+
+
+@needs_program
+@pytest.mark.parametrize("quality", [None, 60])
+def test_defaults_make_the_file_of_the_command_line(tmp_path, quality):
+    asked = [] if quality is None else ["-q", str(quality)]
+    with htvm.Encoder(tmp_path / "python.htvm", quality=quality) as encoder:
+        for number in range(6):
+            htvm.write_mesh(tmp_path / f"{number}.ply", sheet(number), unit="mm")
+            encoder.push(sheet(number))
+    subprocess.run([program, "encode", *(tmp_path / f"{number}.ply" for number in range(6)), "--unit", "mm", *asked,
+                    "-o", tmp_path / "program.htvm", "--quiet"], check=True)
+    assert (tmp_path / "python.htvm").read_bytes() == (tmp_path / "program.htvm").read_bytes()
 
 
 @pytest.mark.parametrize("options, sentence", [
@@ -48,6 +61,7 @@ def test_options_have_their_names_with_underscores_for_dots():
     (dict(tracked_references="both"), "intra"),
     (dict(topology_still_below=3), "still_below"),
     (dict(quality=101), "0 to 100"),
+    (dict(quality=50, rate_bits_per_second=80e3), "quality does nothing with rate.bits_per_second"),
     (dict(profile="best"), "tracked, topology, paper"),
     (dict(fps=0), "fps must be above 0"),
     (dict(metadata={"title": "x" * 5000}), "metadata|title"),
@@ -97,7 +111,7 @@ def test_a_file_object_gets_the_packets_and_stays_open(stream):
 
 
 def test_a_bitrate_changes_while_frames_are_pushed():
-    encoder = htvm.Encoder(subject_size=1000, quality=None, rate_bits_per_second=80e3, key_interval=1)
+    encoder = htvm.Encoder(subject_size=1000, rate_bits_per_second=80e3, key_interval=1)
 
     def size_of(first, last):
         return sum(len(packet) for number in range(first, last) for packet in encoder.push(sheet(number)))

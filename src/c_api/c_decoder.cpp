@@ -243,7 +243,7 @@ htvm_status htvm_decoder_conceal(htvm_decoder* decoder, uint32_t frame, int64_t 
                                  size_t info_size) {
     if (!decoder) return HTVM_BAD_INPUT;
     return guarded(decoder->error, [&] {
-        decoder->current = decoder->decoder.stand_in(frame, timestamp_us);
+        decoder->current = decoder->decoder.conceal(frame, timestamp_us);
         return decoder->current ? describe_current(*decoder, info, info_size) : htvm_status{HTVM_AGAIN};
     });
 }
@@ -310,7 +310,7 @@ htvm_status htvm_decoder_sequence(htvm_decoder* decoder, htvm_sequence_info* inf
     htvm_sequence_info out{};
     out.joints = static_cast<std::uint32_t>(sequence->skeleton.joint_names.size());
     out.bones = static_cast<std::uint32_t>(sequence->skeleton.bones.size());
-    out.skeleton_tracked = sequence->skeleton_tracked;
+    out.skeleton_tracked = sequence->has_skeleton;
     out.fps_numerator = sequence->fps_numerator;
     out.fps_denominator = sequence->fps_denominator;
     out.unit_micrometres = sequence->unit_micrometres;

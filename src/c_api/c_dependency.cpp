@@ -22,7 +22,7 @@ struct htvm_dependencies {
 static_assert(HTVM_PACKET_REFERRED == htvm::packet_flag::referred && HTVM_PACKET_ACCESS == htvm::packet_flag::access &&
               HTVM_PACKET_DROPPABLE == htvm::packet_flag::droppable &&
               HTVM_PACKET_COLOUR == htvm::packet_flag::colour && HTVM_PACKET_SESSION == htvm::packet_flag::session &&
-              HTVM_PACKET_TOLD == htvm::packet_flag::told);
+              HTVM_PACKET_TOLD == htvm::packet_flag::flags_valid);
 static_assert(HTVM_PACKET_HEADER == htvm::packet_header_bytes);
 static_assert(HTVM_PACKET_AUDIO == static_cast<int>(htvm::PacketKind::audio) &&
               HTVM_PACKET_PICTURE == static_cast<int>(htvm::PacketKind::texture));
@@ -67,7 +67,7 @@ htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_inf
         one.push({packet, size});
         const auto whole = one.pull();
         if (!whole || one.damaged_bytes() > 0 || one.pending_bytes() > 0) return htvm_status{HTVM_CORRUPT_STREAM};
-        return describe(htvm::told_header(*whole), size, info, info_size);
+        return describe(htvm::header_with_flags(*whole), size, info, info_size);
     });
 }
 
@@ -138,7 +138,7 @@ htvm_status htvm_dependencies_push(htvm_dependencies* dependencies, const htvm_p
         header.frame = given.frame;
         header.reference = given.reference;
         header.timestamp_us = given.timestamp_us;
-        dependencies->numbers.take_told(header);
+        dependencies->numbers.push(header);
         dependencies->frame.reset();
         if (htvm::frame_type(header.kind)) dependencies->frame = header.frame;
         if (place) *place = dependencies->pushed;

@@ -107,7 +107,7 @@ htvm_status read_pose(htvm_encoder& encoder, const htvm_pose& given, htvm::Pose&
     if (encoder.joints > 0 && !pose.joints) return encoder.error.set(HTVM_BAD_INPUT, "htvm_pose.joints is NULL");
     out.joints = elements<htvm::Vector3d>(pose.joints, encoder.joints);
     out.orientations = elements<htvm::Rotation>(pose.orientations, encoder.bones);
-    for (std::size_t j = 0; pose.tracked && j < encoder.joints; ++j) out.tracked.push_back(pose.tracked[j] != 0);
+    for (std::size_t j = 0; pose.tracked && j < encoder.joints; ++j) out.found.push_back(pose.tracked[j] != 0);
     return HTVM_OK;
 }
 

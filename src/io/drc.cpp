@@ -99,7 +99,7 @@ bool for_each_point(const draco::PointCloud& cloud, const draco::PointAttribute&
     return true;
 }
 
-Result<void> take_positions(const draco::PointCloud& cloud, Mesh& mesh) {
+Result<void> copy_positions(const draco::PointCloud& cloud, Mesh& mesh) {
     const draco::PointAttribute* attribute = cloud.GetNamedAttribute(draco::GeometryAttribute::POSITION);
     if (!attribute) {
         return cloud.num_points() == 0 ? Result<void>() : not_readable("it holds no positions");
@@ -122,7 +122,7 @@ Result<void> take_positions(const draco::PointCloud& cloud, Mesh& mesh) {
     return {};
 }
 
-Result<void> take_colours(const draco::PointCloud& cloud, Mesh& mesh) {
+Result<void> copy_colours(const draco::PointCloud& cloud, Mesh& mesh) {
     const draco::PointAttribute* attribute = cloud.GetNamedAttribute(draco::GeometryAttribute::COLOR);
     if (!attribute) return {};
     double scale = 1;
@@ -156,7 +156,7 @@ Result<void> take_colours(const draco::PointCloud& cloud, Mesh& mesh) {
 }
 
 template <std::size_t N>
-Result<void> take_floats(const draco::PointCloud& cloud, draco::GeometryAttribute::Type type, const char* name,
+Result<void> copy_floats(const draco::PointCloud& cloud, draco::GeometryAttribute::Type type, const char* name,
                          std::vector<std::array<float, N>>& out) {
     const draco::PointAttribute* attribute = cloud.GetNamedAttribute(type);
     if (!attribute) return {};
@@ -175,10 +175,10 @@ Result<Mesh> mesh_of(const draco::PointCloud& cloud, const draco::Mesh* faces, c
         return tl::unexpected(ok.error());
     }
     Mesh mesh;
-    Result<void> taken = take_positions(cloud, mesh);
-    if (taken) taken = take_colours(cloud, mesh);
-    if (taken) taken = take_floats(cloud, draco::GeometryAttribute::NORMAL, "normals", mesh.normals);
-    if (taken) taken = take_floats(cloud, draco::GeometryAttribute::TEX_COORD, "texture coordinates", mesh.texcoords);
+    Result<void> taken = copy_positions(cloud, mesh);
+    if (taken) taken = copy_colours(cloud, mesh);
+    if (taken) taken = copy_floats(cloud, draco::GeometryAttribute::NORMAL, "normals", mesh.normals);
+    if (taken) taken = copy_floats(cloud, draco::GeometryAttribute::TEX_COORD, "texture coordinates", mesh.texcoords);
     if (!taken) return tl::unexpected(taken.error());
     const std::uint32_t face_count = faces ? faces->num_faces() : 0;
     for (std::uint32_t f = 0; f < face_count; ++f) {

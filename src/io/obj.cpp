@@ -60,7 +60,7 @@ tl::unexpected<Error> bad_line(std::size_t line, const std::string& why) {
 }
 
 // Removes the next word from the line and returns it; empty at its end.
-std::string_view take_word(std::string_view& line) {
+std::string_view read_word(std::string_view& line) {
     const std::size_t begin = line.find_first_not_of(" \t\r\v\f");
     if (begin == line.npos) return line = {};
     const std::size_t end = std::min(line.find_first_of(" \t\r\v\f", begin), line.size());
@@ -70,9 +70,9 @@ std::string_view take_word(std::string_view& line) {
 }
 
 // Parses the line's numbers, at most eight, into `values`. Returns how many, or nothing if one is not a number.
-std::optional<std::size_t> take_numbers(std::string_view line, std::array<double, 8>& values) {
+std::optional<std::size_t> read_numbers(std::string_view line, std::array<double, 8>& values) {
     std::size_t count = 0;
-    for (std::string_view word = take_word(line); !word.empty() && count < values.size(); word = take_word(line)) {
+    for (std::string_view word = read_word(line); !word.empty() && count < values.size(); word = read_word(line)) {
         const auto value = parse_number(word);
         if (!value) return std::nullopt;
         values[count++] = *value;
@@ -82,7 +82,7 @@ std::optional<std::size_t> take_numbers(std::string_view line, std::array<double
 
 Result<void> read_position(ObjText& obj, std::string_view line, std::size_t line_number, const MeshLimits& limits) {
     std::array<double, 8> values{};
-    const auto count = take_numbers(line, values);
+    const auto count = read_numbers(line, values);
     if (!count || *count < 3) return bad_line(line_number, "v needs three numbers");
     if (auto ok = check_count(obj.positions.size() + 1, limits.most_vertices, "vertices or more"); !ok) return ok;
     if (!fits_float(values[0]) || !fits_float(values[1]) || !fits_float(values[2])) {
@@ -140,7 +140,7 @@ std::optional<Corner> parse_corner(std::string_view word, const ObjText& obj) {
 
 Result<void> read_face(ObjText& obj, std::string_view line, std::size_t line_number, const MeshLimits& limits) {
     Polygon polygon{obj.corners.size(), 0, line_number};
-    for (std::string_view word = take_word(line); !word.empty(); word = take_word(line)) {
+    for (std::string_view word = read_word(line); !word.empty(); word = read_word(line)) {
         const auto corner = parse_corner(word, obj);
         if (!corner) {
             return bad_line(line_number, "the corner \"" + std::string(word.substr(0, 40)) + "\" of face " +
@@ -169,7 +169,7 @@ std::string_view trimmed(std::string_view line) {
 
 Result<void> read_statement(ObjText& obj, std::string_view line, std::size_t line_number, const MeshLimits& limits) {
     line = line.substr(0, line.find('#'));
-    const std::string_view keyword = take_word(line);
+    const std::string_view keyword = read_word(line);
     if (keyword == "v") return read_position(obj, line, line_number, limits);
     if (keyword == "f") return read_face(obj, line, line_number, limits);
     if (keyword == "mtllib") {
@@ -186,7 +186,7 @@ Result<void> read_statement(ObjText& obj, std::string_view line, std::size_t lin
         return {};
     }
     std::array<double, 8> values{};
-    const auto count = take_numbers(line, values);
+    const auto count = read_numbers(line, values);
     if (keyword == "vt") {
         if (!count || *count < 1) return bad_line(line_number, "vt needs two numbers");
         obj.texcoords.push_back({finite_or_zero(values[0]), finite_or_zero(values[1])});
@@ -198,7 +198,7 @@ Result<void> read_statement(ObjText& obj, std::string_view line, std::size_t lin
 }
 
 // Removes the next line from the text and returns it; lines continued with a backslash are put together in `joined`.
-std::string_view take_line(std::string_view& text, std::size_t& line_number, std::string& joined) {
+std::string_view read_line(std::string_view& text, std::size_t& line_number, std::string& joined) {
     joined.clear();
     for (;;) {
         const std::size_t end = std::min(text.find('\n'), text.size());
@@ -362,7 +362,7 @@ Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits, TextureRe
     std::size_t line_number = 0;
     while (!text.empty()) {
         const std::size_t first_line = line_number + 1;
-        const std::string_view line = take_line(text, line_number, joined);
+        const std::string_view line = read_line(text, line_number, joined);
         if (auto ok = read_statement(obj, line, first_line, limits); !ok) return tl::unexpected(ok.error());
     }
     if (obj.positions.empty() && obj.foreign_line > 0)
@@ -383,17 +383,17 @@ std::vector<ObjMaterial> read_obj_materials(std::string_view text) {
     std::string joined;
     std::size_t line_number = 0;
     while (!text.empty()) {
-        std::string_view line = take_line(text, line_number, joined);
-        const std::string_view keyword = take_word(line);
+        std::string_view line = read_line(text, line_number, joined);
+        const std::string_view keyword = read_word(line);
         if (keyword == "newmtl") out.push_back({std::string(trimmed(line)), {}});
         if (keyword != "map_Kd" || out.empty()) continue;
         for (;;) {
             std::string_view rest = line;
-            const std::string_view option = take_word(rest);
+            const std::string_view option = read_word(rest);
             if (!option.starts_with('-')) break;
             for (int left = words_of_option(option); left > 0; --left) {
                 std::string_view behind = rest;
-                const std::string_view word = take_word(behind);
+                const std::string_view word = read_word(behind);
                 const bool is_text = option.starts_with("-blend") || option == "-clamp" || option == "-cc" ||
                                      option == "-imfchan" || option == "-type";
                 if (!is_text && !parse_number(word)) break;

@@ -63,11 +63,11 @@ double decode_value(const std::uint8_t* bytes, PlyType type, bool big_endian) {
 }
 
 // The next value; nothing if the bytes end or, in text, if the next word is not a number.
-std::optional<double> take_value(Body& body, PlyType type) {
+std::optional<double> read_value(Body& body, PlyType type) {
     if (body.format == PlyFormat::ascii) {
         std::array<char, 256> word;
         body.took_words = true;
-        return parse_number(take_word(body.source, word));
+        return parse_number(read_word(body.source, word));
     }
     const std::size_t size = ply_type_size(type);
     if (!body.source.ensure(size)) return std::nullopt;
@@ -77,8 +77,8 @@ std::optional<double> take_value(Body& body, PlyType type) {
 }
 
 // The length of a list; nothing if it is missing, negative or malformed.
-std::optional<std::uint64_t> take_list_length(Body& body, const PlyProperty& list) {
-    const auto length = take_value(body, list.count_type);
+std::optional<std::uint64_t> read_list_length(Body& body, const PlyProperty& list) {
+    const auto length = read_value(body, list.count_type);
     if (!length || !(*length >= 0) || *length > 4294967295.0) return std::nullopt;
     const auto whole = static_cast<std::uint64_t>(*length);
     if (static_cast<double>(whole) != *length) return std::nullopt;
@@ -88,13 +88,13 @@ std::optional<std::uint64_t> take_list_length(Body& body, const PlyProperty& lis
 bool skip_property(Body& body, const PlyProperty& property) {
     std::uint64_t count = 1;
     if (property.is_list) {
-        const auto length = take_list_length(body, property);
+        const auto length = read_list_length(body, property);
         if (!length) return false;
         count = *length;
     }
     if (body.format != PlyFormat::ascii) return body.source.skip(count * ply_type_size(property.type));
     for (std::uint64_t i = 0; i < count; ++i) {
-        if (!take_value(body, property.type)) return false;
+        if (!read_value(body, property.type)) return false;
     }
     return true;
 }
@@ -216,14 +216,14 @@ std::uint8_t colour_component(double value, PlyType type) {
 }
 
 // False if the bytes end or cannot be read.
-bool take_vertex(Body& body, const PlyElement& element, const VertexLayout& layout, VertexValues& value) {
+bool read_vertex(Body& body, const PlyElement& element, const VertexLayout& layout, VertexValues& value) {
     for (std::size_t p = 0; p < element.properties.size(); ++p) {
         const PlyProperty& property = element.properties[p];
         if (layout.fields[p] == ignored) {
             if (!skip_property(body, property)) return false;
             continue;
         }
-        const auto taken = take_value(body, property.type);
+        const auto taken = read_value(body, property.type);
         if (!taken) return false;
         value[layout.fields[p]] = *taken;
     }
@@ -257,7 +257,7 @@ struct VertexBlock {
 
 // One property of all vertices as component c of the last elements of `out`; `otherwise` where it is no finite float.
 template <std::size_t size>
-void take_floats(const VertexBlock& block, std::size_t offset, PlyType type, float otherwise, std::size_t c,
+void copy_floats(const VertexBlock& block, std::size_t offset, PlyType type, float otherwise, std::size_t c,
                  std::vector<std::array<float, size>>& out) {
     auto* to = out.data() + (out.size() - block.vertices);
     const auto* from = block.bytes + offset;
@@ -279,7 +279,7 @@ Result<void> append_block(Mesh& mesh, const VertexLayout& layout, const VertexBl
     mesh.positions.resize(after);
     for (std::size_t c = 0; c < 3; ++c) {
         constexpr float none = std::numeric_limits<float>::quiet_NaN();
-        take_floats(block, layout.offset[x + c], layout.type[x + c], none, c, mesh.positions);
+        copy_floats(block, layout.offset[x + c], layout.type[x + c], none, c, mesh.positions);
     }
     for (std::size_t v = before; v < after; ++v) {
         const auto& p = mesh.positions[v];
@@ -288,12 +288,12 @@ Result<void> append_block(Mesh& mesh, const VertexLayout& layout, const VertexBl
     if (layout.normals) {
         mesh.normals.resize(after);
         for (std::size_t c = 0; c < 3; ++c)
-            take_floats(block, layout.offset[nx + c], layout.type[nx + c], 0, c, mesh.normals);
+            copy_floats(block, layout.offset[nx + c], layout.type[nx + c], 0, c, mesh.normals);
     }
     if (layout.texcoords) {
         mesh.texcoords.resize(after);
         for (std::size_t c = 0; c < 2; ++c)
-            take_floats(block, layout.offset[s + c], layout.type[s + c], 0, c, mesh.texcoords);
+            copy_floats(block, layout.offset[s + c], layout.type[s + c], 0, c, mesh.texcoords);
     }
     if (!layout.colours) return {};
     mesh.colours.resize(after);
@@ -341,7 +341,7 @@ Result<void> read_vertices(Body& body, const PlyElement& element, Mesh& mesh) {
     VertexValues value{};
     for (std::uint64_t v = 0; v < element.count; ++v) {
         fetch_ahead(body, fewest, element.count - v);
-        if (!take_vertex(body, element, *layout, value)) return ends_within(text_of("vertex", v, element.count));
+        if (!read_vertex(body, element, *layout, value)) return ends_within(text_of("vertex", v, element.count));
         if (!fits_float(value[x]) || !fits_float(value[y]) || !fits_float(value[z])) return bad_position(v);
         append_vertex(mesh, *layout, value);
     }
@@ -362,11 +362,11 @@ std::optional<std::uint32_t> as_index(double value, std::uint64_t vertex_count) 
 }
 
 Result<void> read_polygon(Body& body, const PlyProperty& list, std::uint64_t face, std::uint64_t faces, Mesh& mesh) {
-    const auto corners = take_list_length(body, list);
+    const auto corners = read_list_length(body, list);
     if (!corners) return ends_within(text_of("face", face, faces));
     Triangle triangle{};
     for (std::uint64_t c = 0; c < *corners; ++c) {
-        const auto value = take_value(body, list.type);
+        const auto value = read_value(body, list.type);
         if (!value) return ends_within(text_of("face", face, faces));
         const auto index = as_index(*value, body.vertex_count);
         if (!index) return bad_index(face, body.vertex_count);
@@ -383,7 +383,7 @@ Result<void> read_polygon(Body& body, const PlyProperty& list, std::uint64_t fac
 
 // Takes the usual faces, only a triangle each with 32-bit indices, in a fraction of the time: some of those that
 // follow. Returns how many, none if the next face is of another kind, which read_polygon handles.
-std::uint64_t take_plain_triangles(Body& body, const PlyElement& element, std::uint64_t faces, Mesh& mesh) {
+std::uint64_t read_plain_triangles(Body& body, const PlyElement& element, std::uint64_t faces, Mesh& mesh) {
     constexpr std::size_t bytes = 1 + 3 * 4;
     constexpr std::uint64_t at_once = 256;  // few, as room for those that are not taken is made again and again
     const PlyProperty& list = element.properties[0];
@@ -422,7 +422,7 @@ Result<void> read_faces(Body& body, const PlyElement& element, Mesh& mesh) {
     mesh.triangles.reserve(reservation(body, element.count, fewest + 3));
     for (std::uint64_t f = 0; f < element.count; ++f) {
         fetch_ahead(body, fewest, element.count - f);
-        if (const auto taken = indices == 0 ? take_plain_triangles(body, element, element.count - f, mesh) : 0) {
+        if (const auto taken = indices == 0 ? read_plain_triangles(body, element, element.count - f, mesh) : 0) {
             f += taken - 1;
             continue;
         }
@@ -452,7 +452,7 @@ Result<void> skip_element(Body& body, const PlyElement& element) {
 Result<PlyHeader> read_header(PlySource& source) {
     std::vector<char> line;
     const std::uint64_t begin = source.consumed();
-    const auto magic = take_line(source, line, 16);
+    const auto magic = read_line(source, line, 16);
     if (!magic || (*magic != "ply" && *magic != "PLY")) {
         return fail(ErrorKind::bad_input, "this is not a PLY file: it does not begin with a line \"ply\"");
     }
@@ -461,7 +461,7 @@ Result<PlyHeader> read_header(PlySource& source) {
     for (;;) {
         const std::uint64_t used = source.consumed() - begin;
         const auto next = used < most_ply_header_bytes
-                              ? take_line(source, line, most_ply_header_bytes - static_cast<std::size_t>(used))
+                              ? read_line(source, line, most_ply_header_bytes - static_cast<std::size_t>(used))
                               : std::nullopt;
         if (!next)
             return fail(ErrorKind::bad_input, "the PLY header has no end_header; the file is cut off or damaged");
@@ -520,7 +520,7 @@ Result<PlyAtStart> read_one(PlySource& source, const MeshLimits& limits) {
 
 Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
     PlySource source(bytes);
-    take_white_space(source);
+    skip_white_space(source);
     return read_one(source, limits);
 }
 
@@ -528,9 +528,9 @@ Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& lim
     auto read = read_ply_at_start(bytes, limits);
     if (!read) return tl::unexpected(read.error());
     PlySource rest(bytes.subspan(read->bytes_consumed));
-    take_white_space(rest);
+    skip_white_space(rest);
     std::vector<char> line;
-    if (const auto next = take_line(rest, line, 16); next && *next == "ply") {
+    if (const auto next = read_line(rest, line, 16); next && *next == "ply") {
         return fail(ErrorKind::bad_input, "the file holds more than one PLY; give such a file on standard input");
     }
     if (texture && !read->texture.empty()) add_image(*texture, read->texture);
@@ -549,7 +549,7 @@ PlyStreamReader::PlyStreamReader(std::istream& stream, const MeshLimits& limits)
 Result<std::optional<Mesh>> PlyStreamReader::next() {
     if (error_) return tl::unexpected(*error_);
     PlySource source(*stream_.rdbuf());
-    if (!take_white_space(source)) return std::optional<Mesh>();
+    if (!skip_white_space(source)) return std::optional<Mesh>();
     auto read = read_one(source, limits_);
     if (!read) {
         error_ = Error{read.error().kind,

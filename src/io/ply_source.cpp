@@ -39,7 +39,7 @@ std::optional<std::uint64_t> PlySource::remaining() const {
     return buffered();
 }
 
-std::optional<std::string_view> take_line(PlySource& source, std::vector<char>& line, std::size_t most) {
+std::optional<std::string_view> read_line(PlySource& source, std::vector<char>& line, std::size_t most) {
     line.clear();
     if (!source.ensure(1)) return std::nullopt;
     while (source.ensure(1)) {
@@ -53,7 +53,7 @@ std::optional<std::string_view> take_line(PlySource& source, std::vector<char>& 
     return std::string_view(line.data(), line.size());
 }
 
-bool take_white_space(PlySource& source) {
+bool skip_white_space(PlySource& source) {
     while (source.ensure(1)) {
         if (!is_space(*source.cursor())) return true;
         source.advance(1);
@@ -61,8 +61,8 @@ bool take_white_space(PlySource& source) {
     return false;
 }
 
-std::string_view take_word(PlySource& source, std::span<char, 256> word) {
-    if (!take_white_space(source)) return {};
+std::string_view read_word(PlySource& source, std::span<char, 256> word) {
+    if (!skip_white_space(source)) return {};
     std::size_t length = 0;
     while (source.ensure(1) && !is_space(*source.cursor())) {
         if (length == word.size() - 1) return {};

@@ -45,15 +45,15 @@ private:
     std::uint64_t consumed_ = 0;
 };
 
-// Takes bytes up to and including the next '\n' (or up to the end), and returns them without it and without a '\r'
+// Reads bytes up to and including the next '\n' (or up to the end), and returns them without it and without a '\r'
 // before it. Nothing if no byte was left or if the line is longer than `most` bytes.
-std::optional<std::string_view> take_line(PlySource& source, std::vector<char>& line, std::size_t most);
+std::optional<std::string_view> read_line(PlySource& source, std::vector<char>& line, std::size_t most);
 
-// Takes leading white space and the word after it (but not the separator that ends it). Empty at the end of the bytes,
-// and if the word is longer than 255 characters, which no number is.
-std::string_view take_word(PlySource& source, std::span<char, 256> word);
+// Skips leading white space and reads the word after it (but not the separator that ends it). Empty at the end of the
+// bytes, and if the word is longer than 255 characters, which no number is.
+std::string_view read_word(PlySource& source, std::span<char, 256> word);
 
-// Takes spaces, tabs and line endings. False if nothing is left after them.
-bool take_white_space(PlySource& source);
+// Skips spaces, tabs and line endings. False if nothing is left after them.
+bool skip_white_space(PlySource& source);
 
 }  // namespace htvm

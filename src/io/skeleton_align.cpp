@@ -26,7 +26,7 @@ std::string counted(std::size_t count, const char* noun) {
 bool finite(const Vector3d& v) { return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]); }
 
 bool is_tracked(const Pose& pose, std::size_t joint) {
-    return !pose.joints.empty() && (pose.tracked.empty() || pose.tracked[joint]);
+    return !pose.joints.empty() && (pose.found.empty() || pose.found[joint]);
 }
 
 Result<void> check_track(const SkeletonTrack& track) {
@@ -45,7 +45,7 @@ Result<void> check_track(const SkeletonTrack& track) {
         if (!std::isfinite(track.timestamps[t]) || (t > 0 && track.timestamps[t] <= track.timestamps[t - 1]))
             return fail(ErrorKind::bad_input, place + " has a timestamp that is not after the previous one.");
         if (pose.joints.empty()) continue;
-        if (pose.joints.size() != joints || (!pose.tracked.empty() && pose.tracked.size() != joints) ||
+        if (pose.joints.size() != joints || (!pose.found.empty() && pose.found.size() != joints) ||
             (!pose.orientations.empty() && pose.orientations.size() != bones))
             return fail(ErrorKind::bad_input, place + " does not fit its joints and bones.");
         for (std::size_t j = 0; j < joints; ++j)
@@ -163,7 +163,7 @@ void fill_joint(const SkeletonTrack& track, const std::vector<double>& times, st
         for (std::size_t axis = 0; axis < 3; ++axis)
             poses[t].joints[j][axis] = a[axis] + (b[axis] - a[axis]) * place.fraction;
         const double gap = track.timestamps[place.after] - track.timestamps[place.before];
-        poses[t].tracked[j] = !place.held && place.after - place.before <= 1 && gap * track.fps <= 1.5;
+        poses[t].found[j] = !place.held && place.after - place.before <= 1 && gap * track.fps <= 1.5;
     }
 }
 
@@ -194,7 +194,7 @@ Result<FillCount> fill_joints(const SkeletonTrack& track, const std::vector<doub
     std::vector<bool> known(joints, false);
     for (Pose& pose : poses) {
         pose.joints.assign(joints, Vector3d{});
-        pose.tracked.assign(joints, false);
+        pose.found.assign(joints, false);
     }
     std::vector<std::size_t> samples;
     for (std::size_t j = 0; j < joints; ++j) {
@@ -211,8 +211,7 @@ Result<FillCount> fill_joints(const SkeletonTrack& track, const std::vector<doub
         return fail(ErrorKind::bad_input, "The skeleton has no frame with a tracked joint; leave it out.");
     if (!count.never.empty()) place_lost_joints(track.skeleton, known, poses);
     for (std::size_t t = first; t < first + count.of; ++t) {
-        const auto filled =
-            static_cast<std::size_t>(std::count(poses[t].tracked.begin(), poses[t].tracked.end(), false));
+        const auto filled = static_cast<std::size_t>(std::count(poses[t].found.begin(), poses[t].found.end(), false));
         const bool outside =
             times[t] < track.timestamps.front() - same_time || times[t] > track.timestamps.back() + same_time;
         count.joints += filled;
@@ -250,9 +249,9 @@ Rotation blend(const Rotation& a, const Rotation& b, double fraction) {
     return orthonormalised(mean);
 }
 
-// Takes the orientations that the track has; bones without any in all frames stay unknown. Returns how many bones have
-// some.
-std::size_t take_orientations(const SkeletonTrack& track, const std::vector<double>& times, std::vector<Pose>& poses) {
+// Blends the orientations that the track has, at these times; bones without any in all frames stay unknown. Returns how
+// many bones have some.
+std::size_t blend_orientations(const SkeletonTrack& track, const std::vector<double>& times, std::vector<Pose>& poses) {
     const std::size_t bones = track.skeleton.bones.size();
     std::size_t given = 0;
     std::vector<std::size_t> samples;
@@ -305,7 +304,7 @@ Result<AlignedPoses> align(const SkeletonTrack& track, const MeshClock& mesh, co
         aligned.notes.push_back("The skeleton goes on for " + number(track.timestamps.back() - times.back()) +
                                 " s after the last mesh frame: not used.");
 
-    const std::size_t given = take_orientations(track, times, aligned.poses);
+    const std::size_t given = blend_orientations(track, times, aligned.poses);
     if (given < track.skeleton.bones.size() && options.derive_orientations)
         derive_missing_orientations(track.skeleton, aligned.poses);
     return aligned;

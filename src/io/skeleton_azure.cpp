@@ -145,7 +145,7 @@ Result<Pose> read_body(const json& body, std::size_t t, const Skeleton& skeleton
     for (std::size_t j = 0; j < count; ++j) {
         const auto point = point_or_null((*positions)[j], 1);
         if (!point) return fail_at(place("joint", j), point.error());
-        pose.tracked.push_back(point->has_value());
+        pose.found.push_back(point->has_value());
         pose.joints.push_back(point->value_or(Vector3d{}));
     }
     const json* orientations = find_member(body, "joint_orientations");

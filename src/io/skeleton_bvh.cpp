@@ -322,7 +322,7 @@ double guess_unit(double height, std::vector<std::string>& notes) {
 
 Result<Pose> pose_in_mm(const Hierarchy& hierarchy, const GlobalPose& global, double scale, std::size_t frame) {
     Pose pose;
-    pose.tracked.assign(hierarchy.joints.size(), true);
+    pose.found.assign(hierarchy.joints.size(), true);
     for (std::size_t j = 0; j < hierarchy.joints.size(); ++j) {
         Vector3d mm = global.positions[j];
         for (double& coordinate : mm) {

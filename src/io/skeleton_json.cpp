@@ -42,11 +42,11 @@ Result<Pose> pose_from_json(const json& frame, std::size_t t, const Skeleton& sk
                                               " positions, one per joint" +
                                               (frame.is_array() ? ", has " + std::to_string(frame.size()) : ""));
     pose.joints.assign(count, Vector3d{});
-    pose.tracked.assign(count, true);
+    pose.found.assign(count, true);
     for (std::size_t j = 0; j < count; ++j) {
         const auto point = point_or_null(frame[j], scale);
         if (!point) return fail_at(joint_place(t, j, skeleton), point.error());
-        pose.tracked[j] = point->has_value();
+        pose.found[j] = point->has_value();
         if (*point) pose.joints[j] = **point;
     }
     return pose;
@@ -188,13 +188,13 @@ Result<void> check_writable(const SkeletonTrack& track) {
     for (std::size_t t = 0; t < track.poses.size(); ++t) {
         const Pose& pose = track.poses[t];
         if (pose.joints.empty()) continue;
-        if (pose.joints.size() != joints || (!pose.tracked.empty() && pose.tracked.size() != joints) ||
+        if (pose.joints.size() != joints || (!pose.found.empty() && pose.found.size() != joints) ||
             (!pose.orientations.empty() && pose.orientations.size() != bones))
             return fail(ErrorKind::bad_input, "The pose of " + frame_place(t) + " does not fit the skeleton's " +
                                                   std::to_string(joints) + " joints and " + std::to_string(bones) +
                                                   " bones.");
         for (std::size_t j = 0; j < joints; ++j)
-            if ((pose.tracked.empty() || pose.tracked[j]) && !all_finite(pose.joints[j]))
+            if ((pose.found.empty() || pose.found[j]) && !all_finite(pose.joints[j]))
                 return fail(ErrorKind::bad_input,
                             "The position at " + joint_place(t, j, track.skeleton) + " is not finite.");
         for (const Rotation& rotation : pose.orientations)
@@ -212,7 +212,7 @@ void append_frames(std::string& out, const SkeletonTrack& track) {
         out += pose.joints.empty() ? "null" : "[";
         for (std::size_t j = 0; j < pose.joints.size(); ++j) {
             if (j > 0) out += ", ";
-            if (pose.tracked.empty() || pose.tracked[j])
+            if (pose.found.empty() || pose.found[j])
                 append_numbers(out, pose.joints[j], 0, 3);
             else
                 out += "null";

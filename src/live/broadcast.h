@@ -24,7 +24,7 @@ namespace htvm::live {
 
 // A packet as it stands in a file, shared by the viewers.
 struct LivePacket {
-    PacketHeader header;  // as told_header() has it
+    PacketHeader header;  // as header_with_flags() has it
     std::vector<std::uint8_t> bytes;
     std::optional<Stamp> stamp{};  // for measurement
 

@@ -142,7 +142,7 @@ void Hub::replace_publisher(Stream& stream, std::uint32_t session) {
 // The first packet decides whose stream it is.
 Result<void> Hub::admit(std::uint64_t number, Connection& connection, const PacketHeader& header,
                         Clock::time_point now) {
-    if (header.kind != PacketKind::sequence || !header.has(packet_flag::told)) {
+    if (header.kind != PacketKind::sequence || !header.has(packet_flag::flags_valid)) {
         ++counters_.refused_publishers_message;
         return fail(ErrorKind::bad_input, "the first packet must be a sequence header of version 2 or later");
     }

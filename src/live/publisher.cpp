@@ -191,7 +191,7 @@ Result<Publisher> Publisher::open(const std::string& url, const PublisherOptions
 
 Result<void> Publisher::send(const Packet& packet) {
     auto& state = *state_;
-    auto header = told_header(packet);
+    auto header = header_with_flags(packet);
     auto shared = std::make_shared<LivePacket>(LivePacket{header, write_packet(packet)});
     const auto now = Clock::now();
     const std::lock_guard lock(state.mutex);

@@ -8,9 +8,9 @@
 
 namespace htvm::live {
 
-// Takes the headers of all packets of a stream that come, as told_header() has them. In a sequence with a session,
-// packets of frames up to the last one that came are repeats; without a session such frames begin another sequence
-// (docs/bitstream.md, section 2, Order).
+// Takes the headers of all packets of a stream that come, as header_with_flags() has them. In a sequence with a
+// session, packets of frames up to the last one that came are repeats; without a session such frames begin another
+// sequence (docs/bitstream.md, section 2, Order).
 class RepeatedPackets {
 public:
     // Whether the packet came before. Else it counts as having come.

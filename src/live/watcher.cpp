@@ -52,7 +52,7 @@ struct Watcher::State {
 
 void Watcher::State::take_packet(const std::vector<std::uint8_t>& message) {
     auto packet = packet_of(message, options.largest_packet);
-    if (packet && repeated.is_repeat(told_header(*packet))) return;
+    if (packet && repeated.is_repeat(header_with_flags(*packet))) return;
     const std::lock_guard lock(mutex);
     if (!packet) {
         ++counters.damaged_messages;

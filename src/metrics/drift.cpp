@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 namespace htvm {
 namespace {
@@ -35,7 +35,7 @@ Result<void> DriftMeter::attach(const Mesh& marks, const Mesh& decoded) {
     triangles_ = decoded.triangles;
     age_ = 0;
     if (decoded.triangles.empty()) return {};
-    const auto index = SurfaceIndex::build(decoded);
+    const auto index = TriangleIndex::build(decoded);
     if (!index) return tl::unexpected(index.error());
     for (std::size_t mark = 0; mark < marks.positions.size(); ++mark) {
         if (!on_surface(marks, mark)) continue;

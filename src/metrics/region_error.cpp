@@ -8,7 +8,7 @@
 
 #include "core/parallel.h"
 #include "metrics/percentile.h"
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 namespace htvm {
 
@@ -39,8 +39,8 @@ std::vector<Point3> samples_on(const Mesh& mesh, double spacing) {
     return out;
 }
 
-// Of each point, the nearest one on a surface.
-std::vector<Point3> nearest_on(const Mesh& mesh, const SurfaceIndex& index, const std::vector<Point3>& points,
+// The point of the surface that is nearest to each point.
+std::vector<Point3> nearest_on(const Mesh& mesh, const TriangleIndex& index, const std::vector<Point3>& points,
                                Threads threads) {
     std::vector<Point3> out(points.size());
     parallel_for(points.size(), threads, 512, [&](std::size_t begin, std::size_t end) {
@@ -127,9 +127,9 @@ Result<RegionError> worst_region(const Mesh& original, const Mesh& decoded, cons
         out.worst_mm = std::numeric_limits<double>::infinity();
         return out;
     }
-    const auto captured = SurfaceIndex::build(original, options.threads);
+    const auto captured = TriangleIndex::build(original, options.threads);
     if (!captured) return tl::unexpected(captured.error());
-    const auto shown = SurfaceIndex::build(decoded, options.threads);
+    const auto shown = TriangleIndex::build(decoded, options.threads);
     if (!shown) return tl::unexpected(shown.error());
     const auto of_original = samples_on(original, options.spacing), of_decoded = samples_on(decoded, options.spacing);
     Centres centres(options.radius);

@@ -27,14 +27,14 @@ struct RegionError {
 
 // Regions are spread so that every point of the original is within the radius of a centre. The distance is that of
 // points of the original within the region to the decoded surface; and of points of the decoded surface to the original
-// whose nearest point on the original lies within it. Nothing is measured of an original without triangles; a decoded
+// whose nearest point on the original lies within it. An original without triangles has no regions; a decoded
 // mesh without any is infinitely far away. Both meshes must be measurable. Errors: limit, if memory runs out.
 Result<RegionError> worst_region(const Mesh& original, const Mesh& decoded, const RegionErrorOptions& options = {});
 
-// Of several frames.
+// The worst regions of several frames.
 struct RegionErrorSummary {
     std::size_t frames = 0;
-    double median_mm = 0, p99_mm = 0, largest_mm = 0;  // of the frames' worst regions; see percentile.h
+    double median_mm = 0, p99_mm = 0, largest_mm = 0;  // see percentile.h
 };
 RegionErrorSummary summarise(std::vector<double> worst_mm);
 

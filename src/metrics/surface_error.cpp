@@ -8,7 +8,7 @@
 #include "core/parallel.h"
 #include "metrics/mesh_measures.h"
 #include "metrics/point_error.h"
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 namespace htvm {
 
@@ -119,7 +119,7 @@ SamplingPlan plan_samples(const Mesh& mesh, double target, const SurfaceErrorOpt
 
 // Distance to the surface of `mesh`; remembers the last triangle found as the start of the next search.
 struct DistanceToSurface {
-    const SurfaceIndex* index;
+    const TriangleIndex* index;
     std::uint32_t hint = 0;
     double squared(const Point3& p) {
         const ClosestTriangle found = index->closest(p, hint);
@@ -131,7 +131,7 @@ struct DistanceToSurface {
 // Runs measure(item, distance, sums) over [0, count) in blocks that do not depend on the number of threads, and adds up
 // the sums of the blocks in order.
 template <class Measure>
-void measure_blocks(std::size_t count, const SurfaceIndex& index, Threads threads, DistanceSums& total,
+void measure_blocks(std::size_t count, const TriangleIndex& index, Threads threads, DistanceSums& total,
                     const Measure& measure) {
     constexpr std::size_t block = 512;
     std::vector<DistanceSums> sums((count + block - 1) / block);
@@ -143,7 +143,7 @@ void measure_blocks(std::size_t count, const SurfaceIndex& index, Threads thread
     for (const auto& s : sums) add(total, s);
 }
 
-DistanceSums measure_plan(const Mesh& from, const SamplingPlan& plan, const SurfaceIndex& index,
+DistanceSums measure_plan(const Mesh& from, const SamplingPlan& plan, const TriangleIndex& index,
                           const SurfaceErrorOptions& options) {
     DistanceSums total;
     measure_blocks(plan.vertices.size(), index, options.threads, total,
@@ -188,7 +188,7 @@ SurfaceDistances distances_to_vertices(const Mesh& from, const Mesh& to, Threads
 Result<SurfaceDistances> surface_distances(const Mesh& from, const Mesh& to, const SurfaceErrorOptions& options) {
     if (from.positions.empty()) return SurfaceDistances{};
     if (to.triangles.empty()) return distances_to_vertices(from, to, options.threads);
-    const auto index = SurfaceIndex::build(to, options.threads);
+    const auto index = TriangleIndex::build(to, options.threads);
     if (!index) return tl::unexpected(index.error());
     const double target = options.samples > 0
                               ? static_cast<double>(options.samples)

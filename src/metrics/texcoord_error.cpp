@@ -7,7 +7,7 @@
 
 #include "core/parallel.h"
 #include "metrics/mesh_measures.h"
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 namespace htvm {
 
@@ -41,7 +41,7 @@ Result<TexcoordError> texcoord_error(const Mesh& original, const Mesh& decoded, 
     TexcoordError out;
     if (original.texcoords.empty() || decoded.texcoords.empty()) return out;
     if (original.triangles.empty() || decoded.triangles.empty()) return out;
-    const auto index = SurfaceIndex::build(decoded, threads);
+    const auto index = TriangleIndex::build(decoded, threads);
     if (!index) return tl::unexpected(index.error());
     std::vector<double> errors(original.triangles.size());
     constexpr std::size_t block = 512;

@@ -10,7 +10,7 @@
 #include "core/disjoint_sets.h"
 #include "core/parallel.h"
 #include "metrics/mesh_measures.h"
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 namespace htvm {
 
@@ -163,7 +163,7 @@ std::uint64_t count_groups(std::size_t vertices, const std::vector<std::uint32_t
     return static_cast<std::uint64_t>(std::unique(roots.begin(), roots.end()) - roots.begin());
 }
 
-std::uint32_t across_the_crack(const Mesh& lines, const OpenEdge& edge, std::uint32_t e, const SurfaceIndex& index,
+std::uint32_t across_the_crack(const Mesh& lines, const OpenEdge& edge, std::uint32_t e, const TriangleIndex& index,
                                double width) {
     const Point3 a = corner(lines, e, 0), b = corner(lines, e, 1);
     const Point3 middle = (a + b) * 0.5, along = normalised(b - a);
@@ -188,7 +188,7 @@ Result<void> find_cracks(const Mesh& mesh, double width, Threads threads, Topolo
     Mesh lines;  // the open edges, as triangles without area in the same order
     lines.positions = mesh.positions;
     for (const auto& e : edges) lines.triangles.push_back({e.from, e.to, e.to});
-    const auto index = SurfaceIndex::build(lines, threads);
+    const auto index = TriangleIndex::build(lines, threads);
     if (!index) return tl::unexpected(index.error());
     std::vector<std::uint32_t> across(edges.size(), none);
     parallel_for(edges.size(), threads, 256, [&](std::size_t begin, std::size_t end) {
@@ -212,7 +212,7 @@ bool share_a_vertex(const Triangle& a, const Triangle& b) {
     return false;
 }
 
-std::uint32_t other_layer(const Mesh& mesh, const SurfaceIndex& index, std::uint32_t t, double distance) {
+std::uint32_t other_layer(const Mesh& mesh, const TriangleIndex& index, std::uint32_t t, double distance) {
     const Point3 normal = normalised(area_normal(mesh, t));
     if (dot(normal, normal) == 0) return none;
     const Point3 centre = (corner(mesh, t, 0) + corner(mesh, t, 1) + corner(mesh, t, 2)) * (1.0 / 3);
@@ -232,7 +232,7 @@ std::uint32_t other_layer(const Mesh& mesh, const SurfaceIndex& index, std::uint
 
 Result<void> find_flaps(const Mesh& mesh, double distance, Threads threads, Topology& out) {
     if (mesh.triangles.empty()) return {};
-    const auto index = SurfaceIndex::build(mesh, threads);
+    const auto index = TriangleIndex::build(mesh, threads);
     if (!index) return tl::unexpected(index.error());
     std::vector<std::uint32_t> other(mesh.triangles.size(), none);
     parallel_for(mesh.triangles.size(), threads, 256, [&](std::size_t begin, std::size_t end) {

@@ -163,29 +163,4 @@ SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceIndex& search_a,
             std::sqrt(std::max(forward.squared_colour, backward.squared_colour))};
 }
 
-std::vector<RegionErrors> region_errors(const SurfaceView& from, std::span<const std::uint16_t> labels,
-                                        std::size_t regions, const SurfaceView& to, const SurfaceIndex& search_to,
-                                        const SurfaceDistanceOptions& options) {
-    std::vector<RegionErrors> out(regions);
-    const std::size_t every = std::max(1u, options.every), count = std::min(from.positions.size(), labels.size());
-    const Target target{to, search_to, !from.colours.empty() && !to.colours.empty()};
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    std::vector<Squares> squares((count + every - 1) / every, Squares{infinity, 0});
-    if (!search_to.empty())
-        parallel_for(squares.size(), options.threads, block, [&](std::size_t begin, std::size_t end) {
-            for (std::size_t i = begin; i < end; ++i)
-                if (labels[i * every] < regions)
-                    squares[i] = measure(from.positions[i * every], colour_of(from, i * every), target);
-        });
-    for (std::size_t i = 0; i < squares.size(); ++i) {
-        if (labels[i * every] >= regions) continue;
-        auto& region = out[labels[i * every]];
-        ++region.samples;
-        region.squared_distance += squares[i].distance;
-        region.squared_colour += squares[i].colour;
-        region.largest_distance = std::max(region.largest_distance, std::sqrt(squares[i].distance));
-    }
-    return out;
-}
-
 }  // namespace htvm::internal

@@ -57,19 +57,4 @@ SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceView& b, const S
 SurfaceErrors surface_errors(const SurfaceView& a, const SurfaceIndex& search_a, const SurfaceView& b,
                              const SurfaceDistanceOptions& options = {});
 
-// The errors over the samples of one region; being sums, those of several frames can be added up.
-struct RegionErrors {
-    std::uint64_t samples = 0;
-    double squared_distance = 0;  // sum
-    double squared_colour = 0;    // sum, levels^2; 0 without colours
-    double largest_distance = 0;
-};
-
-// Errors by region of the sampled mesh, e.g. by bone: from every n-th vertex of `from` to the surface of `to`; each
-// vertex counts for the region it is labelled with. Labels: one per vertex; vertices with labels >= regions are left
-// out. Distances are infinite if `to` is empty.
-std::vector<RegionErrors> region_errors(const SurfaceView& from, std::span<const std::uint16_t> labels,
-                                        std::size_t regions, const SurfaceView& to, const SurfaceIndex& search_to,
-                                        const SurfaceDistanceOptions& options = {});
-
 }  // namespace htvm::internal

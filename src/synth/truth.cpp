@@ -139,13 +139,6 @@ Gap nearest_part(const PosedScene& scene, std::size_t part, PartSet others) {
     return gap;
 }
 
-// Whether the part is a hand or a forearm of the person, and the place in its pocket.
-bool is_in_pocket(const PosedScene& scene, std::size_t part, const Vector3d& world) {
-    if (part < index_of(Part::left_forearm) || part > index_of(Part::right_hand)) return false;
-    const std::size_t pocket = left_pocket + (part & 1);
-    return (scene.present & part_bit(pocket)) && part_distance(pocket, to_rest(scene.parts[pocket], world)) < 40;
-}
-
 LimbState limb_state(const PosedScene& scene, std::size_t part) {
     LimbState state;
     state.part = part;
@@ -279,32 +272,6 @@ std::vector<LimbEvent> limb_events(std::span<const std::vector<LimbState>> frame
     for (const auto& [key, event] : open) events.push_back(event);
     std::ranges::stable_sort(events, {}, &LimbEvent::first);
     return events;
-}
-
-double deepest_penetration(const SynthOptions& options, int frame, std::string* what) {
-    const PosedScene scene = scene_at(options, frame);
-    double deepest = 0;
-    for (std::size_t part = 0; part < 2 * part_count; ++part) {
-        if (!(scene.present & part_bit(part))) continue;
-        const PartSet others = scene.present & ~joined_parts(part) & ~part_bit(left_pocket) & ~part_bit(right_pocket);
-        const auto& marks = marks_on(part);
-        for (std::size_t i = 0; i < marks.size(); i += 8) {
-            const Eigen::Vector3d& mark = marks[i];
-            const Eigen::Vector3d world = carry(scene.parts[part], mark);
-            for (std::size_t other = 0; other < scene_part_count; ++other) {
-                if (!(others & part_bit(other))) continue;
-                const double depth = -part_distance(other, to_rest(scene.parts[other], world));
-                if (depth <= deepest) continue;
-                // Neighbours but one touch at rest as well, and flesh between them folds.
-                const bool same_person = other < 2 * part_count && other / part_count == part / part_count;
-                if (same_person && part_distance(other, mark) < 40) continue;
-                if (is_in_pocket(scene, part, world) || is_in_pocket(scene, other, world)) continue;
-                deepest = depth;
-                if (what) *what = figure_name(part) + " " + part_name(part) + " into " + part_name(other);
-            }
-        }
-    }
-    return deepest;
 }
 
 }  // namespace htvm

@@ -65,8 +65,4 @@ inline constexpr double touch_gap = 8;      // mm; nearer ones grow together in 
 // Of consecutive frames, the first of which is number `first_frame`.
 std::vector<LimbEvent> limb_events(std::span<const std::vector<LimbState>> frames, int first_frame, double fps);
 
-// How far anything reaches into a part that it does not hang on, where it does not in the T-pose, mm; 0 if nothing
-// does. Hands in pockets are left out. `what`, if given: which part and into which.
-double deepest_penetration(const SynthOptions& options, int frame, std::string* what = nullptr);
-
 }  // namespace htvm

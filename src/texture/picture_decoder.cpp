@@ -266,7 +266,7 @@ PictureDecoder::PictureDecoder(PictureDecoder&&) noexcept = default;
 PictureDecoder& PictureDecoder::operator=(PictureDecoder&&) noexcept = default;
 PictureDecoder::~PictureDecoder() = default;
 
-Result<void> PictureDecoder::take(const Packet& packet) {
+Result<void> PictureDecoder::decode(const Packet& packet) {
     auto& its = *state_;
     const auto read = read_texture_picture(packet);
     if (!read) return tl::unexpected(read.error());

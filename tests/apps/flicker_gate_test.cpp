@@ -30,7 +30,7 @@ struct Coded {
 Mesh decode_next(Encoder& encoder, Decoder& decoder) {
     Mesh out;
     while (const auto packet = encoder.pull()) {
-        auto frame = decoder.push(*packet);
+        auto frame = decoder.decode_copy(*packet);
         EXPECT_TRUE(frame.has_value());
         if (frame && *frame) out = std::move((*frame)->mesh);
     }
@@ -157,12 +157,12 @@ Coded code_textured(const SynthOptions& capture) {
         track->show(encoder->last_frame().frame, encoder->reconstruction(), {repeated.begin(), repeated.end()});
         TexturedMesh shown;
         while (const auto packet = encoder->pull()) {
-            auto decoded = decoder.push(*packet);
+            auto decoded = decoder.decode_copy(*packet);
             EXPECT_TRUE(decoded.has_value());
             if (decoded && *decoded) shown.mesh = std::move((*decoded)->mesh);
             const auto picture = track->behind(*packet, packet->payload.size());
             EXPECT_TRUE(picture.has_value());
-            if (picture && *picture && !pictures.take(**picture)) ADD_FAILURE() << "a picture cannot be decoded";
+            if (picture && *picture && !pictures.decode(**picture)) ADD_FAILURE() << "a picture cannot be decoded";
         }
         shown.texture = pictures.image();
         if (!shown.texture) {

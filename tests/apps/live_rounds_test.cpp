@@ -48,7 +48,7 @@ TEST(LiveRounds, EachSequenceOfEachRoundHasASessionOfItsOwn) {
         const auto header = internal::read_sequence_header(packet.payload);
         ASSERT_TRUE(header);
         EXPECT_EQ(packet.reference, internal::sequence_packet(*header).reference);
-        EXPECT_TRUE(packet.has(packet_flag::session) && packet.has(packet_flag::told));
+        EXPECT_TRUE(packet.has(packet_flag::session) && packet.has(packet_flag::flags_valid));
         if (sessions.empty() || sessions.back() != header->session) sessions.push_back(header->session);
     }
     ASSERT_GE(sessions.size(), 4u);
@@ -60,7 +60,7 @@ std::vector<std::uint64_t> digests_of(const std::vector<Packet>& packets) {
     Decoder decoder;
     std::vector<std::uint64_t> out;
     for (const auto& packet : packets) {
-        auto frame = decoder.push(packet);
+        auto frame = decoder.decode_copy(packet);
         EXPECT_TRUE(frame) << frame.error().message;
         if (!frame || !*frame) continue;
         auto& digest = out.emplace_back(1);

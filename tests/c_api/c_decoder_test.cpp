@@ -168,7 +168,7 @@ TEST(CDecoder, ConcealsAsTheCppDecoder) {
     ASSERT_EQ(htvm_decoder_conceal(decoder.get(), 9, 300000, &info, sizeof info), HTVM_OK);
     EXPECT_EQ(info.frame, 9u);
     EXPECT_EQ(info.concealed, 1u);
-    expect_same_frame(decoder.get(), info, *cpp.conceal(9, 300000));
+    expect_same_frame(decoder.get(), info, *cpp.conceal_copy(9, 300000));
 }
 
 TEST(CDecoder, DamagedPacketsAreErrorsWithASentenceAndCostThemselvesOnly) {
@@ -339,8 +339,9 @@ TEST(CInterface, AnIndexInFrontTellsWhichEntriesAnEntryRefersTo) {
     index.frames = 60;
     index.bytes = 5000;
     index.sequences.push_back({0, 0});
-    const std::uint8_t told = packet_flag::told | packet_flag::referred | packet_flag::access;
-    index.points = {{0, 0, 100, 0, told}, {20, 666667, 2000, 1, told}, {50, 1666667, 4000, 2, packet_flag::told}};
+    const std::uint8_t told = packet_flag::flags_valid | packet_flag::referred | packet_flag::access;
+    index.points = {
+        {0, 0, 100, 0, told}, {20, 666667, 2000, 1, told}, {50, 1666667, 4000, 2, packet_flag::flags_valid}};
     const auto packet = write_packet(write_index(index));
     std::array<htvm_index_entry, 3> entries{};
     std::size_t count = 0;

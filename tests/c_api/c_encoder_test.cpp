@@ -315,7 +315,7 @@ TEST(CEncoder, GivesTheIndexForTheFrontOfAFile) {
         const auto packet = *reader.pull();
         expected.add(packet, offset);
         offset += bytes.size();
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         ASSERT_TRUE(frame.has_value());
         if (*frame) expected.add(*bounds_of((*frame)->mesh.positions));
     }

@@ -14,7 +14,7 @@ TEST(AudioPacket, ComesBack) {
     const auto packet = write_audio(two_packets(), 7, -6500);
     EXPECT_EQ(packet.frame, 7u);
     EXPECT_EQ(packet.timestamp_us, -6500);
-    EXPECT_EQ(packet.flags, packet_flag::told | packet_flag::droppable);
+    EXPECT_EQ(packet.flags, packet_flag::flags_valid | packet_flag::droppable);
     const auto audio = read_audio(packet);
     ASSERT_TRUE(audio) << audio.error().message;
     EXPECT_EQ(*audio, two_packets());
@@ -53,7 +53,7 @@ TEST(AudioPacket, NoFrameNeedsIt) {
     ASSERT_TRUE(decoded);
     EXPECT_FALSE(*decoded);
     PacketHeader header, intra, tracked;
-    header.flags = intra.flags = tracked.flags = packet_flag::told | packet_flag::referred;
+    header.flags = intra.flags = tracked.flags = packet_flag::flags_valid | packet_flag::referred;
     intra.kind = PacketKind::intra;
     tracked.kind = PacketKind::tracked;
     tracked.frame = 1;

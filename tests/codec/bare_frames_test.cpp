@@ -114,7 +114,7 @@ TEST(IntraFramesAlone, AreShownAndLeaveAllAsItWas) {
     EXPECT_TRUE(decoded.errors.empty());
     EXPECT_EQ(decoded.frames.size(), 5u);
     // The same frame, but told to be referred to, or by an encoder of version 1, which told nothing.
-    for (const int flags : {packet_flag::told | packet_flag::referred, 0}) {
+    for (const int flags : {packet_flag::flags_valid | packet_flag::referred, 0}) {
         packets[3].flags = static_cast<std::uint8_t>(flags);
         decoded = decode_packets(packets);
         EXPECT_EQ(decoded.errors.size(), 2u);
@@ -126,8 +126,8 @@ TEST(IntraFramesAlone, StandInForTheFrameBehindThem) {
     options.key_interval = 1;
     const auto coded = encode(walking(2), options);
     Decoder decoder;
-    for (const auto& packet : coded.packets) ASSERT_TRUE(decoder.push(packet).has_value());
-    const auto stand_in = decoder.conceal(2, 99);
+    for (const auto& packet : coded.packets) ASSERT_TRUE(decoder.decode_copy(packet).has_value());
+    const auto stand_in = decoder.conceal_copy(2, 99);
     ASSERT_TRUE(stand_in.has_value());
     EXPECT_TRUE(stand_in->concealed);
     EXPECT_EQ(stand_in->info.reference, 1u);
@@ -139,7 +139,7 @@ TEST(TrackedFramesAlone, AreShownAndLeaveTheFrameBeforeAsItWas) {
     auto packets = coded.packets;
     auto between = packets[3];
     between.frame = 77;
-    between.flags = packet_flag::told | packet_flag::droppable;
+    between.flags = packet_flag::flags_valid | packet_flag::droppable;
     packets.insert(packets.begin() + 3, between);
     const auto decoded = decode_packets(packets);
     EXPECT_TRUE(decoded.errors.empty());
@@ -147,8 +147,8 @@ TEST(TrackedFramesAlone, AreShownAndLeaveTheFrameBeforeAsItWas) {
     expect_same_mesh(decoded.frames[2].mesh, coded.reconstructions[2]);
     expect_same_mesh(decoded.frames[3].mesh, coded.reconstructions[2]);
     Decoder decoder;
-    for (std::size_t i = 0; i < 4; ++i) ASSERT_TRUE(decoder.push(packets[i]).has_value());
-    expect_same_mesh(decoder.conceal(78, 0)->mesh, coded.reconstructions[2]);
+    for (std::size_t i = 0; i < 4; ++i) ASSERT_TRUE(decoder.decode_copy(packets[i]).has_value());
+    expect_same_mesh(decoder.conceal_copy(78, 0)->mesh, coded.reconstructions[2]);
 }
 
 }  // namespace

@@ -62,11 +62,11 @@ TEST(ChartedFrames, AreOfVersion6AndSayHowLargeThePicturesAre) {
     const auto coded = encode(horned_ball(2), charted_options());
     ASSERT_TRUE(coded.errors.empty());
     Decoder decoder;
-    ASSERT_TRUE(decoder.push(coded.packets.front()));
+    ASSERT_TRUE(decoder.decode_copy(coded.packets.front()));
     EXPECT_EQ(decoder.sequence()->version, 6);
     EXPECT_EQ(decoder.sequence()->texture, (StreamTexture{TextureLayout::charts, 512, 256}));
     const auto without = encode(horned_ball(2), patched_options());
-    ASSERT_TRUE(decoder.push(without.packets.front()));
+    ASSERT_TRUE(decoder.decode_copy(without.packets.front()));
     EXPECT_EQ(decoder.sequence()->version, 4);
     EXPECT_EQ(decoder.sequence()->texture, StreamTexture());
 }

@@ -147,7 +147,7 @@ void write_moving() {
 
 // T-frames as the encoder writes them, and from version 4 on an I-frame of the tracked mesh.
 void write_tracked() {
-    EncoderOptions options = default_options(Profile::tracked);
+    EncoderOptions options = test::options_at_2_mm(Profile::tracked);
     options.profile = Profile::tracked;
     options.key_interval = 4;
     options.tracked.access_interval = 2;
@@ -198,7 +198,7 @@ void write_patched() {
 void write_grouped() {
     auto person = walking(14, 200, 20);
     for (auto& frame : person.frames) frame.mesh.texcoords.clear();  // another layout in each would make I-frames
-    auto options = default_options(Profile::tracked);
+    auto options = test::options_at_2_mm(Profile::tracked);
     options.tracked.group = 5;
     options.tracked.access_interval = 6;
     options.key_interval = 11;
@@ -244,7 +244,7 @@ void write_corner_cases() {
 void write_choices() {
     auto person = synthetic(true, 4, 500);
     for (auto& frame : person.frames) frame.mesh.normals.clear();
-    EncoderOptions paper = default_options(Profile::paper);
+    EncoderOptions paper = test::options_at_2_mm(Profile::paper);
     paper.key_interval = 4;
     paper.topology.nearest_vertices = 8;
     write_stream("paper", person, paper);
@@ -276,7 +276,7 @@ void write_sequences() {
     auto person = walking(6, 200, 20);
     for (auto& frame : person.frames) frame.mesh.texcoords.clear();
     person.frames[2].mesh = {};
-    EncoderOptions options = default_options(Profile::tracked);
+    EncoderOptions options = test::options_at_2_mm(Profile::tracked);
     options.up = UpAxis::plus_y;
     options.floor = -12.5;
     options.metadata = {{"title", "a walk"}, {"rights", "\xc2\xa9 nobody"}, {"timecode", "10:00:00:12"}};
@@ -300,7 +300,7 @@ void write_sequences() {
 
 // Frames with audio between them, silence of both numbers of channels, and with audio of a coder that nobody knows.
 void write_audio_between() {
-    const auto coded = encode(walking(3, 200, 20), default_options(Profile::tracked));
+    const auto coded = encode(walking(3, 200, 20), test::options_at_2_mm(Profile::tracked));
     ASSERT_TRUE(coded.errors.empty()) << coded.errors[0];
     std::vector<Packet> packets;
     for (const auto& packet : coded.packets) {

@@ -123,7 +123,7 @@ Decoder decoder_before(const std::vector<Packet>& packets, std::size_t at) {
     Decoder decoder(options);
     for (std::size_t k = 0; k < at; ++k)
         if (packets[at].kind != PacketKind::intra || packets[k].kind == PacketKind::sequence)
-            (void)decoder.push(packets[k]);
+            (void)decoder.decode_copy(packets[k]);
     return decoder;
 }
 
@@ -139,13 +139,13 @@ void expect_harmless(const std::vector<Packet>& packets, int flips) {
         for (int i = 0; i < flips; ++i) {
             auto packet = packets[at];
             flip(packet.payload, random);
-            const auto frame = decoder.push(packet);
+            const auto frame = decoder.decode_copy(packet);
             if (frame && *frame) expect_sound((**frame).mesh);
         }
         // Frames after a damaged T-frame may be lost with it, and a damaged header may begin another sequence.
         if (packets[at].kind == PacketKind::tracked || packets[at].kind == PacketKind::sequence)
             decoder = decoder_before(packets, at);
-        const auto again = decoder.push(packets[at]);
+        const auto again = decoder.decode_copy(packets[at]);
         ASSERT_TRUE(again.has_value()) << again.error().message;
         ASSERT_EQ(again->has_value(), is_frame(packets[at]));
         if (*again) expect_same_mesh((**again).mesh, (expected++)->mesh);
@@ -165,13 +165,13 @@ TEST(Damage, ABadIntraFrameLeavesTrackedFramesTheirReference) {
         if (packet.kind == PacketKind::tracked) {
             Packet bad = tracked()[1];
             bad.payload.resize(bad.payload.size() / 2);
-            ASSERT_FALSE(decoder.push(bad).has_value());
-            const auto instead = decoder.conceal(packet.frame, 0);
+            ASSERT_FALSE(decoder.decode_copy(bad).has_value());
+            const auto instead = decoder.conceal_copy(packet.frame, 0);
             ASSERT_TRUE(instead.has_value());
             expect_same_mesh(instead->mesh, whole.frames[frames - 1].mesh);
             EXPECT_EQ(instead->pose.joints, whole.frames[frames - 1].pose.joints);
         }
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         ASSERT_TRUE(frame.has_value()) << frame.error().message;
         if (*frame) expect_same_mesh((**frame).mesh, whole.frames[frames++].mesh);
     }

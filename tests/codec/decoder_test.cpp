@@ -158,7 +158,7 @@ TEST(Decoder, UnknownPacketKindsAndTheIndexAreSkipped) {
         Packet packet;
         packet.kind = static_cast<PacketKind>(kind);
         packet.payload = {1, 2, 3};
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         ASSERT_TRUE(frame.has_value());
         EXPECT_FALSE(frame->has_value());
     }
@@ -167,7 +167,7 @@ TEST(Decoder, UnknownPacketKindsAndTheIndexAreSkipped) {
 
 TEST(Decoder, SaysWhatTheHeaderSays) {
     Decoder decoder;
-    ASSERT_TRUE(decoder.push(nine_frames().packets[0]).has_value());
+    ASSERT_TRUE(decoder.decode_copy(nine_frames().packets[0]).has_value());
     const auto& info = decoder.sequence();
     ASSERT_TRUE(info.has_value());
     EXPECT_EQ(info->lattice_step, 1.0 / 16);
@@ -175,7 +175,7 @@ TEST(Decoder, SaysWhatTheHeaderSays) {
     EXPECT_EQ(info->skeleton.bones.size(), synth_skeleton().bones.size());
     EXPECT_EQ(info->skeleton.joint_names, synth_skeleton().joint_names);
     EXPECT_EQ(info->radii.size(), info->skeleton.bones.size());
-    EXPECT_TRUE(info->skeleton_tracked);
+    EXPECT_TRUE(info->has_skeleton);
 }
 
 TEST(Decoder, LargerFramesThanAllowedAreRefused) {
@@ -225,7 +225,7 @@ void expect_harmless(const std::vector<Packet>& packets, std::size_t at, const D
             for (std::size_t i = 0; i < std::min(at + 3, packets.size()); ++i) {
                 auto packet = packets[i];
                 if (i == at) packet.payload = payload;
-                const auto frame = decoder.push(packet);
+                const auto frame = decoder.decode_copy(packet);
                 if (!frame || !*frame) continue;
                 const auto& mesh = (**frame).mesh;
                 // Zippering joins the contents of the packet with the I-frame's mesh.
@@ -308,7 +308,7 @@ void expect_noise_is_harmless(const CodedSequence& coded) {
             for (auto packet : coded.packets) {
                 if (packet.kind == original.kind && packet.frame == original.frame)
                     packet.payload = write_frame_payload(payload);
-                (void)decoder.push(packet);
+                (void)decoder.decode_copy(packet);
             }
         }
     }

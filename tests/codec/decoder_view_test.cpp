@@ -96,7 +96,7 @@ TEST(TopologyNumber, ChangesAtFramesThatCodeAMeshAlone) {
             }
             EXPECT_GT((*frame)->topology, most) << packet.frame;
             most = (*frame)->topology;
-            if (told_header(packet).has(packet_flag::referred)) of_intra = most;
+            if (header_with_flags(packet).has(packet_flag::referred)) of_intra = most;
         }
     }
 }
@@ -125,7 +125,7 @@ TEST(DecoderView, TrackedFramesLendTheSameTrianglesFromTheSamePlace) {
 
 TEST(DecoderView, AStandInHasItsReferencesTopology) {
     Decoder decoder;
-    EXPECT_FALSE(decoder.stand_in(0, 0).has_value());
+    EXPECT_FALSE(decoder.conceal(0, 0).has_value());
     std::uint32_t topology = 0;
     for (const auto& packet : tracked_packets()) {
         const auto frame = decoder.decode(packet);
@@ -133,7 +133,7 @@ TEST(DecoderView, AStandInHasItsReferencesTopology) {
         if (!*frame) continue;
         topology = (*frame)->topology;
         const auto shown = copy_of(**frame);
-        const auto stand_in = decoder.stand_in(99, 5);
+        const auto stand_in = decoder.conceal(99, 5);
         ASSERT_TRUE(stand_in.has_value());
         EXPECT_TRUE(stand_in->concealed);
         EXPECT_EQ(stand_in->info.frame, 99u);

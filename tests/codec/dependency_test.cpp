@@ -68,7 +68,7 @@ const std::vector<NamedStream>& streams() {
 
 std::vector<PacketHeader> headers_of(const std::vector<Packet>& packets) {
     std::vector<PacketHeader> out;
-    for (const auto& packet : packets) out.push_back(told_header(packet));
+    for (const auto& packet : packets) out.push_back(header_with_flags(packet));
     return out;
 }
 
@@ -77,7 +77,7 @@ std::optional<DecodedFrame> last_of(const std::vector<Packet>& packets, const st
     Decoder decoder;
     std::optional<DecodedFrame> out;
     for (const auto place : places) {
-        auto frame = decoder.push(packets[place]);
+        auto frame = decoder.decode_copy(packets[place]);
         out = frame ? std::move(*frame) : std::nullopt;
     }
     return out;
@@ -93,7 +93,7 @@ std::map<std::size_t, Mesh> frames_of(const std::vector<Packet>& packets) {
     Decoder decoder;
     std::map<std::size_t, Mesh> out;
     for (std::size_t place = 0; place < packets.size(); ++place) {
-        auto frame = decoder.push(packets[place]);
+        auto frame = decoder.decode_copy(packets[place]);
         EXPECT_TRUE(frame.has_value()) << frame.error().message;
         if (frame && *frame) out[place] = std::move((*frame)->mesh);
     }
@@ -157,7 +157,7 @@ TEST(Closure, OfStreamsOfVersion1DecodesTheFrame) {
         SCOPED_TRACE(entry.path().filename().string());
         std::ifstream in(entry.path(), std::ios::binary);
         const auto packets = read_packets({std::istreambuf_iterator<char>(in), {}}, 100000);
-        if (packets[0].has(packet_flag::told)) continue;
+        if (packets[0].has(packet_flag::flags_valid)) continue;
         ++streams_of_version_1;
         const auto headers = headers_of(packets);
         for (const auto& [place, mesh] : frames_of(packets)) {
@@ -178,9 +178,9 @@ TEST(Dependencies, WhatIsKeptIsEnoughForAllThatComes) {
         for (std::size_t joined = 0; joined < packets.size(); ++joined) {
             EXPECT_EQ(dependencies.push(packets[joined]), joined);
             Decoder decoder;
-            for (const auto place : dependencies.kept()) EXPECT_TRUE(decoder.push(packets[place]).has_value());
+            for (const auto place : dependencies.kept()) EXPECT_TRUE(decoder.decode_copy(packets[place]).has_value());
             for (std::size_t place = joined + 1; place < std::min(joined + 4, packets.size()); ++place) {
-                const auto frame = decoder.push(packets[place]);
+                const auto frame = decoder.decode_copy(packets[place]);
                 ASSERT_TRUE(frame.has_value()) << frame.error().message;
                 if (*frame) {
                     EXPECT_TRUE(same_mesh((*frame)->mesh, all.at(place)));
@@ -207,7 +207,7 @@ TEST(Dependencies, ForgetWhatCanNeverBeNeededAgain) {
 PacketHeader header_packet(std::uint32_t frame, std::uint32_t crc, std::uint8_t flags = 0) {
     PacketHeader out;
     out.kind = PacketKind::sequence;
-    out.flags = packet_flag::told | flags;
+    out.flags = packet_flag::flags_valid | flags;
     out.frame = frame;
     out.reference = crc;
     return out;
@@ -216,7 +216,7 @@ PacketHeader header_packet(std::uint32_t frame, std::uint32_t crc, std::uint8_t 
 PacketHeader frame_packet(PacketKind kind, std::uint32_t frame, std::uint32_t reference, bool referred = true) {
     PacketHeader out;
     out.kind = kind;
-    out.flags = packet_flag::told | (referred ? packet_flag::referred : packet_flag::droppable);
+    out.flags = packet_flag::flags_valid | (referred ? packet_flag::referred : packet_flag::droppable);
     out.frame = frame;
     out.reference = reference;
     return out;

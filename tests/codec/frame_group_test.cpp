@@ -350,13 +350,13 @@ TEST(GroupedStream, SeekingIntoAGroupTakesTheFramesClosure) {
 TEST(GroupedStream, AFrameWhosePacketIsLostIsShownIfAnotherBroughtIt) {
     Decoder decoder;
     for (const auto& packet : without_frames(grouped().packets, {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13}))
-        ASSERT_TRUE(decoder.push(packet).has_value());
-    const auto hidden = decoder.conceal(4, 0);
+        ASSERT_TRUE(decoder.decode_copy(packet).has_value());
+    const auto hidden = decoder.conceal_copy(4, 0);
     ASSERT_TRUE(hidden.has_value());
     EXPECT_TRUE(hidden->concealed);
     expect_same_mesh(hidden->mesh, grouped().reconstructions[4]);
     // Of one that is not there, what was shown last.
-    expect_same_mesh(decoder.conceal(3, 0)->mesh, grouped().reconstructions[4]);
+    expect_same_mesh(decoder.conceal_copy(3, 0)->mesh, grouped().reconstructions[4]);
 }
 
 TEST(GroupedStream, PacketsOfAGroupInAnyOrderGiveTheirFramesOrAnError) {
@@ -373,17 +373,17 @@ TEST(GroupedStream, APacketThatIsNotOfTheGroupInForceIsAnError) {
     const auto frames = frames_of(grouped().packets);
     const auto error_of = [&](const std::function<void(Packet&)>& change, std::size_t frame) {
         Decoder decoder;
-        EXPECT_TRUE(decoder.push(grouped().packets[0]).has_value());
-        for (std::size_t i = 0; i < frame; ++i) EXPECT_TRUE(decoder.push(frames[i]).has_value());
+        EXPECT_TRUE(decoder.decode_copy(grouped().packets[0]).has_value());
+        for (std::size_t i = 0; i < frame; ++i) EXPECT_TRUE(decoder.decode_copy(frames[i]).has_value());
         auto packet = frames[frame];
         change(packet);
-        const auto decoded = decoder.push(packet);
+        const auto decoded = decoder.decode_copy(packet);
         return decoded ? std::string() : decoded.error().message;
     };
     const auto of_other_length = [](Packet& packet) { packet.payload[0] = 6 | 1 << 3; };
     const auto of_other_number = [](Packet& packet) { packet.frame += 1; };
     const auto of_other_reference = [](Packet& packet) { packet.reference = 0; };
-    const auto that_nothing_refers_to = [](Packet& packet) { packet.flags = packet_flag::told; };
+    const auto that_nothing_refers_to = [](Packet& packet) { packet.flags = packet_flag::flags_valid; };
     EXPECT_EQ(error_of(of_other_length, 2), "frame 2, one of a group, refers to frame 1, which is not there");
     EXPECT_EQ(error_of(of_other_number, 2), "frame 3, one of a group, refers to frame 1, which is not there");
     EXPECT_EQ(error_of(of_other_reference, 2), "frame 2, one of a group, refers to frame 0, which is not there");

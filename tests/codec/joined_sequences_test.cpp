@@ -96,10 +96,10 @@ TEST(Session, IsToldWithTheOrdinal) {
     const auto coded = encode(person(50, 1), tracked(9007199254740991));
     EXPECT_TRUE(coded.packets[0].has(packet_flag::session));
     EXPECT_EQ(coded.packets[0].reference, crc32(coded.packets[0].payload));
-    ASSERT_TRUE(decoder.push(coded.packets[0]).has_value());
+    ASSERT_TRUE(decoder.decode_copy(coded.packets[0]).has_value());
     EXPECT_EQ(decoder.sequence()->session, 9007199254740991u);
     EXPECT_EQ(decoder.sequence()->ordinal, 0u);
-    ASSERT_TRUE(decoder.push(encode(person(50, 1), tracked(5)).packets[0]).has_value());
+    ASSERT_TRUE(decoder.decode_copy(encode(person(50, 1), tracked(5)).packets[0]).has_value());
     EXPECT_EQ(decoder.sequence()->session, 5u);
     EXPECT_EQ(decoder.sequence()->ordinal, 1u);
 }

@@ -47,7 +47,7 @@ TEST(AccessFrames, NeedTheReferenceAndNothingElse) {
     Decoder decoder;
     for (const auto& packet : coded.packets) {
         if (frame_type(packet.kind) && packet.frame > 0 && packet.frame < 4) continue;
-        const auto decoded = decoder.push(packet);
+        const auto decoded = decoder.decode_copy(packet);
         ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
         if (!*decoded) continue;
         EXPECT_EQ((*decoded)->mesh.positions, coded.reconstructions[packet.frame].positions);
@@ -60,8 +60,8 @@ TEST(RenewedIFrames, HaveTheTrackedMeshInsteadOfTheCaptures) {
     const auto coded = encode(horned_ball(6, never), options);
     const auto packets = frames_in(coded);
     ASSERT_EQ(packets[4].kind, PacketKind::intra);
-    EXPECT_FALSE(packets[0].has(packet_flag::settled));
-    EXPECT_TRUE(packets[4].has(packet_flag::settled));
+    EXPECT_FALSE(packets[0].has(packet_flag::of_tracked_mesh));
+    EXPECT_TRUE(packets[4].has(packet_flag::of_tracked_mesh));
     const auto& before = coded.reconstructions[3];
     const auto& renewed = coded.reconstructions[4];
     EXPECT_EQ(renewed.positions.size(), before.positions.size());
@@ -75,7 +75,7 @@ TEST(RenewedIFrames, AreMadeOfTheCaptureWhereTrackingIsLost) {
     for (auto& p : sequence.frames[2].mesh.positions) p[0] += 900;
     const auto packets = frames_in(encode(sequence, options));
     ASSERT_EQ(packets[2].kind, PacketKind::intra);
-    EXPECT_FALSE(packets[2].has(packet_flag::settled));
+    EXPECT_FALSE(packets[2].has(packet_flag::of_tracked_mesh));
 }
 
 TEST(RenewedIFrames, ComeWhereTheCallerAsksForAnIFrame) {

@@ -24,7 +24,7 @@ std::vector<std::string> refusals(const DecoderOptions& options) {
     std::vector<std::string> out;
     Decoder decoder(options);
     for (const auto& packet : stream().packets) {
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         if (frame || frame.error().kind == ErrorKind::corrupt_stream)
             continue;  // because it depends on what was
                        // refused
@@ -79,14 +79,14 @@ TEST(Limits, WhatWasRefusedChangesNothing) {
     options.max_joints = 15;
     Decoder decoder(options);
     const auto& packets = stream().packets;
-    ASSERT_TRUE(decoder.push(packets[0]).has_value());
-    ASSERT_TRUE(decoder.push(packets[1]).has_value());
+    ASSERT_TRUE(decoder.decode_copy(packets[0]).has_value());
+    ASSERT_TRUE(decoder.decode_copy(packets[1]).has_value());
     auto header = *read_sequence_header(packets[0].payload);
     header.skeleton.joint_names.push_back("one too many");
     Packet large = packets[0];
     large.payload = write_sequence_header(header);
-    EXPECT_FALSE(decoder.push(large).has_value());
-    for (std::size_t i = 2; i < packets.size(); ++i) EXPECT_TRUE(decoder.push(packets[i]).has_value());
+    EXPECT_FALSE(decoder.decode_copy(large).has_value());
+    for (std::size_t i = 2; i < packets.size(); ++i) EXPECT_TRUE(decoder.decode_copy(packets[i]).has_value());
 }
 
 TEST(Limits, DracoIsNotAskedForMoreThanTheFramesHeaderSays) {
@@ -99,15 +99,15 @@ TEST(Limits, DracoIsNotAskedForMoreThanTheFramesHeaderSays) {
         if (!triangles) sequence.frames[0].mesh.triangles.clear();
         const auto coded = encode(sequence, options);
         Decoder decoder(decoding);
-        ASSERT_TRUE(decoder.push(coded.packets[0]).has_value());
-        ASSERT_TRUE(decoder.push(coded.packets[1]).has_value());
+        ASSERT_TRUE(decoder.decode_copy(coded.packets[0]).has_value());
+        ASSERT_TRUE(decoder.decode_copy(coded.packets[1]).has_value());
         auto payload = copy_of(*read_frame_payload(coded.packets[1].payload));
         auto bytes = payload.of(Layer::external_intra);
         for (std::size_t i = 0; i < 3; ++i) bytes[(triangles ? 12 : 11) + i] = 0xFF;  // the count of vertices
         payload.set(Layer::external_intra, bytes);
         auto packet = coded.packets[1];
         packet.payload = write_frame_payload(payload);
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         ASSERT_FALSE(frame.has_value());
         EXPECT_NE(frame.error().message.find("larger than its header says"), std::string::npos)
             << frame.error().message;
@@ -158,12 +158,12 @@ TEST(LeastPayload, AFrameInLessIsCorrupt) {
                 claims.payload = write_frame_payload(payload);
                 ASSERT_EQ(claims.payload.size(), 62500u);
                 claims.payload.resize(62499);
-                const auto frame = decoder.push(claims);
+                const auto frame = decoder.decode_copy(claims);
                 ASSERT_FALSE(frame.has_value());
                 EXPECT_EQ(frame.error().kind, ErrorKind::corrupt_stream);
                 EXPECT_NE(frame.error().message.find("62499 bytes"), std::string::npos) << frame.error().message;
             }
-            EXPECT_TRUE(decoder.push(packet).has_value());
+            EXPECT_TRUE(decoder.decode_copy(packet).has_value());
         }
         EXPECT_TRUE(found);
     }

@@ -42,7 +42,7 @@ std::vector<Packet> ten_frames_without(std::size_t place) {
 // A decoder that was given the packets before `place`.
 Decoder decoder_before(const std::vector<Packet>& packets, std::size_t place) {
     Decoder decoder;
-    for (std::size_t i = 0; i < place; ++i) EXPECT_TRUE(decoder.push(packets[i]).has_value());
+    for (std::size_t i = 0; i < place; ++i) EXPECT_TRUE(decoder.decode_copy(packets[i]).has_value());
     return decoder;
 }
 
@@ -63,7 +63,7 @@ Mesh moved_by(const std::vector<Packet>& packets, std::size_t place) {
     Packet packet = packets[place];
     packet.kind = PacketKind::predicted;
     packet.payload = write_frame_payload(payload);
-    auto frame = decoder.push(packet);
+    auto frame = decoder.decode_copy(packet);
     EXPECT_TRUE(frame.has_value() && frame->has_value());
     return frame && *frame ? (**frame).mesh : Mesh{};
 }
@@ -110,14 +110,14 @@ TEST(Loss, AMissingIntraFrameCostsEveryFrameUpToTheNext) {
 
 TEST(Loss, WithoutAnIntraFrameNothingStandsIn) {
     Decoder decoder;
-    EXPECT_FALSE(decoder.conceal(0, 0).has_value());
-    ASSERT_TRUE(decoder.push(ten_frames().packets[0]).has_value());
-    EXPECT_FALSE(decoder.conceal(0, 0).has_value());
+    EXPECT_FALSE(decoder.conceal_copy(0, 0).has_value());
+    ASSERT_TRUE(decoder.decode_copy(ten_frames().packets[0]).has_value());
+    EXPECT_FALSE(decoder.conceal_copy(0, 0).has_value());
 }
 
 TEST(Loss, BehindAnIntraFrameItsOwnMeshStandsIn) {
     auto decoder = decoder_before(ten_frames().packets, 2);
-    const auto frame = decoder.conceal(1, 4711);
+    const auto frame = decoder.conceal_copy(1, 4711);
     ASSERT_TRUE(frame.has_value());
     EXPECT_TRUE(frame->concealed);
     EXPECT_EQ(frame->info.type, FrameType::predicted);
@@ -133,7 +133,7 @@ TEST(Loss, TheIntraFrameMovedAsTheFrameBeforeStandsIn) {
     const auto& packets = ten_frames().packets;
     for (std::size_t i = 0; i + 1 < packets.size(); ++i) {
         if (packets[i].kind != PacketKind::enhanced && packets[i].kind != PacketKind::predicted) continue;
-        const auto frame = decoder_before(packets, i + 1).conceal(packets[i].frame + 1, 0);
+        const auto frame = decoder_before(packets, i + 1).conceal_copy(packets[i].frame + 1, 0);
         ASSERT_TRUE(frame.has_value());
         expect_same_mesh(frame->mesh, moved_by(packets, i));
     }
@@ -142,9 +142,9 @@ TEST(Loss, TheIntraFrameMovedAsTheFrameBeforeStandsIn) {
 TEST(Loss, StandInsChangeNothingOfWhatComes) {
     Decoder decoder;
     for (const auto& packet : ten_frames().packets) {
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         ASSERT_TRUE(frame.has_value());
-        (void)decoder.conceal(packet.frame + 1, 0);
+        (void)decoder.conceal_copy(packet.frame + 1, 0);
         if (!*frame) continue;
         EXPECT_FALSE((**frame).concealed);
         expect_same_mesh((**frame).mesh, ten_frames().reconstructions[packet.frame]);
@@ -158,7 +158,7 @@ TEST(Loss, WithoutItsCodebookAFrameIsMovedByItsOwnTransforms) {
     Decoder decoder;
     std::size_t lost = 0;
     for (std::size_t i = 0; i < packets.size(); ++i) {
-        const auto frame = decoder.push(packets[i]);
+        const auto frame = decoder.decode_copy(packets[i]);
         if (packets[i].kind != PacketKind::enhanced) {
             EXPECT_TRUE(frame.has_value());
             continue;
@@ -167,7 +167,7 @@ TEST(Loss, WithoutItsCodebookAFrameIsMovedByItsOwnTransforms) {
         ASSERT_FALSE(frame.has_value());
         EXPECT_EQ(frame.error().kind, ErrorKind::corrupt_stream);
         EXPECT_NE(frame.error().message.find("codebook"), std::string::npos) << frame.error().message;
-        const auto instead = decoder.conceal(packets[i].frame, packets[i].timestamp_us);
+        const auto instead = decoder.conceal_copy(packets[i].frame, packets[i].timestamp_us);
         ASSERT_TRUE(instead.has_value());
         auto complete = ten_frames().packets;
         const auto place = std::find_if(complete.begin(), complete.end(), [&](const Packet& packet) {
@@ -249,11 +249,11 @@ TEST(Predicted, OtherCountsThanTheReferenceMeshsAreRefused) {
         Packet packet = packets[at];
         packet.payload = write_frame_payload(payload);
         auto decoder = decoder_before(packets, at);
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         ASSERT_FALSE(frame.has_value());
         EXPECT_EQ(frame.error().kind, ErrorKind::corrupt_stream);
         // The undamaged one is still accepted.
-        const auto again = decoder.push(packets[at]);
+        const auto again = decoder.decode_copy(packets[at]);
         ASSERT_TRUE(again.has_value() && again->has_value());
         expect_same_mesh((**again).mesh, ten_frames().reconstructions[packets[at].frame]);
     }

@@ -185,6 +185,12 @@ TEST(OptionList, ContradictionsAreRefused) {
                           o.rate.target_error = 1;
                       }),
               "rate.bits_per_second and rate.target_error exclude each other");
+    EXPECT_EQ(message(Profile::tracked,
+                      [](auto& o) {
+                          o.quality = 60;
+                          o.rate.bits_per_second = 1e6;
+                      }),
+              "quality does nothing with rate.bits_per_second or rate.target_error: it follows from these");
     EXPECT_EQ(message(Profile::tracked, [](auto& o) { o.rate.buffer_seconds = 2; }),
               "rate.buffer_seconds does nothing without rate.bits_per_second");
     EXPECT_EQ(message(Profile::tracked, [](auto& o) { o.rate.first_pass.resize(1); }),
@@ -206,6 +212,26 @@ TEST(OptionList, ContradictionsAreRefused) {
     EXPECT_THAT(message(Profile::tracked, [](auto& o) { o.profile = static_cast<Profile>(3); }), HasSubstr("profile"));
     EXPECT_THAT(message(Profile::topology, [](auto& o) { o.topology.frame_choice = static_cast<FrameChoice>(4); }),
                 HasSubstr("topology.frame_choice must be fixed, motion, rd or cheaper, not 4"));
+}
+
+TEST(Quality, IsTwoStepsEachOfWhichCanBeGivenInItsPlace) {
+    EncoderOptions options;
+    EXPECT_EQ(options.quality, 42);
+    EXPECT_EQ(quality_steps(options).geometry_step, 16 * std::exp2(-0.42 * 6));
+    EXPECT_EQ(quality_steps(options).colour_step, 32 * std::exp2(-0.42 * 5));
+    const auto person = walking(3, 300);
+    const auto by_quality = encode(person, options).bytes;
+    auto by_steps = options;
+    by_steps.geometry_step = 16 * std::exp2(-0.42 * 6);
+    by_steps.colour_step = 32 * std::exp2(-0.42 * 5);
+    EXPECT_EQ(encode(person, by_steps).bytes, by_quality);
+    by_steps.quality = 100;
+    EXPECT_EQ(encode(person, by_steps).bytes, by_quality);
+    options.quality = 60;
+    EXPECT_NE(encode(person, options).bytes, by_quality);
+    options.geometry_step = 3;
+    EXPECT_EQ(quality_steps(options).geometry_step, 3);
+    EXPECT_EQ(quality_steps(options).colour_step, 4);
 }
 
 TEST(Profiles, ThePapersDifferFromTopologyInFourChoices) {

@@ -36,7 +36,7 @@ TEST(PatchedFrames, DecodeToWhatTheEncoderHas) {
     Decoder decoder;
     std::size_t frame = 0;
     for (const auto& packet : coded.packets) {
-        const auto decoded = decoder.push(packet);
+        const auto decoded = decoder.decode_copy(packet);
         ASSERT_TRUE(decoded.has_value()) << decoded.error().message;
         if (!*decoded) continue;
         const auto& mesh = (*decoded)->mesh;
@@ -124,10 +124,10 @@ TEST(PatchedFrames, ThatAreLostTakeThoseBehindThemWithThemUpToTheNextIFrame) {
     std::vector<bool> decoded;
     for (const auto& packet : coded.packets) {
         if (!frame_type(packet.kind)) {
-            EXPECT_TRUE(decoder.push(packet).has_value());
+            EXPECT_TRUE(decoder.decode_copy(packet).has_value());
             continue;
         }
-        decoded.push_back(packet.frame != 2 && decoder.push(packet).has_value());
+        decoded.push_back(packet.frame != 2 && decoder.decode_copy(packet).has_value());
     }
     EXPECT_EQ(decoded, (std::vector{true, true, false, false, true, true}));
 }
@@ -137,8 +137,8 @@ TEST(PatchedFrames, ThatNothingMayReferToAreErrors) {
     Decoder decoder;
     for (auto& packet : coded.packets) {
         const bool patched = packet.kind == PacketKind::patched;
-        if (patched) packet.flags = packet_flag::told | packet_flag::droppable;
-        EXPECT_EQ(decoder.push(packet).has_value(), !patched);
+        if (patched) packet.flags = packet_flag::flags_valid | packet_flag::droppable;
+        EXPECT_EQ(decoder.decode_copy(packet).has_value(), !patched);
     }
 }
 
@@ -148,13 +148,13 @@ TEST(PatchedFrames, ThatAreDamagedLeaveTheDecoderAsItWas) {
                                       [](const Packet& packet) { return packet.kind == PacketKind::patched; });
     ASSERT_NE(patched, coded.packets.end());
     Decoder decoder;
-    for (auto packet = coded.packets.begin(); packet != patched; ++packet) ASSERT_TRUE(decoder.push(*packet));
+    for (auto packet = coded.packets.begin(); packet != patched; ++packet) ASSERT_TRUE(decoder.decode_copy(*packet));
     for (std::size_t size = 0; size < patched->payload.size(); size += 7) {
         auto damaged = *patched;
         damaged.payload.resize(size);
-        EXPECT_FALSE(decoder.push(damaged).has_value()) << size;
+        EXPECT_FALSE(decoder.decode_copy(damaged).has_value()) << size;
     }
-    EXPECT_TRUE(decoder.push(*patched).has_value());
+    EXPECT_TRUE(decoder.decode_copy(*patched).has_value());
 }
 
 }  // namespace

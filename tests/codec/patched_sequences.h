@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "codec/ball.h"
+#include "codec/enhanced_options.h"
 #include "codec/test_sequences.h"
 
 namespace htvm::test {
@@ -31,7 +32,7 @@ inline TestSequence horned_ball(int frames, int lost = 2, double horn = 150, dou
 }
 
 inline EncoderOptions patched_options() {
-    auto out = default_options(Profile::tracked);
+    auto out = options_at_2_mm(Profile::tracked);
     out.subject_size = 1750;
     return out;
 }

@@ -50,7 +50,7 @@ std::string text(const char* format, Values... values) {
 }
 
 std::string line_of(const TestSequence& sequence, const char* name, Profile profile) {
-    auto options = default_options(profile);
+    auto options = options_at_2_mm(profile);
     options.key_interval = 4;
     const auto coded = encode(sequence, options);
     EXPECT_TRUE(coded.errors.empty());

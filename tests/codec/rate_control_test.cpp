@@ -72,7 +72,7 @@ Outcome code(const Capture& c, const RateControlOptions& options, std::vector<Fr
         }
         if (bits > rate.room()) type = FrameType::predicted, bits = 0;
         run.most_calls = std::max(run.most_calls, calls);
-        run.fullest = std::max(run.fullest, (rate.buffer_bits() + bits) / capacity);
+        run.fullest = std::max(run.fullest, (capacity - rate.room() + bits) / capacity);
         if (f >= 60 && type == FrameType::enhanced) run.steepest = std::max(run.steepest, std::abs(quality - last));
         if (f >= 60 && type == FrameType::intra) run.intra_apart = std::max(run.intra_apart, std::abs(quality - last));
         if (type == FrameType::enhanced) last = quality;
@@ -80,7 +80,6 @@ Outcome code(const Capture& c, const RateControlOptions& options, std::vector<Fr
         run.bits += bits;
         rate.coded({type, quality, bits});
     }
-    EXPECT_DOUBLE_EQ(rate.total_bits(), run.bits);
     return run;
 }
 
@@ -170,10 +169,9 @@ TEST(RateControl, RoomIsWhatTheBufferDoesNotHold) {
     RateController rate({.bits_per_second = 3000, .frames_per_second = 30, .buffer_seconds = 2});
     EXPECT_EQ(rate.room(), 6000);
     rate.coded({FrameType::intra, 50, 5000});
-    EXPECT_EQ(rate.buffer_bits(), 4900);
     EXPECT_EQ(rate.room(), 1100);
     for (int i = 0; i < 60; ++i) rate.coded({FrameType::predicted, 50, 0});
-    EXPECT_EQ(rate.buffer_bits(), 0);
+    EXPECT_EQ(rate.room(), 6000);
 }
 
 TEST(RateControl, AFirstPassBringsTheTotalWithinTwoPercent) {

@@ -37,18 +37,18 @@ TEST(RunningTime, MissingFramesDoNotLengthenTheLastOne) {
 
 TEST(RunningTime, ASequenceBeginsWhereTheOneBeforeEnds) {
     RunningTime time;
-    time.take(header_of(25), false);
+    time.push(header_of(25), false);
     EXPECT_EQ(time.one_frame_us(), 40000u);
-    time.take(frame_at(500000), true);
+    time.push(frame_at(500000), true);
     EXPECT_EQ(time.microseconds(), 0u);
     EXPECT_EQ(time.total_us(), 40000u);
-    time.take(frame_at(600000), false);
+    time.push(frame_at(600000), false);
     EXPECT_EQ(time.microseconds(), 100000u);
     EXPECT_EQ(time.total_us(), 200000u);
     // The header of the next sequence says nothing of the frames before.
-    time.take(header_of(10), false);
+    time.push(header_of(10), false);
     EXPECT_EQ(time.total_us(), 200000u);
-    time.take(frame_at(0), true);
+    time.push(frame_at(0), true);
     EXPECT_EQ(time.microseconds(), 200000u);
     EXPECT_EQ(time.total_us(), 300000u);
 }
@@ -56,9 +56,9 @@ TEST(RunningTime, ASequenceBeginsWhereTheOneBeforeEnds) {
 TEST(RunningTime, CanBeginInTheMiddle) {
     RunningTime time;
     time.begin(500000);
-    time.take(frame_at(900000), true);
+    time.push(frame_at(900000), true);
     EXPECT_EQ(time.microseconds(), 400000u);
-    time.take(frame_at(950000), false);
+    time.push(frame_at(950000), false);
     EXPECT_EQ(time.microseconds(), 450000u);
 }
 

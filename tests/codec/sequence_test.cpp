@@ -17,7 +17,7 @@ SequenceHeader full_header() {
     header.fps_numerator = 30000;
     header.fps_denominator = 1001;
     header.unit_micrometres = 1000000;
-    header.skeleton_tracked = false;
+    header.has_skeleton = false;
     header.skeleton.joint_names = {"hip", "", "a name with blanks, commas and \xc3\xbc", std::string(255, 'x')};
     header.skeleton.bones = {{0, 1}, {3, 2}, {1, 1}};
     header.radii = {0, 1234, lattice_limit};
@@ -38,7 +38,7 @@ void expect_equal(const SequenceHeader& a, const SequenceHeader& b) {
     EXPECT_EQ(a.fps_numerator, b.fps_numerator);
     EXPECT_EQ(a.fps_denominator, b.fps_denominator);
     EXPECT_EQ(a.unit_micrometres, b.unit_micrometres);
-    EXPECT_EQ(a.skeleton_tracked, b.skeleton_tracked);
+    EXPECT_EQ(a.has_skeleton, b.has_skeleton);
     EXPECT_EQ(a.skeleton.joint_names, b.skeleton.joint_names);
     EXPECT_EQ(a.radii, b.radii);
     EXPECT_EQ(a.nearest_vertices, b.nearest_vertices);

@@ -48,8 +48,8 @@ std::vector<Fault> faults(const Skeleton& skeleton) {
          [](Pose& pose, std::size_t frame, const Pose&) {
              if (frame == 0) return;
              pose.joints[4 + frame % 3] = {0, 0, 0};
-             pose.tracked.assign(pose.joints.size(), true);
-             pose.tracked[4 + frame % 3] = false;
+             pose.found.assign(pose.joints.size(), true);
+             pose.found[4 + frame % 3] = false;
          }},
         {"a skeleton that is frozen for all of the sequence",
          [](Pose& pose, std::size_t, const Pose& first) { pose = first; }},

@@ -24,7 +24,7 @@ StreamIndex full_index() {
     out.bounds = SpaceBounds{{-1.5f, 0, -300}, {2, 1900, 300}};
     out.sequences = {{0, 0}, {500000, 500}};
     for (std::uint32_t i = 0; i < 30; ++i)
-        out.points.push_back({30 * i, -5 + 1000000 * std::int64_t{i}, 90 + 12345 * i, i % 3, packet_flag::told});
+        out.points.push_back({30 * i, -5 + 1000000 * std::int64_t{i}, 90 + 12345 * i, i % 3, packet_flag::flags_valid});
     return out;
 }
 
@@ -126,7 +126,7 @@ TEST(FrontIndex, SaysWhereDecodingCanStart) {
         Decoder decoder;
         const auto sequence_header = reader.pull();
         ASSERT_EQ(sequence_header->kind, PacketKind::sequence);
-        ASSERT_TRUE(decoder.push(*sequence_header).has_value());
+        ASSERT_TRUE(decoder.decode_copy(*sequence_header).has_value());
         const auto first_frame_at = [&](std::uint64_t offset) {
             reader = PacketReader();
             reader.push(std::span(bytes).subspan(offset));
@@ -134,13 +134,13 @@ TEST(FrontIndex, SaysWhereDecodingCanStart) {
         };
         std::vector<Packet> needed;
         for (const auto* at = point; at->back > 0;) needed.push_back(first_frame_at((at -= at->back)->offset));
-        for (; !needed.empty(); needed.pop_back()) ASSERT_TRUE(decoder.push(needed.back()).has_value());
+        for (; !needed.empty(); needed.pop_back()) ASSERT_TRUE(decoder.decode_copy(needed.back()).has_value());
         reader = PacketReader();
         reader.push(std::span(bytes).subspan(point->offset));
         for (auto next = point->frame; next <= frame; ++next) {
             auto packet = reader.pull();
             while (!frame_type(packet->kind)) packet = reader.pull();
-            const auto decoded = decoder.push(*packet);
+            const auto decoded = decoder.decode_copy(*packet);
             ASSERT_TRUE(decoded.has_value() && decoded->has_value());
             expect_same_mesh((*decoded)->mesh, coded.reconstructions[next % 8]);
         }

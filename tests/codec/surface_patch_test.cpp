@@ -35,7 +35,7 @@ double hill_at_border(double x, double y) { return hill(x - 2000, y); }
 
 std::optional<SurfacePatch> patch_of(const LatticeMesh& decoded, const LatticeMesh& captured,
                                      const SurfacePatchOptions& options = {}, std::span<const LatticePoint> rest = {}) {
-    return find_surface_patch({decoded, rest}, captured, surface_of(captured), options);
+    return SurfacePatchSearch({decoded, rest}, captured, surface_of(captured), options).find(options.region_lost);
 }
 
 LatticeMesh patched(const LatticeMesh& decoded, const SurfacePatch& patch) {

@@ -210,7 +210,7 @@ inline DecodedSequence decode_packets(const std::vector<Packet>& packets, const 
     DecodedSequence out;
     Decoder decoder(options);
     for (const auto& packet : packets) {
-        auto frame = decoder.push(packet);
+        auto frame = decoder.decode_copy(packet);
         if (!frame)
             out.errors.push_back(frame.error());
         else if (*frame)

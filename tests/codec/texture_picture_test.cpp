@@ -31,7 +31,7 @@ TEST(TexturePicture, ComesBack) {
     EXPECT_EQ(packet.frame, 7u);
     EXPECT_EQ(packet.reference, 6u);
     EXPECT_EQ(packet.timestamp_us, 233333);
-    EXPECT_EQ(packet.flags, packet_flag::told | packet_flag::referred);
+    EXPECT_EQ(packet.flags, packet_flag::flags_valid | packet_flag::referred);
     const auto picture = read_texture_picture(packet);
     ASSERT_TRUE(picture) << picture.error().message;
     expect_same(*picture, small_picture());
@@ -39,7 +39,7 @@ TEST(TexturePicture, ComesBack) {
 
 TEST(TexturePicture, IsWrittenAsTheDocumentSays) {
     const auto packet = write_texture_picture(small_picture(), {0, 0, 0, false});
-    EXPECT_EQ(packet.flags, packet_flag::told | packet_flag::access | packet_flag::droppable);
+    EXPECT_EQ(packet.flags, packet_flag::flags_valid | packet_flag::access | packet_flag::droppable);
     EXPECT_EQ(packet.payload, (std::vector<std::uint8_t>{2, 6 | 16, 0xac, 0x02, 0xc8, 0x01, 0x00, 0x10, 0x88, 0x13,
                                                          0xff, 0xff, 10, 11, 0, 0, 0}));
 }
@@ -97,7 +97,7 @@ TEST(TexturePicture, OtherCodersAndMatricesAreUnsupported) {
 PacketHeader header_of(PacketKind kind, std::uint32_t frame, std::uint32_t reference) {
     PacketHeader out;
     out.kind = kind;
-    out.flags = packet_flag::told | packet_flag::referred;
+    out.flags = packet_flag::flags_valid | packet_flag::referred;
     out.frame = frame;
     out.reference = reference;
     return out;
@@ -146,7 +146,7 @@ TEST(TexturePicture, WithoutTheOneBeforeItCannotBeShown) {
 
 TEST(TexturePicture, OneThatIsNotReferredToIsNotKept) {
     auto packets = pictures_of_four_frames();
-    packets[4].flags = packet_flag::told | packet_flag::droppable;
+    packets[4].flags = packet_flag::flags_valid | packet_flag::droppable;
     Dependencies dependencies;
     for (std::size_t i = 0; i <= 4; ++i) dependencies.push(packets[i]);
     EXPECT_EQ(dependencies.picture_closure(), (Places{0, 2, 4}));

@@ -146,8 +146,8 @@ TEST(TrackedFrames, OfTheFrameBeforeAreLostUntilTheNextIntraFrame) {
 TEST(TrackedFrames, ThatAreLostAreConcealedByTheLastOne) {
     const auto coded = encode(walking(3, true, 800), tracked());
     Decoder decoder;
-    for (const auto& packet : coded.packets) ASSERT_TRUE(decoder.push(packet).has_value());
-    const auto stand_in = decoder.conceal(3, 0);
+    for (const auto& packet : coded.packets) ASSERT_TRUE(decoder.decode_copy(packet).has_value());
+    const auto stand_in = decoder.conceal_copy(3, 0);
     ASSERT_TRUE(stand_in.has_value());
     EXPECT_TRUE(stand_in->concealed);
     expect_same_mesh(stand_in->mesh, coded.reconstructions[2]);
@@ -296,7 +296,7 @@ TEST(TrackedFrames, HaveTheSameSharesAndCountsInTheEncoderAndTheDecoderWhichAddU
         Decoder decoder;
         std::size_t at = 0;
         for (const auto& packet : coded.packets) {
-            const auto frame = decoder.push(packet);
+            const auto frame = decoder.decode_copy(packet);
             ASSERT_TRUE(frame.has_value());
             if (!*frame) continue;
             const auto& here = (*frame)->info;

@@ -83,7 +83,7 @@ struct StreamByChance {
     void add(Packet packet, std::uint32_t reference) {
         packet.frame = frame;
         packet.reference = reference;
-        packet.flags = packet_flag::told | packet_flag::referred;
+        packet.flags = packet_flag::flags_valid | packet_flag::referred;
         packet.timestamp_us = std::int64_t{frame++} * 33333;
         packets.push_back(std::move(packet));
     }

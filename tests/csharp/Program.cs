@@ -2,6 +2,7 @@
 //     Program.exe interface                 how structs, constants and functions are declared, for check_interface.py
 //     Program.exe digests STREAM            a line for each frame, as in tests/data/conformance
 //     Program.exe tests STREAM              everything else, on a stream of one group
+//     Program.exe encode FOLDER FILE        writes meshes, OBJ, into the folder, and the stream of the encoder's defaults
 using System;
 using System.Collections.Generic;
 using System.IO;
@@ -18,6 +19,7 @@ static class Program
         {
             case "interface": PrintInterface(); return 0;
             case "digests": PrintDigests(arguments[1]); return 0;
+            case "encode": EncodeAtDefaults(arguments[1], arguments[2]); return 0;
             default: RunTests(File.ReadAllBytes(arguments[1])); return 0;
         }
     }
@@ -201,10 +203,11 @@ static class Program
             }
     }
 
-    // A sheet that bends, with a skeleton of one bone.
-    static void WhatIsEncodedDecodes()
+    // A sheet that bends.
+    const int side = 12;
+
+    static int[] SheetIndices()
     {
-        const int side = 12;
         var indices = new List<int>();
         for (int y = 0; y + 1 < side; ++y)
             for (int x = 0; x + 1 < side; ++x)
@@ -212,6 +215,53 @@ static class Program
                 int v = y * side + x;
                 indices.AddRange(new[] { v, v + 1, v + side, v + 1, v + side + 1, v + side });
             }
+        return indices.ToArray();
+    }
+
+    static float[] SheetPositions(int frame)
+    {
+        var positions = new float[3 * side * side];
+        for (int v = 0; v < side * side; ++v)
+        {
+            int x = v % side - side / 2;
+            positions[3 * v] = 10 * (v % side);
+            positions[3 * v + 1] = 10 * (v / side);
+            positions[3 * v + 2] = 0.1f * frame * x * x;
+        }
+        return positions;
+    }
+
+    // The meshes and the file that becomes of them.
+    static void EncodeAtDefaults(string folder, string path)
+    {
+        var culture = System.Globalization.CultureInfo.InvariantCulture;
+        var indices = SheetIndices();
+        var packets = new List<byte[]>();
+        using (var encoder = new Encoder())
+        {
+            for (int frame = 0; frame < 4; ++frame)
+            {
+                var positions = SheetPositions(frame);
+                using (var obj = new StreamWriter(Path.Combine(folder, frame + ".obj")))
+                {
+                    for (int v = 0; v < positions.Length; v += 3)
+                        obj.WriteLine(string.Format(culture, "v {0:R} {1:R} {2:R}", positions[v], positions[v + 1], positions[v + 2]));
+                    for (int i = 0; i < indices.Length; i += 3)
+                        obj.WriteLine("f {0} {1} {2}", indices[i] + 1, indices[i + 1] + 1, indices[i + 2] + 1);
+                }
+                packets.AddRange(encoder.Push(positions, indices, null, (long)Math.Round(frame * 1e6 / 30)));
+            }
+            packets.AddRange(encoder.Finish());
+            packets.RemoveAt(packets.Count - 1);
+            packets.Insert(0, encoder.FrontIndex());
+        }
+        File.WriteAllBytes(path, packets.SelectMany(packet => packet).ToArray());
+    }
+
+    // With a skeleton of one bone.
+    static void WhatIsEncodedDecodes()
+    {
+        var indices = SheetIndices();
         var skeleton = new Skeleton { JointNames = new[] { "pelvis", "neck ü" }, BoneJoints = new ushort[] { 0, 1 } };
         var options = new Dictionary<string, string> { { "subject_size", "1000" }, { "up", "y" }, { "tracked.simplify", "0" } };
         var bytes = new MemoryStream();
@@ -221,21 +271,14 @@ static class Program
         {
             for (int frame = 0; frame < 4; ++frame)
             {
-                var positions = new float[3 * side * side];
-                for (int v = 0; v < side * side; ++v)
-                {
-                    int x = v % side - side / 2;
-                    positions[3 * v] = 10 * (v % side);
-                    positions[3 * v + 1] = 10 * (v / side);
-                    positions[3 * v + 2] = 0.1f * frame * x * x;
-                }
+                var positions = SheetPositions(frame);
                 var colours = Enumerable.Range(0, 3 * side * side).Select(n => (byte)n).ToArray();
                 var pose = new Pose { Joints = new double[] { 50, 10, 0, 50, 100, 0 } };
-                store(encoder.Push(positions, indices.ToArray(), colours, 40000 * frame, pose, forceIntra: frame == 2));
+                store(encoder.Push(positions, indices, colours, 40000 * frame, pose, forceIntra: frame == 2));
                 if (frame > 0) continue;
                 Fails(() => encoder.Push(new float[10], new int[0], null, 1), Status.BadInput, "positions must have 9");
                 Fails(() => encoder.Push(positions, new[] { 0, 1, 99999 }, null, 1), Status.BadInput, "99999");
-                Fails(() => encoder.Push(positions, indices.ToArray(), null, 1, new Pose { Joints = new double[3] }),
+                Fails(() => encoder.Push(positions, indices, null, 1, new Pose { Joints = new double[3] }),
                       Status.BadInput, "joints must have 6");
             }
             Fails(() => encoder.SetBitrate(1e6), Status.BadInput, "rate.bits_per_second");

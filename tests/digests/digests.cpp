@@ -74,7 +74,7 @@ std::optional<Digests> digests_of(const Bytes& stream, unsigned threads) {
     reader.push(stream);
     Digests out;
     while (const auto packet = reader.pull()) {
-        const auto frame = decoder.push(*packet);
+        const auto frame = decoder.decode_copy(*packet);
         if (!frame) {
             std::printf("%s\n", frame.error().message.c_str());
             return std::nullopt;

@@ -45,7 +45,7 @@ TEST(AlignSkeleton, EqualRatesTakeThePosesAsTheyAre) {
         ASSERT_EQ(aligned->poses.size(), 5u);
         for (std::size_t t = 0; t < 5; ++t) {
             EXPECT_EQ(first_x(aligned, t), 10 * static_cast<double>(t));
-            EXPECT_TRUE(aligned->poses[t].tracked[0] && aligned->poses[t].tracked[1]);
+            EXPECT_TRUE(aligned->poses[t].found[0] && aligned->poses[t].found[1]);
         }
         EXPECT_EQ(aligned->notes.size(), 0u);
     }
@@ -56,7 +56,7 @@ TEST(AlignSkeleton, OtherRatesAreInterpolatedByTime) {
     ASSERT_TRUE(doubled);
     for (std::size_t t = 0; t < 7; ++t) {
         EXPECT_NEAR(first_x(doubled, t), 5 * static_cast<double>(t), 1e-9);
-        EXPECT_TRUE(doubled->poses[t].tracked[0]);
+        EXPECT_TRUE(doubled->poses[t].found[0]);
     }
     EXPECT_THAT(doubled->notes, Contains(HasSubstr("30 poses per second, the meshes 60")));
     const auto thirded = align(moving_bone(7, 90), mesh_at(3, 30));
@@ -86,16 +86,16 @@ TEST(AlignSkeleton, MeshTimestampsAreFollowed) {
 TEST(AlignSkeleton, AMissingJointIsInterpolatedInTimeAndMarked) {
     auto track = moving_bone(5, 30);
     for (const std::size_t t : {1u, 2u}) {
-        track.poses[t].tracked = {false, true};
+        track.poses[t].found = {false, true};
         track.poses[t].joints[0] = {};
     }
     const auto aligned = align(track, mesh_at(5, 30));
     ASSERT_TRUE(aligned);
     EXPECT_NEAR(first_x(aligned, 1), 10, 1e-9);
     EXPECT_NEAR(first_x(aligned, 2), 20, 1e-9);
-    EXPECT_FALSE(aligned->poses[1].tracked[0]);
-    EXPECT_TRUE(aligned->poses[1].tracked[1]);
-    EXPECT_TRUE(aligned->poses[3].tracked[0]);
+    EXPECT_FALSE(aligned->poses[1].found[0]);
+    EXPECT_TRUE(aligned->poses[1].found[1]);
+    EXPECT_TRUE(aligned->poses[3].found[0]);
     EXPECT_THAT(aligned->notes, Contains(HasSubstr("missing in 2 mesh frames")));
 }
 
@@ -107,7 +107,7 @@ TEST(AlignSkeleton, AMissingFrameIsInterpolatedAndTheEndsAreHeld) {
     EXPECT_EQ(first_x(aligned, 0), 10);
     EXPECT_NEAR(first_x(aligned, 2), 20, 1e-9);
     EXPECT_EQ(first_x(aligned, 5), 40);
-    for (std::size_t t = 0; t < 6; ++t) EXPECT_EQ(aligned->poses[t].tracked[0], t != 0 && t != 2 && t != 5) << t;
+    for (std::size_t t = 0; t < 6; ++t) EXPECT_EQ(aligned->poses[t].found[0], t != 0 && t != 2 && t != 5) << t;
     EXPECT_THAT(aligned->notes, Contains(HasSubstr("missing in 3 mesh frames of 6")));
 }
 
@@ -115,7 +115,7 @@ TEST(AlignSkeleton, AShorterSkeletonIsHeldAndALongerOneCutAndBothAreSaid) {
     const auto held = align(moving_bone(3, 30), mesh_at(5, 30));
     ASSERT_TRUE(held);
     EXPECT_EQ(first_x(held, 4), 20);
-    EXPECT_FALSE(held->poses[4].tracked[0]);
+    EXPECT_FALSE(held->poses[4].found[0]);
     EXPECT_THAT(held->notes, Contains(HasSubstr("does not cover 2 mesh frames of 5")));
     AlignOptions first_three;
     first_three.used = 3;
@@ -135,7 +135,7 @@ TEST(AlignSkeleton, FramesTheTrackerSkippedAreFilledIn) {
     ASSERT_TRUE(aligned);
     for (std::size_t t = 0; t < 6; ++t) {
         EXPECT_NEAR(first_x(aligned, t), 10 * static_cast<double>(t), 1e-9);
-        EXPECT_EQ(aligned->poses[t].tracked[0], t != 2 && t != 3) << t;
+        EXPECT_EQ(aligned->poses[t].found[0], t != 2 && t != 3) << t;
     }
 }
 
@@ -145,13 +145,13 @@ TEST(AlignSkeleton, AJointThatIsNeverTrackedIsPutWhereItsNeighbourIs) {
     track.skeleton.bones = {{0, 1}, {1, 2}};
     for (auto& pose : track.poses) {
         pose.joints.resize(4);
-        pose.tracked = {true, true, false, false};
+        pose.found = {true, true, false, false};
     }
     const auto aligned = align(track, mesh_at(2, 30));
     ASSERT_TRUE(aligned) << aligned.error().message;
     EXPECT_EQ(aligned->poses[1].joints[2], (Vector3d{10, 100, 0}));
     EXPECT_EQ(aligned->poses[1].joints[3], (Vector3d{10, 0, 0}));
-    EXPECT_FALSE(aligned->poses[1].tracked[2]);
+    EXPECT_FALSE(aligned->poses[1].found[2]);
     EXPECT_THAT(aligned->notes, Contains(HasSubstr("\"c\" is tracked in no frame")));
 }
 
@@ -227,10 +227,10 @@ TEST(AlignSkeleton, RandomTracksGiveCompleteFinitePoses) {
             Pose pose;
             for (std::size_t j = 0; j < joints && random() % 16; ++j) {
                 pose.joints.push_back({static_cast<double>(random() % 9), static_cast<double>(random() % 9), 0});
-                pose.tracked.push_back(random() % 3 > 0);
+                pose.found.push_back(random() % 3 > 0);
             }
             if (pose.joints.size() < joints) pose = Pose{};
-            for (const bool tracked : pose.tracked) any = any || tracked;
+            for (const bool tracked : pose.found) any = any || tracked;
             if (!pose.joints.empty() && random() % 2)
                 pose.orientations.assign(track.skeleton.bones.size(),
                                          random() % 2 ? identity_rotation : unknown_orientation);
@@ -247,7 +247,7 @@ TEST(AlignSkeleton, RandomTracksGiveCompleteFinitePoses) {
         ASSERT_EQ(aligned->poses.size(), mesh.frames);
         for (const Pose& pose : aligned->poses) {
             ASSERT_EQ(pose.joints.size(), joints);
-            ASSERT_EQ(pose.tracked.size(), joints);
+            ASSERT_EQ(pose.found.size(), joints);
             ASSERT_EQ(pose.orientations.size(), track.skeleton.bones.size());
             for (const Vector3d& p : pose.joints)
                 EXPECT_TRUE(p[0] >= 0 && p[0] <= 8 && p[1] >= 0 && p[1] <= 8 && p[2] == 0);

@@ -124,8 +124,8 @@ TEST(SkeletonAzure, NullJointsAndZeroQuaternionsAreNotTracked) {
     document["frames"][0]["bodies"][0]["joint_orientations"][0] = {0, 0, 0, 0};
     const auto track = skeleton_from_azure(document);
     ASSERT_TRUE(track) << track.error().message;
-    EXPECT_FALSE(track->poses[0].tracked[4]);
-    EXPECT_TRUE(track->poses[0].tracked[5]);
+    EXPECT_FALSE(track->poses[0].found[4]);
+    EXPECT_TRUE(track->poses[0].found[5]);
     EXPECT_EQ(track->poses[0].orientations[0], unknown_orientation);  // pelvis to navel
 }
 

@@ -77,7 +77,7 @@ TEST(SkeletonBvh, ForwardKinematicsGivesJointsInMillimetres) {
     expect_vector(bent[0], {10, 1400, 20});
     expect_vector(bent[1], {10, 1400, -280});
     expect_vector(bent[2], {10, 1650, -280});
-    EXPECT_THAT(track->poses[2].tracked, ElementsAre(true, true, true));
+    EXPECT_THAT(track->poses[2].found, ElementsAre(true, true, true));
 }
 
 TEST(SkeletonBvh, ABoneIsOrientedAsItsFirstJoint) {

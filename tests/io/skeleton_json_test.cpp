@@ -41,7 +41,7 @@ TEST(SkeletonJson, EveryMemberIsReadAndPositionsBecomeMillimetres) {
     EXPECT_THAT(track->radii, ElementsAre(80, 60.5));
     ASSERT_EQ(track->poses.size(), 3u);
     EXPECT_EQ(track->poses[0].joints[1], (Vector3d{0, 480, 20}));
-    EXPECT_THAT(track->poses[0].tracked, ElementsAre(true, true, false));
+    EXPECT_THAT(track->poses[0].found, ElementsAre(true, true, false));
     EXPECT_TRUE(track->poses[1].joints.empty());
     EXPECT_EQ(track->poses[2].joints[2], (Vector3d{10, 85, 0}));
     EXPECT_EQ(track->poses[2].orientations[0], (Rotation{0, -1, 0, 1, 0, 0, 0, 0, 1}));
@@ -127,9 +127,9 @@ TEST(SkeletonJson, WhatIsWrittenReadsBackBitForBit) {
         for (std::size_t t = 0; t < random() % 6; ++t) {
             Pose pose;
             for (int j = 0; j < 4 && (round < 10 || random() % 4); ++j) {
-                pose.tracked.push_back(random() % 3 > 0);
+                pose.found.push_back(random() % 3 > 0);
                 pose.joints.push_back({uniform(random), uniform(random), uniform(random)});
-                if (!pose.tracked.back()) pose.joints.back() = {};
+                if (!pose.found.back()) pose.joints.back() = {};
             }
             if (pose.joints.size() < 4) pose = Pose{};
             if (!pose.joints.empty() && round % 2)
@@ -148,7 +148,7 @@ TEST(SkeletonJson, WhatIsWrittenReadsBackBitForBit) {
         ASSERT_EQ(back->poses.size(), track.poses.size());
         for (std::size_t t = 0; t < track.poses.size(); ++t) {
             EXPECT_EQ(back->poses[t].joints, track.poses[t].joints);
-            EXPECT_EQ(back->poses[t].tracked, track.poses[t].tracked);
+            EXPECT_EQ(back->poses[t].found, track.poses[t].found);
             EXPECT_EQ(back->poses[t].orientations, track.poses[t].orientations);
         }
     }

@@ -339,7 +339,7 @@ TEST(SeamStages, the_last_is_what_the_decoder_shows) {
     for (const auto& frame : shots.frames) {
         ASSERT_TRUE(encoder->push(frame->mesh, &*frame->pose, frame->timestamp_us));
         while (auto packet = encoder->pull())
-            if (auto decoded = decoder.push(*packet); decoded && *decoded) shown.push_back((*decoded)->mesh);
+            if (auto decoded = decoder.decode_copy(*packet); decoded && *decoded) shown.push_back((*decoded)->mesh);
     }
     ASSERT_EQ(3u, shown.size());
     for (std::size_t i = 0; i < 2; ++i) {

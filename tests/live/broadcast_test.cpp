@@ -19,7 +19,7 @@ SharedPacket packet(PacketKind kind, std::uint32_t frame, std::uint32_t referenc
     out->header.kind = kind;
     out->header.frame = frame;
     out->header.reference = reference;
-    out->header.flags = static_cast<std::uint8_t>(told | flags);
+    out->header.flags = static_cast<std::uint8_t>(flags_valid | flags);
     out->bytes.resize(bytes);
     return out;
 }

@@ -115,7 +115,7 @@ struct NearHub {
         next.kind = kind;
         next.frame = frame;
         next.reference = reference;
-        next.flags = static_cast<std::uint8_t>(told | flags);
+        next.flags = static_cast<std::uint8_t>(flags_valid | flags);
         next.timestamp_us = frame * 1000;
         const auto size = random() % 400;  // before the bytes, for every compiler
         next.payload.resize(size, static_cast<std::uint8_t>(random()));

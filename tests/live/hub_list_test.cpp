@@ -74,7 +74,7 @@ TEST(RepeatedPackets, AnotherSessionBeginsAgain) {
 
 TEST(RepeatedPackets, WithoutASessionThereAreNone) {
     auto header = live_header(1);
-    header.flags = packet_flag::told;
+    header.flags = packet_flag::flags_valid;
     RepeatedPackets repeated;
     for (const auto& packet : {header, live_intra(0), live_tracked(1), header, live_intra(0)})
         EXPECT_FALSE(repeated.is_repeat(packet));

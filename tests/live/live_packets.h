@@ -13,7 +13,7 @@ inline Packet live_packet(PacketKind kind, std::uint32_t frame, std::uint32_t re
     out.kind = kind;
     out.frame = frame;
     out.reference = reference;
-    out.flags = static_cast<std::uint8_t>(packet_flag::told | flags);
+    out.flags = static_cast<std::uint8_t>(packet_flag::flags_valid | flags);
     out.timestamp_us = std::int64_t{33333} * frame;
     out.payload.assign(bytes, static_cast<std::uint8_t>(frame));
     return out;

@@ -23,12 +23,12 @@ struct Pushed {
 Pushed push_all(Decoder& decoder, const std::vector<Packet>& packets) {
     Pushed out;
     for (const auto& packet : packets) {
-        const auto frame = decoder.push(packet);
+        const auto frame = decoder.decode_copy(packet);
         if (!frame)
             ++(frame.error().kind == ErrorKind::limit ? out.errors : out.other_errors);
         else if (*frame)
             ++out.frames;
-        (void)decoder.conceal(packet.frame, packet.timestamp_us);
+        (void)decoder.conceal_copy(packet.frame, packet.timestamp_us);
     }
     return out;
 }

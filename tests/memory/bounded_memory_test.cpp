@@ -53,7 +53,7 @@ void expect_within_estimate(const std::vector<Packet>& packets, const std::strin
     for (const auto& packet : packets) {
         reset_allocations();
         {
-            const auto frame = decoder.push(packet);
+            const auto frame = decoder.decode_copy(packet);
             ASSERT_TRUE(frame.has_value()) << frame.error().message;
         }
         if (packet.kind == PacketKind::sequence) tracking = read_sequence_header(packet.payload)->node_spacing > 0;
@@ -102,7 +102,7 @@ TEST(DecoderMemory, IsNotTakenForWhatAHeaderClaims) {
         Decoder decoder;
         for (const auto& before : packets) {
             if (before.frame == packet.frame && before.kind == packet.kind) break;
-            ASSERT_TRUE(decoder.push(before).has_value());
+            ASSERT_TRUE(decoder.decode_copy(before).has_value());
         }
         auto payload = copy_of(*read_frame_payload(packet.payload));
         payload.header.vertices = 1u << 22;
@@ -112,7 +112,7 @@ TEST(DecoderMemory, IsNotTakenForWhatAHeaderClaims) {
         claims.payload.resize(std::min<std::size_t>(claims.payload.size(), 1000));
         reset_allocations();
         const auto live = allocations().live;
-        EXPECT_FALSE(decoder.push(claims).has_value());
+        EXPECT_FALSE(decoder.decode_copy(claims).has_value());
         EXPECT_LT(allocations().most_live - live, 100000) << "kind " << static_cast<int>(packet.kind);
     }
 }
@@ -129,7 +129,7 @@ TEST(DecoderMemory, SkinningIsNotMadeForTrackedFrames) {
             EXPECT_TRUE(decoder.decode(packet).has_value());
             // Moves the I-frame's mesh by its bones.
             if (skinned && packet.kind == PacketKind::intra) {
-                EXPECT_TRUE(decoder.stand_in(0, 0).has_value());
+                EXPECT_TRUE(decoder.conceal(0, 0).has_value());
             }
         }
         return allocations().live - live;
@@ -150,7 +150,7 @@ TEST(DecoderMemory, TrackedFramesThatAreLentCopyNoTriangles) {
             if (lent)
                 EXPECT_TRUE(decoder.decode(packet).has_value());
             else
-                EXPECT_TRUE(decoder.push(packet).has_value());
+                EXPECT_TRUE(decoder.decode_copy(packet).has_value());
             if (packet.kind == PacketKind::tracked) bytes = allocations().bytes;
         }
         return bytes;
@@ -169,7 +169,7 @@ TEST(DecoderMemory, IsRefusedBeforeItIsTaken) {
     for (const auto& packet : packets) {
         reset_allocations();
         const auto live = allocations().live;
-        (void)decoder.push(packet);
+        (void)decoder.decode_copy(packet);
         EXPECT_LT(allocations().most_live - live, 1000000);
     }
 }
@@ -213,7 +213,7 @@ std::int64_t most_memory_of_decoding(const std::vector<Packet>& packets) {
     reset_allocations();
     const auto live = allocations().live;
     Decoder decoder(options);
-    for (const auto& packet : packets) EXPECT_TRUE(decoder.push(packet).has_value());
+    for (const auto& packet : packets) EXPECT_TRUE(decoder.decode_copy(packet).has_value());
     return allocations().most_live - live;
 }
 

@@ -8,7 +8,7 @@
 
 #include "metrics/mesh_measures.h"
 #include "metrics/shapes.h"
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 namespace htvm {
 namespace {
@@ -40,12 +40,12 @@ double brute_force_squared_distance(const Mesh& mesh, const Point3& p) {
     return best;
 }
 
-TEST(SurfaceIndex, FindsTheClosestPointThatBruteForceFinds) {
+TEST(TriangleIndex, FindsTheClosestPointThatBruteForceFinds) {
     std::mt19937 random(5);
     std::uniform_real_distribution<double> coordinate(-100, 100);
     for (int round = 0; round < 40; ++round) {
         const Mesh mesh = shapes::soup(random, 1 + random() % 60, 1 + random() % 200);
-        const auto index = SurfaceIndex::build(mesh, {});
+        const auto index = TriangleIndex::build(mesh, {});
         ASSERT_TRUE(index.has_value());
         for (int q = 0; q < 50; ++q) {
             const Point3 p{{coordinate(random), coordinate(random), coordinate(random)}};
@@ -56,20 +56,20 @@ TEST(SurfaceIndex, FindsTheClosestPointThatBruteForceFinds) {
     }
 }
 
-TEST(SurfaceIndex, IsAccurateToNanometresFarFromTheOrigin) {
+TEST(TriangleIndex, IsAccurateToNanometresFarFromTheOrigin) {
     const Mesh mesh = shapes::moved(shapes::plane(100, 10, 0), 100000, 100000, 100000);
-    const auto index = SurfaceIndex::build(mesh, {});
+    const auto index = TriangleIndex::build(mesh, {});
     ASSERT_TRUE(index.has_value());
     const Point3 p{{100033.3, 100071.7, 100000.0001}};
     EXPECT_NEAR(std::sqrt(index->closest(p).squared_distance), 0.0001, 1e-6 * 0.0001 + 1e-10);
 }
 
-TEST(SurfaceIndex, VisitsEveryTriangleThatComesNearerThanTheRadius) {
+TEST(TriangleIndex, VisitsEveryTriangleThatComesNearerThanTheRadius) {
     std::mt19937 random(6);
     std::uniform_real_distribution<double> coordinate(-60, 60);
     for (int round = 0; round < 30; ++round) {
         const Mesh mesh = shapes::soup(random, 3 + random() % 40, 1 + random() % 100);
-        const auto index = SurfaceIndex::build(mesh, {});
+        const auto index = TriangleIndex::build(mesh, {});
         ASSERT_TRUE(index.has_value());
         const Point3 p{{coordinate(random), coordinate(random), coordinate(random)}};
         std::vector<bool> visited(mesh.triangles.size(), false);

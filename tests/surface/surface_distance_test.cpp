@@ -86,29 +86,5 @@ TEST(SurfaceErrors, EveryNthSampleSaysAboutTheSame) {
     EXPECT_NEAR(surface_errors(view(a), view(b), {.every = 5}).geometry_rms, all, 0.05 * all);
 }
 
-TEST(RegionErrors, AreSummedByLabel) {
-    Mesh from;
-    from.positions = {{10, 10, 1}, {20, 20, 2}, {30, 30, 3}, {40, 40, 4}};
-    from.colours = {{0, 0, 0}, {0, 0, 0}, {3, 4, 0}, {0, 0, 0}};
-    const Mesh to = painted(shapes::plane(100, 10, 0), {0, 0, 0});
-    const std::vector<std::uint16_t> labels = {0, 2, 2, 7};  // label 7 is no region
-    const auto regions =
-        region_errors(view(from), labels, 3, view(to), {to.positions, to.triangles}, {.threads = ThreadPool(2)});
-    ASSERT_EQ(regions.size(), 3u);
-    EXPECT_EQ(regions[0].samples, 1u);
-    EXPECT_NEAR(regions[0].squared_distance, 1, 1e-5);
-    EXPECT_EQ(regions[1].samples, 0u);
-    EXPECT_EQ(regions[2].samples, 2u);
-    EXPECT_NEAR(regions[2].squared_distance, 4 + 9, 1e-4);
-    EXPECT_NEAR(regions[2].squared_colour, 25, 1e-4);
-    EXPECT_NEAR(regions[2].largest_distance, 3, 1e-5);
-}
-
-TEST(RegionErrors, ToNothingAreInfinite) {
-    const Mesh from = shapes::plane(10, 1, 0);
-    const std::vector<std::uint16_t> labels(4, 0);
-    EXPECT_EQ(region_errors(view(from), labels, 1, {}, {{}, {}})[0].squared_distance, infinity);
-}
-
 }  // namespace
 }  // namespace htvm::internal

@@ -72,7 +72,7 @@ TEST_P(PictureCoding, OnePacketAPictureComesBackLikeIt) {
     PictureDecoder decoder;
     int i = 0;
     for (const auto& packet : coded(small(GetParam()), 6)) {
-        const auto taken = decoder.take(packet);
+        const auto taken = decoder.decode(packet);
         ASSERT_TRUE(taken) << taken.error().message;
         EXPECT_EQ(decoder.frame(), packet.frame);
         ASSERT_TRUE(decoder.planes());
@@ -85,10 +85,10 @@ TEST_P(PictureCoding, OnePacketAPictureComesBackLikeIt) {
 TEST_P(PictureCoding, DecodingStartsAtAKeyPictureAndNowhereElse) {
     const auto packets = coded(small(GetParam()), 8, {5});
     PictureDecoder decoder;
-    EXPECT_FALSE(decoder.take(packets[3]));
+    EXPECT_FALSE(decoder.decode(packets[3]));
     EXPECT_EQ(decoder.image(), nullptr);
     for (std::size_t i = 5; i < 8; ++i) {
-        const auto taken = decoder.take(packets[i]);
+        const auto taken = decoder.decode(packets[i]);
         ASSERT_TRUE(taken) << taken.error().message;
         EXPECT_GT(psnr(*decoder.image(), waves(static_cast<int>(i))), 32);
     }
@@ -97,16 +97,16 @@ TEST_P(PictureCoding, DecodingStartsAtAKeyPictureAndNowhereElse) {
 TEST_P(PictureCoding, AfterALostPictureTheLastOneStaysUntilTheNextKeyPicture) {
     const auto packets = coded(small(GetParam()), 8, {5});
     PictureDecoder decoder;
-    ASSERT_TRUE(decoder.take(packets[0]));
+    ASSERT_TRUE(decoder.decode(packets[0]));
     const auto first = *decoder.image();
     for (const std::size_t i : {2, 3, 4}) {
-        const auto taken = decoder.take(packets[i]);
+        const auto taken = decoder.decode(packets[i]);
         ASSERT_FALSE(taken);
         EXPECT_EQ(taken.error().kind, ErrorKind::corrupt_stream);
         EXPECT_EQ(decoder.image()->rgb, first.rgb);
         EXPECT_EQ(decoder.frame(), 0u);
     }
-    EXPECT_TRUE(decoder.take(packets[5]));
+    EXPECT_TRUE(decoder.decode(packets[5]));
 }
 
 TEST_P(PictureCoding, DamagedBytesAreAnErrorOrAPictureAndTheNextKeyPictureIsSound) {
@@ -114,14 +114,14 @@ TEST_P(PictureCoding, DamagedBytesAreAnErrorOrAPictureAndTheNextKeyPictureIsSoun
     std::srand(1);
     for (int trial = 0; trial < 200; ++trial) {
         PictureDecoder decoder;
-        ASSERT_TRUE(decoder.take(packets[0]));
+        ASSERT_TRUE(decoder.decode(packets[0]));
         auto damaged = packets[1];
         for (int k = 0; k < 3; ++k)
             damaged.payload[10 + static_cast<std::size_t>(std::rand()) % (damaged.payload.size() - 10)] =
                 static_cast<std::uint8_t>(std::rand());
-        (void)decoder.take(damaged);
-        (void)decoder.take(packets[2]);
-        ASSERT_TRUE(decoder.take(packets[3]));
+        (void)decoder.decode(damaged);
+        (void)decoder.decode(packets[2]);
+        ASSERT_TRUE(decoder.decode(packets[3]));
         EXPECT_GT(psnr(*decoder.image(), waves(3)), 32);
     }
 }
@@ -175,7 +175,7 @@ TEST_P(PictureCoding, OddSidesComeBack) {
     options.width = 99;
     options.height = 51;
     PictureDecoder decoder;
-    for (const auto& packet : coded(options, 2)) ASSERT_TRUE(decoder.take(packet));
+    for (const auto& packet : coded(options, 2)) ASSERT_TRUE(decoder.decode(packet));
     EXPECT_EQ(decoder.image()->width, 99);
     EXPECT_EQ(decoder.image()->height, 51);
     EXPECT_GT(psnr(*decoder.image(), waves(1, 99, 51)), 30);
@@ -188,7 +188,7 @@ TEST_P(PictureCoding, APictureOfAnotherSizeThanItsPacketSaysIsAnError) {
     picture.coded = bytes;
     picture.width = 32;
     PictureDecoder decoder;
-    const auto taken = decoder.take(write_texture_picture(picture, {}));
+    const auto taken = decoder.decode(write_texture_picture(picture, {}));
     ASSERT_FALSE(taken);
     EXPECT_EQ(taken.error().kind, ErrorKind::corrupt_stream);
 }
@@ -198,7 +198,7 @@ TEST_P(PictureCoding, WhatIsLargerThanAllowedIsRefusedBeforeItIsDecoded) {
     PictureDecoderOptions options;
     options.largest_side = 64;
     PictureDecoder decoder(options);
-    const auto taken = decoder.take(packet);
+    const auto taken = decoder.decode(packet);
     ASSERT_FALSE(taken);
     EXPECT_EQ(taken.error().kind, ErrorKind::limit);
     // Nor where the packet lies about it.
@@ -206,7 +206,7 @@ TEST_P(PictureCoding, WhatIsLargerThanAllowedIsRefusedBeforeItIsDecoded) {
     const std::vector<std::uint8_t> bytes(picture.coded.begin(), picture.coded.end());
     picture.coded = bytes;
     picture.width = picture.height = 64;
-    EXPECT_FALSE(decoder.take(write_texture_picture(picture, {})));
+    EXPECT_FALSE(decoder.decode(write_texture_picture(picture, {})));
 }
 
 TEST(PictureEncoder, RefusesWhatItCannotCode) {
@@ -233,13 +233,13 @@ TEST(PictureDecoder, ReadsImageFilesWhereItIsGivenAReader) {
     picture.gains = {picture_gain_one, picture_gain_one / 2, picture_gain_one};
     picture.coded = *file;
     const auto packet = write_texture_picture(picture, {});
-    const auto refused = PictureDecoder().take(packet);
+    const auto refused = PictureDecoder().decode(packet);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().kind, ErrorKind::unsupported);
     PictureDecoderOptions options;
     options.read_image_file = [](std::span<const std::uint8_t> bytes) { return read_image(bytes); };
     PictureDecoder decoder(options);
-    ASSERT_TRUE(decoder.take(packet));
+    ASSERT_TRUE(decoder.decode(packet));
     EXPECT_EQ(decoder.planes(), nullptr);
     const auto shown = decoder.image();
     const auto expected = waves(0);

@@ -64,7 +64,7 @@ std::string pictures_of(const std::vector<Packet>& packets) {
     std::ostringstream out;
     for (const auto& packet : packets) {
         if (packet.kind != PacketKind::texture) continue;
-        const auto taken = decoder.take(packet);
+        const auto taken = decoder.decode(packet);
         if (!taken && taken.error().kind == ErrorKind::unsupported) {
             out << packet.frame << " unknown\n";
             continue;

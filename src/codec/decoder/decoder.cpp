@@ -135,7 +135,7 @@ SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
     info.fps_numerator = header.fps_numerator;
     info.fps_denominator = header.fps_denominator;
     info.unit_micrometres = header.unit_micrometres;
-    info.skeleton_tracked = header.skeleton_tracked;
+    info.has_skeleton = header.has_skeleton;
     info.skeleton = header.skeleton;
     for (const auto r : header.radii) info.radii.push_back(r * info.lattice_step);
     info.nearest_vertices = header.nearest_vertices;
@@ -310,7 +310,7 @@ Result<std::optional<FrameView>> Decoder::decode(const Packet& packet) {
     return within_memory([&] { return decode_packet(*state_, packet); }, [&] { return out_of_memory_at(packet); });
 }
 
-Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
+Result<std::optional<DecodedFrame>> Decoder::decode_copy(const Packet& packet) {
     const auto copied = [&]() -> Result<std::optional<DecodedFrame>> {
         const auto frame = decode_packet(*state_, packet);
         if (!frame) return tl::unexpected(frame.error());
@@ -319,7 +319,7 @@ Result<std::optional<DecodedFrame>> Decoder::push(const Packet& packet) {
     return within_memory(copied, [&] { return out_of_memory_at(packet); });
 }
 
-std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t timestamp_us) {
+std::optional<FrameView> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) {
     const auto shown = [&]() -> std::optional<FrameView> {
         auto& state = *state_;
         free_lent(state.shown);
@@ -339,9 +339,9 @@ std::optional<FrameView> Decoder::stand_in(std::uint32_t frame, std::int64_t tim
     return within_memory(shown, [] { return std::nullopt; });
 }
 
-std::optional<DecodedFrame> Decoder::conceal(std::uint32_t frame, std::int64_t timestamp_us) {
+std::optional<DecodedFrame> Decoder::conceal_copy(std::uint32_t frame, std::int64_t timestamp_us) {
     const auto copied = [&]() -> std::optional<DecodedFrame> {
-        const auto lent = stand_in(frame, timestamp_us);
+        const auto lent = conceal(frame, timestamp_us);
         return lent ? std::optional(copy_of(*lent)) : std::nullopt;
     };
     return within_memory(copied, [] { return std::nullopt; });

@@ -17,8 +17,9 @@ Result<void> decode_intra(DecoderState& state, const Packet& packet, const Frame
     const auto& external = state.options.intra_coder;
     auto mesh = decode_intra_frame(payload, external ? &*external : nullptr, state.threads);
     if (!mesh) return tl::unexpected(mesh.error());
-    const auto step = smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step),
-                                      packet.has(packet_flag::told) && packet.has(packet_flag::settled), header);
+    const auto step =
+        smooth_as_shown(*mesh, static_cast<std::int32_t>(payload.header.geometry_step),
+                        packet.has(packet_flag::flags_valid) && packet.has(packet_flag::of_tracked_mesh), header);
     auto textured = read_charts(state, payload, *mesh);
     if (!textured) return tl::unexpected(textured.error());
     auto shown = to_pose(*pose, header.lattice);

@@ -16,7 +16,7 @@ std::uint32_t count(std::size_t n) { return static_cast<std::uint32_t>(n); }
 std::uint8_t flags_of(const CodedFrame& frame) {
     using namespace packet_flag;
     return static_cast<std::uint8_t>((frame.referred ? referred : droppable) | (frame.access ? access : 0) |
-                                     (frame.renewal ? settled : 0));
+                                     (frame.renewal ? of_tracked_mesh : 0));
 }
 
 ShownMesh shown(CodedFrame& frame, const TexturedSurface* of_reference) {
@@ -49,7 +49,7 @@ OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, con
         packet.frame = number;
         packet.reference = frame.reference;
         packet.timestamp_us = timestamp_us;
-        packet.flags |= packet_flag::told;
+        packet.flags |= packet_flag::flags_valid;
         if (packet.kind == PacketKind::codebook) {
             codebooks.overhead += packet_overhead;
             codebooks[packet.payload[0] == codebook_for_geometry ? Layer::geometry : Layer::colour] +=

@@ -55,7 +55,7 @@ Result<PoseTracker> complete(Configuration& configuration, const Mesh& mesh, con
     auto tracker = make_pose_tracker(options.skeleton, mesh, pose);
     if (!tracker) return tl::unexpected(tracker.error());
     header.skeleton = tracker->skeleton;
-    header.skeleton_tracked = tracker->tracked;
+    header.has_skeleton = tracker->has_skeleton;
     auto radii = options.radii;
     if (radii.empty()) {
         auto calibrated = calibrate(mesh, header.skeleton, tracker->last);

@@ -288,17 +288,15 @@ int frames_in_group(const EncoderOptions& options) {
     return may_be ? tracking_effort(options.tracked.effort).group : 1;
 }
 
-QualitySteps quality_steps(double quality) {
-    const double q = std::clamp(quality, 0.0, 100.0) / 100;
-    return {16 * std::exp2(-6 * q), 32 * std::exp2(-5 * q)};
-}
-
 Result<Encoder> Encoder::create(const EncoderOptions& options) {
     return within_memory([&]() -> Result<Encoder> {
         if (auto ok = check(options); !ok) return tl::unexpected(ok.error());
         auto state = std::make_unique<State>();
         state->configuration.options = options;
         state->configuration.options.tracked.group = frames_in_group(options);
+        const auto steps = quality_steps(options);
+        state->configuration.options.geometry_step = steps.geometry_step;
+        state->configuration.options.colour_step = steps.colour_step;
         if (options.profile != Profile::tracked) state->strategy = BonesStrategy();
         state->effort = options.tracked.effort;
         state->pool = ThreadPool(options.threads, options.runner);
@@ -404,7 +402,7 @@ Result<void> Encoder::finish() {
     static_cast<void>(within_memory([&]() -> Result<void> {
         Packet packet;
         packet.kind = PacketKind::index;
-        packet.flags = packet_flag::told;
+        packet.flags = packet_flag::flags_valid;
         packet.frame = next_frame(state);
         packet.timestamp_us = *state.last_timestamp;
         packet.payload = write_sequence_index(state.output.index);

@@ -20,12 +20,23 @@ constexpr std::array<const char*, 2> bone_registrations = {"point", "plane"};
 
 // Within each group, the options that people need most come first.
 constexpr Option list[] = {
+    {.name = "quality",
+     .group = OptionGroup::common,
+     .kind = OptionKind::number,
+     .least = 0,
+     .most = 100,
+     .meaning = "how fine positions and colours are: the steps of positions are 16 mm at 0, 2 mm at 50, 0.25 mm at "
+                "100; of colours 32, 5.7 and 1 of 255 levels",
+     .get = [](const EncoderOptions& o) -> double { return o.quality; },
+     .set = [](EncoderOptions& o, double value) { o.quality = value; },
+     .flag = "--quality"},
     {.name = "geometry_step",
      .group = OptionGroup::common,
      .kind = OptionKind::number,
      .unit = "mm",
      .least = 1.0 / 65536,
      .most = 1000,
+     .zero = "by the quality",
      .meaning = "step of the positions; errors are about half of it",
      .get = [](const EncoderOptions& o) -> double { return o.geometry_step; },
      .set = [](EncoderOptions& o, double value) { o.geometry_step = value; },
@@ -36,6 +47,7 @@ constexpr Option list[] = {
      .unit = "levels",
      .least = 1,
      .most = 255,
+     .zero = "by the quality",
      .meaning = "step of the colours, of 255 levels",
      .get = [](const EncoderOptions& o) -> double { return o.colour_step; },
      .set = [](EncoderOptions& o, double value) { o.colour_step = value; },
@@ -435,6 +447,17 @@ EncoderOptions default_options(Profile profile) {
     out.topology.registration = BoneRegistration::point;
     out.topology.weight_width = 0;
     return out;
+}
+
+QualitySteps quality_steps(double quality) {
+    const double q = std::clamp(quality, 0.0, 100.0) / 100;
+    return {16 * std::exp2(-6 * q), 32 * std::exp2(-5 * q)};
+}
+
+QualitySteps quality_steps(const EncoderOptions& options) {
+    const auto usual = quality_steps(options.quality);
+    return {options.geometry_step > 0 ? options.geometry_step : usual.geometry_step,
+            options.colour_step > 0 ? options.colour_step : usual.colour_step};
 }
 
 std::span<const Option> option_list() { return list; }

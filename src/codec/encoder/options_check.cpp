@@ -26,6 +26,8 @@ Result<void> check_that_options_go_together(const EncoderOptions& o) {
                    std::to_string(o.key_interval));
     if (o.rate.bits_per_second > 0 && o.rate.target_error > 0)
         return bad("rate.bits_per_second and rate.target_error exclude each other");
+    if (o.quality != usual.quality && (o.rate.bits_per_second > 0 || o.rate.target_error > 0))
+        return bad("quality does nothing with rate.bits_per_second or rate.target_error: it follows from these");
     if (!(o.rate.bits_per_second > 0)) {
         if (o.rate.buffer_seconds != usual.rate.buffer_seconds)
             return bad("rate.buffer_seconds does nothing without rate.bits_per_second");

@@ -20,7 +20,7 @@ Vector3d middle_of(const Mesh& mesh) {
 
 // One bone through the middle of the mesh, along the longest side of its bounding box.
 void stand_in(PoseTracker& tracker, const Mesh& mesh) {
-    tracker.tracked = false;
+    tracker.has_skeleton = false;
     tracker.skeleton.joint_names = {"low", "high"};
     tracker.skeleton.bones = {{0, 1}};
     Vector3d low = middle_of(mesh), high = low;
@@ -72,7 +72,7 @@ Result<PoseTracker> make_pose_tracker(const Skeleton& skeleton, const Mesh& firs
 
 Result<CodedPose> PoseTracker::next(const Mesh& mesh, const Pose* pose, const Lattice& lattice) {
     Pose now = last;
-    if (!tracked) {
+    if (!has_skeleton) {
         now = rest;
         if (!mesh.positions.empty()) {
             const auto middle = middle_of(mesh);

@@ -11,9 +11,9 @@ namespace htvm::internal {
 
 struct PoseTracker {
     Skeleton skeleton;
-    bool tracked = true;  // false: one bone that spans the first mesh stands in, and moves with each mesh's centre
-    Pose rest;            // the first pose, from which orientations are derived where they are not given
-    Pose last;            // repeated for a frame without a pose
+    bool has_skeleton = true;  // false: one bone that spans the first mesh stands in, and moves with each mesh's centre
+    Pose rest;                 // the first pose, from which orientations are derived where they are not given
+    Pose last;                 // repeated for a frame without a pose
     Vector3d rest_middle{};
 
     // bad_input if the number of joints or orientations differs from the skeleton's, or a value is not finite.

@@ -34,7 +34,7 @@ Packet write_audio(const AudioPacket& audio, std::uint32_t frame, std::int64_t t
     for (const auto& packet : audio.opus) out.bytes(packet);
     Packet packet;
     packet.kind = PacketKind::audio;
-    packet.flags = packet_flag::told | packet_flag::droppable;
+    packet.flags = packet_flag::flags_valid | packet_flag::droppable;
     packet.frame = packet.reference = frame;
     packet.timestamp_us = timestamp_us;
     packet.payload = out.take();

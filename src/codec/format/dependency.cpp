@@ -13,17 +13,17 @@ namespace htvm {
 
 using namespace internal;
 
-PacketHeader told_header(const Packet& packet) {
+PacketHeader header_with_flags(const Packet& packet) {
     PacketHeader out = packet;
-    if (out.has(packet_flag::told)) return out;
-    out.flags = packet_flag::told;
+    if (out.has(packet_flag::flags_valid)) return out;
+    out.flags = packet_flag::flags_valid;
     if (packet.kind == PacketKind::sequence) out.reference = crc32(packet.payload);
     if (packet.kind == PacketKind::codebook && !packet.payload.empty() && packet.payload[0] == codebook_for_colour)
         out.flags |= packet_flag::colour;
     if (const auto type = frame_type(packet.kind)) {
         const auto& rules = rules_of(*type);
         out.flags |= rules.referred ? packet_flag::referred : packet_flag::droppable;
-        // Of a T-frame the frames before would have to tell.
+        // Whether decoding can start at a T-frame follows from the frames before it.
         if (rules.refers_to != RefersTo::reference_or_before) out.flags |= packet_flag::access;
     }
     return out;
@@ -31,10 +31,10 @@ PacketHeader told_header(const Packet& packet) {
 
 std::uint64_t Dependencies::push(const PacketHeader& header) {
     const auto place = pushed_++;
-    if (header.kind == PacketKind::sequence) take_header(header, place);
-    if (header.kind == PacketKind::codebook) take_codebook(header, place);
-    if (header.kind == PacketKind::texture) take_picture(header, place);
-    if (frame_type(header.kind)) take_frame(header, place);
+    if (header.kind == PacketKind::sequence) push_header(header, place);
+    if (header.kind == PacketKind::codebook) push_codebook(header, place);
+    if (header.kind == PacketKind::texture) push_picture(header, place);
+    if (frame_type(header.kind)) push_frame(header, place);
     return place;
 }
 
@@ -51,31 +51,31 @@ void Dependencies::forget_reference() {
     references_.clear();
     chain_.clear();
     codebooks_ = {};
-    untold_codebooks_.clear();
+    unmarked_codebooks_.clear();
 }
 
-void Dependencies::take_header(const PacketHeader& header, std::uint64_t place) {
-    HeaderInForce taken{place, {}, header.has(packet_flag::told) && header.has(packet_flag::session)};
-    if (header.has(packet_flag::told)) taken.crc = header.reference;
-    const bool same = header_ && header_->crc == taken.crc;
-    if (begins_sequence(same, taken.session, header.frame, highest_frame_)) begin_sequence();
-    header_ = taken;
+void Dependencies::push_header(const PacketHeader& header, std::uint64_t place) {
+    HeaderInForce pushed{place, {}, header.has(packet_flag::flags_valid) && header.has(packet_flag::session)};
+    if (header.has(packet_flag::flags_valid)) pushed.crc = header.reference;
+    const bool same = header_ && header_->crc == pushed.crc;
+    if (begins_sequence(same, pushed.session, header.frame, highest_frame_)) begin_sequence();
+    header_ = pushed;
 }
 
-void Dependencies::take_codebook(const PacketHeader& header, std::uint64_t place) {
+void Dependencies::push_codebook(const PacketHeader& header, std::uint64_t place) {
     if (references_.empty() || references_.back().number != header.reference) return;
-    if (header.has(packet_flag::told)) {
-        codebooks_.told[header.has(packet_flag::colour)] = place;
+    if (header.has(packet_flag::flags_valid)) {
+        codebooks_.marked[header.has(packet_flag::colour)] = place;
         return;
     }
-    untold_codebooks_.push_back(place);
-    codebooks_.untold = untold_codebooks_.size();
-    if (untold_codebooks_.size() <= most_) return;
+    unmarked_codebooks_.push_back(place);
+    codebooks_.unmarked = unmarked_codebooks_.size();
+    if (unmarked_codebooks_.size() <= most_) return;
     forget_reference();
     newest_ = {};
 }
 
-void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
+void Dependencies::push_frame(const PacketHeader& header, std::uint64_t place) {
     newest_ = {};
     if (!header_) return;
     highest_frame_ = std::max(highest_frame_.value_or(0), header.frame);
@@ -104,7 +104,7 @@ void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
     newest_ = {};
 }
 
-void Dependencies::take_picture(const PacketHeader& header, std::uint64_t place) {
+void Dependencies::push_picture(const PacketHeader& header, std::uint64_t place) {
     newest_picture_.reset();
     if (!header_) return;
     const bool key = is_key_picture(header);
@@ -113,7 +113,7 @@ void Dependencies::take_picture(const PacketHeader& header, std::uint64_t place)
     if (!key && named == pictures_.end()) return;
     const auto before = key ? std::size_t{0} : static_cast<std::size_t>(named - pictures_.begin()) + 1;
     newest_picture_ = {place, before};
-    if (header.has(packet_flag::told) && !header.has(packet_flag::referred)) return;
+    if (header.has(packet_flag::flags_valid) && !header.has(packet_flag::referred)) return;
     pictures_.resize(before);
     pictures_.push_back({header.frame, place});
     if (pictures_.size() <= most_) return;
@@ -133,9 +133,9 @@ std::vector<std::uint64_t> Dependencies::places(std::size_t references, const Co
                                                 std::size_t chained) const {
     std::vector<std::uint64_t> out;
     for (std::size_t i = 0; i < references; ++i) out.push_back(references_[i].place);
-    for (const auto& place : codebooks.told)
+    for (const auto& place : codebooks.marked)
         if (place) out.push_back(*place);
-    for (std::size_t i = 0; i < codebooks.untold; ++i) out.push_back(untold_codebooks_[i]);
+    for (std::size_t i = 0; i < codebooks.unmarked; ++i) out.push_back(unmarked_codebooks_[i]);
     for (std::size_t i = 0; i < chained; ++i) out.push_back(chain_[i].place);
     std::sort(out.begin(), out.end());
     if (header_) out.insert(out.begin(), header_->place);

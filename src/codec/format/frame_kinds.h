@@ -64,7 +64,7 @@ inline bool stands_alone(FrameType type) { return rules_of(type).refers_to == Re
 
 // Whether later frames may refer to this one. Otherwise it leaves what they refer to as it was.
 inline bool is_referred(const PacketHeader& packet, const FrameRules& rules) {
-    return rules.referred && (!packet.has(packet_flag::told) || packet.has(packet_flag::referred));
+    return rules.referred && (!packet.has(packet_flag::flags_valid) || packet.has(packet_flag::referred));
 }
 
 }  // namespace htvm::internal

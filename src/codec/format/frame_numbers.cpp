@@ -6,7 +6,7 @@
 
 namespace htvm {
 
-void FrameNumbers::take_told(const PacketHeader& header) {
+void FrameNumbers::push(const PacketHeader& header) {
     dependencies_.push(header);
     begins_ = false;
     if (!frame_type(header.kind)) return;

@@ -58,7 +58,7 @@ Packet write_index(const StreamIndex& index) {
     }
     Packet packet;
     packet.kind = PacketKind::front_index;
-    packet.flags = packet_flag::told;
+    packet.flags = packet_flag::flags_valid;
     packet.frame = static_cast<std::uint32_t>(index.frames);
     packet.timestamp_us = index.first_timestamp_us;
     packet.payload = out.take();

@@ -35,7 +35,7 @@ double seconds_of_frames(std::int64_t first_us, std::int64_t last_us, std::uint6
     return seconds * count / (count - 1);
 }
 
-void RunningTime::take(const Packet& packet, bool begins_sequence) {
+void RunningTime::push(const Packet& packet, bool begins_sequence) {
     if (packet.kind == PacketKind::sequence)
         if (const auto header = read_sequence_header(packet.payload))
             of_one_ = static_cast<double>(header->fps_denominator) / header->fps_numerator;

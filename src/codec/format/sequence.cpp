@@ -139,7 +139,7 @@ std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
     out.u32(header.unit_micrometres);
     out.u8(header.nearest_vertices);
     out.u32(static_cast<std::uint32_t>(header.weight_width));
-    out.u8(header.skeleton_tracked);
+    out.u8(header.has_skeleton);
     out.u16(static_cast<std::uint16_t>(header.skeleton.joint_names.size()));
     for (const auto& name : header.skeleton.joint_names) {
         const auto length = std::min(name.size(), max_name);
@@ -170,7 +170,7 @@ Packet sequence_packet(const SequenceHeader& header) {
     Packet out;
     out.payload = write_sequence_header(header);
     out.reference = crc32(out.payload);
-    out.flags = packet_flag::told;
+    out.flags = packet_flag::flags_valid;
     if (header.session != 0) out.flags |= packet_flag::session;
     return out;
 }
@@ -195,7 +195,7 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
     out.unit_micrometres = in.u32();
     out.nearest_vertices = in.u8();
     const std::uint32_t weight_width = in.u32();
-    out.skeleton_tracked = in.u8() != 0;
+    out.has_skeleton = in.u8() != 0;
     const std::size_t joints = in.u16();
     if (!in.ok() || out.lattice.bits > 16 || out.fps_numerator == 0 || out.fps_denominator == 0 ||
         out.unit_micrometres == 0 || out.nearest_vertices < 1 || out.nearest_vertices > mtfan_max_nearest ||

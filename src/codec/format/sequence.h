@@ -50,7 +50,7 @@ struct SequenceHeader {
     Lattice lattice;
     std::uint32_t fps_numerator = 30, fps_denominator = 1;
     std::uint32_t unit_micrometres = 1000;  // the unit that the capture came in, so that a decoder can give it back
-    bool skeleton_tracked = true;           // false: the bones stand in for a skeleton that the capture does not have
+    bool has_skeleton = true;               // false: the bones stand in for a skeleton that the capture does not have
     Skeleton skeleton;                      // at least one bone
     std::vector<std::int32_t> radii;        // r^i of each bone, lattice units
     std::int32_t node_spacing = 0;          // of T-frames' deformation nodes, lattice units; 0: no T-frames

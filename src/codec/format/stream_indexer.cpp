@@ -10,8 +10,8 @@ namespace htvm {
 using namespace internal;
 
 void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
-    numbers_.take(packet);
-    time_.take(packet, numbers_.begins_sequence());
+    numbers_.push(packet);
+    time_.push(packet, numbers_.begins_sequence());
     if (packet.kind == PacketKind::sequence) header_offset_ = offset;
     const auto type = frame_type(packet.kind);
     if (!type) return;
@@ -23,7 +23,7 @@ void StreamIndexer::add(const Packet& packet, std::uint64_t offset) {
         reference_.reset();
     }
     const auto& rules = rules_of(*type);
-    const auto header = told_header(packet);
+    const auto header = header_with_flags(packet);
     const bool alone = stands_alone(*type), referred = is_referred(header, rules);
     if (!alone && !(referred && header.has(packet_flag::access))) return;
     if (!index_.points.empty() && number <= index_.points.back().frame) return;

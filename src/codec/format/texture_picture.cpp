@@ -48,7 +48,7 @@ Packet write_texture_picture(const TexturePicture& picture, const PicturePlace& 
     out.bytes(picture.coded);
     Packet packet;
     packet.kind = PacketKind::texture;
-    packet.flags = packet_flag::told | (place.referred ? packet_flag::referred : packet_flag::droppable);
+    packet.flags = packet_flag::flags_valid | (place.referred ? packet_flag::referred : packet_flag::droppable);
     if (place.reference == place.frame) packet.flags |= packet_flag::access;
     packet.frame = place.frame;
     packet.reference = place.reference;

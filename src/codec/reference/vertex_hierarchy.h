@@ -54,12 +54,6 @@ struct VertexHierarchy {
     std::size_t vertex_count = 0;
     std::vector<HierarchyLevel> levels;  // the first level joins vertices, the last has a single node; empty for < 2
                                          // vertices
-
-    std::size_t node_count() const {  // in all levels together
-        std::size_t count = 0;
-        for (const auto& level : levels) count += level.size();
-        return count;
-    }
 };
 
 // Accepts any triangles: non-manifold, duplicate, degenerate, none. Every level has at most three quarters of the nodes

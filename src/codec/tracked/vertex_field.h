@@ -88,10 +88,4 @@ Result<EncodedField> encode_field(const VertexHierarchy& hierarchy, std::span<co
 Result<DecodedField> decode_field(RangeDecoder& decoder, const FieldSteps& steps, const VertexHierarchy& hierarchy,
                                   std::size_t components, const FieldHistory* before = nullptr);
 
-// The largest error of a vertex, in the values' unit, that lambda 0 can leave before values are rounded to whole
-// numbers, in a component that is not turned and has this step: about 1.3 steps on meshes of some 30,000 vertices, as
-// the errors of a vertex's differences add up. Where it is below 0.5 the coding is lossless: there, with a step of
-// 0.25.
-double field_error_bound(const VertexHierarchy& hierarchy, double step);
-
 }  // namespace htvm::internal

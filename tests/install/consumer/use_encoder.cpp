@@ -37,9 +37,7 @@ void write_packets(htvm::Encoder& encoder, std::ofstream& file) {
 int main(int argc, char** argv) {
     if (argc != 2) return 2;
     auto options = htvm::default_options(htvm::Profile::tracked);
-    const auto steps = htvm::quality_steps(60);
-    options.geometry_step = steps.geometry_step;
-    options.colour_step = steps.colour_step;
+    options.quality = 60;
     options.key_interval = 60;
     auto encoder = htvm::Encoder::create(options);
     if (!encoder) return 1;

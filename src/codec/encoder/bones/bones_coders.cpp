@@ -13,7 +13,7 @@ Result<BonesIntra> code_intra_for(const BonesWork& work, FrameSteps steps, bool 
     const auto& mesh = work.mesh();
     const auto captured = counts_of(mesh);
     // Without a skeleton EP-frames may never pay off, and then the bits of a finer I-frame would be wasted.
-    const bool finer = referred_to && (configuration.header.skeleton_tracked ||
+    const bool finer = referred_to && (configuration.header.has_skeleton ||
                                        configuration.options.topology.frame_choice != FrameChoice::cheaper);
     StageClock clock(work.stages);
     BonesIntra out;

@@ -77,8 +77,6 @@ public:
     // The line carries so many bits a second from the next frame on. The quality follows at once, as far as the model
     // knows how, and then in larger steps than usual for half a second. What was planned from a first pass is dropped.
     void change_rate(double bits_per_second);
-    double buffer_bits() const { return buffer_; }
-    double total_bits() const { return total_bits_; }  // of all frames so far
 
 private:
     void take_line();            // what follows from the bitrate

@@ -1065,9 +1065,4 @@ std::optional<SurfacePatch> SurfacePatchSearch::find(double region_lost) const {
     return std::nullopt;
 }
 
-std::optional<SurfacePatch> find_surface_patch(const TrackedMesh& tracked, const LatticeMesh& captured,
-                                               const SurfaceIndex& surface, const SurfacePatchOptions& options) {
-    return SurfacePatchSearch(tracked, captured, surface, options).find(options.region_lost);
-}
-
 }  // namespace htvm::internal

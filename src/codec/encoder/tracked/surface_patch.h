@@ -59,8 +59,4 @@ private:
     std::unique_ptr<const Measured> measured_;  // null where no patch is possible
 };
 
-// The same in one call.
-std::optional<SurfacePatch> find_surface_patch(const TrackedMesh& tracked, const LatticeMesh& captured,
-                                               const SurfaceIndex& surface, const SurfacePatchOptions& options);
-
 }  // namespace htvm::internal

@@ -75,7 +75,7 @@ Result<std::shared_ptr<TrackedReference>> reference_of(const TrackedWork& work, 
     auto decoded = make_reference(
         configuration.header, {work.sequence.next_frame, step, frame.captured, std::move(kept), frame.textured},
         frame.decoded, std::move(pose),
-        {.bones = referred_to && configuration.header.skeleton_tracked, .nodes = referred_to}, configuration.threads);
+        {.bones = referred_to && configuration.header.has_skeleton, .nodes = referred_to}, configuration.threads);
     if (!decoded) return tl::unexpected(decoded.error());
     auto out = std::make_shared<TrackedReference>();
     out->decoded = std::move(*decoded);

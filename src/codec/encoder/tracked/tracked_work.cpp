@@ -10,7 +10,7 @@ namespace {
 // Where the skeleton moves each node: with the bone of the vertex that the node sits on.
 std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration, const Reference& reference,
                                               const CodedPose& pose) {
-    if (!configuration.header.skeleton_tracked) return {};
+    if (!configuration.header.has_skeleton) return {};
     const auto bones = skeletal_motion(reference.skinned, configuration.header.skeleton.bones, pose);
     std::vector<RigidMotion> out;
     for (const auto v : reference.by_nodes->nodes.vertex) out.push_back(bones[reference.skinned.bone_of_vertex[v]]);

@@ -24,11 +24,11 @@ struct ClosestTriangle {
     std::uint32_t triangle = 0;   // of equally near ones, the lowest index
 };
 
-class SurfaceIndex {
+class TriangleIndex {
 public:
     // Indexes the triangles of `mesh`, which must have at least one and must outlive the index. A limit error if Embree
     // cannot start or runs out of memory.
-    static Result<SurfaceIndex> build(const Mesh& mesh, internal::Threads threads = {});
+    static Result<TriangleIndex> build(const Mesh& mesh, internal::Threads threads = {});
 
     // The triangle nearest to p, which must lie within +-2 * largest_coordinate. `hint` is any triangle, ideally a near
     // one: the search starts with its distance. The result does not depend on it. Thread-safe.
@@ -40,7 +40,7 @@ public:
 
 private:
     struct Impl;
-    SurfaceIndex() = default;
+    TriangleIndex() = default;
     std::shared_ptr<const Impl> impl_;
 };
 

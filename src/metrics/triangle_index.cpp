@@ -1,4 +1,4 @@
-#include "metrics/surface_index.h"
+#include "metrics/triangle_index.h"
 
 #include <embree3/rtcore.h>
 
@@ -14,7 +14,7 @@ namespace htvm {
 
 using namespace internal;
 
-struct SurfaceIndex::Impl {
+struct TriangleIndex::Impl {
     const Mesh* mesh = nullptr;
     RTCDevice device = nullptr;
     RTCScene scene = nullptr;
@@ -107,7 +107,7 @@ bool fill_scene(RTCDevice device, RTCScene scene, const Mesh& mesh) {
 
 }  // namespace
 
-Result<SurfaceIndex> SurfaceIndex::build(const Mesh& mesh, Threads threads) {
+Result<TriangleIndex> TriangleIndex::build(const Mesh& mesh, Threads threads) {
     if (mesh.triangles.empty()) return fail(ErrorKind::bad_input, "A mesh without triangles has no surface to index.");
     auto impl = std::make_shared<Impl>();
     impl->mesh = &mesh;
@@ -119,12 +119,12 @@ Result<SurfaceIndex> SurfaceIndex::build(const Mesh& mesh, Threads threads) {
         return fail(ErrorKind::limit, "Embree could not index a mesh of " + std::to_string(mesh.triangles.size()) +
                                           " triangles: not enough memory.");
     for (const auto& p : mesh.positions) impl->largest = std::max(impl->largest, largest_component(to_point(p)));
-    SurfaceIndex index;
+    TriangleIndex index;
     index.impl_ = std::move(impl);
     return index;
 }
 
-ClosestTriangle SurfaceIndex::closest(const Point3& p, std::uint32_t hint) const {
+ClosestTriangle TriangleIndex::closest(const Point3& p, std::uint32_t hint) const {
     const double largest = std::max(impl_->largest, largest_component(p));
     ClosestSearch search{impl_->mesh, p, largest, {squared_distance_to(*impl_->mesh, hint, p), hint}};
     RTCPointQuery query = query_at(p, search_radius(std::sqrt(search.best.squared_distance), largest));
@@ -134,7 +134,7 @@ ClosestTriangle SurfaceIndex::closest(const Point3& p, std::uint32_t hint) const
     return search.best;
 }
 
-void SurfaceIndex::visit_near(const Point3& p, double radius, const std::function<bool(std::uint32_t)>& visit) const {
+void TriangleIndex::visit_near(const Point3& p, double radius, const std::function<bool(std::uint32_t)>& visit) const {
     NearSearch search{&visit};
     RTCPointQuery query = query_at(p, search_radius(radius, std::max(impl_->largest, largest_component(p))));
     RTCPointQueryContext context;
