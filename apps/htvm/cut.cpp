@@ -143,7 +143,7 @@ Result<bool> take(Cut& cut, Packet packet) {
     cut.output.add_bounds_of(packet);
     if (packet.kind == PacketKind::index || packet.kind == PacketKind::front_index) return true;
     if (packet.kind == PacketKind::sequence) {
-        if (auto ok = cut.headers.push(packet); !ok) return tl::unexpected(ok.error());
+        if (auto ok = cut.headers.decode(packet); !ok) return tl::unexpected(ok.error());
         cut.header = packet;
     }
     if (!frame_type(packet.kind)) {

@@ -454,7 +454,7 @@ Result<void> extract_sound(const Options& options) {
     Decoder headers(options.limits);  // only checks the sequence headers
     while (auto packet = input->next()) {
         if (packet->kind == PacketKind::sequence)
-            if (auto ok = headers.push(*packet); !ok) return tl::unexpected(ok.error());
+            if (auto ok = headers.decode(*packet); !ok) return tl::unexpected(ok.error());
         if (auto ok = sound.take(*packet); !ok) return fail(ok.error().kind, options.input + ": " + ok.error().message);
         if (sound.is_enough()) break;
     }

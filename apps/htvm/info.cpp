@@ -301,7 +301,7 @@ Result<void> info(const Options& options) {
         bytes += packet->payload.size() + packet_overhead;
         if (packet->kind == PacketKind::sequence) {
             const bool first = !headers.sequence();
-            if (auto ok = headers.push(*packet); !ok) return tl::unexpected(ok.error());
+            if (auto ok = headers.decode(*packet); !ok) return tl::unexpected(ok.error());
             if (!options.json && first) print_sequence(*headers.sequence(), options.input);
             if (!options.json && first && front) print_index(*front);
             if (!options.json && first && !options.summary)

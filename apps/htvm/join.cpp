@@ -40,7 +40,7 @@ Result<void> add_stream(StreamJoin& join, const std::string& path, const Decoder
     join.begin_stream();
     while (auto packet = input->next()) {
         if (packet->kind == PacketKind::sequence)
-            if (auto ok = headers.push(*packet); !ok) return tl::unexpected(ok.error());
+            if (auto ok = headers.decode(*packet); !ok) return tl::unexpected(ok.error());
         if (auto ok = join.take(std::move(*packet)); !ok) return ok;
     }
     if (auto fine = check_whole(*input, path); !fine) return fine;

@@ -38,7 +38,7 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
     while (const auto packet = input->next()) {
         numbers.push(*packet);
         if (packet->kind == PacketKind::sequence)
-            if (auto ok = headers.push(*packet); !ok)
+            if (auto ok = headers.decode(*packet); !ok)
                 return fail(ok.error().kind, source.name + ": " + ok.error().message);
         if (const auto index = read_index(*packet); packet->kind == PacketKind::front_index && index) {
             indexed += index->frames;
