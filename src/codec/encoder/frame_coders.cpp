@@ -349,7 +349,7 @@ TrackedFrameOptions tracked_frame_options(const Configuration& configuration, co
     // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
     constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
     TrackedFrameOptions out;
-    out.millimetre = configuration.adult_millimetre;
+    out.scale = {configuration.units, configuration.adult_millimetre};
     out.geometry_step = tracked_steps(steps).geometry;
     out.colour_step = coarser_colours * steps.colour;
     out.lambda = configuration.options.lambda;

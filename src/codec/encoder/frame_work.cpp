@@ -82,7 +82,7 @@ double region_side(const Configuration& configuration) { return 100 * configurat
 
 DeformationOptions deformation_options(const Configuration& configuration, const TrackingEffort& effort) {
     DeformationOptions out;
-    out.millimetre = configuration.adult_millimetre;
+    out.scale = {configuration.units, configuration.adult_millimetre};
     out.threads = configuration.threads;
     return with_effort(out, effort);
 }
@@ -262,7 +262,7 @@ TrackedFit FrameWork::tracked_fit(const LatticeMesh& decoded, double reference_e
     StageClock clock(stages);
     TrackedFitOptions options;
     options.stray = std::max(stray_in_edges * reference_edge, 1.0);
-    options.reach = std::max(reach * configuration.adult_millimetre, options.stray);
+    options.reach = std::max<LatticeUnits>(reach * configuration.adult_millimetre, options.stray);
     options.region = region_side(configuration);
     options.threads = configuration.threads;
     auto out = measure_tracked_fit(captured, decoded, near, intra_squared, options);
