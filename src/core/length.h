@@ -34,6 +34,7 @@ struct Length {
     friend constexpr auto operator<=>(Length a, Length b) = default;
 };
 
+// made_of_numbers: whether a number may stand for such a length.
 struct OnLattice {
     static constexpr bool made_of_numbers = true;
 };
