@@ -107,8 +107,9 @@ void find_blocks(std::vector<SampleBlend>& blends, const std::vector<HandlePair>
     }
 }
 
-// Forms groups of handles about `spacing` apart along their pairs, and how each handle follows the groups.
-void group_handles(DeformableMesh& mesh, double spacing) {
+// Forms groups of handles about this far apart along their pairs, and how each handle follows the groups.
+void group_handles(DeformableMesh& mesh, LatticeUnits apart) {
+    const double spacing = apart.value;
     const PlaceGraph graph = graph_of_handles(mesh);
     std::vector<bool> covered(mesh.handles.size(), false);
     std::vector<std::vector<std::pair<float, std::uint16_t>>> parts(mesh.handles.size());
@@ -262,7 +263,7 @@ DeformableMesh make_deformable(std::span<const Point3f> positions, std::span<con
         [&] { mesh.sample_textures = textures_of_samples(mesh, colours); });
     for (std::uint32_t h = 0; h < handles.size(); ++h) mesh.fine.centre.push_back(h);
     mesh.fine.pairs = std::move(pairs);
-    group_handles(mesh, options.coarse_spacing * options.millimetre);
+    group_handles(mesh, options.scale.on_lattice(options.coarse_spacing));
     for (const auto i : mesh.coarse.samples)
         mesh.coarse.blends.push_back(over_groups(mesh.fine.blends[i], mesh.groups));
     find_blocks(mesh.fine.blends, mesh.fine.pairs, handles.size(), mesh.fine.pattern);

@@ -1,7 +1,8 @@
 // A reference mesh prepared for deformation by handles (surface/tracked_registration.h): which of its vertices are
 // matched, how they follow handles, and handles in groups. Built once per I- or TP-frame. Encoder only.
 //
-// Lengths are in the unit of the positions; options are in millimetres and say how long a millimetre is.
+// Positions are in lattice units, as are lengths that are no more than numbers; options are in millimetres on an adult
+// and say how long one is.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "core/geometry.h"
+#include "core/length.h"
 #include "core/thread.h"
 #include "core/vertex_weights.h"
 #include "htvm/mesh.hpp"
@@ -31,19 +33,19 @@ struct HandlePair {
     double turn_stiffness = 0.2;  // weight of the difference of their turns; lower still at a joint between bones
 };
 
+// The defaults are those of the usual effort (codec/encoder/tracked/tracking_effort.h).
 struct DeformationOptions {
-    double millimetre = 1;            // the length of a millimetre in units of the positions: 16 on a lattice of 1/16
-                                      // mm
-    int coarse_rounds = 6;            // most rounds with groups of handles that move together, to cover large motion
-    double settled = 2;               // mm: once no group moves farther than this in a round, the next is the last
-    int fine_rounds = 4;              // rounds with all handles
-    double coarse_spacing = 180;      // mm between the centres of groups
-    double far_reach = 250;           // mm: search distance of the first coarse round
-    double middle_reach = 120;        // mm: of the last coarse round and the first fine one
-    double near_reach = 60;           // mm: of the last fine round
-    std::size_t samples = 4500;       // number of vertices of the reference, spread over the handles
-    std::size_t back_samples = 3500;  // number of vertices of the target, each of which pulls the nearest vertex of the
-                                      // reference
+    Scale scale;                  // of the lattice on which the positions are
+    int coarse_rounds = 6;        // most rounds with groups of handles that move together, to cover large motion
+    AdultMillimetres settled{2};  // once no group moves farther than this in a round, the next is the last
+    int fine_rounds = 3;          // rounds with all handles
+    AdultMillimetres coarse_spacing{180};  // between the centres of groups
+    AdultMillimetres far_reach{250};       // search distance of the first coarse round
+    AdultMillimetres middle_reach{120};    // of the last coarse round and the first fine one
+    AdultMillimetres near_reach{60};       // of the last fine round
+    std::size_t samples = 4500;            // number of vertices of the reference, spread over the handles
+    std::size_t back_samples = 3500;  // number of vertices of the target, each of which pulls the nearest vertex of
+                                      // the reference
     double first_stiffness = 1;       // of a handle's ties relative to its samples: in the coarse rounds and the first
                                       // fine one
     double last_stiffness = 0.01;     // the same in the last fine round
@@ -51,11 +53,12 @@ struct DeformationOptions {
                                       // the same rounds
     double last_point_share = 0.2;
     double agreement = 0.2;      // least dot product of the normals of a match
-    int solver_iterations = 40;  // at most, of conjugate gradients, per round
+    int solver_iterations = 25;  // at most, of conjugate gradients, per round
     int colour_rounds = 3;       // last fine rounds in which colours are matched as well, where both sides have them
-    double colour_weight = 5;    // mm^2: variance of a distance that counts as much as the noise of a colour does
-    int surface_rounds = 3;      // last fine rounds in which the target is matched to the reference's triangles, not to
-                                 // its vertices alone
+    double colour_weight = 5;  // mm^2 on an adult: variance of a distance that counts as much as the noise of a colour
+                               // does
+    int surface_rounds = 3;    // last fine rounds in which the target is matched to the reference's triangles, not to
+                               // its vertices alone
     Threads threads = {};
     const std::atomic<bool>* in_vain = nullptr;  // once it is set no more rounds are made: nobody wants the result
 };

@@ -59,12 +59,13 @@ std::vector<std::uint32_t> extremities_of(const PlaceGraph& graph, const std::ve
 
 }  // namespace
 
-PlaceGraph graph_of_surface(const SurfaceIndex& surface, double side) {
+PlaceGraph graph_of_surface(const SurfaceIndex& surface, LatticeUnits side) {
     using Cube = std::array<std::int32_t, 3>;
     const auto cube_of = [&](std::uint32_t v) {
         Cube cube{};
         for (std::size_t axis = 0; axis < 3; ++axis)
-            cube[axis] = static_cast<std::int32_t>(std::floor(static_cast<double>(surface.positions[v][axis]) / side));
+            cube[axis] =
+                static_cast<std::int32_t>(std::floor(static_cast<double>(surface.positions[v][axis]) / side.value));
         return cube;
     };
     std::vector<Cube> cube(surface.positions.size());
@@ -103,15 +104,15 @@ PlaceGraph graph_of_surface(const SurfaceIndex& surface, double side) {
     return out;
 }
 
-std::vector<std::uint32_t> extremities(const PlaceGraph& graph, double reach) {
-    return extremities_of(graph, mean_distances(graph), reach);
+std::vector<std::uint32_t> extremities(const PlaceGraph& graph, LatticeUnits reach) {
+    return extremities_of(graph, mean_distances(graph), reach.value);
 }
 
-std::vector<Limb> limbs_of(const DeformableMesh& mesh, double reach) {
+std::vector<Limb> limbs_of(const DeformableMesh& mesh, LatticeUnits reach) {
     constexpr double limb_of_way = 0.7;  // of the way from an extremity to what lies in the middle of the body
     const auto graph = graph_of_handles(mesh);
     const auto mean = mean_distances(graph);
-    const auto ends = extremities_of(graph, mean, reach);
+    const auto ends = extremities_of(graph, mean, reach.value);
     std::vector<std::vector<double>> distance;
     for (const auto end : ends) distance.push_back(distances_from(graph, end));
     std::vector<Limb> out;
@@ -142,8 +143,8 @@ namespace {
 // Whether the reference's samples at the end of each limb lie on the target: then none is lost.
 bool all_lie_on(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> motions,
                 const std::vector<Limb>& limbs, const LimbReach& options) {
-    constexpr double on = 15;  // mm: mean distance
-    const double reach = options.matched / 2 * options.millimetre;
+    constexpr AdultMillimetres on(15);  // mean distance
+    const double reach = options.scale.on_lattice(options.matched / 2).value, near = options.scale.on_lattice(on).value;
     std::vector<double> sum(mesh.handles.size(), 0);
     std::vector<std::size_t> count(mesh.handles.size(), 0);
     std::vector<bool> ends(mesh.handles.size(), false);
@@ -164,7 +165,7 @@ bool all_lie_on(const DeformableMesh& mesh, const SurfaceIndex& target, std::spa
     }
     return std::all_of(limbs.begin(), limbs.end(), [&](const Limb& limb) {
         const auto tip = limb.handles.front();
-        return sum[tip] < on * options.millimetre * static_cast<double>(count[tip]);
+        return sum[tip] < near * static_cast<double>(count[tip]);
     });
 }
 
@@ -174,19 +175,19 @@ std::vector<RigidMotion> reached_for_extremities(const DeformableMesh& mesh, con
                                                  std::span<const RigidMotion> motions,
                                                  std::span<const RigidMotion> last, const LimbReach& options) {
     constexpr double bend = 0.25;  // of the limb, from its root on, in which it turns
-    const double unit = options.millimetre;
-    const auto limbs = limbs_of(mesh, options.apart * unit);
+    const auto limbs = limbs_of(mesh, options.scale.on_lattice(options.apart));
     if (limbs.empty() || all_lie_on(mesh, target, motions, limbs, options)) return {};
-    const auto graph = graph_of_surface(target, options.cell * unit);
+    const auto graph = graph_of_surface(target, options.scale.on_lattice(options.cell));
     std::vector<Vector3d> free;
-    for (const auto place : extremities(graph, options.apart * unit)) free.push_back(graph.places[place]);
+    for (const auto place : extremities(graph, options.scale.on_lattice(options.apart)))
+        free.push_back(graph.places[place]);
     // Those that a limb ends near are taken.
     std::vector<bool> lost(limbs.size(), true);
     for (std::size_t i = 0; i < limbs.size(); ++i) {
         const auto tip = limbs[i].handles.front();
         const Vector3d end = motions[tip](mesh.handles[tip]);
         const auto near = std::find_if(free.begin(), free.end(), [&](const Vector3d& place) {
-            return (place - end).norm() < options.matched * unit;
+            return LatticeUnits((place - end).norm()) < options.scale.on_lattice(options.matched);
         });
         if (near == free.end()) continue;
         lost[i] = false;
@@ -208,7 +209,7 @@ std::vector<RigidMotion> reached_for_extremities(const DeformableMesh& mesh, con
             return (a - end).squaredNorm() < (b - end).squaredNorm();
         });
         const Vector3d to = *nearest;
-        if ((to - end).norm() > options.farthest * unit) continue;
+        if (LatticeUnits((to - end).norm()) > options.scale.on_lattice(options.farthest)) continue;
         double length = 0;  // of the limb when it is straight, at least
         for (const auto h : limbs[i].handles) length = std::max(length, (mesh.handles[h] - mesh.handles[root]).norm());
         if ((to - from).norm() > options.longer * length || !((to - from).norm() > 0)) continue;

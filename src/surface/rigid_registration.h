@@ -27,7 +27,7 @@ struct RegistrationOptions {
     double trim = 0.1;                // share of the worst pairs to leave out in each iteration, such as mis-skinned
                                       // vertices
     std::size_t minimum_points = 12;  // with fewer points on either side, the start is returned
-    bool point_to_plane = false;      // needs normals
+    bool point_to_plane = true;  // where the reference has normals; else the points themselves are brought together
 };
 
 // Registers the reference points (in the tree, in their own space) to the frame's points, beginning at `start`; returns

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <numeric>
 #include <optional>
 
 #include "core/parallel.h"
@@ -136,7 +137,7 @@ struct Guesses {
 };
 
 struct Round {
-    double reach = 0;  // in units of the positions
+    LatticeUnits reach;
     double stiffness = 0;
     double point_share = 0;
     float gap = 0;          // spacing of the reference's samples
@@ -147,9 +148,9 @@ struct Round {
 
 // Near matches have full weight, which fades to zero at the reach; distant ones all have the same small pull.
 float match_weight(double squared_distance, const Round& round) {
-    const double d = std::sqrt(squared_distance);
-    if (round.far) return static_cast<float>(1 / std::max(1.0, d / (0.1 * round.reach)));
-    const double fade = std::max(0.0, 1 - d * d / (round.reach * round.reach));
+    const double d = std::sqrt(squared_distance), reach = round.reach.value;
+    if (round.far) return static_cast<float>(1 / std::max(1.0, d / (0.1 * reach)));
+    const double fade = std::max(0.0, 1 - d * d / (reach * reach));
     return static_cast<float>(fade * fade);
 }
 
@@ -208,118 +209,164 @@ private:
     mutable std::optional<OrientedPoints> points_;
 };
 
-// Matches in both directions: from each sample to the target, and from each of the target's samples to the nearest
+// ---- Matches in both directions: from each sample to the target, and from each of the target's samples to the nearest
 // moved sample, or to the triangles around that.
 //
 // A search goes from vertex to vertex, or from sample to sample, as long as the distance shrinks, beginning with what
 // the last round found; on the target, in the first round, with what the neighbouring search found. (Among the samples
 // that took 4 to 6 % more bits.) Where it ends far from the point, or faces elsewhere, the search is among all.
+
+constexpr float begins_near = 4;  // spacings: from farther away it is not worth going
+
+// What the searches of one round share.
+struct MatchSearch {
+    const DeformableMesh& mesh;
+    const DeformationLevel& level;
+    const Moved& moved;
+    const SurfaceIndex& target;
+    const Round& round;
+    float reach, agreement;
+    float target_gap;  // spacing of the target's vertices, or in far rounds of its samples
+    float sample_gap;  // spacing of the moved samples
+    std::size_t skip;  // of the target's samples, every how many-th is matched back
+    MovedGrid grid;    // of the moved samples
+};
+
+bool agrees(const MatchSearch& search, const Point3f& a, const Point3f& b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= search.agreement;
+}
+
+bool is_near(const Point3f& a, const Point3f& b, float spacing) {
+    const Point3f apart = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+    return apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2] <= spacing * spacing;
+}
+
+// Among the samples of the target. guess: a vertex of the target, or no_point.
+OrientedMatch nearest_target_sample(const MatchSearch& search, const Point3f& point, const Point3f& normal,
+                                    std::uint32_t guess) {
+    const auto& target = search.target;
+    std::uint32_t beside = OrientedPoints::no_point;
+    if (guess != OrientedPoints::no_point) {
+        if (is_near(target.positions[guess], point, begins_near * search.target_gap)) {
+            const auto near = target.nearest_along(point, guess);
+            const auto most = std::min(search.reach, search.target_gap);
+            if (near.squared_distance <= most * most && agrees(search, target.normals[near.index], normal))
+                return {near.index, near.squared_distance, true};
+        }
+        beside = static_cast<std::uint32_t>(std::size_t{guess} * target.samples.size() / target.positions.size());
+    }
+    auto match = target.coarse.nearest(point, normal, search.reach, search.agreement, beside);
+    if (match.found) match.index = target.samples[match.index];
+    return match;
+}
+
+// Among the moved samples. guess: what the last round found; last: what the search before found; or no_point.
+OrientedMatch nearest_moved_sample(const MatchSearch& search, const Point3f& point, const Point3f& normal,
+                                   std::uint32_t guess, std::uint32_t last) {
+    const auto& moved = search.moved;
+    if (guess != OrientedPoints::no_point && is_near(moved.points[guess], point, begins_near * search.sample_gap)) {
+        const auto near = nearest_along(moved.points, point, guess, [&](std::uint32_t sample, const auto& visit) {
+            for (const auto next : search.level.beside.of(sample)) visit(next);
+        });
+        const auto most = std::min(search.reach, search.sample_gap);
+        if (near.squared_distance <= most * most && agrees(search, moved.normals[near.index], normal))
+            return {near.index, near.squared_distance, true};
+        guess = near.index;
+    }
+    return search.grid.points().nearest(point, normal, search.reach, search.agreement,
+                                        guess == OrientedPoints::no_point ? last : guess);
+}
+
+// From a sample to the target. guess: where the last round found it, set to where it is; last: as above. Both ways a
+// match that is not found is left as it is.
+void match_forward(const MatchSearch& search, std::size_t sample, std::uint32_t last, std::uint32_t& guess,
+                   Match& out) {
+    const auto& moved = search.moved;
+    const auto from = guess == OrientedPoints::no_point ? last : guess;
+    const auto match =
+        search.round.far
+            ? nearest_target_sample(search, moved.points[sample], moved.normals[sample], from)
+            : search.target.nearest_facing(moved.points[sample], moved.normals[sample],
+                                           {.reach = search.reach, .agreement = search.agreement, .along = true}, from);
+    if (!match.found) return;
+    guess = match.index;
+    out = match_of(moved, static_cast<std::uint32_t>(sample), search.target, match.index, search.target_gap);
+    out.weight = match_weight(match.squared_distance, search.round);
+}
+
+// From a vertex of the target to the samples, or to the triangles around the nearest one.
+void match_back(const MatchSearch& search, std::uint32_t vertex, std::uint32_t last, std::uint32_t& guess, Match& out) {
+    const auto& place = search.target.positions[vertex];
+    const auto match = nearest_moved_sample(search, place, search.target.normals[vertex], guess, last);
+    if (!match.found) return;
+    guess = match.index;
+    out = match_of(search.moved, match.index, search.target, vertex, search.round.gap);
+    auto squared_distance = static_cast<double>(match.squared_distance);
+    if (search.round.surfaces) {
+        const auto near = nearest_around(search.mesh, search.moved.vertices, match.index, place);
+        if (near.squared_distance < match.squared_distance) {
+            squared_distance = static_cast<double>(near.squared_distance);
+            out.across = out.normal.dot(floats_of(near.apart));
+        }
+    }
+    out.weight = match_weight(squared_distance, search.round);
+}
+
+// Both directions are cut into slices, so that the threads have equal work. Each begins without a guess: what is found
+// along a surface depends on where a search begins, and must not depend on how the threads share the slices.
+constexpr std::size_t slices = 64;
+
+// out: the matches of the samples, then those of the target's samples.
+void match_slice(const MatchSearch& search, std::size_t slice, Guesses& guesses, std::vector<Match>& out) {
+    constexpr std::size_t ahead = 6;
+    const auto& target = search.target;
+    const std::size_t forward = guesses.forward.size(), back = guesses.back.size();
+    const std::size_t first = slice * forward / slices, after = (slice + 1) * forward / slices;
+    target.walk_all(std::span(search.moved.points).subspan(first, after - first),
+                    search.round.far ? begins_near * search.target_gap : target.begins_near(),
+                    std::span(guesses.forward).subspan(first, after - first));
+    std::uint32_t last = OrientedPoints::no_point;
+    for (std::size_t i = first; i < after; ++i) {
+        if (i + ahead < after) target.expect(guesses.forward[i + ahead]);
+        match_forward(search, i, last, guesses.forward[i], out[i]);
+        last = guesses.forward[i];
+    }
+    last = OrientedPoints::no_point;
+    for (std::size_t i = slice * back / slices; i < (slice + 1) * back / slices; ++i) {
+        match_back(search, target.samples[i * search.skip], last, guesses.back[i], out[forward + i]);
+        last = guesses.back[i];
+    }
+}
+
 std::vector<Match> find_matches(const DeformableMesh& mesh, const DeformationLevel& level, const Moved& moved,
-                                const SurfaceIndex& target, const Round& round, float cell,
-                                const DeformationOptions& options, Guesses& guesses) {
-    constexpr float begins_near = 4;  // spacings: from farther away it is not worth going
+                                const SurfaceIndex& target, const Round& round, const DeformationOptions& options,
+                                Guesses& guesses) {
+    constexpr AdultMillimetres cell(30);  // of the grid of moved samples
     const std::size_t skip = round.far ? 2 : 1;
-    const std::size_t forward = moved.points.size(), back = target.samples.size() / skip;
-    const auto reach = static_cast<float>(round.reach), agreement = static_cast<float>(options.agreement);
-    const MovedGrid reference(moved, cell);
-    const float gap = round.far ? target.coarse_gap : target.fine_gap;
-    guesses.forward.resize(forward, OrientedPoints::no_point);
-    guesses.back.resize(back, OrientedPoints::no_point);
-    std::vector<Match> out(forward + back);
-    const auto agrees = [&](const Point3f& a, const Point3f& b) {
-        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] >= agreement;
-    };
-    const auto is_near = [&](const Point3f& a, const Point3f& b, float spacing) {
-        const Point3f apart = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-        return apart[0] * apart[0] + apart[1] * apart[1] + apart[2] * apart[2] <= spacing * spacing;
-    };
-    // Among the samples of the target.
-    const auto nearest_far = [&](const Point3f& point, const Point3f& normal, std::uint32_t guess) {
-        std::uint32_t beside = OrientedPoints::no_point;
-        if (guess != OrientedPoints::no_point) {
-            if (is_near(target.positions[guess], point, begins_near * gap)) {
-                const auto near = target.nearest_along(point, guess);
-                const auto most = std::min(reach, gap);
-                if (near.squared_distance <= most * most && agrees(target.normals[near.index], normal))
-                    return OrientedMatch{near.index, near.squared_distance, true};
-            }
-            beside = static_cast<std::uint32_t>(std::size_t{guess} * target.samples.size() / target.positions.size());
-        }
-        auto match = target.coarse.nearest(point, normal, reach, agreement, beside);
-        if (match.found) match.index = target.samples[match.index];
-        return match;
-    };
-    const auto go_forward = [&](std::size_t sample, std::uint32_t last) {
-        std::uint32_t& guess = guesses.forward[sample];
-        const auto from = guess == OrientedPoints::no_point ? last : guess;
-        const auto match = round.far
-                               ? nearest_far(moved.points[sample], moved.normals[sample], from)
-                               : target.nearest_facing(moved.points[sample], moved.normals[sample],
-                                                       {.reach = reach, .agreement = agreement, .along = true}, from);
-        if (!match.found) return guess;
-        guess = match.index;
-        out[sample] = match_of(moved, static_cast<std::uint32_t>(sample), target, match.index, gap);
-        out[sample].weight = match_weight(match.squared_distance, round);
-        return guess;
-    };
-    const float spacing =
-        mesh.sample_gap * std::sqrt(static_cast<float>(mesh.samples.size()) /
-                                    static_cast<float>(std::max<std::size_t>(moved.points.size(), 1)));
-    const auto nearest_sample = [&](const Point3f& point, const Point3f& normal, std::uint32_t guess,
-                                    std::uint32_t last) {
-        if (guess != OrientedPoints::no_point && is_near(moved.points[guess], point, begins_near * spacing)) {
-            const auto near = nearest_along(moved.points, point, guess, [&](std::uint32_t sample, const auto& visit) {
-                for (const auto next : level.beside.of(sample)) visit(next);
-            });
-            const auto most = std::min(reach, spacing);
-            if (near.squared_distance <= most * most && agrees(moved.normals[near.index], normal))
-                return OrientedMatch{near.index, near.squared_distance, true};
-            guess = near.index;
-        }
-        return reference.points().nearest(point, normal, reach, agreement,
-                                          guess == OrientedPoints::no_point ? last : guess);
-    };
-    const auto go_back = [&](std::size_t i, std::uint32_t last) {
-        const std::uint32_t vertex = target.samples[i * skip];
-        std::uint32_t& guess = guesses.back[i];
-        const auto match = nearest_sample(target.positions[vertex], target.normals[vertex], guess, last);
-        if (!match.found) return guess;
-        guess = match.index;
-        Match& there = out[forward + i];
-        there = match_of(moved, match.index, target, vertex, round.gap);
-        auto squared_distance = static_cast<double>(match.squared_distance);
-        if (round.surfaces) {
-            const auto near = nearest_around(mesh, moved.vertices, match.index, target.positions[vertex]);
-            if (near.squared_distance < match.squared_distance) {
-                squared_distance = static_cast<double>(near.squared_distance);
-                there.across = there.normal.dot(floats_of(near.apart));
-            }
-        }
-        there.weight = match_weight(squared_distance, round);
-        return guess;
-    };
-    // Both directions are cut into slices, so that the threads have equal work. Each begins without a guess: what is
-    // found along a surface depends on where a search begins, and must not depend on how the threads share the slices.
-    constexpr std::size_t slices = 64;
+    const auto samples = std::max<std::size_t>(moved.points.size(), 1);
+    const MatchSearch search{.mesh = mesh,
+                             .level = level,
+                             .moved = moved,
+                             .target = target,
+                             .round = round,
+                             .reach = static_cast<float>(round.reach.value),
+                             .agreement = static_cast<float>(options.agreement),
+                             .target_gap = round.far ? target.coarse_gap : target.fine_gap,
+                             .sample_gap = mesh.sample_gap * std::sqrt(static_cast<float>(mesh.samples.size()) /
+                                                                       static_cast<float>(samples)),
+                             .skip = skip,
+                             .grid = {moved, static_cast<float>(options.scale.on_lattice(cell).value)}};
+    guesses.forward.resize(moved.points.size(), OrientedPoints::no_point);
+    guesses.back.resize(target.samples.size() / skip, OrientedPoints::no_point);
+    std::vector<Match> out(guesses.forward.size() + guesses.back.size());
     parallel_for(slices, options.threads, 4, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t slice = begin; slice < end; ++slice) {
-            std::uint32_t last = OrientedPoints::no_point;
-            constexpr std::size_t ahead = 6;
-            const std::size_t first = slice * forward / slices, after = (slice + 1) * forward / slices;
-            target.walk_all(std::span(moved.points).subspan(first, after - first),
-                            round.far ? begins_near * gap : target.begins_near(),
-                            std::span(guesses.forward).subspan(first, after - first));
-            for (std::size_t i = first; i < after; ++i) {
-                if (i + ahead < after) target.expect(guesses.forward[i + ahead]);
-                last = go_forward(i, last);
-            }
-            last = OrientedPoints::no_point;
-            for (std::size_t i = slice * back / slices; i < (slice + 1) * back / slices; ++i) last = go_back(i, last);
-        }
+        for (std::size_t slice = begin; slice < end; ++slice) match_slice(search, slice, guesses, out);
     });
     std::erase_if(out, [](const Match& m) { return !(m.weight > 0); });
     return out;
 }
+
+// ---- Pulls
 
 // The derivative of a point's motion by the six unknowns of a handle: the turn about `centre`, and the shift.
 Eigen::Matrix<double, 3, 6> lever(const Vector3d& point, const Vector3d& centre) {
@@ -431,7 +478,7 @@ std::vector<Pull> colour_pulls(const Stage& stage, const std::vector<Match>& mat
     const auto slopes = turned_slopes(stage, moved);
     const auto differences = colour_differences(stage, matches, moved, slopes, target);
     const float noise = colour_noise(differences);
-    const auto unit = static_cast<float>(options.millimetre * options.millimetre);
+    const auto unit = static_cast<float>(options.scale.adult_millimetre.value * options.scale.adult_millimetre.value);
     const auto colour_weight = static_cast<float>(options.colour_weight);
     const auto means = mean_differences(stage, matches, differences, noise);
     for (std::size_t m = 0; m < matches.size(); ++m) {
@@ -460,49 +507,89 @@ Matrix3d cross_matrix(const Vector3d& r) {
     return out;
 }
 
-// What the pulls on samples do to a turn about one common origin and a shift, the same for all handles: a symmetric
-// matrix of 6 x 6, as its rows from the diagonal on; padded for vectors. A sample's is found once, however many pairs
-// of handles move it; what it does to a handle that turns about its own centre follows from the sum over all samples
-// (about_centres()).
-using AboutOrigin = std::array<float, 24>;
+// What the pulls on samples do to a turn about one common origin and a shift, the same for all handles: the blocks of a
+// symmetric matrix of 6 x 6. A sample's is found once, however many pairs of handles move it; what it does to a handle
+// that turns about its own centre follows from the sum over all samples (about_centres()).
+struct AboutOrigin {
+    enum Place : std::size_t {
+        // turns, symmetric
+        turn_xx,
+        turn_xy,
+        turn_xz,
+        turn_yy,
+        turn_yz,
+        turn_zz,
+        // turn by shift: a row per axis of the turn
+        x_shift_x,
+        x_shift_y,
+        x_shift_z,
+        y_shift_x,
+        y_shift_y,
+        y_shift_z,
+        z_shift_x,
+        z_shift_y,
+        z_shift_z,
+        // shifts, symmetric
+        shift_xx,
+        shift_xy,
+        shift_xz,
+        shift_yy,
+        shift_yz,
+        shift_zz,
+        places
+    };
+    static constexpr std::size_t padded = 24;  // for vectors, four by four
+    static_assert(places <= padded);
+    std::array<float, padded> sum{};
+
+    float& operator[](Place place) { return sum[place]; }
+
+    Matrix3d turns() const {
+        Matrix3d out;
+        out << sum[turn_xx], sum[turn_xy], sum[turn_xz], sum[turn_xy], sum[turn_yy], sum[turn_yz], sum[turn_xz],
+            sum[turn_yz], sum[turn_zz];
+        return out;
+    }
+    Matrix3d turn_by_shift() const {
+        Matrix3d out;
+        out << sum[x_shift_x], sum[x_shift_y], sum[x_shift_z], sum[y_shift_x], sum[y_shift_y], sum[y_shift_z],
+            sum[z_shift_x], sum[z_shift_y], sum[z_shift_z];
+        return out;
+    }
+    Matrix3d shifts() const {
+        Matrix3d out;
+        out << sum[shift_xx], sum[shift_xy], sum[shift_xz], sum[shift_xy], sum[shift_yy], sum[shift_yz], sum[shift_xz],
+            sum[shift_yz], sum[shift_zz];
+        return out;
+    }
+};
 
 AboutOrigin about_origin(const Vector3f& point, const Pull& pull) {
     const auto& m = pull.metric;
-    Matrix3f turn_shift;  // cross matrix of the point * metric
+    Matrix3f b;  // cross matrix of the point * metric
     const float x = point.x(), y = point.y(), z = point.z();
     for (int column = 0; column < 3; ++column)
-        turn_shift.col(column) << y * m(2, column) - z * m(1, column), z * m(0, column) - x * m(2, column),
+        b.col(column) << y * m(2, column) - z * m(1, column), z * m(0, column) - x * m(2, column),
             x * m(1, column) - y * m(0, column);
-    const auto& b = turn_shift;
-    // -turn_shift * cross matrix of the point
-    return {b(0, 2) * y - b(0, 1) * z,
-            b(0, 0) * z - b(0, 2) * x,
-            b(0, 1) * x - b(0, 0) * y,
-            b(0, 0),
-            b(0, 1),
-            b(0, 2),
-            b(1, 0) * z - b(1, 2) * x,
-            b(1, 1) * x - b(1, 0) * y,
-            b(1, 0),
-            b(1, 1),
-            b(1, 2),
-            b(2, 1) * x - b(2, 0) * y,
-            b(2, 0),
-            b(2, 1),
-            b(2, 2),
-            m(0, 0),
-            m(0, 1),
-            m(0, 2),
-            m(1, 1),
-            m(1, 2),
-            m(2, 2),
-            0,
-            0,
-            0};
+    using enum AboutOrigin::Place;
+    AboutOrigin out;
+    // -b * cross matrix of the point
+    out[turn_xx] = b(0, 2) * y - b(0, 1) * z;
+    out[turn_xy] = b(0, 0) * z - b(0, 2) * x;
+    out[turn_xz] = b(0, 1) * x - b(0, 0) * y;
+    out[turn_yy] = b(1, 0) * z - b(1, 2) * x;
+    out[turn_yz] = b(1, 1) * x - b(1, 0) * y;
+    out[turn_zz] = b(2, 1) * x - b(2, 0) * y;
+    out[x_shift_x] = b(0, 0), out[x_shift_y] = b(0, 1), out[x_shift_z] = b(0, 2);
+    out[y_shift_x] = b(1, 0), out[y_shift_y] = b(1, 1), out[y_shift_z] = b(1, 2);
+    out[z_shift_x] = b(2, 0), out[z_shift_y] = b(2, 1), out[z_shift_z] = b(2, 2);
+    out[shift_xx] = m(0, 0), out[shift_xy] = m(0, 1), out[shift_xz] = m(0, 2);
+    out[shift_yy] = m(1, 1), out[shift_yz] = m(1, 2), out[shift_zz] = m(2, 2);
+    return out;
 }
 
 void add_scaled(AboutOrigin& to, const AboutOrigin& from, float scale) {
-    for (std::size_t i = 0; i < to.size(); ++i) to[i] += scale * from[i];
+    for (std::size_t i = 0; i < to.sum.size(); ++i) to.sum[i] += scale * from.sum[i];
 }
 
 using Vector6f = Eigen::Matrix<float, 6, 1>;
@@ -543,11 +630,8 @@ void add_pull(const SampleBlend& blend, const Vector3f& point, const Pull& pull,
 }
 
 // The block of two handles that turn about their own centres, as seen from the origin.
-Matrix6 about_centres(const AboutOrigin& s, const Vector3d& centre_a, const Vector3d& centre_b) {
-    Matrix3d turns, turn_shift, shifts;
-    turns << s[0], s[1], s[2], s[1], s[6], s[7], s[2], s[7], s[11];
-    turn_shift << s[3], s[4], s[5], s[8], s[9], s[10], s[12], s[13], s[14];
-    shifts << s[15], s[16], s[17], s[16], s[18], s[19], s[17], s[19], s[20];
+Matrix6 about_centres(const AboutOrigin& sums, const Vector3d& centre_a, const Vector3d& centre_b) {
+    const Matrix3d turns = sums.turns(), turn_shift = sums.turn_by_shift(), shifts = sums.shifts();
     const Matrix3d a = cross_matrix(centre_a), b = cross_matrix(centre_b);
     const Matrix3d shift_turn = turn_shift.transpose() + shifts * b;
     Matrix6 out;
@@ -596,26 +680,26 @@ void add_pairs(const Stage& stage, const std::vector<Vector3d>& centres, double 
 
 // Applies the step and gives the largest distance that a handle moves, counting its turn at a hand's breadth from its
 // centre.
-double apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>& centres, double breadth,
-                  Stage& stage) {
+LatticeUnits apply_step(const std::vector<Vector6>& step, const std::vector<Vector3d>& centres, LatticeUnits breadth,
+                        Stage& stage) {
     double farthest = 0;
     for (std::size_t h = 0; h < step.size(); ++h) {
         if (!step[h].allFinite()) continue;
         const Vector3d turn = step[h].head<3>();
         const double angle = turn.norm();
-        farthest = std::max(farthest, step[h].tail<3>().norm() + breadth * angle);
+        farthest = std::max(farthest, step[h].tail<3>().norm() + breadth.value * angle);
         RigidMotion& motion = stage.motion[h];
         if (angle > 1e-12)
             motion.rotation =
                 Eigen::AngleAxisd(std::min(angle, 0.6), turn / angle).toRotationMatrix() * motion.rotation;
         motion.shift = centres[h] + step[h].tail<3>() - motion.rotation * stage.centre[h];
     }
-    return farthest;
+    return LatticeUnits(farthest);
 }
 
 struct RoundResult {
-    double farthest = 0;  // the largest distance that a handle moved, see apply_step
-    double weight = 0;    // of all matches
+    LatticeUnits farthest;  // the largest distance that a handle moved, see apply_step
+    double weight = 0;      // of all matches
 };
 
 // What a level's rounds use again and again.
@@ -626,11 +710,15 @@ struct RoundMemory {
     explicit RoundMemory(const BlockPattern& pattern) : system(pattern), sums{}, guesses{} {}
 };
 
-RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& round, float cell, RoundMemory& memory,
+RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& round, RoundMemory& memory,
                       const DeformationOptions& options) {
+    // What holds a handle that nothing else holds at its place: of each unit of load, against a turn (mm^2 on an adult)
+    // and against a shift.
+    constexpr double held_turn = 10, held_shift = 0.01;
+    constexpr AdultMillimetres hand(100);  // breadth
     Moved moved = move_samples(stage, options.threads);
     if (round.surfaces) moved.vertices = deform(stage.mesh, stage.motion, options.threads);
-    const auto matches = find_matches(stage.mesh, stage.level, moved, target, round, cell, options, memory.guesses);
+    const auto matches = find_matches(stage.mesh, stage.level, moved, target, round, options, memory.guesses);
     std::vector<Pull> of_colours;
     if (round.colours) of_colours = colour_pulls(stage, matches, moved, target, options);
     std::vector<Vector3d> centres(stage.centre.size());
@@ -661,15 +749,14 @@ RoundResult run_round(Stage& stage, const SurfaceIndex& target, const Round& rou
     set_system(stage.level.pattern, memory.sums[0], from_origin, system);
     const double load = static_cast<double>(stage.rest.size()) / static_cast<double>(centres.size());
     add_pairs(stage, centres, round.stiffness * load, system);
-    // Handles that nothing holds stay where they are.
-    const double unit = options.millimetre * options.millimetre;
+    const double unit = options.scale.adult_millimetre.value * options.scale.adult_millimetre.value;
     for (auto& diagonal : system.diagonal) {
-        diagonal.topLeftCorner<3, 3>().diagonal().array() += 10 * load * unit;
-        diagonal.bottomRightCorner<3, 3>().diagonal().array() += 0.01 * load;
+        diagonal.topLeftCorner<3, 3>().diagonal().array() += held_turn * load * unit;
+        diagonal.bottomRightCorner<3, 3>().diagonal().array() += held_shift * load;
     }
     RoundResult out;
     out.farthest = apply_step(solve(stage.level.pattern, system, options.solver_iterations, 1e-2), centres,
-                              100 * options.millimetre, stage);
+                              options.scale.on_lattice(hand), stage);
     for (const Match& match : matches) out.weight += static_cast<double>(match.weight);
     return out;
 }
@@ -751,13 +838,13 @@ Guesses finer(const DeformableMesh& mesh, const Guesses& coarse) {
     return out;
 }
 
-// How far apart, in mm on an adult, two motions take a handle if one of them takes it elsewhere.
-constexpr double elsewhere = 15;
+// How far apart two motions take a handle if one of them takes it elsewhere.
+constexpr AdultMillimetres elsewhere(15);
 
 bool is_elsewhere(const DeformableMesh& mesh, std::size_t handle, const RigidMotion& motion, const RigidMotion& other,
                   const DeformationOptions& options) {
     const auto& place = mesh.handles[handle];
-    return (motion(place) - other(place)).norm() > elsewhere * options.millimetre;
+    return LatticeUnits((motion(place) - other(place)).norm()) > options.scale.on_lattice(elsewhere);
 }
 
 // Whether the motion takes no limb elsewhere than `known` does.
@@ -773,7 +860,9 @@ bool in_vain(const DeformationOptions& options) {
     return options.in_vain && options.in_vain->load(std::memory_order_relaxed);
 }
 
-double between(double from, double to, int step, int steps) {
+// The value of a step of a geometric series that leads from one value to another.
+template <class Value>
+Value between(Value from, Value to, int step, int steps) {
     return steps <= 1 ? to : from * std::pow(to / from, static_cast<double>(step) / (steps - 1));
 }
 
@@ -785,19 +874,18 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     std::vector<RigidMotion> motion(start.begin(), start.end());
     motion.resize(mesh.handles.size());
     if (mesh.samples.empty() || target.samples.empty()) return motion;
-    const double unit = options.millimetre;
-    const auto cell = static_cast<float>(30 * unit);
     Stage fine = fine_stage(mesh, std::move(motion));
     Guesses guesses;
     if (options.coarse_rounds > 0) {
         Stage coarse = coarse_stage(mesh, fine, options.threads);
         RoundMemory memory(mesh.coarse.pattern);
         for (int i = 0; i < options.coarse_rounds && !in_vain(options); ++i) {
-            const double reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
-            const Round round = {reach * unit, options.first_stiffness, options.first_point_share,
+            const auto reach = between(options.far_reach, options.middle_reach, i, options.coarse_rounds);
+            const Round round = {options.scale.on_lattice(reach), options.first_stiffness, options.first_point_share,
                                  0.7f * mesh.sample_gap, true};
-            const double moved = run_round(coarse, target, round, cell, memory, options).farthest;
-            if (moved < options.settled * unit) i = std::max(i, options.coarse_rounds - 2);  // one more round
+            const auto moved = run_round(coarse, target, round, memory, options).farthest;
+            if (moved < options.scale.on_lattice(options.settled))
+                i = std::max(i, options.coarse_rounds - 2);  // one more
             if (known.empty()) continue;
             auto so_far = fine.motion;
             follow_groups(mesh, coarse, so_far);
@@ -810,14 +898,14 @@ std::vector<RigidMotion> register_deformation(const DeformableMesh& mesh, const 
     memory.guesses = std::move(guesses);
     double weight = 0;
     for (int i = 0; i < options.fine_rounds && !in_vain(options); ++i) {
-        auto value = [&](double from, double to) { return between(from, to, i, options.fine_rounds); };
-        Round round = {value(options.middle_reach, options.near_reach) * unit,
+        auto value = [&](auto from, auto to) { return between(from, to, i, options.fine_rounds); };
+        Round round = {options.scale.on_lattice(value(options.middle_reach, options.near_reach)),
                        value(options.first_stiffness, options.last_stiffness),
                        value(options.first_point_share, options.last_point_share), 0.5f * mesh.sample_gap, false};
         round.colours = i + options.colour_rounds >= options.fine_rounds && !target.colours.empty() &&
                         !mesh.sample_textures.empty();
         round.surfaces = i + options.surface_rounds >= options.fine_rounds;
-        weight = run_round(fine, target, round, cell, memory, options).weight;
+        weight = run_round(fine, target, round, memory, options).weight;
     }
     if (form && options.fine_rounds > 0) {
         *form = form_of(mesh.fine.pattern, std::move(memory.system), weight);
@@ -870,15 +958,50 @@ void settle(const DeformableMesh& mesh, const SurfaceIndex& target, const Deform
     motions = register_deformation(mesh, target, motions, near, form);
 }
 
-// What two motions that differ in one limb are compared by: its samples, and those of the target that lie near it where
-// either of the two takes it. Elsewhere both are the same.
-struct LimbSamples {
-    std::vector<std::uint32_t> forward, back;  // indices of the mesh's samples, and of the target's vertices
+// By what a motion is judged: samples of the reference, and vertices of the target. By index.
+struct Compared {
+    std::vector<std::uint32_t> forward, back;
 };
 
-LimbSamples samples_around(const DeformableMesh& mesh, const SurfaceIndex& target, const std::vector<bool>& in_limb,
-                           std::span<const Moved* const> moved, double reach) {
-    LimbSamples out;
+struct Limit {
+    LatticeUnits reach;  // no distance counts as more
+    double agreement = 0;
+    bool along = false;  // FacingReach::along, towards the target
+};
+
+// The sum of the distances of the samples from the target's planes, and of the target's vertices from the planes in
+// which they lie from the nearest of all moved samples.
+double sum_of_distances(const Compared& compared, const std::vector<Point3f>& points,
+                        const std::vector<Point3f>& normals, const SurfaceIndex& target, const Limit& limit) {
+    const double most = limit.reach.value;
+    const auto reach = static_cast<float>(most), agreement = static_cast<float>(limit.agreement);
+    const OrientedPoints reference(points, normals, reach / 2);
+    const auto distance = [&](std::uint32_t sample, std::uint32_t vertex) {
+        const Vector3d apart = vector_of(target.positions[vertex]) - vector_of(points[sample]);
+        return std::min(most, std::abs(apart.dot(vector_of(target.normals[vertex]))));
+    };
+    double sum = 0;
+    std::uint32_t guess = OrientedPoints::no_point;
+    for (const auto i : compared.forward) {
+        const auto match = target.nearest_facing(points[i], normals[i],
+                                                 {.reach = reach, .agreement = agreement, .along = limit.along}, guess);
+        if (match.found) guess = match.index;
+        sum += match.found ? distance(i, match.index) : most;
+    }
+    guess = OrientedPoints::no_point;
+    for (const auto vertex : compared.back) {
+        const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], reach, agreement, guess);
+        if (match.found) guess = match.index;
+        sum += match.found ? distance(match.index, vertex) : most;
+    }
+    return sum;
+}
+
+// What two motions that differ in one limb are compared by: its samples, and those of the target that lie near it where
+// either of the two takes it. Elsewhere both are the same.
+Compared around_limb(const DeformableMesh& mesh, const SurfaceIndex& target, const std::vector<bool>& in_limb,
+                     std::span<const Moved* const> moved, LatticeUnits within) {
+    Compared out;
     for (std::uint32_t i = 0; i < mesh.samples.size(); ++i) {
         const SampleBlend& blend = mesh.fine.blends[i];
         for (std::size_t k = 0; k < blend.count; ++k)
@@ -892,43 +1015,18 @@ LimbSamples samples_around(const DeformableMesh& mesh, const SurfaceIndex& targe
         for (const auto i : out.forward) places.push_back(m->points[i]);
     if (places.empty()) return out;
     const std::vector<Point3f> any_way(places.size(), Point3f{});
-    const OrientedPoints near(places, any_way, static_cast<float>(reach / 2));
+    const auto reach = static_cast<float>(within.value);
+    const OrientedPoints near(places, any_way, reach / 2);
     for (const auto vertex : target.samples)
-        if (near.nearest(target.positions[vertex], {}, static_cast<float>(reach), 0).found) out.back.push_back(vertex);
+        if (near.nearest(target.positions[vertex], {}, reach, 0).found) out.back.push_back(vertex);
     return out;
-}
-
-// The sum of their distances to the planes of what they match, each limited to `reach`.
-double error_of(const LimbSamples& samples, const Moved& moved, const SurfaceIndex& target, double reach,
-                double agreement) {
-    const OrientedPoints reference(moved.points, moved.normals, static_cast<float>(reach / 2));
-    const auto far = static_cast<float>(reach), facing = static_cast<float>(agreement);
-    const auto distance = [&](std::uint32_t sample, std::uint32_t vertex) {
-        const Vector3d apart = vector_of(target.positions[vertex]) - vector_of(moved.points[sample]);
-        return std::min(reach, std::abs(apart.dot(vector_of(target.normals[vertex]))));
-    };
-    double sum = 0;
-    std::uint32_t guess = OrientedPoints::no_point;
-    for (const auto i : samples.forward) {
-        const auto match =
-            target.nearest_facing(moved.points[i], moved.normals[i], {.reach = far, .agreement = facing}, guess);
-        if (match.found) guess = match.index;
-        sum += match.found ? distance(i, match.index) : reach;
-    }
-    guess = OrientedPoints::no_point;
-    for (const auto vertex : samples.back) {
-        const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], far, facing, guess);
-        if (match.found) guess = match.index;
-        sum += match.found ? distance(match.index, vertex) : reach;
-    }
-    return sum;
 }
 
 }  // namespace
 
 bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
                        const DeformationOptions& options, std::vector<RigidMotion>& motions, DeformationForm* form) {
-    const double reach = options.near_reach * options.millimetre;
+    const Limit limit{.reach = options.scale.on_lattice(options.near_reach), .agreement = options.agreement};
     std::vector<bool> differs(motions.size());
     for (std::size_t h = 0; h < motions.size(); ++h) differs[h] = is_elsewhere(mesh, h, motions[h], other[h], options);
     if (std::find(differs.begin(), differs.end(), true) == differs.end()) return false;
@@ -948,9 +1046,11 @@ bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, s
         for (const auto h : limb) stage.motion[h] = other[h];
         Moved trial = move_samples(stage, options.threads);
         const std::array<const Moved*, 2> both = {&moved, &trial};
-        const auto samples = samples_around(mesh, target, in_limb, both, reach);
-        if (error_of(samples, trial, target, reach, options.agreement) <
-            error_of(samples, moved, target, reach, options.agreement)) {
+        const auto compared = around_limb(mesh, target, in_limb, both, limit.reach);
+        const auto error_of = [&](const Moved& m) {
+            return sum_of_distances(compared, m.points, m.normals, target, limit);
+        };
+        if (error_of(trial) < error_of(moved)) {
             moved = std::move(trial);
             taken = true;
         } else {
@@ -975,30 +1075,14 @@ double deformation_error(const DeformableMesh& mesh, const SurfaceIndex& target,
         points.push_back(moved.point);
         normals.push_back(moved.normal);
     }
-    const double reach = options.near_reach * options.millimetre;
-    const auto far = static_cast<float>(reach), agreement = static_cast<float>(options.agreement);
-    const auto distance = [&](std::size_t sample, std::uint32_t vertex) {
-        const Vector3d apart = vector_of(target.positions[vertex]) - vector_of(points[sample]);
-        return std::min(reach, std::abs(apart.dot(vector_of(target.normals[vertex]))));
-    };
-    double sum = 0;
-    std::size_t count = 0;
-    std::uint32_t guess = OrientedPoints::no_point;
-    for (std::size_t i = 0; i < points.size(); ++i, ++count) {
-        const auto match =
-            target.nearest_facing(points[i], normals[i], {.reach = far, .agreement = agreement, .along = true}, guess);
-        if (match.found) guess = match.index;
-        sum += match.found ? distance(i, match.index) : reach;
-    }
-    const OrientedPoints reference(points, normals, far / 2);
-    guess = OrientedPoints::no_point;
-    for (std::size_t i = 0; i < target.samples.size(); i += every, ++count) {
-        const auto vertex = target.samples[i];
-        const auto match = reference.nearest(target.positions[vertex], target.normals[vertex], far, agreement, guess);
-        if (match.found) guess = match.index;
-        sum += match.found ? distance(match.index, vertex) : reach;
-    }
-    return sum / static_cast<double>(count);
+    Compared compared;
+    compared.forward.resize(points.size());
+    std::iota(compared.forward.begin(), compared.forward.end(), 0u);
+    for (std::size_t i = 0; i < target.samples.size(); i += every) compared.back.push_back(target.samples[i]);
+    const double sum = sum_of_distances(
+        compared, points, normals, target,
+        {.reach = options.scale.on_lattice(options.near_reach), .agreement = options.agreement, .along = true});
+    return sum / static_cast<double>(compared.forward.size() + compared.back.size());
 }
 
 std::vector<Point3f> deform(const DeformableMesh& mesh, std::span<const RigidMotion> motions, Threads threads) {

@@ -3,7 +3,8 @@
 // 2007; Li, Sumner, Pauly: Global correspondence optimization for non-rigid registration of depth scans, 2008). Encoder
 // only: the result is quantised before it is used to predict.
 //
-// Lengths are in the unit of the positions; options are in millimetres and say how long a millimetre is.
+// Positions are in lattice units, as are lengths that are no more than numbers; options are in millimetres on an adult
+// and say how long one is.
 #pragma once
 
 #include <Eigen/Core>

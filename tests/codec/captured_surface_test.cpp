@@ -65,7 +65,7 @@ TEST(TrackedTargets, beyond_what_a_field_can_code_are_clamped_to_it) {
     const auto reference = height_field(4, 100, flat);
     for (const int side : {1, -1}) {
         const auto captured = height_field(4, 100, [&](double, double) { return side * (field_limit + 5000.0); });
-        const auto targets = targets_of(reference, captured, {.reach = 2.0 * field_limit});
+        const auto targets = targets_of(reference, captured, {.reach = LatticeUnits(2.0 * field_limit)});
         EXPECT_EQ(targets.displacement, std::vector<std::int32_t>(25, side * field_limit));
         const auto hierarchy = build_vertex_hierarchy(reference.positions, reference.triangles).value();
         const auto coded = encode_field(hierarchy, targets.displacement, 1);
@@ -77,7 +77,7 @@ TEST(TrackedTargets, beyond_what_a_field_can_code_are_clamped_to_it) {
 TEST(TrackedTargets, are_taken_from_neighbours_where_nothing_is_in_reach) {
     auto captured = height_field(40, 30, [](double, double) { return 16; });
     std::erase_if(captured.triangles, [&](const Triangle& t) { return captured.positions[t[0]].x > 200; });
-    const auto targets = targets_of(height_field(10, 100, flat), captured, {.reach = 60});
+    const auto targets = targets_of(height_field(10, 100, flat), captured, {.reach = LatticeUnits(60)});
     for (const auto d : targets.displacement) EXPECT_NEAR(d, 16, 2);
 }
 
@@ -114,7 +114,7 @@ TEST(SimplifiedReference, has_fewer_vertices_within_the_error) {
     captured.colours.assign(captured.positions.size(), {9, 8, 7});
     captured.normals.assign(captured.positions.size(), {0, 0, 127});
     SimplifiedReferenceOptions options;
-    options.surface_error = 8;
+    options.surface_error = LatticeUnits(8);
     const auto out = simplified_reference(captured, surface_of(captured), options);
     EXPECT_LT(out.positions.size(), captured.positions.size() / 5);
     EXPECT_LT(measure_tracked_fit(surface_of(captured), out, {}, {}, {}).rms, 8);
@@ -136,7 +136,7 @@ TEST(SimplifiedReference, does_not_gape_where_a_seam_has_two_vertices_in_the_sam
             }
     }
     SimplifiedReferenceOptions options;
-    options.surface_error = 8;
+    options.surface_error = LatticeUnits(8);
     const auto out = simplified_reference(cut, surface_of(cut), options);
     EXPECT_LT(out.positions.size(), whole.positions.size() / 4);
     std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
@@ -169,7 +169,7 @@ TEST(TrackedFit, tells_of_one_region_that_does_not_fit_where_the_whole_hardly_sh
     const auto captured = height_field(100, 25, flat);
     const auto bumped = height_field(100, 25, [](double x, double y) { return x * x + y * y < 200 * 200 ? 100 : 0; });
     TrackedFitOptions options;
-    options.region = 500;
+    options.region = LatticeUnits(500);
     const auto fit = measure_tracked_fit(surface_of(captured), bumped, {}, {}, options);
     EXPECT_LT(fit.rms, 20);
     EXPECT_GT(fit.worst_region, 2 * fit.rms);

@@ -162,12 +162,12 @@ TEST(SceneChanges, AreMoreThanATenthOfEitherSurfaceFarFromTheOther) {
     std::vector<LatticePoint> near, more;
     for (int i = 0; i < 1000; ++i) near.push_back({i, 0, 0});
     more = near;
-    EXPECT_FALSE(scene_changed(near, more, 50));
+    EXPECT_FALSE(scene_changed(near, more, LatticeUnits(50)));
     for (int i = 0; i < 90; ++i) more.push_back({i, 5000, 0});
-    EXPECT_FALSE(scene_changed(near, more, 50));
+    EXPECT_FALSE(scene_changed(near, more, LatticeUnits(50)));
     for (int i = 0; i < 90; ++i) more.push_back({i, 6000, 0});
-    EXPECT_TRUE(scene_changed(near, more, 50));
-    EXPECT_TRUE(scene_changed(more, near, 50));
+    EXPECT_TRUE(scene_changed(near, more, LatticeUnits(50)));
+    EXPECT_TRUE(scene_changed(more, near, LatticeUnits(50)));
 }
 
 TEST(ChoiceByCost, TakesAPredictedFrameWhereNothingButThePlaceChanged) {

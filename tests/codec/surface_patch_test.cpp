@@ -34,8 +34,10 @@ double hill(double x, double y) { return 600 * std::clamp((500 - std::hypot(x, y
 double hill_at_border(double x, double y) { return hill(x - 2000, y); }
 
 std::optional<SurfacePatch> patch_of(const LatticeMesh& decoded, const LatticeMesh& captured,
-                                     const SurfacePatchOptions& options = {}, std::span<const LatticePoint> rest = {}) {
-    return SurfacePatchSearch({decoded, rest}, captured, surface_of(captured), options).find(options.region_lost);
+                                     const SurfacePatchOptions& options = {}, std::span<const LatticePoint> rest = {},
+                                     LatticeUnits region_lost = {}) {
+    const auto surface = surface_of(captured);
+    return SurfacePatchSearch({decoded, rest}, captured, surface, options).find(region_lost);
 }
 
 LatticeMesh patched(const LatticeMesh& decoded, const SurfacePatch& patch) {
@@ -101,7 +103,7 @@ TEST(SurfacePatch, puts_the_capture_where_a_part_has_moved_and_leaves_a_closed_s
     const auto out = patched(decoded, *patch);
     EXPECT_TRUE(open_sides(out).empty());
     EXPECT_GT(farthest(decoded, captured), 600);
-    EXPECT_LT(farthest(out, captured), options.lost);
+    EXPECT_LT(farthest(out, captured), options.lost.value);
     // The cap is a fourteenth of the sphere.
     for (std::size_t v = 0; v < decoded.positions.size(); ++v) {
         const double height = decoded.positions[v].z / radius;
@@ -213,18 +215,18 @@ TEST(SurfacePatch, replaces_only_what_reaches_into_lost_cubes) {
         return any;
     };
     SurfacePatchOptions options;
-    options.region = 2000;
+    options.region = LatticeUnits(2000);
     const auto both = patch_of(decoded, captured, options);
     ASSERT_TRUE(both.has_value());
     EXPECT_TRUE(goes_at(both, 1200, 1200));
     EXPECT_TRUE(goes_at(both, -1200, -1200));
-    options.region_lost = 125;  // RMS of the higher hill in its cube; of the other half as much
-    const auto higher = patch_of(decoded, captured, options);
+    // RMS of the higher hill in its cube; of the other half as much.
+    const auto higher = patch_of(decoded, captured, options, {}, LatticeUnits(125));
     ASSERT_TRUE(higher.has_value());
     EXPECT_TRUE(goes_at(higher, 1200, 1200));
     EXPECT_FALSE(goes_at(higher, -1200, -1200));
-    options.region_lost = 4000;  // no cube is: what is lost by itself goes
-    EXPECT_EQ(patch_of(decoded, captured, options)->removed, both->removed);
+    // Where no cube is lost, what is lost by itself goes.
+    EXPECT_EQ(patch_of(decoded, captured, options, {}, LatticeUnits(4000))->removed, both->removed);
 }
 
 TEST(SurfacePatch, is_none_if_too_much_is_lost) {

@@ -65,7 +65,8 @@ Errors errors_of(const TrackedTargets& targets, const Truth& truth) {
             std::sqrt(out.colours / static_cast<double>(vertices))};
 }
 
-constexpr TargetFilterOptions options{.geometry_step = 16, .colour_step = 8, .captured_edge = 100};
+constexpr TargetFilterOptions options{
+    .geometry_step = LatticeUnits(16), .colour_step = 8, .captured_edge = LatticeUnits(100)};
 
 // The history behind `frames` frames of a surface that is still.
 TargetHistory after_stillness(Capture& capture, int frames) {

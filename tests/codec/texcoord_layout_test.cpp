@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "codec/encoder/tracked/tracking_numbers.h"
 #include "htvm/encoder.hpp"
 
 namespace htvm::internal {
@@ -41,7 +42,7 @@ Place scattered(double s, double t) {
     return {(place % 8 + std::fmod(8 * s, 1.0)) / 8, (place / 8 + std::fmod(8 * t, 1.0)) / 8};
 }
 Place mirrored(double s, double t) { return {std::abs(2 * s - 1), t}; }
-constexpr double reach = 480;  // 30 mm
+constexpr LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.slip);
 
 TEST(TexcoordLayout, IsTheSameWhereTrackingSlips) {
     for (const auto layout : {plain, scattered, mirrored})

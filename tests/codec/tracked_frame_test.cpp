@@ -581,8 +581,7 @@ TEST(NodeMotion, AlongAFloorThatSlidesIsNotSent) {
         weights[v].handle[0] = static_cast<std::uint16_t>(nearest);
         weights[v].weight[0] = 1 << weight_bits;
     }
-    DeformationOptions options;
-    options.millimetre = 16;
+    const DeformationOptions options;
     const auto mesh = make_deformable(positions, triangles, weights, handles, pairs, options);
     for (auto& p : positions) p = {p[0] + 90, p[1] - 70, p[2] + 64};
     const SurfaceIndex target(positions, triangles, {.cell = 320, .samples = options.back_samples});

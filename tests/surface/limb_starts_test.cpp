@@ -26,21 +26,21 @@ PlaceGraph star(const std::vector<std::pair<Vector3d, int>>& rows) {
 
 TEST(Extremities, AreTheEndsOfWhatStandsOut) {
     const auto graph = star({{{1, 0, 0}, 12}, {{-1, 0, 0}, 14}, {{0, 1, 0}, 9}});
-    EXPECT_EQ(extremities(graph, 250), (std::vector<std::uint32_t>{12, 26, 35}));
+    EXPECT_EQ(extremities(graph, LatticeUnits(250)), (std::vector<std::uint32_t>{12, 26, 35}));
 }
 
 TEST(Extremities, AreFoundWhereTheEndsOfTwoLimbsNearlyTouch) {
     // Two limbs side by side, as arms that are held out together.
     const double angle = 0.02;
     const auto graph = star({{{1, 0, 0}, 12}, {{std::cos(angle), std::sin(angle), 0}, 12}, {{-1, 0, 0}, 12}});
-    EXPECT_EQ(extremities(graph, 250), (std::vector<std::uint32_t>{12, 24, 36}));
+    EXPECT_EQ(extremities(graph, LatticeUnits(250)), (std::vector<std::uint32_t>{12, 24, 36}));
 }
 
 TEST(Extremities, AreNotWhatStandsOutLessThanTheirDistance) {
     const auto graph = star({{{1, 0, 0}, 12}, {{-1, 0, 0}, 12}, {{0, 1, 0}, 1}});
-    EXPECT_EQ(extremities(graph, 250), (std::vector<std::uint32_t>{12, 24}));
-    EXPECT_TRUE(extremities({}, 250).empty());
-    EXPECT_TRUE(extremities(star({}), 250).empty());
+    EXPECT_EQ(extremities(graph, LatticeUnits(250)), (std::vector<std::uint32_t>{12, 24}));
+    EXPECT_TRUE(extremities({}, LatticeUnits(250)).empty());
+    EXPECT_TRUE(extremities(star({}), LatticeUnits(250)).empty());
 }
 
 TEST(GraphOfSurface, KeepsPartsThatOnlyPassNearEachOtherApart) {
@@ -56,14 +56,14 @@ TEST(GraphOfSurface, KeepsPartsThatOnlyPassNearEachOtherApart) {
             triangles.push_back({i + 1, i + 2, i + 3});
         }
     }
-    const auto graph = graph_of_surface(SurfaceIndex(points, triangles), 40);
+    const auto graph = graph_of_surface(SurfaceIndex(points, triangles), LatticeUnits(40));
     ASSERT_EQ(graph.places.size(), 22u);  // 401 mm, twice
     for (std::size_t place = 0; place < graph.places.size(); ++place)
         for (const auto other : graph.beside[place]) {
             EXPECT_NEAR(graph.places[place].z(), graph.places[other].z(), 1e-3);
             EXPECT_LT((graph.places[place] - graph.places[other]).norm(), 60);
         }
-    EXPECT_EQ(extremities(graph, 250).size(), 4u);
+    EXPECT_EQ(extremities(graph, LatticeUnits(250)).size(), 4u);
 }
 
 }  // namespace

@@ -21,6 +21,9 @@ Point3f point(const Vector3d& v) {
 }
 Vector3d vector(const Point3f& p) { return {p[0], p[1], p[2]}; }
 
+// As the product has them, on a lattice of whole millimetres.
+DeformationOptions in_millimetres() { return {.scale = {.units = 1}}; }
+
 // A grid of rows x columns vertices, closed in the columns.
 Surface sweep(std::uint32_t rows, std::uint32_t columns, const std::function<Vector3d(double, double)>& place) {
     Surface out;
@@ -115,7 +118,7 @@ Vector3d bent(const Vector3d& p, double angle) {
 }
 
 TEST(RegisterDeformation, LaysAStraightTubeOnABentOne) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto reference = sweep(121, 40, arm);
     const auto target = target_of(moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.8); }), options);
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
@@ -125,7 +128,7 @@ TEST(RegisterDeformation, LaysAStraightTubeOnABentOne) {
 }
 
 TEST(RegisterDeformation, FollowsASphereThatMovesFiveCentimetres) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     auto ball = [](double u, double v) {
         const double a = std::numbers::pi * (0.01 + 0.98 * u), b = 2 * std::numbers::pi * v;
         return Vector3d(-150 * std::cos(a), 150 * std::sin(a) * std::cos(b), 150 * std::sin(a) * std::sin(b));
@@ -141,7 +144,7 @@ TEST(RegisterDeformation, FollowsASphereThatMovesFiveCentimetres) {
 }
 
 TEST(RegisterDeformation, TurnsATwistedArm) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto reference = sweep(121, 40, arm);
     auto twist = [](const Vector3d& p) {
         return Vector3d(Eigen::AngleAxisd(0.9 * p.x() / 600, Vector3d::UnitX()) * p);
@@ -165,7 +168,7 @@ double rms_from_triangles(const DeformableMesh& mesh, const SurfaceIndex& target
 }
 
 TEST(RegisterDeformation, LaysTheTrianglesOfACoarseReferenceOnTheSurface) {
-    DeformationOptions options;
+    auto options = in_millimetres();
     const auto reference = sweep(25, 8, arm);  // sides up to 50 mm long, on a tube 80 by 50 mm thick
     const auto target = target_of(moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); }), options);
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
@@ -176,7 +179,7 @@ TEST(RegisterDeformation, LaysTheTrianglesOfACoarseReferenceOnTheSurface) {
 }
 
 TEST(RegisterDeformation, MovesNothingWhereNothingMoved) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto surface = sweep(121, 40, arm);
     const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
     const auto target = target_of(surface, options);
@@ -186,7 +189,7 @@ TEST(RegisterDeformation, MovesNothingWhereNothingMoved) {
 }
 
 TEST(RegisterDeformation, IsTheSameForAnyNumberOfThreads) {
-    DeformationOptions options;
+    auto options = in_millimetres();
     const auto mesh = with_handles_along_x(sweep(121, 40, arm), 0, 600, 9, options);
     const auto bent_arm = moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); });
     const auto one = register_deformation(mesh, target_of(bent_arm, options), {}, options);
@@ -204,13 +207,13 @@ TEST(RegisterDeformation, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(RegisterDeformation, WorksInLatticeUnitsAsInMillimetres) {
-    DeformationOptions options;
+    auto options = in_millimetres();
     auto target = moved(sweep(97, 52, arm), [](const Vector3d& p) { return bent(p, 0.5); });
     const auto reference = sweep(121, 40, arm);
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, options);
     const auto in_mm = register_deformation(mesh, target_of(target, options), {}, options);
     auto scale = [](const Vector3d& p) { return Vector3d(16 * p); };
-    options.millimetre = 16;
+    options.scale = {.units = 16};
     const auto finer = with_handles_along_x(moved(reference, scale), 0, 9600, 9, options);
     target = moved(target, scale);
     const auto on_lattice = register_deformation(
@@ -219,7 +222,7 @@ TEST(RegisterDeformation, WorksInLatticeUnitsAsInMillimetres) {
 }
 
 TEST(RegisterDeformation, EmptyMeshesKeepTheStart) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto surface = sweep(21, 10, arm);
     const auto mesh = with_handles_along_x(surface, 0, 600, 3, options);
     const std::vector<RigidMotion> start(3, RigidMotion{Eigen::Matrix3d::Identity(), Vector3d(1, 2, 3)});
@@ -233,7 +236,7 @@ TEST(RegisterDeformation, EmptyMeshesKeepTheStart) {
 }
 
 TEST(RegisterDeformation, SoupsOfTrianglesGiveFiniteMotions) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     Surface soup;
     std::uint32_t state = 1;
     auto next = [&] { return state = state * 1664525 + 1013904223, static_cast<float>(state >> 8) / (1 << 15); };
@@ -267,7 +270,7 @@ std::vector<Colour> striped(const Surface& surface, double angle) {
 
 // The mean turn about the axis, radians, that is found if the sleeve is captured so; `shown` are its colours.
 double turn_found(const std::vector<Colour>& shown, const std::vector<Colour>& reference_colours) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto reference = sweep(121, 40, sleeve);
     const auto mesh = with_handles_along_x(reference, 0, 600, 9, options, reference_colours);
     auto target = target_of(sweep(97, 52, sleeve), options);
@@ -312,7 +315,7 @@ TEST(RegisterDeformation, ColoursWithoutAPatternChangeNothing) {
 }
 
 TEST(MovedOn, RepeatsTheLastStepOfEachHandle) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto mesh = with_handles_along_x(sweep(21, 10, arm), 0, 600, 2, options);
     const auto step = [](double angle, double shift) {
         return RigidMotion{Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix(), Vector3d(shift, 0, 0)};
@@ -325,7 +328,7 @@ TEST(MovedOn, RepeatsTheLastStepOfEachHandle) {
 }
 
 TEST(MovedOn, HandlesOfAPatchedMeshRepeatTheStepOfThoseThatWereThere) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto mesh = with_handles_along_x(sweep(21, 10, arm), 0, 600, 2, options);
     const auto shift = [](double x, double y) { return RigidMotion{Eigen::Matrix3d::Identity(), Vector3d(x, y, 0)}; };
     const std::vector<RigidMotion> before = {shift(0, 10), shift(0, 0)}, last = {shift(0, 30), shift(0, -5)};
@@ -339,7 +342,7 @@ TEST(MovedOn, HandlesOfAPatchedMeshRepeatTheStepOfThoseThatWereThere) {
 }
 
 TEST(RegisterDeformation, FromAnotherStartEndsOnceItLeadsToWhatIsKnown) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto surface = sweep(121, 40, arm);
     const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
     const auto target = target_of(surface, options);
@@ -353,7 +356,7 @@ TEST(RegisterDeformation, FromAnotherStartEndsOnceItLeadsToWhatIsKnown) {
 }
 
 TEST(RegisterDeformation, InVainMakesNoRounds) {
-    DeformationOptions options;
+    auto options = in_millimetres();
     const std::atomic<bool> yes = true, no = false;
     const auto surface = sweep(121, 40, arm);
     const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
@@ -366,7 +369,7 @@ TEST(RegisterDeformation, InVainMakesNoRounds) {
 }
 
 TEST(TakeNearerLimbs, TakesThePartThatLiesNearerAndLeavesTheRest) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto surface = sweep(121, 40, arm);
     const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
     const auto target = target_of(surface, options);
@@ -397,14 +400,14 @@ Vector3d folded(const Vector3d& p, double angle) {
 }
 
 TEST(ReachedForExtremities, FindsALimbThatClosestPointsLose) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto reference = sweep(121, 40, long_arm);
     const auto mesh = with_handles_along_x(reference, 0, 1200, 17, options);
     const auto fold = [](const Vector3d& p) { return folded(p, 1.9); };
     const auto target = target_of(moved(sweep(141, 36, long_arm), fold), options);
     auto motions = register_deformation(mesh, target, {}, options);
     EXPECT_GT(rms_from_triangles(mesh, target, motions), 30);
-    const auto reached = reached_for_extremities(mesh, target, motions, {}, {});
+    const auto reached = reached_for_extremities(mesh, target, motions, {}, {.scale = options.scale});
     ASSERT_EQ(reached.size(), mesh.handles.size());
     EXPECT_LT((reached[16](mesh.handles[16]) - fold(mesh.handles[16])).norm(), 60);
     auto near = options;
@@ -415,15 +418,16 @@ TEST(ReachedForExtremities, FindsALimbThatClosestPointsLose) {
 }
 
 TEST(ReachedForExtremities, IsNothingWhereEveryLimbEndsAtOne) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto mesh = with_handles_along_x(sweep(121, 40, long_arm), 0, 1200, 17, options);
     const auto bow = [](const Vector3d& p) { return Vector3d(p + Vector3d(0, 60 * std::sin(p.x() / 400), 0)); };
     const auto target = target_of(moved(sweep(141, 36, long_arm), bow), options);
-    EXPECT_TRUE(reached_for_extremities(mesh, target, std::vector<RigidMotion>(17), {}, {}).empty());
+    EXPECT_TRUE(
+        reached_for_extremities(mesh, target, std::vector<RigidMotion>(17), {}, {.scale = options.scale}).empty());
 }
 
 TEST(DeformationError, IsSmallerForTheBetterMotion) {
-    const DeformationOptions options;
+    const auto options = in_millimetres();
     const auto surface = sweep(121, 40, arm);
     const auto mesh = with_handles_along_x(surface, 0, 600, 9, options);
     const auto target =

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "codec/encoder/tracked/tracking_numbers.h"
+
 namespace htvm::internal {
 namespace {
 
@@ -37,7 +39,7 @@ int lattice_bits(const EncoderOptions& options, double adult) {
 }
 
 FrameSteps steps_of(const Configuration& configuration, const QualitySteps& steps) {
-    return {static_cast<std::int32_t>(std::clamp(std::lround(steps.geometry_step * configuration.units), 1L,
+    return {static_cast<std::int32_t>(std::clamp(std::lround(steps.geometry_step * configuration.scale.units), 1L,
                                                  static_cast<long>(lattice_limit))),
             static_cast<std::int32_t>(std::lround(steps.colour_step))};
 }
@@ -62,8 +64,8 @@ Result<PoseTracker> complete(Configuration& configuration, const Mesh& mesh, con
         if (!calibrated) return tl::unexpected(calibrated.error());
         radii = std::move(*calibrated);
     }
-    const double units = configuration.units = 1.0 / header.lattice.step();
-    configuration.adult_millimetre = adult * units;
+    const double units = 1.0 / header.lattice.step();
+    configuration.scale = {units, adult * units};
     const auto on_lattice = [](double length) {
         return static_cast<std::int32_t>(std::lround(std::min(length, 1.0 * lattice_limit)));
     };
@@ -88,9 +90,8 @@ Result<PoseTracker> complete(Configuration& configuration, const Mesh& mesh, con
     header.nearest_vertices = static_cast<std::uint8_t>(options.topology.nearest_vertices);
     header.weight_width = on_lattice(options.topology.weight_width * units);
     if (options.profile == Profile::tracked) {
-        constexpr double spacing_on_adults = 80;  // mm
-        const double spacing =
-            options.tracked.node_spacing > 0 ? options.tracked.node_spacing : spacing_on_adults * adult;
+        const double spacing = options.tracked.node_spacing > 0 ? options.tracked.node_spacing
+                                                                : tracking_numbers.node_spacing.value * adult;
         header.node_spacing = std::max(on_lattice(spacing * units), 1);
     }
     return tracker;
@@ -102,7 +103,7 @@ FrameSteps steps_asked_for(const Configuration& configuration) {
 
 FrameSteps steps_of_quality(const Configuration& configuration, double quality) {
     auto steps = quality_steps(quality);
-    steps.geometry_step *= configuration.adult_millimetre / configuration.units;
+    steps.geometry_step *= configuration.scale.adult_millimetre.value / configuration.scale.units;
     return steps_of(configuration, steps);
 }
 

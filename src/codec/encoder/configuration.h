@@ -5,6 +5,7 @@
 
 #include "codec/encoder/pose_tracker.h"
 #include "codec/format/sequence.h"
+#include "core/length.h"
 #include "core/thread.h"
 #include "htvm/encoder.hpp"
 
@@ -14,11 +15,8 @@ struct Configuration {
     EncoderOptions options;
     SequenceHeader header;
     Threads threads = {};
-    double units = 16;             // lattice units per millimetre
-    double adult_millimetre = 16;  // the length on this subject that corresponds to a millimetre on an adult, in
-                                   // lattice units
+    Scale scale;
     bool intra_only() const { return options.key_interval == 1; }  // no frame refers to another
-    double to_millimetres(double lattice_units) const { return lattice_units / units; }
 };
 
 // Completes the configuration, whose options and threads are set, from the first frame: the origin of the lattice, the

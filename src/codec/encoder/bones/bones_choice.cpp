@@ -20,8 +20,8 @@ Result<Frame> as_frame(Result<BonesIntra> intra) {
 bool is_scene_change(const BonesWork& work) {
     const auto& configuration = work.configuration;
     if (!configuration.options.topology.scene_changes) return false;
-    constexpr double far = 150;  // mm on an adult
-    return scene_changed(work.mesh().positions, work.motion->predicted, far * configuration.adult_millimetre);
+    constexpr AdultMillimetres far(150);
+    return scene_changed(work.mesh().positions, work.motion->predicted, configuration.scale.on_lattice(far));
 }
 
 // ---- what may be animated -------------------------------------------------------------------------------------------
@@ -31,7 +31,7 @@ double largest_animation_error(const Configuration& configuration) {
     const auto& options = configuration.options;
     double largest = options.topology.animation_error;
     if (options.rate.target_error > 0) largest = std::min(largest > 0 ? largest : 1e6, options.rate.target_error);
-    return largest * configuration.units;
+    return largest * configuration.scale.units;
 }
 
 bool animation_fits(const BonesWork& work) {
@@ -51,7 +51,7 @@ BonesMoved code_whole(const BonesWork& work, BonesProgress& progress, const Fram
 
 // Uses motion-based coding if it is enabled and leaves something out; otherwise codes the whole frame.
 BonesMoved code_what_moves(const BonesWork& work, BonesProgress& progress, const FrameSteps& steps) {
-    const double still_below = work.configuration.options.topology.still_below * work.configuration.units;
+    const double still_below = work.configuration.options.topology.still_below * work.configuration.scale.units;
     if (!(still_below > 0)) return code_whole(work, progress, steps);
     const auto shifts = shifts_of_bones(work);
     if (std::all_of(shifts.begin(), shifts.end(), [&](double shift) { return shift >= still_below; }))
@@ -65,7 +65,7 @@ BonesMoved code_what_moves(const BonesWork& work, BonesProgress& progress, const
 
 Result<Frame> choose_by_motion(const BonesWork& work, BonesProgress& progress, const FrameSteps& steps) {
     const auto shifts = shifts_of_bones(work);
-    const double motion = work.configuration.to_millimetres(std::accumulate(shifts.begin(), shifts.end(), 0.0));
+    const double motion = work.configuration.scale.in_space(std::accumulate(shifts.begin(), shifts.end(), 0.0)).value;
     const auto& options = work.configuration.options.topology;
     if (options.intra_above > 0 && motion > options.intra_above && may_be_intra(work))
         return as_frame(code_intra(work, steps));

@@ -74,22 +74,23 @@ AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& ref
     return out;
 }
 
-std::vector<bool> choose_coded_bones(std::span<const double> shifts, const AnimationFit& fit, double still_below,
-                                     double largest_error) {
+std::vector<bool> choose_coded_bones(std::span<const double> shifts, const AnimationFit& fit, LatticeUnits still_below,
+                                     LatticeUnits largest_error) {
     std::vector<bool> out;
     for (std::size_t bone = 0; bone < shifts.size(); ++bone)
-        out.push_back(shifts[bone] >= still_below || (largest_error > 0 && fit.rms[bone] > largest_error));
+        out.push_back(shifts[bone] >= still_below.value ||
+                      (largest_error.value > 0 && fit.rms[bone] > largest_error.value));
     return out;
 }
 
 MovingPart cut_moving_part(const LatticeMesh& mesh, std::span<const BoneIndex> bone_of_vertex,
                            const ReferenceMesh& reference, const AnimationFit& fit,
-                           const std::vector<bool>& coded_bones, double stray) {
+                           const std::vector<bool>& coded_bones, LatticeUnits stray) {
     const std::size_t n = mesh.positions.size();
     std::vector<bool> coded(n), kept(n);
     for (std::size_t k = 0; k < n; ++k)
         kept[k] = coded[k] =
-            coded_bones[reference.bone_of_vertex[fit.nearest[k]]] || static_cast<double>(fit.distance[k]) > stray;
+            coded_bones[reference.bone_of_vertex[fit.nearest[k]]] || static_cast<double>(fit.distance[k]) > stray.value;
     std::vector<Triangle> triangles;
     for (const auto& t : mesh.triangles) {
         if (!coded[t[0]] && !coded[t[1]] && !coded[t[2]]) continue;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "codec/encoder/bones/motion.h"
+#include "core/length.h"
 #include "core/thread.h"
 
 namespace htvm::internal {
@@ -25,9 +26,9 @@ AnimationFit measure_animation(const LatticeMesh& mesh, const ReferenceMesh& ref
                                std::span<const LatticePoint> predicted, bool both_ways, Threads threads);
 
 // For each bone, whether it must be coded: its shift is at least `still_below`, or its sub-mesh fits worse than
-// `largest_error` (0: not checked). Lattice units.
-std::vector<bool> choose_coded_bones(std::span<const double> shifts, const AnimationFit& fit, double still_below,
-                                     double largest_error);
+// `largest_error` (0: not checked). shifts: in lattice units.
+std::vector<bool> choose_coded_bones(std::span<const double> shifts, const AnimationFit& fit, LatticeUnits still_below,
+                                     LatticeUnits largest_error);
 
 struct MovingPart {
     LatticeMesh mesh;  // the triangles that touch a vertex of the coded bones, and the isolated vertices of these bones
@@ -35,10 +36,10 @@ struct MovingPart {
     std::vector<std::uint32_t> nearest;  // one per vertex, as in AnimationFit
 };
 // A captured vertex belongs to a coded bone if the nearest predicted vertex does: then both sides of the seam are cut
-// along the same line, however differently the two frames were skinned. A vertex farther than `stray` lattice units
-// from the predicted mesh is coded too, since the reference does not have it.
+// along the same line, however differently the two frames were skinned. A vertex farther than `stray` from
+// the predicted mesh is coded too, since the reference does not have it.
 MovingPart cut_moving_part(const LatticeMesh& mesh, std::span<const BoneIndex> bone_of_vertex,
                            const ReferenceMesh& reference, const AnimationFit& fit,
-                           const std::vector<bool>& coded_bones, double stray);
+                           const std::vector<bool>& coded_bones, LatticeUnits stray);
 
 }  // namespace htvm::internal

@@ -235,7 +235,7 @@ std::vector<Four> SurfaceFit::fitted(std::span<const Four> seen) const {
 std::vector<SurfacePoint> targets_of(const SurfaceSamples& samples, std::span<const Triangle> triangles,
                                      const SurfaceIndex& surface, const TargetSearch& how,
                                      std::span<std::uint32_t> near) {
-    const FacingReach within{.reach = static_cast<float>(how.reach), .along = true};
+    const FacingReach within{.reach = static_cast<float>(how.reach.value), .along = true};
     const auto points = std::span(samples.points), normals = std::span(samples.normals);
     auto out =
         closest_facing(surface, points.first(near.size()), normals.first(near.size()), within, how.threads, near);
@@ -290,8 +290,8 @@ std::vector<Four> seen_at(const SurfaceSamples& samples, const MovedReference& m
 SurfaceIndex captured_surface(const LatticeMesh& mesh, const DeformationOptions& options) {
     // The cells must not be too fine for the search to go through, as for captures with tiny triangles, or none. Every
     // eighth triangle gives a good enough estimate of the edges.
-    const double edge =
-        std::max({mean_edge(mesh.positions, mesh.triangles, 8), options.far_reach * options.millimetre / 48, 1.0});
+    const double coarsest = options.scale.on_lattice(options.far_reach).value / 48;
+    const double edge = std::max({mean_edge(mesh.positions, mesh.triangles, 8), coarsest, 1.0});
     SurfaceIndex out(
         points_of(mesh.positions), mesh.triangles,
         {.cell = static_cast<float>(2 * edge), .samples = options.back_samples, .threads = options.threads});
@@ -328,10 +328,10 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
 
 namespace {
 
-CubeErrors::Cube cube_of(const Point3f& point, double side) {
+CubeErrors::Cube cube_of(const Point3f& point, LatticeUnits side) {
     CubeErrors::Cube out{};
     for (std::size_t axis = 0; axis < 3; ++axis)
-        out[axis] = static_cast<std::int32_t>(std::floor(static_cast<double>(point[axis]) / side));
+        out[axis] = static_cast<std::int32_t>(std::floor(static_cast<double>(point[axis]) / side.value));
     return out;
 }
 
@@ -350,7 +350,7 @@ double CubeErrors::at(const Point3f& point) const {
     return found != rms.end() && found->first == cube ? found->second : 0;
 }
 
-CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side,
+CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, LatticeUnits side,
                        std::ptrdiff_t fewest, std::ptrdiff_t left_out) {
     // Neighbouring samples mostly lie in the same cube.
     std::map<CubeErrors::Cube, std::vector<double>> in_cubes;
@@ -410,11 +410,12 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
     // One sample that found the wrong sheet does not mean that a region is lost.
     constexpr std::ptrdiff_t fewest = 10, left_out = 2;
     if (points.empty()) return {};
+    const double stray = options.stray.value * options.stray.value;
     double squares = 0;
     std::size_t strays = 0;
     for (const double distance : squared) {
         squares += distance;
-        if (distance > options.stray * options.stray) ++strays;
+        if (distance > stray) ++strays;
     }
     const auto count = static_cast<double>(points.size());
     return {std::sqrt(squares / count),
@@ -428,9 +429,9 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
 std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, std::vector<std::uint32_t> near,
                                          const SurfaceIndex& captured, const TrackedFitOptions& options) {
     const auto found = closest_facing(captured, decoded.points, decoded.normals,
-                                      {.reach = static_cast<float>(options.reach), .agreement = 0, .along = true},
+                                      {.reach = static_cast<float>(options.reach.value), .agreement = 0, .along = true},
                                       options.threads, near);
-    std::vector<double> squared(found.size(), options.reach * options.reach);
+    std::vector<double> squared(found.size(), options.reach.value * options.reach.value);
     for (std::size_t i = 0; i < found.size(); ++i)
         if (found[i].found()) squared[i] = static_cast<double>(found[i].squared_distance);
     return squared;
@@ -440,8 +441,8 @@ std::vector<double> distances_of_decoded(const SurfaceSamples& decoded, std::vec
 // more bits. near: of each sample a decoded vertex that may be beside it.
 TrackedFit fit_of_captured(const SurfaceSamples& captured, std::span<const std::uint32_t> near,
                            const SurfaceIndex& decoded, const TrackedFitOptions& options) {
-    const auto reach = static_cast<float>(options.reach);
-    std::vector<double> squared(captured.points.size(), options.reach * options.reach);
+    const auto reach = static_cast<float>(options.reach.value);
+    std::vector<double> squared(captured.points.size(), options.reach.value * options.reach.value);
     // Guesses may decide what is found, so they must not depend on how the threads cut the range.
     constexpr std::size_t in_a_row = 256;
     parallel_for((squared.size() + in_a_row - 1) / in_a_row, options.threads, 2,
@@ -473,7 +474,7 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
     const double edge = mean_edge(decoded.positions, decoded.triangles, 8);
     const SurfaceIndex index(
         points_of(decoded.positions), decoded.triangles,
-        {.cell = static_cast<float>(std::max(2 * edge, options.reach / 24)), .threads = options.threads});
+        {.cell = static_cast<float>(std::max(2 * edge, options.reach.value / 24)), .threads = options.threads});
     std::vector<std::uint32_t> beside(captured.positions.size(), OrientedPoints::no_point);
     for (std::uint32_t v = 0; v < near.size(); ++v)
         if (near[v] != OrientedPoints::no_point) beside[near[v]] = v;
@@ -508,9 +509,9 @@ LatticeMesh with_fewer_vertices(const LatticeMesh& captured, bool keep_tips,
     points.reserve(captured.positions.size());
     for (const auto p : captured.positions) points.emplace_back(p.x, p.y, p.z);
     SimplificationOptions simplification;
-    simplification.surface_error = options.surface_error;
+    simplification.surface_error = options.surface_error.value;
     simplification.colour_error = options.colour_error;
-    simplification.longest_edge = options.longest_edge;
+    simplification.longest_edge = options.longest_edge.value;
     simplification.keep_tips = keep_tips;
     simplification.threads = options.threads;
     auto simplified = simplify(points, captured.triangles, captured.colours, simplification);

@@ -8,9 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "codec/encoder/tracked/tracking_numbers.h"
 #include "codec/intra/duplicates.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/lattice.h"
+#include "core/length.h"
 #include "core/thread.h"
 #include "surface/surface_index.h"
 #include "surface/tracked_registration.h"
@@ -38,7 +40,8 @@ struct TrackedTargets {
 enum class TargetSamples : std::uint8_t { middles, three };
 
 struct TargetSearch {
-    double reach = 480;  // lattice units; vertices without a surface within it take the values of their neighbours
+    // Vertices without a surface within it take the values of their neighbours.
+    LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.reach);
     TargetSamples samples = TargetSamples::middles;
     Threads threads = {};
 };
@@ -54,14 +57,14 @@ TrackedTargets find_tracked_targets(const MovedReference& moved, const LatticeMe
 // The RMS distance of samples of a surface from another one, in each cube of space.
 struct CubeErrors {
     using Cube = std::array<std::int32_t, 3>;
-    double side = 1;
+    LatticeUnits side{1};
     std::vector<std::pair<Cube, double>> rms{};  // ascending by cube; cubes with few samples are left out
     double worst() const;
     double at(const Point3f& point) const;  // 0 if its cube is left out
 };
 // squared: the samples' squared distances. left_out: how many of the farthest of each cube do not count; fewest: of
 // samples that a cube must have, > left_out.
-CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, double side,
+CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, LatticeUnits side,
                        std::ptrdiff_t fewest, std::ptrdiff_t left_out = 0);
 
 // Measured with a few thousand samples in each direction; the worse of the two directions. Lattice units.
@@ -73,9 +76,12 @@ struct TrackedFit {
 };
 
 struct TrackedFitOptions {
-    double stray = 200;    // lattice units, > 0
-    double reach = 400;    // likewise: beyond it the captured surface is not searched
-    double region = 1600;  // side length of the cubes, likewise; cubes with few samples are left out
+    // What is farther off is astray; > 0.
+    LatticeUnits stray = tracking_numbers.stray_in_edges * usual_request.captured_edge;
+    // Beyond it the captured surface is not searched; > 0.
+    LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.fit_reach);
+    // Side of the cubes, > 0; cubes with few samples are left out.
+    LatticeUnits region = Scale{}.on_lattice(tracking_numbers.region);
     Threads threads = {};
 };
 
@@ -91,10 +97,11 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
 TrackedFit least_of(TrackedFit fit, const TrackedFit& before);
 
 struct SimplifiedReferenceOptions {
-    double surface_error = 16;  // lattice units, > 0: see SimplificationOptions
-    double colour_error = 16;   // levels, > 0
-    double longest_edge = 640;  // lattice units, > 0
-    double reach = 480;         // lattice units: how far to search for the captured surface
+    // > 0: see SimplificationOptions
+    LatticeUnits surface_error = usual_request.simplify * usual_request.geometry_step;
+    double colour_error = tracking_numbers.simplified_colours * usual_request.colour_step;  // levels, > 0
+    LatticeUnits longest_edge = Scale{}.on_lattice(tracking_numbers.longest_edge);          // > 0
+    LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.reach);  // how far to search for the captured surface
     Threads threads = {};
 };
 

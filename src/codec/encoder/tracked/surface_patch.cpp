@@ -135,8 +135,8 @@ std::vector<std::vector<std::uint32_t>> border_loops(const Sides& sides, const S
 // ---- Closest points -------------------------------------------------------------------------------------------------
 
 struct Seeker {
-    double reach = 0;
-    double enough = 0;  // what is this near need not be searched for a second time; 0: nothing is
+    LatticeUnits reach;
+    LatticeUnits enough;  // what is this near need not be searched for a second time; 0: nothing is
     double agreement = 0.2;
     Threads threads = {};
 };
@@ -150,12 +150,12 @@ std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std:
                                                std::vector<std::uint32_t> near = {}) {
     std::vector<SurfacePoint> out(points.size());
     if (surface.triangles.empty()) return out;
-    const auto reach = static_cast<float>(how.reach), agreement = static_cast<float>(how.agreement);
+    const auto reach = static_cast<float>(how.reach.value), agreement = static_cast<float>(how.agreement);
     const auto is_enough = [&](const SurfacePoint& found) {
-        return found.found() && static_cast<double>(found.squared_distance) <= how.enough * how.enough;
+        return found.found() && static_cast<double>(found.squared_distance) <= how.enough.value * how.enough.value;
     };
     const auto closest = [&](const Point3f& point, const Point3f& normal, std::uint32_t& guess) {
-        if (how.enough > 0) {
+        if (how.enough.value > 0) {
             auto along =
                 surface.closest_facing(point, normal, {.reach = reach, .agreement = agreement, .along = true}, guess);
             if (is_enough(along)) return along;
@@ -175,7 +175,7 @@ std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std:
         for (std::size_t row = begin; row < end; ++row) {
             std::uint32_t guess = OrientedPoints::no_point;
             const std::size_t first = row * in_a_row, after = std::min(points.size(), first + in_a_row);
-            if (how.enough > 0 && !near.empty())
+            if (how.enough.value > 0 && !near.empty())
                 surface.walk_all(points.subspan(first, after - first), surface.begins_near(),
                                  std::span(near).subspan(first, after - first));
             for (std::size_t i = first; i < after; ++i) {
@@ -188,8 +188,9 @@ std::vector<SurfacePoint> closest_on_same_side(const SurfaceIndex& surface, std:
     return out;
 }
 
-double distance_to(const SurfacePoint& found, double reach) {
-    return found.found() ? std::sqrt(static_cast<double>(found.squared_distance)) : reach;
+// reach: what is given where nothing was found.
+LatticeUnits distance_to(const SurfacePoint& found, LatticeUnits reach) {
+    return found.found() ? LatticeUnits(std::sqrt(static_cast<double>(found.squared_distance))) : reach;
 }
 
 // ---- 1. What is lost ------------------------------------------------------------------------------------------------
@@ -205,7 +206,7 @@ struct Capture {
     std::vector<SurfacePoint> on_decoded{};  // the nearest point of the tracked mesh to each vertex
 
     std::optional<NearestPoints> along_rim{};  // points of the border, half a side apart
-    double rim_reach = 0;                      // what is nearer than this to one of them is at the border
+    LatticeUnits rim_reach{};                  // what is nearer than this to one of them is at the border
 
     // Whether the capture's point nearest to this one lies on its border.
     bool ends_at(const Point3f& point) const {
@@ -218,7 +219,8 @@ struct Capture {
     }
     // The same for points of a simplified border.
     bool ends_near(const Point3f& point) const {
-        return along_rim && static_cast<double>(along_rim->nearest(point).squared_distance) <= rim_reach * rim_reach;
+        return along_rim &&
+               static_cast<double>(along_rim->nearest(point).squared_distance) <= rim_reach.value * rim_reach.value;
     }
 };
 
@@ -244,8 +246,8 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
     std::vector<double> error(samples.size());
     parallel_for(samples.size(), options.threads, 512, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-            error[i] = distance_to(found[i], options.reach);
-            if (error[i] > options.lost / 2 && capture.ends_at(samples[i])) error[i] = 0;
+            const auto distance = distance_to(found[i], options.reach);
+            error[i] = distance > options.lost / 2 && capture.ends_at(samples[i]) ? 0 : distance.value;
         }
     });
     std::vector<double> out(points.size(), 0);
@@ -259,6 +261,9 @@ std::vector<double> errors_of(const TrackedMesh& tracked, const SurfaceIndex& sh
     return out;
 }
 
+// In squared lattice units.
+double area_of_speck(const SurfacePatchOptions& options) { return options.speck.value * options.speck.value; }
+
 // Vertices of the tracked mesh around captured surface that it does not cover: they are lost, so that the hole in which
 // the uncovered surface belongs opens there. Specks of it do not count.
 void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, const SurfacePatchOptions& options,
@@ -266,7 +271,7 @@ void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, c
     const auto& mesh = capture.mesh;
     std::vector<bool> uncovered(mesh.positions.size());
     for (std::size_t v = 0; v < uncovered.size(); ++v)
-        uncovered[v] = !capture.on_decoded[v].found() || distance_to(capture.on_decoded[v], 0) > options.lost;
+        uncovered[v] = !capture.on_decoded[v].found() || distance_to(capture.on_decoded[v], {}) > options.lost;
     std::vector<Triangle> there;
     std::copy_if(mesh.triangles.begin(), mesh.triangles.end(), std::back_inserter(there),
                  [&](const Triangle& t) { return uncovered[t[0]] || uncovered[t[1]] || uncovered[t[2]]; });
@@ -283,7 +288,7 @@ void add_rims_of_uncovered(const Capture& capture, const LatticeMesh& decoded, c
     for (const auto& t : there)
         for (const auto from : t)
             for (const auto to : t)
-                if (uncovered[from] && !uncovered[to] && area[regions.of(from)] > options.speck * options.speck)
+                if (uncovered[from] && !uncovered[to] && area[regions.of(from)] > area_of_speck(options))
                     for (const auto corner : decoded.triangles[capture.on_decoded[to].triangle]) lost[corner] = true;
 }
 
@@ -327,7 +332,7 @@ std::vector<double> errors_around(std::span<const Point3f> points, std::span<con
     std::vector<double> squared, of_capture;
     for (const double distance : error) squared.push_back(distance * distance);
     for (const auto& found : capture.on_decoded) {
-        const double distance = distance_to(found, options.reach);
+        const double distance = distance_to(found, options.reach).value;
         of_capture.push_back(distance * distance);
     }
     const auto back = cube_errors(points, squared, options.region, fewest),
@@ -345,13 +350,13 @@ struct LossSigns {
 
 // A region is lost as far as the error is over half the limit, if enough of it is over the limit. Where any cube of
 // space is lost, only regions that reach into lost cubes are.
-std::vector<bool> find_lost(const LatticeMesh& decoded, const Sides& sides, const LossSigns& signs, double region_lost,
-                            const SurfacePatchOptions& options) {
+std::vector<bool> find_lost(const LatticeMesh& decoded, const Sides& sides, const LossSigns& signs,
+                            LatticeUnits region_lost, const SurfacePatchOptions& options) {
     constexpr double hardly_seen = 0.25;  // how much a triangle of bad shape counts that lies on the surface
     const std::size_t vertices = decoded.positions.size();
     const auto& [error, around, rims, bad_shape] = signs;
     const auto doubtful = [&](std::uint32_t v) {
-        return signs.error[v] > options.lost / 2 || signs.rims[v] || signs.bad_shape[v];
+        return LatticeUnits(signs.error[v]) > options.lost / 2 || signs.rims[v] || signs.bad_shape[v];
     };
     DisjointSets regions(vertices);
     std::vector<double> area(vertices, 0);
@@ -360,17 +365,17 @@ std::vector<bool> find_lost(const LatticeMesh& decoded, const Sides& sides, cons
     for (const auto& t : decoded.triangles) {
         const double third = area_of(decoded.positions, t) / 3;
         for (const auto v : t)
-            if (error[v] > options.lost)
+            if (LatticeUnits(error[v]) > options.lost)
                 area[regions.of(v)] += third;
             else if (bad_shape[v])
                 area[regions.of(v)] += hardly_seen * third;
     }
-    const double enough = options.speck * options.speck;
+    const double enough = area_of_speck(options);
     for (std::uint32_t v = 0; v < vertices; ++v)
         if (rims[v]) area[regions.of(v)] += enough;
     std::vector<bool> reaches(vertices, true);
-    const auto in_lost_cube = [&](std::uint32_t v) { return signs.error_around[v] > region_lost; };
-    if (std::any_of(around.begin(), around.end(), [&](double rms) { return rms > region_lost; })) {
+    const auto in_lost_cube = [&](std::uint32_t v) { return LatticeUnits(signs.error_around[v]) > region_lost; };
+    if (std::any_of(around.begin(), around.end(), [&](double rms) { return LatticeUnits(rms) > region_lost; })) {
         reaches.assign(vertices, false);
         for (std::uint32_t v = 0; v < vertices; ++v)
             if (in_lost_cube(v)) reaches[regions.of(v)] = true;
@@ -404,6 +409,8 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
           const SurfacePatchOptions& options) {
     constexpr int rounds = 12, smoothing = 3;
     constexpr double most_gone = 0.6;
+    constexpr double smallest = 4;  // island that stays, in areas of a speck
+    const double least = smallest * area_of_speck(options);
     const std::size_t vertices = removed.size();
     std::vector<double> area_of_triangle;
     for (const auto& t : decoded.triangles) area_of_triangle.push_back(area_of(decoded.positions, t));
@@ -442,13 +449,11 @@ void tidy(std::vector<bool>& removed, const LatticeMesh& decoded, const Sides& s
         std::vector<std::uint32_t> more;
         for (std::uint32_t v = 0; v < vertices; ++v) {
             if (removed[v] || gone[v] == 0) {
-                if (!removed[v] && kept[v] > 0 && opened[parts.of(v)] &&
-                    area[parts.of(v)] < 4 * options.speck * options.speck)
-                    more.push_back(v);
+                if (!removed[v] && kept[v] > 0 && opened[parts.of(v)] && area[parts.of(v)] < least) more.push_back(v);
                 continue;
             }
             const bool notch = round < smoothing && lost_corners[v] > most_gone * corners[v];
-            const bool island = area[parts.of(v)] < 4 * options.speck * options.speck;
+            const bool island = area[parts.of(v)] < least;
             if (kept[v] == 0 || borders[v] > 1 || notch || island) more.push_back(v);
         }
         for (const auto v : more) removed[v] = true;
@@ -522,7 +527,7 @@ Outside outside_of(const Remainder& stays, const LatticeMesh& decoded, const std
     const SurfaceIndex index(points, triangles,
                              {.cell = static_cast<float>(std::max(2 * mean, 1.0)), .threads = options.threads});
     const auto found =
-        closest_on_same_side(index, query_points, query_normals, {options.reach, 0, 0.2, options.threads});
+        closest_on_same_side(index, query_points, query_normals, {options.reach, {}, 0.2, options.threads});
     Outside out;
     out.edges.assign(capture.points.size(), far);
     out.at_opening.assign(capture.points.size(), false);
@@ -532,13 +537,13 @@ Outside outside_of(const Remainder& stays, const LatticeMesh& decoded, const std
             local += static_cast<double>(p.shares[i]) * edge[t[i]];
             if (p.shares[i] > none_of_it && !stays.open[t[i]]) depth += static_cast<double>(p.shares[i]);
         }
-        const double distance = distance_to(p, options.reach);
+        const auto distance = distance_to(p, options.reach);
         if (depth > 0) {
             out.edges[v] = distance > options.lost ? far : -depth;
             return;
         }
         out.at_opening[v] = true;
-        out.edges[v] = std::min(far, distance / std::max(local, 1.0));
+        out.edges[v] = std::min(far, distance.value / std::max(local, 1.0));
     };
     for (std::uint32_t v = 0; v < capture.points.size(); ++v)
         if (nearest_stays(capture.on_decoded[v]))
@@ -548,75 +553,104 @@ Outside outside_of(const Remainder& stays, const LatticeMesh& decoded, const std
     return out;
 }
 
-// The captured triangles where `outside` is more than the gap, those that cross it cut along it. Parts that do not
-// reach the open border are none of this patch's, nor are crumbs.
-LatticeMesh cut_piece(const Outside& outside, const Capture& capture, const SurfacePatchOptions& options) {
-    constexpr double least_share = 0.1;  // of an edge, so that no triangle gets too thin for the lattice
-    constexpr double crumb = 0.25;       // side of a square, in specks
-    const auto& mesh = capture.mesh;
-    LatticeMesh all;
-    std::vector<std::uint32_t> number(mesh.positions.size(), none);
-    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> cuts;
-    std::vector<bool> joins;
-    const auto inside = [&](std::uint32_t v) { return outside.edges[v] > options.gap; };
-    const auto whole = [&](std::uint32_t v) {
-        if (number[v] == none) {
-            number[v] = static_cast<std::uint32_t>(all.positions.size());
-            all.positions.push_back(mesh.positions[v]);
-            if (!mesh.colours.empty()) all.colours.push_back(mesh.colours[v]);
-            joins.push_back(false);
-        }
-        return number[v];
-    };
-    const auto cut = [&](std::uint32_t in, std::uint32_t out) {
-        const auto [at, fresh] = cuts.try_emplace({in, out}, static_cast<std::uint32_t>(all.positions.size()));
-        if (!fresh) return at->second;
-        const double span = outside.edges[in] - outside.edges[out];
-        const double share = std::clamp((outside.edges[in] - options.gap) / span, least_share, 1 - least_share);
-        const auto a = to_vector(mesh.positions[in]), b = to_vector(mesh.positions[out]);
-        const auto p = a + (b - a) * share;
-        const auto coordinate = [&](std::size_t axis) { return static_cast<std::int32_t>(std::lround(p[axis])); };
-        all.positions.push_back({coordinate(0), coordinate(1), coordinate(2)});
-        if (!mesh.colours.empty()) {
-            Colour colour{};
-            for (std::size_t c = 0; c < 3; ++c)
-                colour[c] = static_cast<std::uint8_t>(
-                    std::lround(mesh.colours[in][c] + (mesh.colours[out][c] - mesh.colours[in][c]) * share));
-            all.colours.push_back(colour);
-        }
-        joins.push_back(outside.at_opening[in] || outside.at_opening[out]);
-        return at->second;
-    };
-    for (const auto& t : mesh.triangles) {
+// Captured triangles that were cut out.
+struct Cutting {
+    LatticeMesh mesh;
+    std::vector<bool> joins;  // of its vertices: whether it was cut at the open border
+};
+
+// Cuts the captured triangles along the line at which `outside` is the gap, and keeps what is beyond it.
+class Cutter {
+public:
+    Cutter(const Outside& outside, const LatticeMesh& captured, double gap)
+        : outside_(outside), captured_(captured), gap_(gap), number_(captured.positions.size(), none) {}
+
+    Cutting run() {
+        for (const auto& t : captured_.triangles) add(t);
+        return std::move(out_);
+    }
+
+private:
+    const Outside& outside_;
+    const LatticeMesh& captured_;
+    double gap_;                                                             // in edges
+    std::vector<std::uint32_t> number_;                                      // of the captured vertices in the piece
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> cuts_;  // those of sides that cross the line
+    Cutting out_;
+
+    bool inside(std::uint32_t v) const { return outside_.edges[v] > gap_; }
+
+    void add(const Triangle& t) {
         const int count = int{inside(t[0])} + int{inside(t[1])} + int{inside(t[2])};
-        if (count == 0) continue;
+        if (count == 0) return;
+        auto& triangles = out_.mesh.triangles;
         if (count == 3) {
-            all.triangles.push_back({whole(t[0]), whole(t[1]), whole(t[2])});
-            continue;
+            triangles.push_back({whole(t[0]), whole(t[1]), whole(t[2])});
+            return;
         }
         // The corner that is alone on its side comes first.
         std::size_t alone = 0;
         while (inside(t[alone]) != (count == 1)) ++alone;
         const auto a = t[alone], b = t[(alone + 1) % 3], c = t[(alone + 2) % 3];
         if (count == 1) {
-            all.triangles.push_back({whole(a), cut(a, b), cut(a, c)});
+            triangles.push_back({whole(a), cut(a, b), cut(a, c)});
         } else {
             const auto at_b = cut(b, a), at_c = cut(c, a);
-            all.triangles.push_back({at_b, whole(b), whole(c)});
-            all.triangles.push_back({at_b, whole(c), at_c});
+            triangles.push_back({at_b, whole(b), whole(c)});
+            triangles.push_back({at_b, whole(c), at_c});
         }
     }
-    DisjointSets parts(all.positions.size());
-    std::vector<double> area(all.positions.size(), 0);
+
+    // The piece's number of a captured vertex.
+    std::uint32_t whole(std::uint32_t v) {
+        if (number_[v] == none) {
+            number_[v] = static_cast<std::uint32_t>(out_.mesh.positions.size());
+            out_.mesh.positions.push_back(captured_.positions[v]);
+            if (!captured_.colours.empty()) out_.mesh.colours.push_back(captured_.colours[v]);
+            out_.joins.push_back(false);
+        }
+        return number_[v];
+    }
+
+    // That of the vertex at which the side between a vertex inside and one outside crosses the line.
+    std::uint32_t cut(std::uint32_t in, std::uint32_t out) {
+        constexpr double least_share = 0.1;  // of an edge, so that no triangle gets too thin for the lattice
+        auto& mesh = out_.mesh;
+        const auto [at, fresh] = cuts_.try_emplace({in, out}, static_cast<std::uint32_t>(mesh.positions.size()));
+        if (!fresh) return at->second;
+        const double span = outside_.edges[in] - outside_.edges[out];
+        const double share = std::clamp((outside_.edges[in] - gap_) / span, least_share, 1 - least_share);
+        const auto a = to_vector(captured_.positions[in]), b = to_vector(captured_.positions[out]);
+        const auto p = a + (b - a) * share;
+        const auto coordinate = [&](std::size_t axis) { return static_cast<std::int32_t>(std::lround(p[axis])); };
+        mesh.positions.push_back({coordinate(0), coordinate(1), coordinate(2)});
+        if (!captured_.colours.empty()) {
+            const auto &from = captured_.colours[in], &to = captured_.colours[out];
+            Colour colour{};
+            for (std::size_t c = 0; c < 3; ++c)
+                colour[c] = static_cast<std::uint8_t>(std::lround(from[c] + (to[c] - from[c]) * share));
+            mesh.colours.push_back(colour);
+        }
+        out_.joins.push_back(outside_.at_opening[in] || outside_.at_opening[out]);
+        return at->second;
+    }
+};
+
+// Without the parts that do not reach the open border, and without crumbs.
+LatticeMesh parts_that_join(const Cutting& cutting, const SurfacePatchOptions& options) {
+    constexpr double crumb = 0.25;  // side of a square, in specks
+    const double least = crumb * crumb * area_of_speck(options);
+    const auto& all = cutting.mesh;
+    const std::size_t vertices = all.positions.size();
+    DisjointSets parts(vertices);
+    std::vector<double> area(vertices, 0);
     for (const auto& t : all.triangles) parts.join(t[0], t[1]), parts.join(t[1], t[2]);
     for (const auto& t : all.triangles) area[parts.of(t[0])] += area_of(all.positions, t);
-    std::vector<bool> wanted(all.positions.size(), false);
-    for (std::uint32_t v = 0; v < joins.size(); ++v)
-        if (joins[v]) wanted[parts.of(v)] = true;
-    const double least = crumb * crumb * options.speck * options.speck;
+    std::vector<bool> wanted(vertices, false);
+    for (std::uint32_t v = 0; v < vertices; ++v)
+        if (cutting.joins[v]) wanted[parts.of(v)] = true;
     LatticeMesh out;
-    std::fill(number.begin(), number.end(), none);
-    number.resize(std::max(number.size(), all.positions.size()), none);
+    std::vector<std::uint32_t> number(vertices, none);
     for (auto t : all.triangles) {
         const auto part = parts.of(t[0]);
         if (!wanted[part] || area[part] < least) continue;
@@ -631,6 +665,12 @@ LatticeMesh cut_piece(const Outside& outside, const Capture& capture, const Surf
         out.triangles.push_back(t);
     }
     return out;
+}
+
+// What of the captured surface lies farther outside than the gap, as far as it reaches the open border: the rest is
+// none of this patch's.
+LatticeMesh cut_piece(const Outside& outside, const Capture& capture, const SurfacePatchOptions& options) {
+    return parts_that_join(Cutter(outside, capture.mesh, options.gap).run(), options);
 }
 
 // ---- 4. The join ----------------------------------------------------------------------------------------------------
@@ -975,7 +1015,8 @@ Capture make_capture(const LatticeMesh& captured, const SurfaceIndex& surface, c
     }
     if (along_rim.empty()) return capture;
     capture.along_rim.emplace(along_rim);
-    capture.rim_reach = 2 * options.simplification.surface_error + rim_length / static_cast<double>(along_rim.size());
+    capture.rim_reach =
+        2 * options.simplification.surface_error + LatticeUnits(rim_length / static_cast<double>(along_rim.size()));
     return capture;
 }
 
@@ -1029,7 +1070,7 @@ SurfacePatchSearch::SurfacePatchSearch(SurfacePatchSearch&&) noexcept = default;
 SurfacePatchSearch& SurfacePatchSearch::operator=(SurfacePatchSearch&&) noexcept = default;
 SurfacePatchSearch::~SurfacePatchSearch() = default;
 
-std::optional<SurfacePatch> SurfacePatchSearch::find(double region_lost) const {
+std::optional<SurfacePatch> SurfacePatchSearch::find(LatticeUnits region_lost) const {
     if (!measured_) return std::nullopt;
     const auto& m = *measured_;
     const auto& options = m.options;

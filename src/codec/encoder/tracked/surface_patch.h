@@ -8,21 +8,25 @@
 #include <vector>
 
 #include "codec/encoder/tracked/captured_surface.h"
+#include "codec/encoder/tracked/tracking_numbers.h"
 #include "codec/tracked/surface_patch.h"
 #include "core/lattice.h"
+#include "core/length.h"
 #include "core/thread.h"
 #include "surface/surface_index.h"
 
 namespace htvm::internal {
 
-// Lengths are in lattice units; the defaults suit an adult at 16 units a millimetre.
+// The defaults suit an adult on the default lattice.
 struct SurfacePatchOptions {
-    double lost = 96;         // a region is lost where the surfaces are farther apart than this, as far as they are
-                              // apart by half of it
-    double reach = 480;       // how far to search for the other surface
-    double speck = 320;       // side of a square: lost regions of a smaller area are left alone
-    double region = 1600;     // side of the cubes of space by which a frame is judged: see TrackedFitOptions
-    double region_lost = 0;   // RMS distance from which on a cube is lost; 0: regions are lost by themselves
+    // A region is lost where the surfaces are farther apart than this, as far as they are apart by half of it.
+    LatticeUnits lost = Scale{}.on_lattice(tracking_numbers.lost);
+    // How far to search for the other surface.
+    LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.reach);
+    // Side of a square: lost regions of a smaller area are left alone.
+    LatticeUnits speck = Scale{}.on_lattice(tracking_numbers.speck);
+    // Side of the cubes of space by which a frame is judged: see TrackedFitOptions.
+    LatticeUnits region = Scale{}.on_lattice(tracking_numbers.region);
     int margin = 1;           // rings of triangles around a lost region that go as well, >= 0
     double stretch = 3;       // a triangle is lost, too, where a side is longer than at rest by this factor
     double gap = 0.5;         // between what stays and the piece, before they are joined: in mean edges there
@@ -50,9 +54,10 @@ public:
     SurfacePatchSearch& operator=(SurfacePatchSearch&&) noexcept;
     ~SurfacePatchSearch();
 
-    // region_lost: as in the options, in place of theirs. The result is nothing if nothing is lost, too much is lost,
-    // the borders cannot be joined clearly, or the capture has texture coordinates: an I-frame is what is left then.
-    std::optional<SurfacePatch> find(double region_lost) const;
+    // region_lost: RMS distance from which on a cube is lost; 0: regions are lost by themselves. The result is nothing
+    // if nothing is lost, too much is lost, the borders cannot be joined clearly, or the capture has texture
+    // coordinates: an I-frame is what is left then.
+    std::optional<SurfacePatch> find(LatticeUnits region_lost) const;
 
 private:
     struct Measured;

@@ -88,7 +88,7 @@ TargetVariance median_square(std::span<const TargetDetail> details) {
 // The variance of what the reference is off by because it is coded.
 TargetVariance coded_variance(const TargetFilterOptions& options) {
     const auto of_step = [](double step) { return static_cast<float>(step * step / 12); };
-    return {of_step(options.geometry_step), of_step(options.colour_step)};
+    return {of_step(options.geometry_step.value), of_step(options.colour_step)};
 }
 
 // What one frame tells at a vertex, its neighbours' mixed in.
@@ -171,7 +171,7 @@ TargetHistory filter_targets(TrackedTargets& targets, std::span<const Triangle> 
         if (before.measured == 0) out.unsure = out.noise;
     }
 
-    const auto edges = of_meshing * static_cast<float>(options.captured_edge);
+    const auto edges = of_meshing * static_cast<float>(options.captured_edge.value);
     const float known = std::min(static_cast<float>(out.measured), longest_memory);
     double left_out = 0;
     for (std::size_t v = 0; v < vertices; ++v) {
@@ -195,11 +195,11 @@ TargetHistory filter_targets(TrackedTargets& targets, std::span<const Triangle> 
     return out;
 }
 
-double price_of_bits(const TargetHistory& filtered, double step) {
+double price_of_bits(const TargetHistory& filtered, LatticeUnits step) {
     constexpr double fine = 1.5;  // steps up to which, in deviations of the noise, what is left out is small anyway
     constexpr double least = 0.2;
     const double noise = std::sqrt(std::max(0.0, static_cast<double>(filtered.usual_noise[0])));
-    return 1 - filtered.calm * (1 - std::clamp(fine * noise / step, least, 1.0));
+    return 1 - filtered.calm * (1 - std::clamp(fine * noise / step.value, least, 1.0));
 }
 
 TargetHistory on_new_reference(const TargetHistory& before, std::span<const std::uint32_t> kept, std::size_t vertices,

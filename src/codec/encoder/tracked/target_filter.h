@@ -17,6 +17,8 @@
 #include <vector>
 
 #include "codec/encoder/tracked/captured_surface.h"
+#include "codec/encoder/tracked/tracking_numbers.h"
+#include "core/length.h"
 #include "htvm/mesh.hpp"
 
 namespace htvm::internal {
@@ -39,8 +41,10 @@ struct TargetHistory {
 };
 
 struct TargetFilterOptions {
-    double geometry_step = 32, colour_step = 11;  // by which the reference itself may be off: lattice units, levels
-    double captured_edge = 128;                   // mean edge of the captured mesh, lattice units
+    // By which the reference itself may be off, the second in levels.
+    LatticeUnits geometry_step = tracking_numbers.finer * usual_request.geometry_step;
+    double colour_step = tracking_numbers.coarser_colours * usual_request.colour_step;
+    LatticeUnits captured_edge = usual_request.captured_edge;  // mean edge of the captured mesh
 };
 
 // Replaces the targets by what they are without noise. triangles: of the reference. before: of the frame before, or of
@@ -49,9 +53,9 @@ TargetHistory filter_targets(TrackedTargets& targets, std::span<const Triangle> 
                              const TargetFilterOptions& options);
 
 // By how much less a bit should cost than where all targets are new in each frame: where they are calm, an error that
-// is left stays for long. step: of the displacement, lattice units. From 0.2 to 1, which it is where nothing was
+// is left stays for long. step: of the displacement. From 0.2 to 1, which it is where nothing was
 // filtered.
-double price_of_bits(const TargetHistory& filtered, double step);
+double price_of_bits(const TargetHistory& filtered, LatticeUnits step);
 
 // What is left of the history when the surface that was coded becomes the reference, with `vertices` vertices. kept:
 // which vertices its first ones were before; the others are new, or all of them.

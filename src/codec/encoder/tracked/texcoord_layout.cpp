@@ -77,7 +77,8 @@ double texcoords_per_unit(const LatticeMesh& mesh) {
 
 }  // namespace
 
-double share_with_other_texcoords(const LatticeMesh& tracked, const LatticeMesh& captured, double reach) {
+double share_with_other_texcoords(const LatticeMesh& tracked, const LatticeMesh& captured, LatticeUnits within) {
+    const double reach = within.value;
     if (tracked.texcoords.empty() || captured.texcoords.empty() || !(reach > 0)) return 0;
     constexpr std::size_t wanted = 2000;
     constexpr double stretch = 2;  // of parts of the atlas, against its median

@@ -11,43 +11,42 @@ namespace htvm::internal {
 namespace {
 
 using Frame = TrackedWork::Frame;
+constexpr auto& numbers = tracking_numbers;
 
 // ---- Is tracking lost? ----------------------------------------------------------------------------------------------
 
 // How far off a region of 10 cm may be. best: RMS of the best T-frame.
-double allowed_in_region(const TrackedWork& work, double best) {
-    constexpr double region_to_best = 5, region_to_intra = 1.5;
-    constexpr double visible = 3.5, visible_in_edges = 0.42;  // mm on an adult; in mean edges of the capture
+LatticeUnits allowed_in_region(const TrackedWork& work, LatticeUnits best) {
     const auto& origin = work.reference().origin;
-    return std::max({region_to_best * best, region_to_intra * origin.fit.worst_region,
-                     visible * work.configuration.adult_millimetre, visible_in_edges * origin.edge});
+    return std::max({numbers.region_to_best * best, numbers.region_to_intra * LatticeUnits(origin.fit.worst_region),
+                     work.configuration.scale.on_lattice(numbers.visible),
+                     numbers.remeshed_in_edges * LatticeUnits(origin.edge)});
 }
 
 // The same of the whole surface. On a clean, smooth capture the best T-frame may be far better than quantisation lets
 // an I-frame or a patch be.
-double allowed_over_all(const TrackedWork& work, double best) {
-    constexpr double worst_to_best = 2.2, quantised = 0.75;  // steps
-    return std::max(worst_to_best * best, quantised * static_cast<double>(work.reference().origin.steps.geometry));
+LatticeUnits allowed_over_all(const TrackedWork& work, LatticeUnits best) {
+    const LatticeUnits step = work.reference().origin.steps.geometry;
+    return std::max(numbers.worst_to_best * best, numbers.quantised * step);
 }
 
 // Whether so much is lost that the picture falls apart: most of the person, as where a capture is cut, or all of a
 // limb.
 bool falls_apart(const TrackedWork& work, const TrackedFit& fit) {
-    constexpr double most_of_all = 4, most_in_region = 30;  // mm on an adult
-    constexpr double to_lost = 3;                           // times what already counts as lost
-    const double millimetre = work.configuration.adult_millimetre, best = work.sequence.history.best_fit;
-    const double allowed = std::max(allowed_over_all(work, best), work.reference().origin.fit.rms);
-    return fit.rms > std::max(most_of_all * millimetre, to_lost * allowed) ||
-           fit.worst_region > std::max(most_in_region * millimetre, to_lost * allowed_in_region(work, best));
+    const auto& scale = work.configuration.scale;
+    const auto best = work.sequence.history.best_fit;
+    const auto allowed = std::max(allowed_over_all(work, best), LatticeUnits(work.reference().origin.fit.rms));
+    return fit.rms > std::max(scale.on_lattice(numbers.most_of_all), numbers.apart_to_lost * allowed) ||
+           fit.worst_region > std::max(scale.on_lattice(numbers.most_in_region),
+                                       numbers.apart_to_lost * allowed_in_region(work, best));
 }
 
 // Whether a T-frame fits visibly worse than the T-frames of its I-frame can: over the whole surface, or in one region,
 // such as a hand.
 bool is_lost(const TrackedWork& work, const TrackedFit& fit) {
-    constexpr double more_strays = 0.004;
-    const double best_fit = work.sequence.history.best_fit;
-    const double best = best_fit > 0 ? best_fit : fit.rms;
-    return fit.stray_share > work.reference().origin.fit.stray_share + more_strays ||
+    const auto best_fit = work.sequence.history.best_fit;
+    const auto best = best_fit > 0 ? best_fit : fit.rms;
+    return fit.stray_share > work.reference().origin.fit.stray_share + numbers.more_strays ||
            fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best);
 }
 
@@ -61,44 +60,43 @@ TrackedFit fit_of(const TrackedWork& work, const EncodedTrackedFrame& encoded) {
 // Whether the capture's texture atlas is laid out anew since the I-frame, whose texture coordinates a T-frame shows.
 bool texture_is_laid_out_anew(const TrackedWork& work, const LatticeMesh& tracked) {
     if (work.mesh().texcoords.empty()) return false;
-    // Tracking slips along the surface by less than this, mm on an adult, unless it is lost. Measured on a studio's
-    // capture: without a new layout no vertex has other coordinates, with one 92 % have.
-    constexpr double slip = 30, most_others = 0.1;
+    // Measured on a studio's capture: without a new layout no vertex has other coordinates, with one 92 % have.
     StageClock clock(work.stages);
-    const double others = share_with_other_texcoords(tracked, work.mesh(), slip * work.configuration.adult_millimetre);
+    const double others =
+        share_with_other_texcoords(tracked, work.mesh(), work.configuration.scale.on_lattice(numbers.slip));
     clock.done("layout of the texture");
-    return others > most_others;
+    return others > numbers.most_others;
 }
 
 // Whoever joins late needs all patches since the I-frame.
 bool patches_have_grown(const TrackedWork& work) {
-    constexpr int most_patches = 24;
-    constexpr double most_bytes = 4;  // times the I-frame's
     const auto& reference = work.reference();
-    return reference.patches >= most_patches || reference.patch_bytes > most_bytes * reference.intra_bytes;
+    return reference.patches >= numbers.most_patches ||
+           reference.patch_bytes > numbers.most_patches_bytes * reference.intra_bytes;
 }
 
 // Whether an I-frame of the tracked mesh is as good as one of the capture: it does not have many more vertices, nor was
 // it made for much coarser or finer steps. (Where an error is asked for, the steps of I- and T-frames are far apart.)
 bool may_be_renewed(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
-    constexpr double most_vertices = 1.3, most_steps = 1.5;
     const auto& origin = work.reference().origin;
     const double ratio = static_cast<double>(steps.geometry) / origin.steps.geometry;
     return work.configuration.options.rate.target_error <= 0 &&
-           static_cast<double>(tracked.positions.size()) <= most_vertices * static_cast<double>(origin.vertices) &&
-           ratio <= most_steps && ratio >= 1 / most_steps;
+           static_cast<double>(tracked.positions.size()) <=
+               numbers.most_renewed_vertices * static_cast<double>(origin.vertices) &&
+           ratio <= numbers.most_renewed_steps && ratio >= 1 / numbers.most_renewed_steps;
 }
 
 // ---- Patches --------------------------------------------------------------------------------------------------------
 
 SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& steps) {
     const auto& configuration = work.configuration;
-    const double millimetre = configuration.adult_millimetre;
+    const auto& scale = configuration.scale;
     SurfacePatchOptions out;
-    out.lost = std::max(6 * millimetre, 0.42 * work.reference().origin.edge);
+    out.lost = std::max(scale.on_lattice(numbers.lost),
+                        numbers.remeshed_in_edges * LatticeUnits(work.reference().origin.edge));
     out.region = region_side(configuration);
-    out.reach = 30 * millimetre;
-    out.speck = 20 * millimetre;
+    out.reach = scale.on_lattice(numbers.reach);
+    out.speck = scale.on_lattice(numbers.speck);
     out.most_share = configuration.options.tracked.patch_share;
     out.simplification = simplification_options(configuration, steps);
     out.threads = configuration.threads;
@@ -110,17 +108,14 @@ SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& ste
 Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeRegistration& registered,
                                           const FrameSteps& steps, const EncodedTrackedFrame& tracked) {
     using Patched = std::optional<TrackedPatch>;
-    constexpr double most_bytes = 0.8;  // of the I-frame's
-    // At fine steps a bit brings more where less is wrong.
-    constexpr double lost_in_steps = 1.75;
     const auto& reference = work.reference();
-    const double lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
-                                 lost_in_steps * static_cast<double>(steps.geometry));
+    const auto lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
+                               numbers.lost_in_steps * LatticeUnits(steps.geometry));
     StageClock measuring(work.stages);
     const SurfacePatchSearch search({tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near},
                                     work.mesh(), work.surface, patch_options(work, steps));
     measuring.done("patch");
-    for (const double region_lost : {lost, 0.0}) {
+    for (const auto region_lost : {lost, LatticeUnits(0)}) {
         StageClock clock(work.stages);
         const auto found = search.find(region_lost);
         clock.done("patch");
@@ -130,7 +125,8 @@ Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeReg
         auto& out = *coded;
         if (!out) continue;
         auto& fit = out->origin.fit;
-        if (static_cast<double>(out->frame.bytes()) > most_bytes * reference.intra_bytes || is_lost(work, fit))
+        if (static_cast<double>(out->frame.bytes()) > numbers.most_patch_bytes * reference.intra_bytes ||
+            is_lost(work, fit))
             continue;
         fit = least_of(std::move(fit), reference.origin.fit);
         out->best_fit = work.sequence.history.best_fit;

@@ -14,12 +14,12 @@ enum class IntraUse : std::uint8_t { reference, none };  // whether later frames
 // The steps at which the simplified I-frame and its T-frames have about the same error as other frames have at the
 // steps asked for; docs/experiments/colour_steps.md has measurements.
 FrameSteps tracked_steps(const FrameSteps& steps) {
-    constexpr double finer = 0.55, coarser_colours = 1.3;
     const auto scaled = [](double factor, std::int32_t step) {
         return std::max(1, static_cast<std::int32_t>(std::lround(factor * step)));
     };
     constexpr std::int32_t coarsest_colours = 255;  // the largest step that a frame header can hold
-    return {scaled(finer, steps.geometry), std::min(scaled(coarser_colours, steps.colour), coarsest_colours)};
+    return {scaled(tracking_numbers.finer, steps.geometry),
+            std::min(scaled(tracking_numbers.coarser_colours, steps.colour), coarsest_colours)};
 }
 
 LatticeMesh simplified(const TrackedWork& work, const FrameSteps& steps) {
@@ -137,26 +137,22 @@ Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistrati
 }  // namespace
 
 TrackedFrameOptions tracked_frame_options(const Configuration& configuration, const FrameSteps& steps) {
-    // Re-meshing alone makes the colour at one place vary from frame to frame; finer steps would code that noise.
-    constexpr double coarser_colours = 6, reach = 30;  // the reach in mm on an adult
     TrackedFrameOptions out;
-    out.millimetre = configuration.adult_millimetre;
+    out.scale = configuration.scale;
     out.geometry_step = tracked_steps(steps).geometry;
-    out.colour_step = coarser_colours * steps.colour;
+    out.colour_step = tracking_numbers.coarser_tracked_colours * steps.colour;
     out.lambda = configuration.options.lambda;
-    out.reach = reach * configuration.adult_millimetre;
+    out.reach = configuration.scale.on_lattice(tracking_numbers.reach);
     out.threads = configuration.threads;
     return out;
 }
 
 SimplifiedReferenceOptions simplification_options(const Configuration& configuration, const FrameSteps& steps) {
-    constexpr double longest_edge = 40, reach = 30;  // mm on an adult
-    constexpr double colour_steps = 2.5;
     SimplifiedReferenceOptions out;
     out.surface_error = configuration.options.tracked.simplify * steps.geometry;
-    out.colour_error = colour_steps * steps.colour;
-    out.longest_edge = longest_edge * configuration.adult_millimetre;
-    out.reach = reach * configuration.adult_millimetre;
+    out.colour_error = tracking_numbers.simplified_colours * steps.colour;
+    out.longest_edge = configuration.scale.on_lattice(tracking_numbers.longest_edge);
+    out.reach = configuration.scale.on_lattice(tracking_numbers.reach);
     out.threads = configuration.threads;
     return out;
 }
@@ -170,10 +166,9 @@ Result<TrackedIntra> code_unreferred_intra(const TrackedWork& work, const FrameS
 }
 
 Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
-    // What is quantised already would err twice as far, and jump.
-    constexpr double finer_again = 0.5;
     auto quantised = tracked_steps(steps);
-    quantised.geometry = std::max(1, static_cast<std::int32_t>(std::lround(finer_again * quantised.geometry)));
+    quantised.geometry =
+        std::max(1, static_cast<std::int32_t>(std::lround(tracking_numbers.finer_renewed * quantised.geometry)));
     auto out = code_intra_of(work, tracked, steps, quantised, IntraUse::reference, true);
     if (!out) return out;
     const auto& before = work.reference().origin;

@@ -34,12 +34,14 @@ std::vector<QuantisedTransform> quantised(std::span<const RigidMotion> motion, s
 
 // For shifts, half the step of the displacement; for turns steps that shrink somewhat faster than that step does:
 // docs/experiments/node_motion.md has measurements.
-NodeMotionSteps motion_steps(double geometry_step, double millimetre) {
+NodeMotionSteps motion_steps(LatticeUnits geometry_step, const Scale& scale) {
+    constexpr double sixteenths = 16;  // of a millimetre on an adult, in which the step counts for turns
     const auto exponent = [](double step, double slope, double more, int most) {
         return std::clamp(static_cast<int>(std::lround(slope * std::log2(std::max(step, 1.0)) + more)), 0, most);
     };
-    return {.rotation_exponent = exponent(16 * geometry_step / millimetre, 1.25, 1.4, NodeMotionSteps::most_rotation),
-            .shift_exponent = exponent(geometry_step, 1, -1, NodeMotionSteps::most_shift)};
+    const double on_adult = sixteenths * (geometry_step / scale.adult_millimetre);
+    return {.rotation_exponent = exponent(on_adult, 1.25, 1.4, NodeMotionSteps::most_rotation),
+            .shift_exponent = exponent(geometry_step.value, 1, -1, NodeMotionSteps::most_shift)};
 }
 
 // A bit of node motion is worth 0.3 of what a bit of the displacement is worth to each sample that a node moves: most
@@ -47,7 +49,8 @@ NodeMotionSteps motion_steps(double geometry_step, double millimetre) {
 double price_of_motion(const DeformationForm& form, const TrackedFrameOptions& options) {
     constexpr double share = 0.3;
     const double samples = form.weight / static_cast<double>(std::max<std::size_t>(form.diagonal.size(), 1));
-    return share * options.lambda * options.geometry_step * options.geometry_step * samples;
+    const double step = options.geometry_step.value;
+    return share * options.lambda * step * step * samples;
 }
 
 // What was taken off, as long as the values can be coded without it.
@@ -147,8 +150,8 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
         if (i != registered.start &&
             take_nearer_limbs(deformable, surface, others[i], options, registered.motion, &registered.form))
             any = true;
-    const auto reached = reached_for_extremities(deformable, surface, registered.motion, starts.last,
-                                                 {.millimetre = options.millimetre});
+    const auto reached =
+        reached_for_extremities(deformable, surface, registered.motion, starts.last, {.scale = options.scale});
     if (reached.empty()) return any;
     auto near = options;  // the body is where it should be already
     near.coarse_rounds = 0;
@@ -156,101 +159,158 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
     return take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form) || any;
 }
 
+namespace {
+
+// What a frame is coded from, as encode_tracked_frame() is told.
+struct FrameSource {
+    const LatticeMesh& captured;
+    const SurfaceIndex& surface;
+    const TrackedReference& reference;
+    const NodeRegistration& registered;
+    const TrackedState* before;
+    const TrackedFrameOptions& options;
+};
+
+// The reference, moved by its nodes as they were coded.
+struct MovedSurface {
+    std::vector<LatticePoint> positions;
+    std::vector<Vector3d> normals;
+};
+
+EncodedNodeMotion code_motion(const FrameSource& source, const NodeMotionSteps& steps) {
+    const auto& [captured, surface, reference, registered, before, options] = source;
+    return encode_node_motion(
+        quantised(registered.motion, reference.graph.pivots), reference.graph,
+        before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
+        {.steps = steps, .form = &registered.form, .price = price_of_motion(registered.form, options)});
+}
+
+// Zero where nothing but the motion is coded.
+TrackedTargets targets_of(const FrameSource& source, const MovedSurface& moved) {
+    const auto& [captured, surface, reference, registered, before, options] = source;
+    if (options.motion_alone) {
+        TrackedTargets none;
+        none.displacement.resize(moved.positions.size());
+        if (!reference.mesh.colours.empty()) none.colours.resize(3 * moved.positions.size());
+        return none;
+    }
+    return find_tracked_targets(
+        {moved.positions, moved.normals, reference.mesh.triangles, reference.mesh.colours}, captured, surface,
+        {.reach = options.reach, .samples = options.target_samples, .threads = options.threads},
+        options.near.empty() ? registered.form.matches
+                             : std::vector<std::uint32_t>(options.near.begin(), options.near.end()));
+}
+
+// Filters the targets; sets what the frame leaves of it, and what was taken off if that is to be told.
+void denoise(const TargetFilterOptions& how, const FrameSource& source, const TargetHistory& history,
+             TrackedTargets& targets, EncodedTrackedFrame& out) {
+    const auto& options = source.options;
+    if (options.keeps_noise) out.noise.targets = targets;
+    if (options.motion_alone)
+        out.targets = history;
+    else
+        out.targets = filter_targets(targets, source.reference.mesh.triangles, history, how);
+    if (!options.keeps_noise) return;
+    take_off(out.noise.targets.displacement, targets.displacement);
+    take_off(out.noise.targets.colours, targets.colours);
+}
+
+struct CodedFields {
+    EncodedField displacement;
+    std::optional<EncodedField> colours;  // none where the reference has no colours
+    std::vector<LatticePoint> positions;  // as the decoder will have them
+};
+
+// price: by how much less a bit of the displacement should cost.
+Result<CodedFields> code_fields(const FrameSource& source, const MovedSurface& moved, const TrackedTargets& targets,
+                                LatticeUnits geometry_step, double price) {
+    const auto& reference = source.reference;
+    const auto& options = source.options;
+    const TrackedState* before = source.before;
+    const double step = geometry_step.value, colour_step = options.motion_alone ? field_limit : options.colour_step;
+    const FieldOptions geometry{.step = {step, step, step}, .lambda = options.lambda * price};
+    const FieldOptions colour{
+        .step = {colour_step, colour_step, colour_step}, .lambda = options.lambda, .turned = true};
+    CodedFields out;
+    Result<EncodedField> displacement, colours;
+    const auto code_displacement = [&] {
+        displacement = encode_field(reference.hierarchy, targets.displacement, 1, geometry,
+                                    before ? &before->displacement : nullptr);
+        if (displacement) out.positions = displaced(moved.positions, moved.normals, displacement->values);
+    };
+    if (reference.mesh.colours.empty()) {
+        code_displacement();
+    } else {
+        colours = encode_field(reference.hierarchy, targets.colours, 3, colour, before ? &before->colour : nullptr,
+                               options.threads, code_displacement);
+        if (!colours) return tl::unexpected(colours.error());
+        out.colours = std::move(*colours);
+    }
+    if (!displacement) return tl::unexpected(displacement.error());
+    out.displacement = std::move(*displacement);
+    return out;
+}
+
+// The mesh that the decoder will have, what the next frame refers to, and the payload.
+void finish(const FrameSource& source, const NodeMotionSteps& steps, EncodedNodeMotion motion, CodedFields fields,
+            EncodedTrackedFrame& out) {
+    // A run takes four bytes beside its decisions: from here on less than a hundredth.
+    constexpr std::size_t least_run = 400;
+    const auto& [captured, surface, reference, registered, before, options] = source;
+    out.mesh.positions = std::move(fields.positions);
+    out.mesh.triangles = reference.mesh.triangles;
+    out.mesh.texcoords = reference.mesh.texcoords;
+    if (!reference.mesh.normals.empty())
+        out.mesh.normals = quantised_normals(vertex_normals(out.mesh.positions, out.mesh.triangles));
+    out.state.transforms = std::move(motion.transforms);
+    out.state.displacement = std::move(fields.displacement.history);
+    auto& head = out.state.head;
+    head.captured = {static_cast<std::uint32_t>(captured.positions.size()),
+                     static_cast<std::uint32_t>(captured.triangles.size())};
+    head.motion = steps;
+    head.displacement = fields.displacement.steps;
+    if (fields.colours) {
+        out.mesh.colours = recoloured(reference.mesh.colours, fields.colours->values);
+        out.state.colour = std::move(fields.colours->history);
+        head.colour = fields.colours->steps;
+    }
+    out.runs = write_tracked_runs(
+        head, {before ? &before->head : nullptr, reference.captured, fields.colours.has_value()},
+        {motion.decisions, fields.displacement.decisions, fields.colours ? &fields.colours->decisions : nullptr},
+        least_run);
+}
+
+}  // namespace
+
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
                                                  const NodeReference& reference, const NodeRegistration& registered,
                                                  const TrackedState* before, const TargetHistory& targets_before,
                                                  const TrackedFrameOptions& options, std::vector<StageTime>& stages) {
     StageClock clock(stages);
-    const auto& triangles = reference.mesh.triangles;
+    const FrameSource source{mesh, surface, reference, registered, before, options};
     EncodedTrackedFrame out;
-    NodeMotionOptions of_motion;
-    of_motion.steps = options.motion.value_or(motion_steps(options.geometry_step, options.millimetre));
-    of_motion.form = &registered.form;
-    of_motion.price = price_of_motion(registered.form, options);
-    auto coded_motion = encode_node_motion(
-        quantised(registered.motion, reference.graph.pivots), reference.graph,
-        before ? std::span<const QuantisedTransform>(before->transforms) : std::span<const QuantisedTransform>{},
-        of_motion);
-    const auto moved = moved_by_nodes(reference, coded_motion.transforms, options.threads);
-    const auto normals = vertex_normals(moved, triangles);
-    TrackedTargets targets;
-    if (options.motion_alone) {
-        targets.displacement.resize(moved.size());
-        if (!reference.mesh.colours.empty()) targets.colours.resize(3 * moved.size());
-    } else {
-        targets = find_tracked_targets(
-            {moved, normals, triangles, reference.mesh.colours}, mesh, surface,
-            {.reach = options.reach, .samples = options.target_samples, .threads = options.threads},
-            options.near.empty() ? registered.form.matches
-                                 : std::vector<std::uint32_t>(options.near.begin(), options.near.end()));
-        out.near = std::move(targets.near);
-    }
+    const auto steps = options.motion.value_or(motion_steps(options.geometry_step, options.scale));
+    auto motion = code_motion(source, steps);
+    MovedSurface moved{moved_by_nodes(reference, motion.transforms, options.threads), {}};
+    moved.normals = vertex_normals(moved.positions, reference.mesh.triangles);
+    auto targets = targets_of(source, moved);
+    out.near = std::move(targets.near);
     clock.done("targets");
     if (options.denoise) {
-        if (options.keeps_noise) out.noise.targets = targets;
-        if (options.motion_alone)
-            out.targets = targets_before;
-        else
-            out.targets = filter_targets(targets, triangles, targets_before, *options.denoise);
-        if (options.keeps_noise) {
-            take_off(out.noise.targets.displacement, targets.displacement);
-            take_off(out.noise.targets.colours, targets.colours);
-        }
+        denoise(*options.denoise, source, targets_before, targets, out);
         clock.done("denoising");
     } else if (options.noise) {
         take_off(targets.displacement, options.noise->targets.displacement);
         take_off(targets.colours, options.noise->targets.colours);
     }
-
-    // A step so large that every difference from the prediction becomes zero.
-    const double displacement_step = options.motion_alone ? field_limit : options.geometry_step;
-    const double colour_step = options.motion_alone ? field_limit : options.colour_step;
-    FieldOptions geometry;
-    geometry.step = {displacement_step, displacement_step, displacement_step};
-    const double price = options.noise ? options.noise->price : price_of_bits(out.targets, displacement_step);
+    // With motion alone, a step so large that every difference from the prediction becomes zero.
+    const auto step = options.motion_alone ? LatticeUnits(field_limit) : options.geometry_step;
+    const double price = options.noise ? options.noise->price : price_of_bits(out.targets, step);
     if (options.keeps_noise) out.noise.price = price;
-    geometry.lambda = options.lambda * price;
-    FieldOptions colour;
-    colour.step = {colour_step, colour_step, colour_step};
-    colour.lambda = options.lambda;
-    colour.turned = true;
-    Result<EncodedField> displacement, colours;
-    const auto code_displacement = [&] {
-        displacement = encode_field(reference.hierarchy, targets.displacement, 1, geometry,
-                                    before ? &before->displacement : nullptr);
-        if (displacement) out.mesh.positions = displaced(moved, normals, displacement->values);
-    };
-    if (reference.mesh.colours.empty())
-        code_displacement();
-    else
-        colours = encode_field(reference.hierarchy, targets.colours, 3, colour, before ? &before->colour : nullptr,
-                               options.threads, code_displacement);
-    if (!reference.mesh.colours.empty() && !colours) return tl::unexpected(colours.error());
-    if (!displacement) return tl::unexpected(displacement.error());
+    auto fields = code_fields(source, moved, targets, step, price);
+    if (!fields) return tl::unexpected(fields.error());
     clock.done("fields");
-
-    out.mesh.triangles = triangles;
-    out.mesh.texcoords = reference.mesh.texcoords;
-    if (!reference.mesh.normals.empty())
-        out.mesh.normals = quantised_normals(vertex_normals(out.mesh.positions, triangles));
-    out.state.transforms = std::move(coded_motion.transforms);
-    out.state.displacement = std::move(displacement->history);
-    auto& head = out.state.head;
-    head.captured = {static_cast<std::uint32_t>(mesh.positions.size()),
-                     static_cast<std::uint32_t>(mesh.triangles.size())};
-    head.motion = of_motion.steps;
-    head.displacement = displacement->steps;
-    const bool coloured = !reference.mesh.colours.empty();
-    if (coloured) {
-        out.mesh.colours = recoloured(reference.mesh.colours, colours->values);
-        out.state.colour = std::move(colours->history);
-        head.colour = colours->steps;
-    }
-    // A run takes four bytes beside its decisions: from here on less than a hundredth.
-    constexpr std::size_t least_run = 400;
-    out.runs = write_tracked_runs(
-        head, {before ? &before->head : nullptr, reference.captured, coloured},
-        {coded_motion.decisions, displacement->decisions, coloured ? &colours->decisions : nullptr}, least_run);
+    finish(source, steps, std::move(motion), std::move(*fields), out);
     clock.done("reconstruction");
     return out;
 }

@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "codec/encoder/tracked/target_filter.h"
+#include "codec/encoder/tracked/tracking_numbers.h"
 #include "codec/tracked/tracked_frame.h"
+#include "core/length.h"
 #include "core/thread.h"
 #include "entropy/decision_log.h"
 #include "htvm/encoder.hpp"
@@ -25,11 +27,13 @@ struct RemovedNoise {
 };
 
 struct TrackedFrameOptions {
-    double millimetre = 16;     // lattice units: see Configuration::adult_millimetre
-    double geometry_step = 32;  // lattice units: for the displacement along the normal
-    double colour_step = 11;    // levels
-    double lambda = 0.12;       // squared steps that one bit is worth
-    double reach = 480;         // lattice units: how far from the moved reference to search for the captured surface
+    Scale scale;  // of the lattice
+    // Of the displacement along the normal, and of colours (levels).
+    LatticeUnits geometry_step = tracking_numbers.finer * usual_request.geometry_step;
+    double colour_step = tracking_numbers.coarser_tracked_colours * usual_request.colour_step;
+    double lambda = 0.12;  // squared steps that one bit is worth
+    // How far from the moved reference to search for the captured surface.
+    LatticeUnits reach = Scale{}.on_lattice(tracking_numbers.reach);
     std::optional<NodeMotionSteps> motion;       // none: those that suit the geometry step
     std::optional<TargetFilterOptions> denoise;  // filters the targets over time
     const RemovedNoise* noise = nullptr;         // else: what to take off them

@@ -1,6 +1,6 @@
 // The tracked strategy: I-, T- and TP-frames, and groups of T-frames. A frame's way through it, in order: begin_work(),
-// choose() (tracked_choice.h), sequence_after(), hand_out(), commit(). Groups: T-frames that were chosen are held until their
-// group is whole, which then is coded anew.
+// choose() (tracked_choice.h), sequence_after(), hand_out(), commit(). Groups: T-frames that were chosen are held until
+// their group is whole, which then is coded anew.
 //
 // Frames in flight (EncoderOptions::latency_frames): while one frame is coded, other threads go on with the work of
 // those that wait behind it, as far as that does not need this one coded: first the search structures of each, then the

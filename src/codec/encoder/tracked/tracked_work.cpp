@@ -88,11 +88,10 @@ FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered,
 
 TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double reference_edge,
                   std::span<const std::uint32_t> near, std::span<const double> intra_squared) {
-    constexpr double stray_in_edges = 2, reach = 25;  // in mean edges; mm on an adult
     StageClock clock(work.stages);
     TrackedFitOptions options;
-    options.stray = std::max(stray_in_edges * reference_edge, 1.0);
-    options.reach = std::max(reach * work.configuration.adult_millimetre, options.stray);
+    options.stray = std::max(tracking_numbers.stray_in_edges * reference_edge, 1.0);
+    options.reach = std::max(work.configuration.scale.on_lattice(tracking_numbers.fit_reach), options.stray);
     options.region = region_side(work.configuration);
     options.threads = work.configuration.threads;
     auto out = measure_tracked_fit(work.surface, decoded, near, intra_squared, options);
@@ -105,9 +104,10 @@ std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decod
     if (colours.empty()) return {};
     const auto points = points_of(decoded.positions);
     const auto normals = points_of(vertex_normals(decoded.positions, decoded.triangles));
-    const auto found = closest_facing(work.surface, points, normals,
-                                      {.reach = static_cast<float>(30 * work.configuration.adult_millimetre)},
-                                      work.configuration.threads);
+    const auto found =
+        closest_facing(work.surface, points, normals,
+                       {.reach = static_cast<float>(work.configuration.scale.on_lattice(tracking_numbers.reach).value)},
+                       work.configuration.threads);
     std::vector<Colour> out;
     for (const auto& at : found) {
         Colour colour{};
@@ -122,11 +122,13 @@ std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decod
     return out;
 }
 
-double region_side(const Configuration& configuration) { return 100 * configuration.adult_millimetre; }
+LatticeUnits region_side(const Configuration& configuration) {
+    return configuration.scale.on_lattice(tracking_numbers.region);
+}
 
 DeformationOptions deformation_options(const Configuration& configuration, const TrackingEffort& effort) {
     DeformationOptions out;
-    out.millimetre = configuration.adult_millimetre;
+    out.scale = configuration.scale;
     out.threads = configuration.threads;
     return with_effort(out, effort);
 }

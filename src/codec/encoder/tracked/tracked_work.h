@@ -14,6 +14,7 @@
 #include "codec/encoder/tracked/captured_surface.h"
 #include "codec/encoder/tracked/tracked_frame.h"
 #include "codec/encoder/tracked/tracking_effort.h"
+#include "codec/encoder/tracked/tracking_numbers.h"
 #include "codec/reference/reference.h"
 
 namespace htvm::internal {
@@ -156,7 +157,7 @@ TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double re
 std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decoded);
 
 // Side of the cubes of space by which it is judged whether a region is lost.
-double region_side(const Configuration& configuration);
+LatticeUnits region_side(const Configuration& configuration);
 
 // The registration's options, scaled to this subject, with the effort that the encoder was asked for, or a frame's. The
 // reference's samples are as many as were chosen with it, whatever the effort since.

@@ -10,11 +10,11 @@ namespace htvm::internal {
 inline constexpr int usual_effort = 5, most_effort = 9;
 
 struct TrackingEffort {
-    double samples = 1;     // registration's samples, relative to DeformationOptions'
-    int coarse_rounds = 6;  // see DeformationOptions, as what follows
-    int fine_rounds = 3;
-    int surface_rounds = 3;
-    int solver_iterations = 25;
+    double samples = 1;                                      // registration's samples, relative to DeformationOptions'
+    int coarse_rounds = DeformationOptions{}.coarse_rounds;  // as what follows
+    int fine_rounds = DeformationOptions{}.fine_rounds;
+    int surface_rounds = DeformationOptions{}.surface_rounds;
+    int solver_iterations = DeformationOptions{}.solver_iterations;
     TargetSamples target_samples = TargetSamples::middles;  // see TargetSearch
     bool always_other_starts = false;  // other starts are registered for every frame, not for lost ones alone
     int group = 1;                     // TrackedOptions::group where that is not given
