@@ -42,7 +42,7 @@ void put(GltfBuffer& buffer, std::uint64_t value, std::size_t bytes) {
 
 void put(GltfBuffer& buffer, float value) { put(buffer, std::bit_cast<std::uint32_t>(value), 4); }
 
-// Of everything in the buffer from `begin` on, which is multiples of four bytes.
+// Adds an accessor of everything in the buffer from `begin` on, which is a multiple of four bytes long.
 std::size_t add_accessor(GltfBuffer& buffer, std::uint64_t begin, Target target, GltfComponent component,
                          const char* type, std::size_t count) {
     json view = {{"buffer", 0}, {"byteOffset", begin}, {"byteLength", buffer.size() - begin}};

@@ -232,7 +232,7 @@ struct View {
     std::optional<std::uint64_t> stride = {};
 };
 
-// Of numbers, or of an image; nothing if it goes beyond its buffer.
+// Opens a view of numbers or of an image; nothing if it goes beyond its buffer.
 Result<std::optional<View>> open_view(GltfFile& file, std::uint64_t index) {
     const auto view = gltf_item(file, "bufferViews", index);
     if (!view) return tl::unexpected(view.error());

@@ -76,7 +76,7 @@ std::string lower_case(std::string text) {
     return text;
 }
 
-// Of a file whose name is not even that of an image.
+// Adds to the error which files are taken, if the name is not even that of an image.
 Error with_what_is_taken(Error error, const fs::path& path) {
     const bool is_image =
         std::ranges::find(image_extensions, lower_case(path.extension().string())) != std::end(image_extensions);

@@ -55,8 +55,8 @@ public:
     // The same for a mesh that was read already, from standard input, at that place among all that came.
     Result<TexturedMesh> with_image(Mesh mesh, std::size_t place, const TextureReference& said, TextureUse use);
 
-    // Of the mesh that was read last: whether there is an image for it, read or not, and what it is called.
-    const std::string& image_name() const { return image_name_; }  // empty: there is none
+    // The name of the image for the mesh that was read last, whether the image was read or not; empty: there is none.
+    const std::string& image_name() const { return image_name_; }
 
     // Whether coordinates were taken for counted from the top because of the seams.
     bool is_from_top_by_seams() const { return from_top_by_seams_.value_or(false); }

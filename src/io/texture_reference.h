@@ -14,7 +14,7 @@ struct TextureReference {
     };
     std::vector<Image> images;  // each once; several if parts of the mesh have different ones
     bool is_partial = false;    // parts of the mesh have no image, though others have
-    // Of an OBJ, which names its images in files of their own (read_obj_materials):
+    // An OBJ names its images in files of their own (read_obj_materials):
     std::vector<std::string> material_files;
     std::vector<std::string> materials;  // that faces use; empty text: none was named
 };

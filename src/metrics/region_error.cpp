@@ -39,7 +39,7 @@ std::vector<Point3> samples_on(const Mesh& mesh, double spacing) {
     return out;
 }
 
-// Of each point, the nearest one on a surface.
+// The point of the surface that is nearest to each point.
 std::vector<Point3> nearest_on(const Mesh& mesh, const SurfaceIndex& index, const std::vector<Point3>& points,
                                Threads threads) {
     std::vector<Point3> out(points.size());

@@ -31,7 +31,7 @@ struct RegionError {
 // mesh without any is infinitely far away. Both meshes must be measurable. Errors: limit, if memory runs out.
 Result<RegionError> worst_region(const Mesh& original, const Mesh& decoded, const RegionErrorOptions& options = {});
 
-// Of several frames.
+// The worst regions of several frames.
 struct RegionErrorSummary {
     std::size_t frames = 0;
     double median_mm = 0, p99_mm = 0, largest_mm = 0;  // of the frames' worst regions; see percentile.h

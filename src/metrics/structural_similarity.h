@@ -2,9 +2,9 @@
 // assessment: from error visibility to structural similarity, IEEE Transactions on Image Processing 13(4), 2004). It
 // sees what a PSNR hardly does: texture that is blurred or gone.
 //
-// Of the luma Y = 0.299 R + 0.587 G + 0.114 B (0..255), in a window of 11 x 11 pixels with Gaussian weights (sigma 1.5,
-// sum 1) around each pixel; with mean m, variance v and covariance c of the two windows, C1 = (0.01 * 255)^2 and
-// C2 = (0.03 * 255)^2:
+// It compares the luma Y = 0.299 R + 0.587 G + 0.114 B (0..255), in a window of 11 x 11 pixels with Gaussian weights
+// (sigma 1.5, sum 1) around each pixel; with mean m, variance v and covariance c of the two windows, C1 = (0.01 *
+// 255)^2 and C2 = (0.03 * 255)^2:
 //     SSIM = (2 m1 m2 + C1) (2 c + C2) / ((m1^2 + m2^2 + C1) (v1 + v2 + C2))
 // It is taken at the pixels that either picture covers: their windows may reach into the background, which alone would
 // be alike everywhere. Pixels whose window leaves the picture, within 5 of its edge, are left out.

@@ -23,7 +23,7 @@ PacketHeader told_header(const Packet& packet) {
     if (const auto type = frame_type(packet.kind)) {
         const auto& rules = rules_of(*type);
         out.flags |= rules.referred ? packet_flag::referred : packet_flag::droppable;
-        // Of a T-frame the frames before would have to tell.
+        // Whether decoding can start at a T-frame follows from the frames before it.
         if (rules.refers_to != RefersTo::reference_or_before) out.flags |= packet_flag::access;
     }
     return out;
@@ -96,7 +96,7 @@ void Dependencies::take_frame(const PacketHeader& header, std::uint64_t place) {
                .chained = chained,
                .known = true};
     if (!referred) return;
-    // The newest frame itself is the last of these now; what it needs is what comes before it there.
+    // The newest frame itself becomes the last of the chain; what it needs is what comes before it there.
     chain_.resize(chained);
     (rules.renews ? references_ : chain_).push_back({header.frame, place});
     if (references_.size() + chain_.size() <= most_ + 1) return;
