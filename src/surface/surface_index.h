@@ -96,7 +96,8 @@ public:
     OrientedPoints(std::span<const Point3f> points, std::span<const Point3f> normals, float cell);
     // The nearest point within reach whose normal agrees with the given one: their dot product is at least `agreement`.
     // Where several are equally near, the lowest index counts. guess: the index of a point that may be near, such as
-    // the match of a neighbouring query, or no_point. A good guess makes the search faster; it never changes the result.
+    // the match of a neighbouring query, or no_point. A good guess makes the search faster; it never changes the
+    // result.
     OrientedMatch nearest(const Point3f& query, const Point3f& normal, float reach, float agreement,
                           std::uint32_t guess = no_point) const;
 

@@ -29,7 +29,8 @@ class Choice(unittest.TestCase):
         self.assertEqual(quick.programs_of("tests/data/conformance/tracked.htvm"), ["codec"])
 
     def test_what_no_program_tests_runs_none(self):
-        for path in ("README.md", "web/build.mjs", "tests/apps/serve.sh", "tests/digests/digests.cpp", "bench/captures.h"):
+        for path in ("README.md", "web/build.mjs", "tests/apps/serve.sh", "tests/digests/digests.cpp",
+                     "bench/captures.h"):
             self.assertEqual(quick.programs_of(path), [], path)
 
     def test_every_folder_of_src_has_a_program(self):
