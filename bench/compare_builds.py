@@ -22,7 +22,7 @@ import sys
 import tempfile
 
 PROFILES = ["tracked", "topology", "paper"]
-KINDS = ["I", "EP", "P", "T"]
+KINDS = ["I", "EP", "P", "T", "TP"]
 ENCODER, DECODER = "htvm::Encoder::push(", "htvm::Decoder::push("
 
 

@@ -61,6 +61,9 @@ add_test(NAME pages COMMAND ${PROJECT_SOURCE_DIR}/tests/install/pages.sh $<TARGE
 add_test(NAME docs_links COMMAND ${PROJECT_SOURCE_DIR}/tests/docs/links.py ${PROJECT_SOURCE_DIR})
 add_test(NAME bench COMMAND ${PROJECT_SOURCE_DIR}/tests/bench/run.sh)
 set_tests_properties(bench PROPERTIES SKIP_RETURN_CODE 77)
+# Which folder includes which; and that this check, and the rest of ./dev check, find what they should.
+add_test(NAME floors COMMAND ${PROJECT_SOURCE_DIR}/tests/floors/check.py)
+add_test(NAME floors_check COMMAND python3 -B -m unittest discover -s ${PROJECT_SOURCE_DIR}/tests/floors -p *_test.py)
 # Builds programs against an installation of this build.
 if(HTVM_INSTALL AND htvm_kinds STREQUAL "static;shared")
   add_test(NAME install COMMAND ${PROJECT_SOURCE_DIR}/tests/install/check.sh ${PROJECT_BINARY_DIR})

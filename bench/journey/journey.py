@@ -12,11 +12,13 @@ src/surface (once src/geometry), each pair of caller and callee counted once, at
   returns    those of them into a file that had been entered before
 
 A header counts as a file of its own, where code of it runs. The same is counted again without functions of a single
-line, for which no reader opens a file, and by modules: NAME.h, NAME.cpp, NAME_enc.* and NAME_dec.* as one.
+line, for which no reader opens a file, and by modules. A module is NAME.h and NAME.cpp, with what the encoder or the
+decoder has beside them: FOLDER/NAME and encoder/FOLDER/NAME, or NAME_enc and NAME_dec in trees without these folders.
 Constructors and the like that the compiler wrote are left out, as are the standard library, Eigen, src/core and
 src/entropy. --list prints the entries in order.
 
-And of the sources, src and each program of apps: files, lines, median lines of a file, share of lines that are comment.
+And of the sources, each folder of src with what is below it, and each program of apps: files, lines, median lines of a
+file, share of lines that are comment.
 """
 import os
 import re
@@ -73,7 +75,8 @@ class Functions:
 
 
 def module_of(path):
-    return re.sub(r"(_enc|_dec)?\.(h|cpp)$", "", path)
+    shared = re.sub(r"^src/codec/(encoder|decoder)/(?=.*/)", "src/codec/", path)
+    return re.sub(r"(_enc|_dec)?\.(h|cpp)$", "", shared)
 
 
 def walk(calls, functions, unit):
@@ -117,13 +120,16 @@ def source_files(folder):
                   if name.endswith((".h", ".hpp", ".cpp")))
 
 
+def folders_of(tree, top):
+    return sorted(os.path.relpath(at, tree) for at, _, _ in os.walk(os.path.join(tree, top)))
+
+
 def is_comment(line):
     return line.lstrip().startswith(("//", "/*", "* "))
 
 
 def sources(tree):
-    programs = sorted(os.listdir(os.path.join(tree, "apps")))
-    for part in ["src", "src/codec", "include", *(f"apps/{program}" for program in programs)]:
+    for part in [*folders_of(tree, "src"), "include", *folders_of(tree, "apps")[1:]]:
         texts = []
         for path in source_files(os.path.join(tree, part)):
             with open(path, encoding="utf-8") as file:

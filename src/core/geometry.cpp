@@ -118,7 +118,7 @@ VerticesAround vertices_around(std::size_t vertices, std::span<const Triangle> t
         add(t[1], t[0], t[2]);
         add(t[2], t[0], t[1]);
     }
-    // Of the two corners that a triangle adds, a closed mesh has seen one. Whether a vertex was seen already cannot be
+    // A triangle adds two corners, one of which a closed mesh has seen. Whether a vertex was seen already cannot be
     // foreseen, so each is written, and what follows overwrites it if it was. Rows only move towards the front.
     out.first.resize(vertices + 1);
     std::vector<std::uint32_t> seen(vertices, std::numeric_limits<std::uint32_t>::max());

@@ -19,7 +19,7 @@ bool normalise(Vector3d& v) {
 
 Vector3d column(const Rotation& r, std::size_t c) { return {r[c], r[3 + c], r[6 + c]}; }
 
-// Of the unit vectors perpendicular to the unit vector v, the one nearest to the hint.
+// The unit vector nearest to the hint among those perpendicular to the unit vector v.
 Vector3d perpendicular(const Vector3d& v, const Vector3d& hint) {
     Vector3d p = hint - v * dot(hint, v);
     if (std::isfinite(dot(p, p)) && dot(p, p) > 1e-6 && normalise(p)) return p;

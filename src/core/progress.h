@@ -14,7 +14,7 @@ namespace htvm::internal {
 
 class Progress {
 public:
-    // Of steps as short as coding a vertex, telling of each would cost more than it saves.
+    // Where steps are as short as coding a vertex, telling of each would cost more than it saves.
     static constexpr std::size_t told_every = 64;
     // So many steps are done, and what they wrote may be read.
     void reach(std::size_t steps) { done_.store(steps, std::memory_order_release); }

@@ -1,5 +1,5 @@
-// Which cells of a grid a triangle covers: those whose centres lie inside. Of triangles that share an edge and lie on
-// different sides of it, no cell is covered twice, and none between them is missed.
+// Which cells of a grid a triangle covers: those whose centres lie inside. Triangles that share an edge and lie on
+// different sides of it cover no cell twice, and miss none between them.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // Draco files (.drc), meshes and point clouds, read with libdraco.
 //
 // Positions are floats or integers (taken as they are); colours have 3 or 4 components (alpha is dropped) of 8 bits, of
-// 16 bits, or as floats 0..1; normals have 3 components, texture coordinates 2. Of several attributes of one kind, the
-// first is used. Each of Draco's points becomes a vertex, in Draco's order, with the attributes mapped to it; a vertex
+// 16 bits, or as floats 0..1; normals have 3 components, texture coordinates 2. The first attribute of each kind is
+// used. Each of Draco's points becomes a vertex, in Draco's order, with the attributes mapped to it; a vertex
 // on a seam of an attribute thus appears once for each side. Faces keep their order and orientation.
 //
 // Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.

@@ -6,7 +6,7 @@
 //
 // Read: every mesh that the file's scene shows, joined to one, with the transforms of the nodes applied. POSITION,
 // NORMAL, COLOR_0 (times the material's base colour) and TEXCOORD_0, of floats or integers; triangles, strips, fans and
-// points, with indices or without. Of materials the base colour and its texture's image, with the coordinates that it
+// points, with indices or without. A material's base colour and its texture's image, with the coordinates that it
 // uses (KHR_texture_transform applied; the base colour does not multiply the image). Lines, materials otherwise,
 // cameras, lights and animations are passed over, and so are nodes that are scaled to nothing, which glTF uses to hide.
 // A vertex that lacks what others have is white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh

@@ -62,7 +62,7 @@ Result<Image> read_png(std::span<const std::uint8_t> bytes, int largest_side) {
         return damaged("PNG", why);
     };
     if (!png_image_begin_read_from_memory(&png, bytes.data(), bytes.size())) return failed();
-    constexpr std::size_t depth_at = 24;  // within the first chunk, IHDR, which is read by now
+    constexpr std::size_t depth_at = 24;  // within the first chunk, IHDR, which has been read
     auto ok = check_size(png.width, png.height, largest_side);
     if (ok && bytes[depth_at] > 8) ok = not_read("has 16 bits a channel");
     if (!ok) {

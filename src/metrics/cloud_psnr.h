@@ -7,8 +7,8 @@
 //     PSNR = 10 log10(peak^2 / error).
 //
 // The peak is the diagonal of the original sequence's bounding box unless given. pc_error puts 3 p^2 in the numerator
-// for a cube of side p: use peak = p * sqrt(3) to get the same numbers. Of vertices at the same distance the lowest
-// index is taken, whereas pc_error averages them.
+// for a cube of side p: use peak = p * sqrt(3) to get the same numbers. Where vertices are at the same distance, the
+// lowest index is taken, whereas pc_error averages them.
 #pragma once
 
 #include <cstdint>

@@ -41,7 +41,7 @@ ChangeSums change_between(const TwoFrames& original, const TwoFrames& decoded) {
     return sums;
 }
 
-// meshes: the original before, the original now, the decoded before, the decoded now.
+// meshes: the original frame before, the original frame, the decoded frame before, the decoded frame.
 ChangeSums change_in_views(const std::array<const TexturedMesh*, 4>& meshes, const std::vector<Camera>& cameras,
                            const RenderOptions& render, Threads threads) {
     std::array<DrawableMesh, 4> drawables;

@@ -39,7 +39,7 @@ std::array<std::uint8_t, 4> reduced(const Picture& large, std::size_t x, std::si
 }  // namespace
 
 Camera zoomed_to(const Mesh& mesh, const Camera& camera, double margin) {
-    double across = 0, upright = 0;  // shares of half of the picture that the mesh takes now
+    double across = 0, upright = 0;  // shares of half of the picture that the mesh takes with `camera`
     for (const auto& position : mesh.positions) {
         const Point3 d = to_point(position) - camera.position;
         const double depth = -dot(d, camera.backward);

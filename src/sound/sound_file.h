@@ -24,7 +24,7 @@ public:
     ~SoundFile();
 
     int channels() const;
-    // Of the whole, at 48 kHz, as the file tells it; 0: it does not.
+    // The length of the whole at 48 kHz, as the file tells it; 0: it does not.
     std::uint64_t promised_samples() const;
     // The next samples, one for each channel in turn, within -1..1 unless the file goes beyond; empty at the end. Valid
     // until the next call. limit beyond most_sound_samples, bad_input where the file is damaged.

@@ -47,7 +47,7 @@ std::vector<std::uint32_t> spread_samples(const HandleWeights& weights, std::siz
     return out;
 }
 
-// Of each vertex, the sample that is the fewest edges away; no_point where none can be reached.
+// The sample that is the fewest edges away from each vertex; no_point where none can be reached.
 std::vector<std::uint32_t> samples_of_vertices(const DeformableMesh& mesh, const DeformationLevel& level) {
     constexpr auto none = OrientedPoints::no_point;
     std::vector<std::uint32_t> sample_of(mesh.positions.size(), none), reached;
@@ -155,7 +155,7 @@ SampleBlend over_groups(const SampleBlend& fine, const std::vector<SampleBlend>&
 // The colours around a vertex, and how well they fit a slope; zero slope and trust if they do not. normal: unit length.
 SampleTexture texture_at(const DeformableMesh& mesh, std::span<const Colour> colours, std::uint32_t vertex,
                          const Vector3d& normal) {
-    // Of colours by chance at six neighbours a slope explains a third; trust begins where it explains two thirds.
+    // A slope explains a third of random colours at six neighbours; trust begins where it explains two thirds.
     constexpr double chance = 3, least_moment = 0.02;
     const auto place_of = [&](std::uint32_t v) {
         return Vector3d(mesh.positions[v][0], mesh.positions[v][1], mesh.positions[v][2]);

@@ -353,7 +353,7 @@ std::uint8_t find_regions(Work& work) {
 // still be collapsed.
 constexpr std::size_t most_around = 256;
 
-// Of a triangle's sides: sum of squares, which for an equilateral one is 2 sqrt(3) times the size of its area normal.
+// The sum of a triangle's squared sides; for an equilateral one 2 sqrt(3) times the size of its area normal.
 double squared_sides(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
     return (b - a).squaredNorm() + (c - b).squaredNorm() + (a - c).squaredNorm();
 }

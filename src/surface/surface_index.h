@@ -95,8 +95,9 @@ public:
     // of the grid's cells, > 0; searches are fast within a few cells. Points that are not finite are never found.
     OrientedPoints(std::span<const Point3f> points, std::span<const Point3f> normals, float cell);
     // The nearest point within reach whose normal agrees with the given one: their dot product is at least `agreement`.
-    // Of equally near points, the lowest index. guess: the index of a point that may be near, such as the match of a
-    // neighbouring query, or no_point. A good guess makes the search faster; it never changes the result.
+    // Where several are equally near, the lowest index counts. guess: the index of a point that may be near, such as
+    // the match of a neighbouring query, or no_point. A good guess makes the search faster; it never changes the
+    // result.
     OrientedMatch nearest(const Point3f& query, const Point3f& normal, float reach, float agreement,
                           std::uint32_t guess = no_point) const;
 

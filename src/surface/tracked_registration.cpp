@@ -402,7 +402,7 @@ std::vector<Pull> sum_pulls(const std::vector<Match>& matches, float point_share
 
 // ---- Colours: where the reference's colours have a slope, a difference tells how far it has slid along the surface.
 
-// The samples' slopes as they lie now, along the moved surface.
+// The samples' slopes as they lie along the moved surface.
 std::vector<Matrix3f> turned_slopes(const Stage& stage, const Moved& moved) {
     std::vector<Matrix3f> out(stage.textures.size(), Matrix3f::Zero());
     const auto rows = rows_of(stage.motion);
@@ -611,7 +611,7 @@ struct PullSums {
     }
 };
 
-// A sample moves with the turn and shift of handle k by weight_k (turn x point + shift). point: where it lies now, seen
+// A sample moves with the turn and shift of handle k by weight_k (turn x point + shift). point: its moved place, seen
 // from the origin; the few millimetres by which its handles would take it elsewhere are neglected as levers.
 void add_pull(const SampleBlend& blend, const Vector3f& point, const Pull& pull, PullSums& sums) {
     const auto form = about_origin(point, pull);

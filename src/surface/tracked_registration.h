@@ -20,7 +20,7 @@
 namespace htvm::internal {
 
 // What the data say about the motions that were found: the squared distances of the matches, each with its weight, grow
-// by x' F x if the handles move by x, of each a turn in radians about where it lies now, then a shift. Along the
+// by x' F x if the handles move by x, of each a turn in radians about its moved place, then a shift. Along the
 // surface F is next to nothing, as the data leave the motion open there. Its blocks below the diagonal are the
 // transposes of those above.
 struct DeformationForm {
@@ -31,7 +31,7 @@ struct DeformationForm {
     std::vector<Matrix6> diagonal;  // one per handle; none if nothing could be registered
     std::vector<Block> above;       // ascending by row, then column
     double weight = 0;              // of all matches together
-    // Of each vertex, the vertex of the target that the sample nearest to it was matched to last, or
+    // For each vertex, the vertex of the target that the sample nearest to it was matched to last, or
     // OrientedPoints::no_point.
     std::vector<std::uint32_t> matches;
 };

@@ -123,8 +123,8 @@ using Whole [[gnu::vector_size(32)]] = std::int32_t;
     return above < 1 ? above : Floats{} + 1;
 }
 
-// All is seen from the vertex: b and c are the other corners, q is the query. Of the nearest point of a triangle only
-// the distance is found, which the products of these tell.
+// All is seen from the vertex: b and c are the other corners, q is the query. Only the distance of a triangle's
+// nearest point is found, which the products of these tell.
 [[gnu::always_inline]] inline NearInFan nearest(const VertexFan& fan, const Vector3f& query, const Facing* facing) {
     constexpr Whole numbers = {0, 1, 2, 3, 4, 5, 6, 7};
     const auto& own = fan.own;
@@ -214,7 +214,7 @@ using Order = std::array<std::uint32_t, lanes>;
     Order order;
     if (!find_order(row, order)) return;
     const auto end = row.last[order[count - 1]];
-    // Of a fan that is open, or not the only one here, eight triangles have nine neighbours.
+    // Eight triangles have nine neighbours in a fan that is open, or that is not the only one here.
     if (count == lanes && end != row.next[order[0]]) return;
     fan.triangles = row.count;
     for (std::size_t i = 0; i < lanes; ++i) {

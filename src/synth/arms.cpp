@@ -203,7 +203,7 @@ void reach(PosedScene& scene, std::size_t first_part, const Holds& holds, const 
         }
         push_out(scene, first_part, side, obstacles_of(scene, first_part, side), in_pocket[side]);
     }
-    // Once more, now that both are there: the right arm gives way to the left one, which gives way to its upper arm.
+    // Once more, with both in place: the right arm gives way to the left one, which gives way to its upper arm.
     const PartSet right_upper_arm = part_bit(first_part + index_of(Part::right_upper_arm));
     push_out(scene, first_part, 0, obstacles_of(scene, first_part, 0) | right_upper_arm, in_pocket[0]);
     push_out(scene, first_part, 1, obstacles_of(scene, first_part, 1), in_pocket[1]);

@@ -338,7 +338,7 @@ void fill_gutters(Image& image, std::vector<std::uint8_t>& drawn) {
     }
 }
 
-// Of variance 1, nearly normal: the sum of eight bytes.
+// A nearly normal number of variance 1: the sum of eight bytes, scaled.
 double quick_gaussian(RandomKey key, std::uint64_t index) {
     std::uint64_t bits = random_bits(key, index);
     int sum = 0;

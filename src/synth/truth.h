@@ -62,7 +62,7 @@ struct LimbEvent {
 inline constexpr double fast_speed = 6000;  // mm/s: 20 cm in a frame at 30 fps
 inline constexpr double touch_gap = 8;      // mm; nearer ones grow together in the capture
 
-// Of consecutive frames, the first of which is number `first_frame`.
+// The events of consecutive frames, the first of which is number `first_frame`.
 std::vector<LimbEvent> limb_events(std::span<const std::vector<LimbState>> frames, int first_frame, double fps);
 
 }  // namespace htvm

@@ -56,7 +56,7 @@ OwnPlanes::OwnPlanes(const Image& image, ColourMatrix matrix, bool full_range) {
     const Colours c(matrix, full_range);
     const double l = c.luma_levels;
     const Weights luma = {fixed(l * c.red), fixed(l * c.green), fixed(l * c.blue)};
-    // Of sums of four pixels. The weights of each add up to nothing, so that grey has no colour.
+    // The weights of a sum of four pixels. Those of each plane add up to nothing, so that grey has no colour.
     const double b = c.chroma_levels / (2 * (1 - c.blue)) / 4, r = c.chroma_levels / (2 * (1 - c.red)) / 4;
     Weights blue = {fixed(-b * c.red), fixed(-b * c.green), 0}, red = {0, fixed(-r * c.green), fixed(-r * c.blue)};
     blue[2] = -blue[0] - blue[1];
@@ -114,7 +114,7 @@ Image image_of(const PicturePlanes& planes, const std::array<std::uint16_t, 3>& 
     const auto black = static_cast<std::int64_t>(c.black);
     constexpr std::int64_t half = std::int64_t{1} << (fixed_bits - 1);
 
-    // Of a row of pixels the samples nearest to it, three times, and those of the row behind, once.
+    // For a row of pixels: three times the samples of the nearest row, and once those of the next nearest.
     std::vector<std::int32_t> blue(half_width), red(half_width);
     for (std::size_t y = 0; y < height; ++y) {
         const auto near = static_cast<std::ptrdiff_t>(y / 2);

@@ -28,7 +28,7 @@ struct TextureBakingOptions {
 struct BakedTexture {
     // Charts have gutters of some texels around them; what lies between them is as it was in the picture before.
     Image picture;
-    // Of red, green and blue: the captured image's exposure, divided by the picture's. Where cameras flicker, the
+    // The captured image's exposure in red, green and blue, divided by the picture's. Where cameras flicker, the
     // picture does not; who shows it multiplies by these.
     std::array<double, 3> gains = {1, 1, 1};
     double seen = 0;  // the share of the charts' texels that the captured surface reached; the others are as they were,

@@ -1,6 +1,6 @@
 // Codebooks of the entropy-constrained vector quantiser (paper, section IV-C2), and the layers coded with them:
 // geometry and colour residuals of EP-frames, one index each. A codebook has a packet of its own, because it is used by
-// more frames than the one it was made for. vector_quantiser_enc.h trains them.
+// more frames than the one it was made for. encoder/bones/vector_quantiser.h trains them.
 #pragma once
 
 #include <array>

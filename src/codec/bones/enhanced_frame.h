@@ -1,6 +1,6 @@
 // EP-frames (paper, section IV): the reference mesh moved bone by bone, corrected by quantised residuals, with
 // connectivity of its own. This is the decoder, together with the arithmetic that the encoder shares with it so that
-// both see the same mesh; the encoder is in enhanced_frame_enc.h.
+// both see the same mesh; the encoder is in encoder/bones/enhanced_frame.h.
 #pragma once
 
 #include <span>

@@ -128,7 +128,7 @@ struct CandidateClasses {
                                  // focus
 };
 
-// Of the m vertices nearest to a focus, those not yet visited, nearest first.
+// Finds those of the m vertices nearest to a focus that are not yet visited, nearest first.
 class UnvisitedNear {
 public:
     UnvisitedNear(std::span<const LatticePoint> positions, int m, Threads threads);

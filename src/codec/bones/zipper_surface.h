@@ -71,8 +71,8 @@ public:
     SurfaceGrid(std::span<const LatticePoint> positions, std::span<const Triangle> triangles,
                 std::span<const std::uint32_t> used, std::int64_t reach);
 
-    // The nearest point within reach on triangles that face the same way: dot(normal, facing) > 0. Of equally near
-    // triangles, the lowest index. Thread-safe.
+    // The nearest point within reach on triangles that face the same way: dot(normal, facing) > 0. Where several
+    // triangles are equally near, the lowest index counts. Thread-safe.
     SurfacePoint nearest(LatticePoint point, Direction facing) const;
 
 private:

@@ -93,7 +93,7 @@ private:
     Candidates candidates_of(const Triangle& t) const {
         Candidates out;
         for (const auto v : t) out.vote(last_[v]);
-        // Of equally many votes the one that came first.
+        // Where votes are equal, the candidate that came first wins.
         std::stable_sort(out.of.begin(), out.of.begin() + static_cast<std::ptrdiff_t>(out.count),
                          [](const Candidate& a, const Candidate& b) { return a.votes > b.votes; });
         return out;

@@ -36,7 +36,7 @@ struct Chart {
     std::int32_t x = 0, y = 0;       // where the lower left corner of what bounds it lies, texels, 0..4095
 };
 
-// Of all of a mesh's triangles, or of those from some index on.
+// The charts of all of a mesh's triangles, or of those from some index on.
 struct ChartLayout {
     std::uint32_t scale = 1;    // texels of 2^-texel_bits in a lattice unit, times 2^16; 1..largest_scale
     std::vector<Chart> charts;  // in the order in which the triangles name them first

@@ -17,7 +17,7 @@ std::string megabytes(std::uint64_t bytes) { return std::to_string((bytes >> 20)
 }  // namespace
 
 std::uint64_t memory_of_reference(MeshCounts mesh) { return each(mesh, 128, 48); }
-// Of each triangle every corner may be a vertex of its own.
+// Every corner of a triangle may be a vertex of its own.
 std::uint64_t memory_of_charts(MeshCounts mesh) { return each(mesh, 32, 360); }
 std::uint64_t memory_of_tracking(MeshCounts mesh) { return each(mesh, 416, 48); }
 // What is measured for tracking has two of them.

@@ -96,7 +96,7 @@ void Dependencies::push_frame(const PacketHeader& header, std::uint64_t place) {
                .chained = chained,
                .known = true};
     if (!referred) return;
-    // The newest frame itself is the last of these now; what it needs is what comes before it there.
+    // The newest frame itself becomes the last of the chain; what it needs is what comes before it there.
     chain_.resize(chained);
     (rules.renews ? references_ : chain_).push_back({header.frame, place});
     if (references_.size() + chain_.size() <= most_ + 1) return;

@@ -17,7 +17,7 @@ namespace htvm::internal {
 inline constexpr std::uint8_t intra_coder_tfan = 0;
 inline constexpr std::uint8_t intra_coder_draco = 1;
 
-// Of the mesh that a frame was captured with.
+// The size of the mesh that a frame was captured with.
 struct CapturedCounts {
     std::uint32_t vertices = 0, triangles = 0;
     bool operator==(const CapturedCounts&) const = default;

@@ -36,7 +36,7 @@ inline constexpr std::uint16_t grouped_version = 5;
 // (charts/chart_layer.h).
 inline constexpr std::uint16_t textured_version = 6;
 
-// The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (paper/mtfan.h). The
+// The most that m, the number of nearest vertices among which M-TFAN names a new one, may be (bones/mtfan.h). The
 // paper's are 8, 16 and 32.
 inline constexpr int mtfan_max_nearest = 64;
 

@@ -191,7 +191,7 @@ void write_colours(std::vector<Colour>& colours, const ColourSource& source, con
     }
 }
 
-// Of a few predictors, the one that codes the first vertices in the fewest bits.
+// Chooses among a few predictors the one that codes the first vertices in the fewest bits.
 ColourPredictor choose_predictor(std::span<const Colour> colours, const ColourSource& source) {
     constexpr std::size_t trial_size = 6144;
     constexpr std::array<std::array<std::int8_t, 3>, 3> shares{{{64, 64, 0}, {58, 29, 29}, {52, 32, 18}}};

@@ -65,8 +65,8 @@ struct Corners {
     std::size_t paired_edges = 0;         // edges whose two sides both have a corner
 };
 
-// Accepts any triangles (non-manifold, duplicate, open, none). Of the triangles at an edge, the first is paired with
-// the second, the third with the fourth, and so on. Time and memory are linear in vertices plus triangles. Errors:
+// Accepts any triangles (non-manifold, duplicate, open, none). At each edge the first triangle is paired with the
+// second, the third with the fourth, and so on. Time and memory are linear in vertices plus triangles. Errors:
 // bad_input if a triangle names a vertex >= vertex_count; limit above 2^28 vertices or triangles.
 Result<Corners> find_corners(std::span<const Triangle> triangles, std::size_t vertex_count, Threads threads = {});
 

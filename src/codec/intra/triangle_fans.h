@@ -1,4 +1,4 @@
-// Triangle fans: what TFAN (tfan.h) and M-TFAN (paper/mtfan.h) share, which is everything except what they code about a
+// Triangle fans: what TFAN (tfan.h) and M-TFAN (bones/mtfan.h) share, which is everything except what they code about a
 // vertex that a fan meets for the first time.
 //
 // From top to bottom: the open edges of what is coded; the state of a fan among them; the contexts and the syntax of
@@ -39,7 +39,7 @@ public:
         std::uint32_t next_out = none, previous_out = none, next_in = none, previous_in = none;
     };
 
-    // The next visiting number is now in use.
+    // Takes the next visiting number into use.
     void add_vertex() { vertices_.push_back({}); }
     std::uint32_t vertex_count() const { return static_cast<std::uint32_t>(vertices_.size()); }
 
@@ -195,7 +195,7 @@ inline std::uint32_t after_on_border(const OpenEdges& edges, std::uint32_t verte
     return OpenEdges::none;
 }
 
-// Of several end candidates, puts first the one that bounds the same gap as the fan's start.
+// Puts first the end candidate that bounds the same gap as the fan's start.
 inline void put_own_gap_first(const OpenEdges& edges, FanState& fan) {
     std::uint32_t vertex = fan.start;
     for (std::uint32_t i = 0; i < longest_walk && vertex != OpenEdges::none; ++i) {

@@ -149,7 +149,7 @@ LatticePoint mean_of(const Mean& mean, LatticePoint a, LatticePoint b) {
     return {of(a.x, b.x), of(a.y, b.y), of(a.z, b.z)};
 }
 
-// Of turns whose largest components differ, that of the nearer frame.
+// The mean of two turns; where their largest components differ, the turn of the nearer frame.
 QuantisedRotation mean_of(const Mean& mean, const QuantisedRotation& a, const QuantisedRotation& b) {
     if (a.largest != b.largest) return mean.earlier >= mean.later ? a : b;
     QuantisedRotation out = a;

@@ -26,7 +26,7 @@ tl::unexpected<Error> corrupt(const char* what) { return fail(ErrorKind::corrupt
 
 // ---- What goes ------------------------------------------------------------------------------------------------------
 
-// Of a node of the hierarchy, or a vertex.
+// What happens to a vertex, or to the vertices below a node of the hierarchy.
 enum class Share : std::uint8_t { stays, goes, mixed };
 
 // By node, level by level: [0] the vertices, [1 + k] level k of the hierarchy.
@@ -59,7 +59,7 @@ Share code_share(Coder& coder, ShareModels& models, std::uint32_t vertices, std:
     const auto size = std::min<std::size_t>(static_cast<std::size_t>(std::bit_width(vertices)), ShareModels::sizes - 1);
     const std::size_t context = twin ? 1 + static_cast<std::size_t>(*twin) : 0;
     if (vertices > 1 && coder.bit(models.mixed[size][context], wanted == Share::mixed)) return Share::mixed;
-    // Of a mixed node's halves not both go, and not both stay.
+    // A node whose halves both go, or both stay, is not mixed: beside a half that stays, the other goes.
     if (twin == Share::stays) return Share::goes;
     if (twin == Share::goes) return Share::stays;
     return coder.bit(models.goes[size][context], wanted == Share::goes) ? Share::goes : Share::stays;

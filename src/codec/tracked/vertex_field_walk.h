@@ -24,7 +24,7 @@ namespace htvm::internal {
 struct SplitContext {
     static constexpr std::size_t levels = 6, magnitudes = 3, activities = 12, steeps = 8, signs = 3;
     std::size_t level = 0;  // of the hierarchy, the finest is 0
-    // Of the differences round it: those coded, and those above the ones not yet coded.
+    // How large the differences round it are; for one that is not coded yet, the one above it counts.
     std::size_t activity = 0;
     // By level, the magnitude of the difference above (0, 1, more) and the activity.
     std::size_t by_level = level * magnitudes * activities;
@@ -42,7 +42,7 @@ struct SignContext {
     std::size_t by_sign = 0;   // the sign of the same difference in the component before, and that of the predicted one
 };
 
-// Of one component.
+// The models of one component.
 struct SplitModels {
     template <std::size_t N>
     using Models = std::array<BinaryModel, N>;
