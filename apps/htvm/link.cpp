@@ -8,7 +8,7 @@
 #include <string>
 
 #include "commands.h"
-#include "live/access.h"
+#include "live/server/access.h"
 
 namespace htvm::app {
 namespace {

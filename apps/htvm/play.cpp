@@ -17,7 +17,7 @@
 #include "io/child_program.h"
 #include "io/number_text.h"
 #include "io/sequence.h"
-#include "live/file_server.h"
+#include "live/server/file_server.h"
 
 namespace htvm::app {
 namespace {

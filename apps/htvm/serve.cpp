@@ -10,9 +10,9 @@
 
 #include "command_line/terminal.h"
 #include "commands.h"
-#include "live/access.h"
-#include "live/file_server.h"
-#include "live/recorder.h"
+#include "live/server/access.h"
+#include "live/server/file_server.h"
+#include "live/server/recorder.h"
 
 namespace htvm::app {
 namespace {

@@ -1,9 +1,9 @@
 // What hubs on other machines say, as one message and in parts: whatever is claimed, memory is bounded, and what is
 // understood can be written again. A stream watched from afar gives on nothing twice.
-#include "live/hub_message.h"
+#include "live/hub/hub_message.h"
 
 #include "fuzz_input.h"
-#include "live/far_stream.h"
+#include "live/hub/far_stream.h"
 
 namespace {
 

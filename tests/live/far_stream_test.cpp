@@ -1,6 +1,6 @@
 // A stream watched from afar: whatever the network does to its messages, what goes on is the publisher's packets in
 // order, and every frame can be decoded to the same bits as there.
-#include "live/far_stream.h"
+#include "live/hub/far_stream.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 
 #include "htvm/decoder.hpp"
-#include "live/broadcast.h"
+#include "live/client/broadcast.h"
 
 namespace htvm::live {
 namespace {

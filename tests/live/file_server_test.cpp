@@ -1,5 +1,5 @@
 // The server as clients see it, who are not always polite, on this machine's loopback address.
-#include "live/file_server.h"
+#include "live/server/file_server.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

@@ -1,6 +1,6 @@
 // Hubs on several machines, joined by a network that is given: whoever watches on one is sent what is published on
 // another, whatever the network, the hubs and the publishers do.
-#include "live/hub_link.h"
+#include "live/hub/hub_link.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What hubs say to each other survives the way; what is damaged is refused, whatever counts it claims.
-#include "live/hub_message.h"
+#include "live/hub/hub_message.h"
 
 #include <gtest/gtest.h>
 

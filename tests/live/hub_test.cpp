@@ -1,5 +1,5 @@
 // Who may publish a stream, and what of a publisher's messages goes on.
-#include "live/hub.h"
+#include "live/hub/hub.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

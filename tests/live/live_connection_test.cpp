@@ -1,5 +1,5 @@
 // Publishing and watching over real connections, on this machine's loopback address.
-#include "live/live_connection.h"
+#include "live/server/live_connection.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 #include "htvm/decoder.hpp"
 #include "htvm/dependency.hpp"
-#include "live/recorder.h"
+#include "live/server/recorder.h"
 #include "live_packets.h"
 #include "server_test.h"
 #include "web_socket.h"

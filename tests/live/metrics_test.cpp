@@ -1,5 +1,5 @@
 // What Prometheus reads: checked by a reader of its text format.
-#include "live/metrics.h"
+#include "live/server/metrics.h"
 
 #include <gtest/gtest.h>
 

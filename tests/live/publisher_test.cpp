@@ -17,9 +17,9 @@
 #include <optional>
 #include <thread>
 
-#include "live/control.h"
-#include "live/file_server.h"
-#include "live/watcher.h"
+#include "live/client/control.h"
+#include "live/client/watcher.h"
+#include "live/server/file_server.h"
 #include "live_packets.h"
 #include "soon.h"
 

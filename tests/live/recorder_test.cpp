@@ -1,5 +1,5 @@
 // Live streams as files: what is in them can be decoded, whatever happens to the disk, the line or the program.
-#include "live/recorder.h"
+#include "live/server/recorder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -13,7 +13,7 @@
 #include <mutex>
 #include <optional>
 
-#include "live/access.h"
+#include "live/server/access.h"
 #include "live_packets.h"
 #include "server_test.h"
 #include "web_socket.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-#include "live/file_server.h"
+#include "live/server/file_server.h"
 #include "soon.h"
 
 namespace htvm::live {
