@@ -29,7 +29,7 @@ protected:
     LiveConnectionTest()
         : LiveConnectionTest(HubLimits{.streams = 2, .publisher_silence = std::chrono::seconds(600)}) {}
     explicit LiveConnectionTest(const HubLimits& limits) : hub(limits) {
-        options.connections_per_address = options.viewers_per_address = 300;
+        options.admission.connections_per_address = options.admission.viewers_per_address = 300;
         options.hub = &hub;
     }
     void SetUp() override { start(); }
@@ -138,7 +138,7 @@ TEST_F(LiveConnectionTest, AViewerWhoDoesNotReadDelaysNobodyAndGoesOnAtTheNewest
         if (i > 0) publisher.send(i % 30 == 0 ? live_intra(i, 60000) : live_tracked(i, 30000));
         ASSERT_EQ(quick.next_frame(), i);
     }
-    // Of nine megabytes it gets what the buffers on the way held, and then the newest I-frame with what followed.
+    // It gets what the buffers on the way held of nine megabytes, and then the newest I-frame with what followed.
     std::vector<PacketHeader> headers;
     while (headers.empty() || headers.back().frame + 1 < frames) {
         const auto next = paused.next();

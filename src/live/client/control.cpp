@@ -198,7 +198,7 @@ std::string write_text(const HeartbeatToViewer& message) {
 std::string write_text(const KeyFrameRequest&) { return text_of({{"type", "key_frame"}}); }
 
 std::string write_text(const Gone& message) {
-    // Of bytes that take six each in JSON there is room; characters of several bytes are not cut apart.
+    // There is room for bytes that take six each in JSON; characters of several bytes are not cut apart.
     auto length = std::min<std::size_t>(message.reason.size(), 512);
     while (length < message.reason.size() && length > 0 && (message.reason[length] & 0xc0) == 0x80) --length;
     return text_of({{"type", "gone"}, {"reason", message.reason.substr(0, length)}});

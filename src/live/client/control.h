@@ -72,7 +72,7 @@ struct Gone {
 // Now by the system clock: microseconds since 1970, as stamps tell it, and claims of hubs.
 std::int64_t system_microseconds();
 
-// Of a frame, for measurement; it comes right before the frame's packet. By the system clocks, since 1970.
+// When a frame was sent, for measurement; it comes right before the frame's packet. By the system clocks, since 1970.
 struct Stamp {
     std::uint32_t frame = 0;            // the number in the packet's header
     std::int64_t sent = 0;              // by the publisher

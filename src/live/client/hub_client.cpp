@@ -228,9 +228,9 @@ void HubClient::State::came(Connection& its, beast::flat_buffer& buffer) {
     const auto* bytes = static_cast<const std::uint8_t*>(buffer.cdata().data());
     const auto count = buffer.size();
     if (its.socket.got_binary()) {
-        if (talk.take_packet) talk.take_packet({bytes, bytes + count});
-    } else if (talk.take_text && count <= most_text_bytes) {
-        talk.take_text({reinterpret_cast<const char*>(bytes), count});
+        if (talk.receive_packet) talk.receive_packet({bytes, bytes + count});
+    } else if (talk.receive_text && count <= most_text_bytes) {
+        talk.receive_text({reinterpret_cast<const char*>(bytes), count});
     }
     buffer.consume(count);
 }

@@ -46,13 +46,13 @@ struct HubTalk {
     std::function<void()> connected;
     // The next packet to send; null: none for now, wake() says when there is one.
     std::function<SharedPacket()> next;
-    std::function<std::string(const LivePacket&)> before;        // a text to send right before it; empty: none
-    std::function<void(std::vector<std::uint8_t>)> take_packet;  // a binary message, whatever is in it
-    std::function<void(const std::string&)> take_text;           // at most 4,096 bytes
-    std::function<bool()> may_read;                              // else what comes stays in the line until wake()
-    std::function<std::string()> heartbeat;                      // a text for each second; empty: none
-    std::function<void(const HubEnding&)> lost;                  // of each connection; it will be tried again
-    std::function<void(const HubEnding&)> ended;                 // of the last one: nothing is called behind it
+    std::function<std::string(const LivePacket&)> before;           // a text to send right before it; empty: none
+    std::function<void(std::vector<std::uint8_t>)> receive_packet;  // a binary message, whatever is in it
+    std::function<void(const std::string&)> receive_text;           // at most 4,096 bytes
+    std::function<bool()> may_read;                                 // else what comes stays in the line until wake()
+    std::function<std::string()> heartbeat;                         // a text for each second; empty: none
+    std::function<void(const HubEnding&)> lost;                     // of each connection; it will be tried again
+    std::function<void(const HubEnding&)> ended;                    // of the last one: nothing is called behind it
 };
 
 struct HubClientStatus {

@@ -68,21 +68,4 @@ void keep_kernel_buffers_small(Line& line) {
     ::setsockopt(socket.native_handle(), IPPROTO_TCP, TCP_NOTSENT_LOWAT, &unsent, sizeof unsent);
 }
 
-Result<net::ssl::context> server_context(const std::string& certificate, const std::string& private_key) {
-    net::ssl::context context(net::ssl::context::tls_server);
-    auto* native = context.native_handle();
-    SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION);
-    SSL_CTX_set_options(native, SSL_OP_NO_RENEGOTIATION | SSL_OP_CIPHER_SERVER_PREFERENCE);
-    SSL_CTX_set_mode(native, SSL_MODE_RELEASE_BUFFERS);  // of connections on which nothing is under way
-    beast::error_code error;
-    context.use_certificate_chain_file(certificate, error);
-    if (error)
-        return fail(ErrorKind::bad_input, "no certificate can be read from " + certificate + ": " + error.message());
-    context.use_private_key_file(private_key, net::ssl::context::pem, error);
-    if (error)
-        return fail(ErrorKind::bad_input,
-                    "no key of that certificate can be read from " + private_key + ": " + error.message());
-    return context;
-}
-
 }  // namespace htvm::live

@@ -11,11 +11,8 @@
 #include <boost/beast/ssl/ssl_stream.hpp>
 #include <boost/beast/websocket/teardown.hpp>
 #include <boost/container/static_vector.hpp>
-#include <string>
 #include <utility>
 #include <variant>
-
-#include "htvm/result.hpp"
 
 namespace htvm::live {
 
@@ -44,7 +41,7 @@ public:
     Secure* secure() { return std::get_if<Secure>(&stream_); }
     executor_type get_executor() { return next_layer().get_executor(); }
 
-    // Of very many buffers the first are read into or written, as if there were no others.
+    // Where there are very many buffers, the first are read into or written, as if there were no others.
     template <class Buffers, class Token>
     auto async_read_some(const Buffers& buffers, Token&& token) {
         return started<&Line::read_some>(first_of<boost::asio::mutable_buffer>(buffers), std::forward<Token>(token));
@@ -85,10 +82,6 @@ private:
 
 // So that the kernel does not hide how slow the other side is: of what it takes, little may lie unsent.
 void keep_kernel_buffers_small(Line& line);
-
-// For the side that others connect to: TLS 1.2 and 1.3, with the certificate chain and the private key of two PEM
-// files. bad_input if they cannot be read or do not belong together.
-Result<boost::asio::ssl::context> server_context(const std::string& certificate, const std::string& private_key);
 
 template <class Handler>
 void async_teardown(boost::beast::role_type role, Line& line, Handler&& handler) {

@@ -24,7 +24,7 @@ namespace {
 // set it back.
 class StreamClock {
 public:
-    void take(std::int64_t timestamp_us, Clock::time_point now) {
+    void add(std::int64_t timestamp_us, Clock::time_point now) {
         if (timestamp_us <= last_us_) ahead_.reset();  // another sequence, with times of its own
         last_us_ = timestamp_us;
         const auto ahead = timestamp_us - microseconds(now);
@@ -61,11 +61,11 @@ struct Publisher::State {
     Broadcast broadcast;
     std::optional<Broadcast::Viewer> line;  // while there is a connection
     StreamClock clock;
-    ViewerCounters before;                           // of connections that ended
-    std::uint64_t alone_from = 0, alone_frames = 0;  // since there is no connection: the first place, and frames
-    std::optional<std::uint32_t> session;            // of the last sequence header sent over this connection: its CRC
-    bool announced = true;                           // whether its clock was told behind its first frame
-    bool asked = false;                              // for a key frame, by the hub
+    ViewerCounters before;                               // of connections that ended
+    std::uint64_t unheard_from = 0, unheard_frames = 0;  // since there is no connection: the first place, and frames
+    std::optional<std::uint32_t> checksum;               // of the last sequence header sent over this connection
+    bool announced = true;                               // whether its clock was told behind its first frame
+    bool asked = false;                                  // for a key frame, by the hub
     Clock::time_point asked_at{};
     std::optional<std::uint64_t> viewers;
     std::string trouble;
@@ -80,7 +80,7 @@ struct Publisher::State {
 
     ViewerCounters counters() const {
         auto out = before;
-        out.dropped_frames += alone_frames;
+        out.dropped_frames += unheard_frames;
         if (!line) return out;
         const auto& now = broadcast.counters(*line);
         out.packets += now.packets;
@@ -88,39 +88,40 @@ struct Publisher::State {
         out.dropped_frames += now.dropped_frames;
         return out;
     }
-    // Of the frames that found no connection, the hub is sent those that the newest needs.
+    // The hub is sent those frames that found no connection and that the newest needs.
     void connect() {
         line = broadcast.join([this] { client->wake(); }, Clock::now());
         if (const auto sent = broadcast.kept())
-            alone_frames -= static_cast<std::uint64_t>(std::count_if(sent->begin(), sent->end(), [&](const auto& one) {
-                return one.place >= alone_from && frame_type(one.packet->header.kind);
-            }));
-        before.dropped_frames += std::exchange(alone_frames, 0);
+            unheard_frames -=
+                static_cast<std::uint64_t>(std::count_if(sent->begin(), sent->end(), [&](const auto& one) {
+                    return one.place >= unheard_from && frame_type(one.packet->header.kind);
+                }));
+        before.dropped_frames += std::exchange(unheard_frames, 0);
     }
     void disconnect(const std::string& reason) {
         const std::lock_guard lock(mutex);
         if (line) {
             before = counters();
             broadcast.leave(*std::exchange(line, std::nullopt));
-            alone_from = broadcast.next_place();
+            unheard_from = broadcast.next_place();
         }
         viewers.reset();
         trouble = reason;
     }
     std::string heartbeat() const { return write_text(HeartbeatFromPublisher{clock.at(Clock::now())}); }
     void sent(const PacketHeader& header);
-    void take_text(const std::string& text);
+    void receive_text(const std::string& text);
     HubTalk talk();
 };
 
-// Of a packet that is sent next. Behind the first frame of a session goes its clock.
+// header: of a packet that is sent next. Behind the first frame of a session goes its clock.
 void Publisher::State::sent(const PacketHeader& header) {
-    if (header.kind == PacketKind::sequence && std::exchange(session, header.reference) != header.reference)
+    if (header.kind == PacketKind::sequence && std::exchange(checksum, header.reference) != header.reference)
         announced = false;
     if (frame_type(header.kind) && !std::exchange(announced, true)) client->say(heartbeat());
 }
 
-void Publisher::State::take_text(const std::string& text) {
+void Publisher::State::receive_text(const std::string& text) {
     const auto message = read_to_publisher(text);
     if (!message) return;
     if (const auto* hello = std::get_if<Hello>(&*message)) client->learn(hello->hubs);
@@ -134,7 +135,7 @@ HubTalk Publisher::State::talk() {
     out.connected = [this] {
         const std::lock_guard lock(mutex);
         trouble.clear();
-        session.reset();
+        checksum.reset();
         connect();
     };
     out.next = [this]() -> SharedPacket {
@@ -148,7 +149,7 @@ HubTalk Publisher::State::talk() {
             if (!frame_type(packet.header.kind)) return std::string();
             return write_text(Stamp{packet.header.frame, system_microseconds(), {}});
         };
-    out.take_text = [this](const std::string& text) { take_text(text); };
+    out.receive_text = [this](const std::string& text) { receive_text(text); };
     out.heartbeat = [this] {
         const std::lock_guard lock(mutex);
         return heartbeat();
@@ -197,8 +198,8 @@ Result<void> Publisher::send(const Packet& packet) {
     const std::lock_guard lock(state.mutex);
     if (state.ending) return fail(ErrorKind::bad_input, state.ending->reason);
     const bool frame = frame_type(packet.kind).has_value();
-    if (frame) state.clock.take(packet.timestamp_us, now);
-    if (state.broadcast.push(std::move(shared), now) && frame && !state.line) ++state.alone_frames;
+    if (frame) state.clock.add(packet.timestamp_us, now);
+    if (state.broadcast.push(std::move(shared), now) && frame && !state.line) ++state.unheard_frames;
     return {};
 }
 

@@ -45,12 +45,12 @@ struct Watcher::State {
         if (client) client->stop();
     }
     bool is_full() const { return waiting.size() >= most_waiting || waiting_bytes >= most_waiting_bytes; }
-    void take_packet(const std::vector<std::uint8_t>& message);
-    void take_text(const std::string& text);
+    void receive_packet(const std::vector<std::uint8_t>& message);
+    void receive_text(const std::string& text);
     HubTalk talk();
 };
 
-void Watcher::State::take_packet(const std::vector<std::uint8_t>& message) {
+void Watcher::State::receive_packet(const std::vector<std::uint8_t>& message) {
     auto packet = packet_of(message, options.largest_packet);
     if (packet && repeated.is_repeat(told_header(*packet))) return;
     const std::lock_guard lock(mutex);
@@ -64,7 +64,7 @@ void Watcher::State::take_packet(const std::vector<std::uint8_t>& message) {
     changed.notify_all();
 }
 
-void Watcher::State::take_text(const std::string& text) {
+void Watcher::State::receive_text(const std::string& text) {
     const auto message = read_to_viewer(text);
     if (!message) return;
     if (const auto* hello = std::get_if<Hello>(&*message)) client->learn(hello->hubs);
@@ -74,8 +74,8 @@ void Watcher::State::take_text(const std::string& text) {
 
 HubTalk Watcher::State::talk() {
     HubTalk out;
-    out.take_packet = [this](std::vector<std::uint8_t> message) { take_packet(message); };
-    out.take_text = [this](const std::string& text) { take_text(text); };
+    out.receive_packet = [this](std::vector<std::uint8_t> message) { receive_packet(message); };
+    out.receive_text = [this](const std::string& text) { receive_text(text); };
     out.may_read = [this] {
         const std::lock_guard lock(mutex);
         return !is_full();

@@ -16,7 +16,7 @@ std::string time_text(std::chrono::system_clock::time_point time, const char* fo
     return std::string(text.data(), std::strftime(text.data(), text.size(), format, &parts));
 }
 
-std::string printable(std::string text) {
+std::string without_control(std::string text) {
     for (char& c : text)
         if (static_cast<unsigned char>(c) < 0x20 || static_cast<unsigned char>(c) >= 0x7f) c = '?';
     return text;
@@ -43,7 +43,7 @@ std::string text_line(const Event& event, std::chrono::system_clock::time_point 
     if (!event.stream.empty()) out += event.stream + ": ";
     out += event.text;
     if (!event.address.empty()) out += " (" + event.address + ')';
-    return printable(std::move(out));
+    return without_control(std::move(out));
 }
 
 }  // namespace htvm::live

@@ -27,7 +27,7 @@ void FarStream::give_held(std::vector<Bytes>& out) {
     lacking_ = gap;
 }
 
-std::vector<Bytes> FarStream::take(PublishedPacket message) {
+std::vector<Bytes> FarStream::receive(PublishedPacket message) {
     std::vector<Bytes> out;
     auto& packet = message.packet;
     if (message.claim != claim_) return out;
@@ -45,9 +45,9 @@ std::vector<Bytes> FarStream::take(PublishedPacket message) {
     return out;
 }
 
-// Of the closure, what was given already is left out. Nothing else is missing from before it: what is needed now was
+// Leaves out what was given already of the closure. Nothing else is missing from before it: what is needed now was
 // needed when it was passed by, and was given then.
-std::vector<Bytes> FarStream::take(ClosureAnswer message) {
+std::vector<Bytes> FarStream::receive(ClosureAnswer message) {
     std::vector<Bytes> out;
     if (message.claim != claim_ || (next_ && message.next < *next_)) return out;
     ++counters_.closures;

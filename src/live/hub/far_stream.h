@@ -32,8 +32,8 @@ public:
     explicit FarStream(const Claim& claim, const FarStreamLimits& limits = {}) : claim_(claim), limits_(limits) {}
 
     // Each gives the packets that can go on now. Those of another claim are passed over.
-    std::vector<Bytes> take(PublishedPacket message);
-    std::vector<Bytes> take(ClosureAnswer message);
+    std::vector<Bytes> receive(PublishedPacket message);
+    std::vector<Bytes> receive(ClosureAnswer message);
     // The publisher's hub says which packet comes next.
     void announced(std::uint64_t next, Clock::time_point now);
     // Messages were lost, perhaps, and nothing that comes may tell.

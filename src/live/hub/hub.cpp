@@ -10,7 +10,7 @@
 namespace htvm::live {
 namespace {
 
-// Of text messages. Viewers have little to say; a publisher may stamp each frame.
+// Text messages: viewers have little to say; a publisher may stamp each frame.
 constexpr double viewer_burst = 50, viewer_texts_each_second = 10;
 constexpr double publisher_burst = 1000, publisher_texts_each_second = 500;
 
@@ -40,7 +40,7 @@ CloseCode code_of(const Error& error) {
 template <class Message>
 std::optional<Closing> text_refused(std::string_view text, const Result<Message>& message, TextAllowance& allowance,
                                     Hub::Clock::time_point now) {
-    if (message && allowance.take(now)) return std::nullopt;
+    if (message && allowance.allow(now)) return std::nullopt;
     return Closing{text.size() > most_text_bytes ? CloseCode::too_large : CloseCode::refused,
                    message ? "too many text messages" : message.error().message};
 }
@@ -77,7 +77,7 @@ std::optional<std::int64_t> PublisherClock::at(Clock::time_point now) const {
     return microseconds(now.time_since_epoch()) + *std::max_element(ahead_us_.begin(), ahead_us_.end());
 }
 
-bool TextAllowance::take(Clock::time_point now) {
+bool TextAllowance::allow(Clock::time_point now) {
     const std::chrono::duration<double> passed = now - last_;
     left_ = std::min(burst_, left_ + passed.count() * each_second_);
     last_ = now;
@@ -129,11 +129,11 @@ Result<void> Hub::refuse(Connection& connection, const Error& error, CloseCode c
 }
 
 // Another connection goes on with the stream.
-void Hub::replace_publisher(Stream& stream, std::uint32_t session) {
+void Hub::replace_publisher(Stream& stream, std::uint32_t checksum) {
     if (!stream.connection) return;
     auto& before = connections_.at(*stream.connection);
     before.admitted = false;
-    before.closing = stream.session == session
+    before.closing = stream.checksum == checksum
                          ? Closing{CloseCode::continued, "this session was continued by another connection"}
                          : Closing{CloseCode::taken_over, "another session took the stream over"};
     before.wake();
@@ -157,7 +157,7 @@ Result<void> Hub::admit(std::uint64_t number, Connection& connection, const Pack
         stream.broadcast = Broadcast(limits_.broadcast);
     } else {
         auto& stream = known->second;
-        const bool same = stream.session == header.reference;
+        const bool same = stream.checksum == header.reference;
         if (!same && now - stream.heard < limits_.silence) {
             ++counters_.refused_publishers_busy;
             return fail(ErrorKind::bad_input,
@@ -201,7 +201,7 @@ void Hub::tell_from_afar(Publisher publisher, bool published, std::optional<std:
     const auto found = connections_.find(publisher.connection);
     auto* stream = found == connections_.end() ? nullptr : published_by(found->second);
     if (!stream) return;
-    if (checksum && *checksum != stream->session) forget_session(*stream, *checksum);
+    if (checksum && *checksum != stream->checksum) forget_session(*stream, *checksum);
     if (published) stream->heard = now;
     if (std::exchange(stream->alive_afar, published) && !published)
         tell_gone(*stream, "the publisher cannot be reached");
@@ -227,8 +227,8 @@ std::optional<Hub::Closure> Hub::closure(const std::string& name) const {
     return Closure{std::move(*packets), broadcast.next_place()};
 }
 
-void Hub::forget_session(Stream& stream, std::uint32_t next) {
-    stream.session = next;
+void Hub::forget_session(Stream& stream, std::uint32_t next_checksum) {
+    stream.checksum = next_checksum;
     stream.clock.forget();
     stream.has_frames = false;
     stream.header.reset();
@@ -238,8 +238,8 @@ void Hub::forget_session(Stream& stream, std::uint32_t next) {
 // a loop.
 void Hub::begin_session(const std::string& name, Stream& stream, const PacketHeader& header,
                         std::span<const std::uint8_t> message) {
-    // Of one that is published on another hub the session may be known before its header comes.
-    const bool same = stream.session == header.reference;
+    // The session of a stream that is published on another hub may be known before its header comes.
+    const bool same = stream.checksum == header.reference;
     if (same && stream.header) return;
     if (!same) forget_session(stream, header.reference);
     const auto payload = message.subspan(packet_header_bytes, message.size() - packet_overhead);
@@ -269,7 +269,7 @@ bool Hub::hold(PartOfMessage& part, std::size_t bytes, Clock::time_point now) {
 // The message is whole, or nothing more of it will come.
 void Hub::drop(PartOfMessage& part) { *memory_ -= std::exchange(part.bytes, 0); }
 
-Result<void> Hub::take_part(Publisher publisher, std::size_t bytes, Clock::time_point now) {
+Result<void> Hub::receive_part(Publisher publisher, std::size_t bytes, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
@@ -280,7 +280,7 @@ Result<void> Hub::take_part(Publisher publisher, std::size_t bytes, Clock::time_
     return refuse(connection, {ErrorKind::limit, memory_used_up}, CloseCode::try_later);
 }
 
-Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now) {
+Result<void> Hub::receive_packet(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
@@ -331,7 +331,7 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
     const bool new_one = place.has_value();
     if (new_one)
         for (const auto& listener : listeners_)
-            if (listener.taken) listener.taken(connection.stream, *place, packet);
+            if (listener.received) listener.received(connection.stream, *place, packet);
     if (stream.broadcast.undecodable_frames() > undecodable) {
         ++counters_.undecodable_frames;
         ask_for_key_frame(stream, now);
@@ -344,7 +344,7 @@ Result<void> Hub::take(Publisher publisher, std::vector<std::uint8_t> message, C
     return {};
 }
 
-Result<void> Hub::take_text(Publisher publisher, std::string_view text, Clock::time_point now) {
+Result<void> Hub::receive_text(Publisher publisher, std::string_view text, Clock::time_point now) {
     const auto found = connections_.find(publisher.connection);
     if (found == connections_.end() || found->second.closing) return fail(ErrorKind::bad_input, connection_ended);
     auto& connection = found->second;
@@ -352,7 +352,7 @@ Result<void> Hub::take_text(Publisher publisher, std::string_view text, Clock::t
     const auto message = read_from_publisher(text);
     const auto refusal = text_refused(text, message, connection.allowance, now);
     if (!refusal) {
-        take(publisher, *message, now);
+        receive_text(publisher, *message, now);
         return {};
     }
     ++counters_.refused_publishers_message;
@@ -360,7 +360,7 @@ Result<void> Hub::take_text(Publisher publisher, std::string_view text, Clock::t
     return refuse(connection, {ErrorKind::bad_input, refusal->reason}, *refusal->code);
 }
 
-void Hub::take(Publisher publisher, const FromPublisher& message, Clock::time_point now) {
+void Hub::receive_text(Publisher publisher, const FromPublisher& message, Clock::time_point now) {
     heard(publisher, now);
     const auto found = connections_.find(publisher.connection);
     auto* stream = found == connections_.end() ? nullptr : published_by(found->second);
@@ -508,7 +508,7 @@ void Hub::leave(const Viewer& viewer) {
     if (stream.ended && stream.watching.empty()) ended_.erase(viewer.number);
 }
 
-Result<void> Hub::take_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now) {
+Result<void> Hub::receive_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now) {
     auto* watching = this->watching(viewer);
     if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
     if (hold(watching->part, bytes, now)) return {};
@@ -518,7 +518,7 @@ Result<void> Hub::take_part(const Viewer& viewer, std::size_t bytes, Clock::time
     return fail(ErrorKind::limit, memory_used_up);
 }
 
-Result<void> Hub::take_text(const Viewer& viewer, std::string_view text, Clock::time_point now) {
+Result<void> Hub::receive_text(const Viewer& viewer, std::string_view text, Clock::time_point now) {
     auto* watching = this->watching(viewer);
     if (!watching || watching->closing) return fail(ErrorKind::bad_input, connection_ended);
     drop(watching->part);
@@ -658,7 +658,7 @@ StreamInfo Hub::info(const std::string& name, const Stream& stream, Clock::time_
                    .published = is_published(stream),
                    .far = is_far(stream),
                    .connection = stream.connection.value_or(0),
-                   .checksum = stream.session.value_or(0),
+                   .checksum = stream.checksum.value_or(0),
                    .next_place = stream.broadcast.next_place(),
                    .viewers = stream.watching.size(),
                    .viewers_afar = stream.viewers_afar,

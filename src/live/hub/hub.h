@@ -1,6 +1,6 @@
 // The live streams of a server: who publishes them, and who watches. A publisher sends packets as they stand in a file;
-// the first is a sequence header, and its checksum tells one session from another. Of packets only headers and
-// checksums are read, and of sequence headers what they tell of the stream.
+// the first is a sequence header, and its checksum tells one session from another. The hub reads
+// only headers and checksums of packets, and what sequence headers tell of the stream.
 //
 // A publisher whose connection broke comes back with the same session and goes on. Another session takes the stream
 // over only once the old one has been silent for a while, so two publishers never mix.
@@ -37,7 +37,7 @@ struct HubLimits {
     std::size_t streams = 256;
     std::size_t viewers = 4096;                        // of one stream
     std::size_t packet_bytes = std::size_t{16} << 20;  // of one packet
-    // Of all packets together, each counted once: kept for those who may join, waiting for viewers, and of those that
+    // All packets together, each counted once: kept for those who may join, waiting for viewers, and those that
     // have come in part. Beyond it nobody new is let in, and what publishers send is dropped.
     std::size_t memory = std::size_t{1} << 30;
     std::chrono::milliseconds message_time{30000};      // from a message's first part to its last
@@ -114,8 +114,8 @@ class TextAllowance {
 public:
     using Clock = Broadcast::Clock;
     TextAllowance(double burst, double each_second) : burst_(burst), each_second_(each_second), left_(burst) {}
-    // Whether one more is allowed.
-    bool take(Clock::time_point now);
+    // Whether one more is allowed; then it counts.
+    bool allow(Clock::time_point now);
 
 private:
     double burst_, each_second_, left_;
@@ -143,7 +143,7 @@ struct HubListener {
     std::function<void(const std::string& stream, const SharedPacket& packet, Broadcast::Clock::time_point now)> sent{};
     std::function<void(const std::string& stream)> ended{};
     // Every packet that is new, whether it can be decoded or not. place: see Broadcast::push().
-    std::function<void(const std::string& stream, std::uint64_t place, const SharedPacket& packet)> taken{};
+    std::function<void(const std::string& stream, std::uint64_t place, const SharedPacket& packet)> received{};
     // The publisher came, went, or began another session; the first viewer came, or the last one left; or it ended.
     std::function<void(const std::string& stream)> changed{};
 };
@@ -168,13 +168,14 @@ public:
     // The publisher's next message: one packet. A damaged one is counted and left out. An error ends the connection,
     // which next() says too: the first packet is no sequence header, the stream belongs to another session that was
     // heard of lately, or there are too many streams.
-    Result<void> take(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now);
+    Result<void> receive_packet(Publisher publisher, std::vector<std::uint8_t> message, Clock::time_point now);
     // A text message. Likewise an error if it is none, too long, or one of too many.
-    Result<void> take_text(Publisher publisher, std::string_view text, Clock::time_point now);
-    void take(Publisher publisher, const FromPublisher& message, Clock::time_point now);
-    // A part of a message came, which takes so many bytes of memory by now, until it is whole: take() or take_text().
-    // An error ends the connection: there is no memory for it.
-    Result<void> take_part(Publisher publisher, std::size_t bytes, Clock::time_point now);
+    Result<void> receive_text(Publisher publisher, std::string_view text, Clock::time_point now);
+    // What a text message said.
+    void receive_text(Publisher publisher, const FromPublisher& message, Clock::time_point now);
+    // A part of a message came, which takes so many bytes of memory by now, until it is whole:
+    // receive_packet() or receive_text(). An error ends the connection: there is no memory for it.
+    Result<void> receive_part(Publisher publisher, std::size_t bytes, Clock::time_point now);
     // The line is alive.
     void heard(Publisher publisher, Clock::time_point now);
     ForPublisher next(Publisher publisher);
@@ -182,17 +183,17 @@ public:
     // waits for them, and their connections end. Otherwise it may come back.
     void leave(Publisher publisher, bool ended_stream, Clock::time_point now);
 
-    // A stream whose publisher is connected to another hub (live/hub/hub_link.h): it is listed and watched as those of
-    // this hub are, and given what comes from there by take(); next() has what goes to that publisher. It goes on with
-    // the stream even if a publisher is connected here, who is told. checksum: of its sequence header. limit: there are
-    // too many streams.
+    // A stream whose publisher is connected to another hub (live/hub/hub_peering.h): it is listed and watched as those
+    // of this hub are, and given what comes from there by receive_packet(); next() has what goes to that publisher. It
+    // goes on with the stream even if a publisher is connected here, who is told. checksum: of its sequence header.
+    // limit: there are too many streams.
     Result<Publisher> publish_from_afar(const std::string& name, std::uint32_t checksum, Clock::time_point now);
     // Whether that publisher is connected there, and which session it has begun.
     void tell_from_afar(Publisher publisher, bool published, std::optional<std::uint32_t> checksum,
                         Clock::time_point now);
     // How many watch the stream on other hubs.
     void tell_viewers_afar(const std::string& name, std::size_t viewers);
-    // After a pause in which nobody watched and nothing was given to take(): what comes next does not go on from there.
+    // After a pause in which nobody watched and nothing was received: what comes next does not go on from there.
     void forget_packets(const std::string& name);
     // What another hub needs to go on with the stream, and the place of the packet that comes next. Nothing if there is
     // no such stream, or what is needed was too large to be kept.
@@ -206,9 +207,9 @@ public:
     Result<Viewer> watch(const std::string& name, std::function<void()> wake, const WatchOptions& options,
                          Clock::time_point now);
     // As of a publisher.
-    Result<void> take_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now);
+    Result<void> receive_part(const Viewer& viewer, std::size_t bytes, Clock::time_point now);
     // A text message; an error ends the connection.
-    Result<void> take_text(const Viewer& viewer, std::string_view text, Clock::time_point now);
+    Result<void> receive_text(const Viewer& viewer, std::string_view text, Clock::time_point now);
     ForViewer next(const Viewer& viewer, Clock::time_point now);
     void leave(const Viewer& viewer);
 
@@ -257,7 +258,7 @@ private:
         std::optional<std::uint64_t> connection;  // of the publisher, one of connections_, if it was admitted
         bool alive_afar = false;                  // of a publisher on another hub: whether it is connected there
         std::size_t viewers_afar = 0;
-        std::optional<std::uint32_t> session;  // checksum of its sequence header
+        std::optional<std::uint32_t> checksum;  // of its sequence header
         std::optional<StreamInfo::Header> header{};
         Clock::time_point heard{};
         PublisherCounters counters;
@@ -294,8 +295,8 @@ private:
     bool is_far(const Stream& stream) const;
     bool is_published(const Stream& stream) const;
     void changed(const std::string& name) const;
-    void replace_publisher(Stream& stream, std::uint32_t session);
-    static void forget_session(Stream& stream, std::uint32_t next);
+    void replace_publisher(Stream& stream, std::uint32_t checksum);
+    static void forget_session(Stream& stream, std::uint32_t next_checksum);
     Result<void> admit(std::uint64_t number, Connection& connection, const PacketHeader& header, Clock::time_point now);
     Result<void> refuse(Connection& connection, const Error& error, CloseCode code);
     void detach(Connection& connection, const std::string& why, Clock::time_point now);

@@ -53,7 +53,7 @@ void write(ByteWriter& out, const Announcement& message) {
     for (const auto& stream : message.streams) {
         put(out, stream.stream);
         out.u64(static_cast<std::uint64_t>(stream.began));
-        out.u64(stream.session);
+        out.u64(stream.checksum);
         out.u8(flags(stream.published, published_bit, stream.clock.has_value(), clock_bit));
         out.u64(static_cast<std::uint64_t>(stream.clock.value_or(0)));
         out.u64(stream.next);
@@ -98,7 +98,7 @@ std::optional<HubMessage> read_announcement(ByteReader& in) {
         if (!name) return std::nullopt;
         stream.stream = *name;
         stream.began = static_cast<std::int64_t>(in.u64());
-        stream.session = in.u64();
+        stream.checksum = in.u64();
         const auto bits = in.u8();
         stream.published = (bits & published_bit) != 0;
         const auto clock = static_cast<std::int64_t>(in.u64());
@@ -186,7 +186,7 @@ std::vector<Bytes> cut_into_parts(std::uint64_t hub, std::uint64_t number, std::
     return out;
 }
 
-std::optional<PartReader::Whole> PartReader::take(std::span<const std::uint8_t> bytes) {
+std::optional<PartReader::Whole> PartReader::add(std::span<const std::uint8_t> bytes) {
     ByteReader in(bytes);
     const bool marked = in.u32() == part_mark;
     const auto hub = in.u64(), number = in.u64();

@@ -17,7 +17,7 @@ namespace htvm::live {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// That a stream's publisher is connected to this hub. Of two hubs that claim a name, the newer claim holds.
+// That a stream's publisher is connected to this hub. Where two hubs claim a name, the newer claim holds.
 struct Claim {
     std::uint64_t hub = 0;   // drawn at random each time a hub starts
     std::int64_t began = 0;  // microseconds since 1970, by the hub's clock; above that of every claim it had heard of
@@ -29,7 +29,7 @@ inline bool newer(const Claim& a, const Claim& b) { return a.began != b.began ? 
 struct AnnouncedStream {
     std::string stream;
     std::int64_t began = 0;             // of the claim
-    std::uint64_t session = 0;          // as Hub tells one from another
+    std::uint64_t checksum = 0;         // of its sequence header, which tells one session from another
     bool published = false;             // whether the publisher is connected at this moment
     std::optional<std::int64_t> clock;  // the publisher's, as its heartbeat has it, at this moment
     std::uint64_t next = 0;             // number of the packet that comes next
@@ -53,7 +53,7 @@ struct PublishedPacket {
     NumberedPacket packet;
 };
 
-// Of a hub that wants a stream's packets, to the publisher's hub: each second, and when one of these is true.
+// From a hub that wants a stream's packets, to the publisher's hub: each second, and when one of these is true.
 struct StreamRequest {
     std::string stream;
     Claim claim;
@@ -95,7 +95,7 @@ public:
         Bytes message;
     };
     // The message that this part makes whole. Nothing if others are missing, or it is no part.
-    std::optional<Whole> take(std::span<const std::uint8_t> part);
+    std::optional<Whole> add(std::span<const std::uint8_t> part);
 
     std::uint64_t damaged() const { return damaged_; }        // what was no part of a message
     std::uint64_t incomplete() const { return incomplete_; }  // messages given up

@@ -1,6 +1,9 @@
-// The parts of a request that are parsed here rather than by Boost.Beast: which file it names, and which part of it.
+// A request as Boost.Beast reads it, and the parts of it that are parsed here: which path it names, with which query,
+// and what its headers say of files.
 #pragma once
 
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -9,13 +12,17 @@
 
 namespace htvm::live {
 
+// None has a body.
+using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+
 // The decoded segments of a request target's path; the query is dropped. Nothing if a segment is empty (except after a
 // final slash), begins with a dot, or holds a slash, backslash or control character, if an escape is wrong, or if the
 // path is longer than 1,024 bytes or has more than 16 segments. So the segments never lead upwards or to hidden files.
 std::optional<std::vector<std::string>> path_segments(std::string_view target);
 
 // The decoded value of this member of the target's query: "2" of "?a=1&b=2"; "" of a name without a value. Nothing if
-// the query has no such member, its escapes are wrong, or it holds a control character. Of several the first counts.
+// the query has no such member, its escapes are wrong, or it holds a control character. Where there are several, the
+// first counts.
 std::optional<std::string> query_value(std::string_view target, std::string_view name);
 
 // All of the text, decimal digits only; nothing if it is no such number or 2^64 or more.

@@ -18,8 +18,6 @@
 #include <string_view>
 #include <utility>
 
-#include "live/server/http_request.h"
-
 namespace htvm::live {
 namespace {
 
@@ -53,7 +51,7 @@ struct Connection {
 };
 using SharedConnection = std::shared_ptr<Connection>;
 
-net::awaitable<bool> accepted(Connection& connection, const LiveRequest& request, std::size_t largest_message) {
+net::awaitable<bool> accepted(Connection& connection, const Request& request, std::size_t largest_message) {
     auto& socket = connection.socket;
     beast::get_lowest_layer(socket).expires_never();
     socket.set_option(websocket::stream_base::timeout{handshake, silence, true});
@@ -74,10 +72,10 @@ net::awaitable<void> close(Connection& connection, CloseCode code, const std::st
     co_await connection.socket.async_close(why, awaited);
 }
 
-// Reads messages until the connection ends, or one of these says that it should: take_part(bytes), which is called for
-// each piece with the memory that the message takes by then, and take(text, message).
-template <class TakePart, class Take>
-net::awaitable<void> read_messages(SharedConnection connection, TakePart take_part, Take take) {
+// Reads messages until the connection ends, or one of these says that it should: receive_part(bytes), which is called
+// for each piece with the memory that the message takes by then, and receive(text, message).
+template <class ReceivePart, class Receive>
+net::awaitable<void> read_messages(SharedConnection connection, ReceivePart receive_part, Receive receive) {
     auto& socket = connection->socket;
     beast::flat_buffer buffer;
     for (bool wanted = true; wanted;) {
@@ -87,7 +85,7 @@ net::awaitable<void> read_messages(SharedConnection connection, TakePart take_pa
         do {
             const auto [error, bytes] = co_await socket.async_read_some(buffer, piece_bytes, awaited);
             failed = error;
-            wanted = take_part(buffer.capacity());
+            wanted = receive_part(buffer.capacity());
         } while (!failed && wanted && !socket.is_message_done() &&
                  !(socket.got_text() && buffer.size() > most_text_bytes));
         if (failed == websocket::error::closed) connection->news.theirs = socket.reason();
@@ -95,8 +93,8 @@ net::awaitable<void> read_messages(SharedConnection connection, TakePart take_pa
             connection->news.ended = true;
             break;
         }
-        wanted = wanted && take(socket.got_text(),
-                                std::span(static_cast<const std::uint8_t*>(buffer.cdata().data()), buffer.size()));
+        wanted = wanted && receive(socket.got_text(),
+                                   std::span(static_cast<const std::uint8_t*>(buffer.cdata().data()), buffer.size()));
     }
     connection->news.timer.cancel();
 }
@@ -153,7 +151,7 @@ struct Leave {
 
 }  // namespace
 
-net::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::string name, Hub& hub) {
+net::awaitable<void> publish_by_socket(Line line, Request request, std::string name, Hub& hub) {
     const auto connection = std::make_shared<Connection>(std::move(line));
     if (!co_await accepted(*connection, request, hub.limits().packet_bytes + packet_overhead)) co_return;
     auto& news = connection->news;
@@ -167,20 +165,20 @@ net::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::stri
         const bool ended_stream = news.theirs && news.theirs->code == websocket::close_code::normal;
         hub.leave(*publisher, ended_stream, Hub::Clock::now());
     });
-    const auto take_part = [&hub, number = *publisher](std::size_t bytes) {
-        return hub.take_part(number, bytes, Hub::Clock::now()).has_value();
+    const auto receive_part = [&hub, number = *publisher](std::size_t bytes) {
+        return hub.receive_part(number, bytes, Hub::Clock::now()).has_value();
     };
-    const auto take = [&hub, number = *publisher](bool text, std::span<const std::uint8_t> message) {
+    const auto receive = [&hub, number = *publisher](bool text, std::span<const std::uint8_t> message) {
         const auto now = Hub::Clock::now();
-        return (text ? hub.take_text(number, text_of(message), now)
-                     : hub.take(number, {message.begin(), message.end()}, now))
+        return (text ? hub.receive_text(number, text_of(message), now)
+                     : hub.receive_packet(number, {message.begin(), message.end()}, now))
             .has_value();
     };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, take_part, take), net::detached);
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive), net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*publisher); });
 }
 
-net::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string name, Hub& hub) {
+net::awaitable<void> watch_by_socket(Line line, Request request, std::string name, Hub& hub) {
     keep_kernel_buffers_small(line);
     const auto connection = std::make_shared<Connection>(std::move(line));
     if (!co_await accepted(*connection, request, most_text_bytes)) co_return;
@@ -193,23 +191,24 @@ net::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string
         co_return;
     }
     const Leave leave([&hub, &viewer] { hub.leave(*viewer); });
-    const auto take_part = [&hub, number = *viewer](std::size_t bytes) {
-        return hub.take_part(number, bytes, Hub::Clock::now()).has_value();
+    const auto receive_part = [&hub, number = *viewer](std::size_t bytes) {
+        return hub.receive_part(number, bytes, Hub::Clock::now()).has_value();
     };
     // What is no text counts as one: it means nothing, but a flood of it is a flood.
-    const auto take = [&hub, number = *viewer](bool text, std::span<const std::uint8_t> message) {
-        return hub.take_text(number, text ? text_of(message) : R"({"type":"binary"})", Hub::Clock::now()).has_value();
+    const auto receive = [&hub, number = *viewer](bool text, std::span<const std::uint8_t> message) {
+        return hub.receive_text(number, text ? text_of(message) : R"({"type":"binary"})", Hub::Clock::now())
+            .has_value();
     };
-    net::co_spawn(connection->socket.get_executor(), read_messages(connection, take_part, take), net::detached);
+    net::co_spawn(connection->socket.get_executor(), read_messages(connection, receive_part, receive), net::detached);
     co_await write_messages(*connection, [&] { return hub.next(*viewer, Hub::Clock::now()); });
 }
 
-net::awaitable<void> refuse_socket(Line line, LiveRequest request, CloseCode code, std::string why) {
+net::awaitable<void> refuse_socket(Line line, Request request, CloseCode code, std::string why) {
     const auto connection = std::make_shared<Connection>(std::move(line));
     if (co_await accepted(*connection, request, most_text_bytes)) co_await close(*connection, code, why);
 }
 
-net::awaitable<void> watch_by_body(Line& line, http::response<http::empty_body> header, std::string name, Hub& hub) {
+net::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::string name, Hub& hub) {
     keep_kernel_buffers_small(line);
     News news(line.get_executor());
     const auto viewer = hub.watch(

@@ -5,27 +5,23 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
-#include <boost/beast/http/empty_body.hpp>
-#include <boost/beast/http/message.hpp>
 #include <chrono>
 #include <string>
 
 #include "live/client/control.h"
 #include "live/client/line.h"
 #include "live/hub/hub.h"
+#include "live/server/http_request.h"
+#include "live/server/response.h"
 
 namespace htvm::live {
 
-using LiveRequest = boost::beast::http::request<boost::beast::http::empty_body>;
-
 // The request asks for a WebSocket; `name` is the stream's.
-boost::asio::awaitable<void> publish_by_socket(Line line, LiveRequest request, std::string name, Hub& hub);
-boost::asio::awaitable<void> watch_by_socket(Line line, LiveRequest request, std::string name, Hub& hub);
+boost::asio::awaitable<void> publish_by_socket(Line line, Request request, std::string name, Hub& hub);
+boost::asio::awaitable<void> watch_by_socket(Line line, Request request, std::string name, Hub& hub);
 // Opens a WebSocket, which the request asks for, only to close it with this code and reason.
-boost::asio::awaitable<void> refuse_socket(Line line, LiveRequest request, CloseCode code, std::string why);
+boost::asio::awaitable<void> refuse_socket(Line line, Request request, CloseCode code, std::string why);
 // Sends response and body. header: what every response has; the status is 404 or 503 if the stream cannot be watched.
-boost::asio::awaitable<void> watch_by_body(Line& line,
-                                           boost::beast::http::response<boost::beast::http::empty_body> header,
-                                           std::string name, Hub& hub);
+boost::asio::awaitable<void> watch_by_body(Line& line, ResponseHeader header, std::string name, Hub& hub);
 
 }  // namespace htvm::live

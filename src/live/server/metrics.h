@@ -9,7 +9,7 @@
 #include <string>
 
 #include "live/hub/hub.h"
-#include "live/hub/nats_link.h"
+#include "live/hub/nats_peering.h"
 #include "live/server/recorder.h"
 
 namespace htvm::live {

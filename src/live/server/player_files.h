@@ -13,5 +13,7 @@ struct PlayerFile {
 };
 
 std::span<const PlayerFile> player_files();
+// Whether the player was built into this program.
+inline bool has_player() { return !player_files().empty(); }
 
 }  // namespace htvm::live

@@ -147,7 +147,7 @@ public:
     }
 
     // Whether there was room.
-    bool take(Item item, std::size_t most_waiting) {
+    bool put(Item item, std::size_t most_waiting) {
         const std::lock_guard lock(mutex_);
         const auto bytes = item.packet->bytes.size();
         if (waiting_ > 0 && waiting_ + bytes > most_waiting) return false;
@@ -315,8 +315,8 @@ Result<Recorder> Recorder::open(const RecorderOptions& options) {
     return Recorder(options);
 }
 
-bool Recorder::take(const std::string& name, const SharedPacket& packet, Clock::time_point now,
-                    std::chrono::system_clock::time_point time) {
+bool Recorder::record(const std::string& name, const SharedPacket& packet, Clock::time_point now,
+                      std::chrono::system_clock::time_point time) {
     const auto& options = state_->options;
     auto& stream = state_->stream(name);
     if (!stream.recording) return false;
@@ -335,7 +335,7 @@ bool Recorder::take(const std::string& name, const SharedPacket& packet, Clock::
     if (!stream.header || (stream.failed && now - *stream.failed < options.retry)) return false;
     const bool due = stream.file && options.file_length.count() > 0 && now - stream.begun >= options.file_length;
     const auto put = [&](const SharedPacket& item, fs::path new_file) {
-        if (stream.recording->take({item, std::move(new_file)}, options.waiting_bytes)) return true;
+        if (stream.recording->put({item, std::move(new_file)}, options.waiting_bytes)) return true;
         if (std::exchange(stream.whole, false))
             state_->shared->warn("recording_behind", name, "the disk is too slow: frames are not recorded", false);
         if (frame) ++state_->shared->dropped_frames;
@@ -355,8 +355,8 @@ bool Recorder::take(const std::string& name, const SharedPacket& packet, Clock::
         stream.pictures = stream.whole && (stream.pictures || is_key_picture(header)) && put(packet, {});
         return false;
     }
-    const bool taken = stream.whole && put(packet, {});
-    if (!taken && (packet->is_reference() || header.kind == PacketKind::codebook)) stream.reference = false;
+    const bool recorded = stream.whole && put(packet, {});
+    if (!recorded && (packet->is_reference() || header.kind == PacketKind::codebook)) stream.reference = false;
     return (frame && !stream.whole) || (due && !begins_file(header));
 }
 
@@ -389,7 +389,7 @@ RecorderCounters Recorder::counters() const {
     return out;
 }
 
-std::vector<Event> Recorder::take_events() {
+std::vector<Event> Recorder::new_events() {
     const std::lock_guard lock(state_->shared->mutex);
     return std::exchange(state_->shared->events, {});
 }

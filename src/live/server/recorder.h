@@ -56,8 +56,8 @@ public:
     // The next packet that went to the viewers of this stream. time: of the system clock, for the file's name. Returns
     // whether a frame that can be decoded by itself is wanted, since a file can only begin with one, and where frames
     // were dropped goes on the sooner.
-    bool take(const std::string& stream, const SharedPacket& packet, Clock::time_point now,
-              std::chrono::system_clock::time_point time);
+    bool record(const std::string& stream, const SharedPacket& packet, Clock::time_point now,
+                std::chrono::system_clock::time_point time);
     // All have ended; waits until their files are finished.
     void finish();
     // The stream has ended; its file is finished in the background.
@@ -65,7 +65,7 @@ public:
 
     RecorderCounters counters() const;
     // What happened since the last call.
-    std::vector<Event> take_events();
+    std::vector<Event> new_events();
 
 private:
     struct State;
@@ -73,8 +73,8 @@ private:
     std::unique_ptr<State> state_;
 };
 
-// The name of a file that begins at this time, without ".htvm". Of the stream's name letters, digits, "-", "_", "." and
-// bytes above 127 stay, others become %XX; at most 200 bytes of it.
+// The name of a file that begins at this time, without ".htvm". In the stream's name letters, digits, "-", "_", "." and
+// bytes above 127 stay, others become %XX; at most 200 bytes of it are used.
 std::string recording_name(const std::string& stream, std::chrono::system_clock::time_point time);
 
 }  // namespace htvm::live

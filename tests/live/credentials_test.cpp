@@ -1,5 +1,5 @@
 // Tokens and links: what is let in, and what is not.
-#include "live/server/access.h"
+#include "live/server/credentials.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// Who may publish and who may watch: tokens of publishers, and links that expire. The files that hold them are the
-// operator's own; tokens and links come from anyone.
+// What people show to be let in: publishers their tokens, viewers links that expire. The files by which they are
+// checked are the operator's own; tokens and links come from anyone.
 #pragma once
 
 #include <array>
@@ -12,12 +12,6 @@
 #include "htvm/result.hpp"
 
 namespace htvm::live {
-
-// A stream's name: 1 to 64 letters, digits, '-', '_' and '.', not beginning with '.'. So it is a file's name, a segment
-// of a path and a word of a log as it stands.
-bool is_stream_name(std::string_view name);
-inline constexpr const char* stream_name_rule =
-    "a stream's name has 1 to 64 letters, digits, '-', '_' and '.', and does not begin with '.'";
 
 // What is kept of a publisher's token, which has 256 random bits: a salted SHA-256 is enough, since nobody can try them
 // all, and it makes checking cheap for the hub.
@@ -60,7 +54,7 @@ std::string link_query(const LinkKeys& keys, std::string_view path, std::chrono:
 
 enum class LinkCheck { good, missing, forged, expired };
 
-// Of a request's target, of which only the query is read here.
+// target: the request's; only its query is read here.
 LinkCheck check_link(const LinkKeys& keys, std::string_view path, std::string_view target,
                      std::chrono::system_clock::time_point now);
 

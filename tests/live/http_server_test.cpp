@@ -1,6 +1,4 @@
 // The server as clients see it, who are not always polite, on this machine's loopback address.
-#include "live/server/file_server.h"
-
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -8,6 +6,8 @@
 #include <fstream>
 #include <thread>
 
+#include "live/server/player_files.h"
+#include "live/server/server.h"
 #include "server_test.h"
 
 namespace htvm::live {
@@ -17,9 +17,9 @@ namespace fs = std::filesystem;
 namespace net = boost::asio;
 using tcp = net::ip::tcp;
 
-class FileServerTest : public ServerTest {
+class HttpServerTest : public ServerTest {
 protected:
-    FileServerTest() {
+    HttpServerTest() {
         fs::create_directory(root / "served" / "inner");
         write("secret.htvm", "secret");
         write("served/person.htvm", content);
@@ -35,22 +35,22 @@ protected:
 };
 
 // reno is part of every kernel.
-TEST_F(FileServerTest, UsesTheCongestionControlItIsTold) {
+TEST_F(HttpServerTest, UsesTheCongestionControlItIsTold) {
     options.congestion_control = "reno";
     start();
     EXPECT_EQ("reno", server->congestion_control());
 }
 
-TEST_F(FileServerTest, LeavesTheKernelsCongestionControlWhereThereIsNoneOfTheNameItIsTold) {
+TEST_F(HttpServerTest, LeavesTheKernelsCongestionControlWhereThereIsNoneOfTheNameItIsTold) {
     start();
     options.congestion_control = "no such";
-    auto other = FileServer::open(options);
+    auto other = Server::open(options);
     ASSERT_TRUE(other);
     EXPECT_EQ(server->congestion_control(), other->congestion_control());
     EXPECT_NE("", other->congestion_control());
 }
 
-TEST_F(FileServerTest, GivesFilesWholeAndInParts) {
+TEST_F(HttpServerTest, GivesFilesWholeAndInParts) {
     start();
     const auto whole = get("/files/person.htvm");
     EXPECT_EQ(status(whole), 200);
@@ -70,7 +70,7 @@ TEST_F(FileServerTest, GivesFilesWholeAndInParts) {
     EXPECT_EQ(body(head), "");
 }
 
-TEST_F(FileServerTest, TagsTellWhetherAFileIsStillTheSame) {
+TEST_F(HttpServerTest, TagsTellWhetherAFileIsStillTheSame) {
     start();
     const auto tag = header(get("/files/person.htvm"), "ETag");
     ASSERT_FALSE(tag.empty());
@@ -81,7 +81,7 @@ TEST_F(FileServerTest, TagsTellWhetherAFileIsStillTheSame) {
     EXPECT_EQ(status(get("/files/person.htvm", "Range: bytes=0-4\r\nIf-Range: " + tag + "\r\n")), 200);
 }
 
-TEST_F(FileServerTest, NothingOutsideTheFolderIsReached) {
+TEST_F(HttpServerTest, NothingOutsideTheFolderIsReached) {
     ASSERT_EQ(mkfifo((root / "served" / "pipe.htvm").c_str(), 0600), 0);
     start();
     for (const char* target : {"/files/../secret.htvm", "/files/%2e%2e/secret.htvm", "/files/up/secret.htvm",
@@ -94,7 +94,7 @@ TEST_F(FileServerTest, NothingOutsideTheFolderIsReached) {
     }
 }
 
-TEST_F(FileServerTest, ListsTheStreams) {
+TEST_F(HttpServerTest, ListsTheStreams) {
     start();
     EXPECT_EQ(body(get("/api/files")), R"([{"bytes":5,"path":"inner/a b.htvm"},{"bytes":20,"path":"person.htvm"}])");
     write("served/inner/a b.jpg", "x");
@@ -105,7 +105,7 @@ TEST_F(FileServerTest, ListsTheStreams) {
                                        R"({"bytes":20,"path":"person.htvm","poster":"person.png"}])");
 }
 
-TEST_F(FileServerTest, FilesWithNamesAreServedAlone) {
+TEST_F(HttpServerTest, FilesWithNamesAreServedAlone) {
     options.files = {{"one.htvm", (root / "served" / "person.htvm").string()},
                      {"beside/one.htvm", (root / "secret.htvm").string()}};
     start();
@@ -116,19 +116,19 @@ TEST_F(FileServerTest, FilesWithNamesAreServedAlone) {
     EXPECT_EQ(body(get("/api/files")), R"([{"bytes":20,"path":"one.htvm"},{"bytes":6,"path":"beside/one.htvm"}])");
 }
 
-TEST_F(FileServerTest, OtherSitesMayReadOnlyIfAllowed) {
+TEST_F(HttpServerTest, OtherSitesMayReadOnlyIfAllowed) {
     start();
     EXPECT_EQ(header(get("/files/person.htvm"), "Access-Control-Allow-Origin"), "");
     stop();
-    options.other_sites = true;
+    options.admission.other_sites = true;
     start();
     EXPECT_EQ(header(get("/files/person.htvm"), "Access-Control-Allow-Origin"), "*");
     EXPECT_EQ(header(get("/files/nowhere.htvm"), "Access-Control-Allow-Origin"), "*");  // so that they learn why
     EXPECT_EQ(header(get("/api/files"), "Access-Control-Allow-Origin"), "");
 }
 
-TEST_F(FileServerTest, HostsOfOtherNamesAreRefusedOnTheLoopback) {
-    options.loopback_names = true;
+TEST_F(HttpServerTest, HostsOfOtherNamesAreRefusedOnTheLoopback) {
+    options.admission.loopback_names = true;
     start();
     EXPECT_EQ(status(get("/files/person.htvm")), 200);
     auto socket = connect();
@@ -138,7 +138,7 @@ TEST_F(FileServerTest, HostsOfOtherNamesAreRefusedOnTheLoopback) {
     EXPECT_EQ(status(read_all(socket)), 421);
 }
 
-TEST_F(FileServerTest, ConnectionsAreKeptForMoreRequests) {
+TEST_F(HttpServerTest, ConnectionsAreKeptForMoreRequests) {
     start();
     auto socket = connect();
     const std::string request = "GET /files/person.htvm HTTP/1.1\r\nHost: x\r\n";
@@ -147,7 +147,7 @@ TEST_F(FileServerTest, ConnectionsAreKeptForMoreRequests) {
     EXPECT_NE(both.find(content), both.rfind(content));
 }
 
-TEST_F(FileServerTest, WhatIsNoRequestIsRefused) {
+TEST_F(HttpServerTest, WhatIsNoRequestIsRefused) {
     start();
     EXPECT_EQ(status(get("/files/person.htvm", "", "POST")), 405);
     EXPECT_EQ(status(get("/files/person.htvm", "Content-Length: 5\r\n")), 400);
@@ -162,7 +162,7 @@ TEST_F(FileServerTest, WhatIsNoRequestIsRefused) {
     EXPECT_EQ(status(get("/files/person.htvm")), 200);
 }
 
-TEST_F(FileServerTest, ClientsThatDoNotFinishTheirRequestAreCutOff) {
+TEST_F(HttpServerTest, ClientsThatDoNotFinishTheirRequestAreCutOff) {
     options.header_time = std::chrono::seconds(1);
     start();
     auto socket = connect();
@@ -171,7 +171,7 @@ TEST_F(FileServerTest, ClientsThatDoNotFinishTheirRequestAreCutOff) {
     EXPECT_EQ(status(get("/files/person.htvm")), 200);
 }
 
-TEST_F(FileServerTest, ARequestThatComesAByteAtATimeIsCutOffAfterItsTimeCountedAndHoldsUpNobody) {
+TEST_F(HttpServerTest, ARequestThatComesAByteAtATimeIsCutOffAfterItsTimeCountedAndHoldsUpNobody) {
     options.header_time = std::chrono::seconds(1);
     start();
     auto silent = connect(), slow = connect();
@@ -190,10 +190,10 @@ TEST_F(FileServerTest, ARequestThatComesAByteAtATimeIsCutOffAfterItsTimeCountedA
     EXPECT_TRUE(metrics_come_to("htvm_refused_total{cause=\"header_time\"} 1"));
 }
 
-TEST_F(FileServerTest, ClientsThatTakeNothingAreCutOffAndHoldUpNobody) {
+TEST_F(HttpServerTest, ClientsThatTakeNothingAreCutOffAndHoldUpNobody) {
     write("served/large.htvm", std::string(64 << 20, 'x'));
     options.stall_time = std::chrono::seconds(1);
-    options.connections_per_address = 2;
+    options.admission.connections_per_address = 2;
     start();
     auto socket = connect();
     net::write(socket, net::buffer(std::string("GET /files/large.htvm HTTP/1.1\r\nHost: x\r\n\r\n")));
@@ -205,8 +205,8 @@ TEST_F(FileServerTest, ClientsThatTakeNothingAreCutOffAndHoldUpNobody) {
     EXPECT_LT(read_all(socket).size(), std::size_t{64} << 20);
 }
 
-TEST_F(FileServerTest, ConnectionsAreFew) {
-    options.connections_per_address = 3;
+TEST_F(HttpServerTest, ConnectionsAreFew) {
+    options.admission.connections_per_address = 3;
     start();
     std::vector<tcp::socket> held;
     for (int i = 0; i < 3; ++i) {
@@ -221,7 +221,7 @@ TEST_F(FileServerTest, ConnectionsAreFew) {
     while (status(get("/files/person.htvm")) != 200) std::this_thread::yield();  // once the server has noticed
 }
 
-TEST_F(FileServerTest, ThePageForbidsWhatItDoesNotNeed) {
+TEST_F(HttpServerTest, ThePageForbidsWhatItDoesNotNeed) {
     if (!has_player()) GTEST_SKIP() << "built without the player";
     start();
     const auto page = get("/", "Accept-Encoding: identity\r\n");
@@ -234,7 +234,7 @@ TEST_F(FileServerTest, ThePageForbidsWhatItDoesNotNeed) {
     EXPECT_EQ(status(get("/", "If-None-Match: " + header(page, "ETag") + "\r\n")), 304);
 }
 
-TEST_F(FileServerTest, TellsProgramsOnThisMachineWhatItCounts) {
+TEST_F(HttpServerTest, TellsProgramsOnThisMachineWhatItCounts) {
     start();
     EXPECT_EQ(body(get("/healthz")), "ok\n");
     const auto metrics = get("/metrics");
@@ -246,18 +246,18 @@ TEST_F(FileServerTest, TellsProgramsOnThisMachineWhatItCounts) {
     EXPECT_EQ(status(get("/metrics", "Origin: https://a.example\r\n")), 403);
 }
 
-TEST_F(FileServerTest, TellsEverybodyWhatItCountsIfAllowed) {
-    options.metrics_anyone = true;
+TEST_F(HttpServerTest, TellsEverybodyWhatItCountsIfAllowed) {
+    options.admission.metrics_anyone = true;
     start();
     EXPECT_EQ(status(get("/metrics", "X-Forwarded-For: 192.0.2.1\r\n")), 200);
 }
 
-TEST_F(FileServerTest, AFolderThatIsNotThereIsAnError) {
+TEST_F(HttpServerTest, AFolderThatIsNotThereIsAnError) {
     options.folder = (root / "nowhere").string();
-    EXPECT_FALSE(FileServer::open(options));
+    EXPECT_FALSE(Server::open(options));
     options.folder = root.string();
     options.address = "not an address";
-    EXPECT_FALSE(FileServer::open(options));
+    EXPECT_FALSE(Server::open(options));
 }
 
 }  // namespace

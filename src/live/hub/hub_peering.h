@@ -1,9 +1,9 @@
 // Joins a hub with those of other machines (docs/live.md, "Many machines"). What is published on the others is listed
-// and watched here as if it were published here; packets come over only while somebody watches. Of a name that is
-// published on two, the newer claim holds.
+// and watched here as if it were published here; packets come over only while somebody watches. Where two
+// publish under one name, the newer claim holds.
 //
-// There is no network here: it is given, and may lose, double and reorder what is sent (live/hub/nats_link.h). All is
-// called on the hub's thread.
+// There is no network here: it is given, and may lose, double and reorder what is sent (live/hub/nats_peering.h). All
+// is called on the hub's thread.
 #pragma once
 
 #include <chrono>
@@ -20,7 +20,7 @@
 
 namespace htvm::live {
 
-struct HubLinkOptions {
+struct HubPeeringOptions {
     std::string name;          // of this hub, for people
     std::string url;           // where viewers and publishers reach it, for their list of hubs; "": they are not told
     std::uint64_t number = 0;  // of this run of the hub; drawn at random
@@ -40,7 +40,7 @@ struct HubNetwork {
     std::function<void(const std::string&subject)> subscribe, unsubscribe;
 };
 
-struct HubLinkCounters {
+struct HubPeeringCounters {
     bool connected = false;
     std::size_t hubs = 0;                               // others, that were heard of lately
     std::size_t far_streams = 0;                        // published on them
@@ -56,14 +56,14 @@ struct HubLinkCounters {
     std::uint64_t lost_claims = 0;                      // publishers here who lost their stream to one elsewhere
 };
 
-class HubLink {
+class HubPeering {
 public:
     using Clock = Hub::Clock;
 
     // hub: outlives it.
-    HubLink(Hub& hub, const HubLinkOptions& options, HubNetwork network);
-    HubLink(const HubLink&) = delete;
-    HubLink& operator=(const HubLink&) = delete;
+    HubPeering(Hub& hub, const HubPeeringOptions& options, HubNetwork network);
+    HubPeering(const HubPeering&) = delete;
+    HubPeering& operator=(const HubPeering&) = delete;
 
     // The subjects that it hears whether anything is watched or not.
     std::vector<std::string> subjects() const { return {announcements_subject(), hub_subject(options_.number)}; }
@@ -73,7 +73,7 @@ public:
     // To be called about fifty times a second.
     void tick(Clock::time_point now);
 
-    HubLinkCounters counters() const;
+    HubPeeringCounters counters() const;
 
 private:
     struct Wanted {
@@ -111,7 +111,7 @@ private:
     void settle(const std::string& name, Clock::time_point now);
     void follow(const std::string& name, const Newest& newest, Clock::time_point now);
     void stream_changed(const std::string& name);
-    void packet_taken(const std::string& name, std::uint64_t place, const SharedPacket& packet);
+    void packet_received(const std::string& name, std::uint64_t place, const SharedPacket& packet);
     void watch(const std::string& name, Far& far, Clock::time_point now);
     void stop_watching(const std::string& name, Far& far);
     void ask(const std::string& name, Far& far, bool closure, Clock::time_point now);
@@ -124,7 +124,7 @@ private:
 
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
     Hub& hub_;
-    HubLinkOptions options_;
+    HubPeeringOptions options_;
     HubNetwork network_;
     PartReader parts_;
     bool connected_ = false;
@@ -137,7 +137,7 @@ private:
     std::optional<Clock::time_point> announced_;
     bool announce_soon_ = false;
     std::uint64_t next_message_ = 0;
-    HubLinkCounters counters_;  // sums; without what streams count that are watched
+    HubPeeringCounters counters_;  // sums; without what streams count that are watched
 };
 
 }  // namespace htvm::live

@@ -1,4 +1,4 @@
-#include "live/server/served_folder.h"
+#include "live/server/served_files.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 
 namespace htvm::live {
 namespace {
@@ -19,6 +20,14 @@ std::string tag_of(const struct stat& status) {
                   static_cast<unsigned long long>(status.st_mtim.tv_sec),
                   static_cast<unsigned long>(status.st_mtim.tv_nsec));
     return text;
+}
+
+// A file by its path, which may change meanwhile as those of a folder may; symbolic links are not followed.
+Result<ServedFile> file_at(const std::filesystem::path& path) {
+    const auto folder = ServedFolder::open(path.parent_path().string());
+    if (!folder) return tl::unexpected(folder.error());
+    const std::vector<std::string> name = {path.filename().string()};
+    return folder->file(name);
 }
 
 }  // namespace
@@ -82,6 +91,44 @@ std::vector<FolderEntry> ServedFolder::files(const std::string& ending) const {
         if (!error) out.push_back({it->path().lexically_relative(path_).string(), size});
     }
     std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
+    return out;
+}
+
+Result<ServedFiles> ServedFiles::open(const std::string& folder, std::vector<NamedFile> named) {
+    ServedFiles out;
+    out.named_ = std::move(named);
+    if (out.named_.empty() && !folder.empty()) {
+        auto opened = ServedFolder::open(folder);
+        if (!opened) return tl::unexpected(opened.error());
+        out.folder_.emplace(std::move(*opened));
+    }
+    return out;
+}
+
+Result<ServedFile> ServedFiles::file(std::span<const std::string> segments) const {
+    std::string path;
+    for (const auto& segment : segments) path += (path.empty() ? "" : "/") + segment;
+    for (const auto& [name, place] : named_)
+        if (name == path) return file_at(place);
+    const bool watched = path.ends_with(".htvm") || path.ends_with(".png") || path.ends_with(".jpg");
+    return folder_ && watched ? folder_->file(segments) : fail(ErrorKind::bad_input, "not served");
+}
+
+std::vector<ListedFile> ServedFiles::list() const {
+    std::vector<ListedFile> out;
+    for (const auto& [name, path] : named_)
+        if (const auto file = file_at(path)) out.push_back({name, file->size});
+    if (!folder_) return out;
+    std::set<std::string> pictures;
+    for (const char* ending : {".png", ".jpg"})
+        for (const auto& picture : folder_->files(ending)) pictures.insert(picture.path);
+    constexpr std::string_view ending = ".htvm";
+    for (auto& [path, size] : folder_->files(".htvm")) {
+        ListedFile& stream = out.emplace_back(ListedFile{path, size});
+        const auto name = path.substr(0, path.size() - ending.size());
+        for (const char* picture : {".jpg", ".png"})
+            if (pictures.contains(name + picture)) stream.poster = name + picture;
+    }
     return out;
 }
 

@@ -1,6 +1,6 @@
 // Hubs on several machines, joined by a network that is given: whoever watches on one is sent what is published on
 // another, whatever the network, the hubs and the publishers do.
-#include "live/hub/hub_link.h"
+#include "live/hub/hub_peering.h"
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ Bytes tracked(std::uint32_t frame) { return write_packet(live_tracked(frame)); }
 struct Machines : testing::Test {
     struct Machine {
         Hub hub;
-        std::unique_ptr<HubLink> link;
+        std::unique_ptr<HubPeering> peering;
         std::set<std::string> subjects;
         bool connected = false;
     };
@@ -48,22 +48,22 @@ struct Machines : testing::Test {
         machines[i] = std::make_unique<Machine>();
         std::erase_if(publishers, [i](const auto& publisher) { return publisher.first == i; });
         auto& machine = *machines[i];
-        HubLinkOptions options;
+        HubPeeringOptions options;
         options.name = "hub" + std::to_string(i);
         options.url = "ws://hub" + std::to_string(i);
         options.number = next_number++;
         options.system_time = [this] { return now.time_since_epoch() / 1us; };
-        machine.link = std::make_unique<HubLink>(
+        machine.peering = std::make_unique<HubPeering>(
             machine.hub, options,
             HubNetwork{[this, i](const std::string& subject, Bytes part) { send(i, subject, std::move(part)); },
                        [&machine](const std::string& subject) { machine.subjects.insert(subject); },
                        [&machine](const std::string& subject) { machine.subjects.erase(subject); }});
-        for (const auto& subject : machine.link->subjects()) machine.subjects.insert(subject);
+        for (const auto& subject : machine.peering->subjects()) machine.subjects.insert(subject);
         connect(i, true);
     }
     void connect(std::size_t i, bool connected) {
         machines[i]->connected = connected;
-        connected ? machines[i]->link->connected(now) : machines[i]->link->disconnected(now);
+        connected ? machines[i]->peering->connected(now) : machines[i]->peering->disconnected(now);
     }
     void send(std::size_t from, const std::string& subject, Bytes part) {
         ++sent[subject];
@@ -82,7 +82,7 @@ struct Machines : testing::Test {
             for (auto& machine : machines) {
                 if (!machine) continue;
                 machine->hub.tick(now);
-                machine->link->tick(now);
+                machine->peering->tick(now);
             }
             for (const auto& [i, publisher] : publishers)
                 if (machines[i]) hub(i).heard(publisher, now);
@@ -93,7 +93,7 @@ struct Machines : testing::Test {
         while (!network.empty()) {
             const auto next = std::move(network.front());
             network.pop_front();
-            if (machines[next.to]) machines[next.to]->link->receive(next.subject, next.part, now);
+            if (machines[next.to]) machines[next.to]->peering->receive(next.subject, next.part, now);
         }
     }
 
@@ -107,7 +107,7 @@ struct Machines : testing::Test {
     }
     void publish(std::size_t i, Hub::Publisher publisher, const std::vector<Bytes>& packets) {
         for (const auto& packet : packets) {
-            EXPECT_TRUE(hub(i).take(publisher, packet, now));
+            EXPECT_TRUE(hub(i).receive_packet(publisher, packet, now));
             deliver();
         }
     }
@@ -142,10 +142,10 @@ struct Machines : testing::Test {
     }
     std::optional<StreamInfo> stream(std::size_t i) { return hub(i).stream("anna", now); }
 };
-using HubLinkTest = Machines;
+using HubPeeringTest = Machines;
 using Frames = std::vector<std::uint32_t>;
 
-TEST_F(HubLinkTest, WhatIsPublishedOnOneHubIsListedAndWatchedOnAnother) {
+TEST_F(HubPeeringTest, WhatIsPublishedOnOneHubIsListedAndWatchedOnAnother) {
     for (const auto i : {0, 1, 2}) start(i);
     const auto anna = publisher(0);
     publish(0, anna, {header(1), intra(0), tracked(1)});
@@ -159,7 +159,7 @@ TEST_F(HubLinkTest, WhatIsPublishedOnOneHubIsListedAndWatchedOnAnother) {
     EXPECT_EQ(stream(0)->viewers_afar, 1u);
 }
 
-TEST_F(HubLinkTest, OfNamesThatAreNoNamesOfStreamsNothingIsHeard) {
+TEST_F(HubPeeringTest, OfNamesThatAreNoNamesOfStreamsNothingIsHeard) {
     for (const auto i : {0, 1}) start(i);
     const auto anna = publisher(0);
     for (const auto& name : std::vector<std::string>{"a b", "", ".a", "b\nc", std::string(65, 'a')}) {
@@ -174,7 +174,7 @@ TEST_F(HubLinkTest, OfNamesThatAreNoNamesOfStreamsNothingIsHeard) {
     EXPECT_EQ(hub(1).streams(now)[0].name, "anna");
 }
 
-TEST_F(HubLinkTest, PacketsGoOverOnlyWhileSomebodyWatches) {
+TEST_F(HubPeeringTest, PacketsGoOverOnlyWhileSomebodyWatches) {
     for (const auto i : {0, 1}) start(i);
     const auto anna = publisher(0);
     publish(0, anna, {header(1), intra(0)});
@@ -200,7 +200,7 @@ TEST_F(HubLinkTest, PacketsGoOverOnlyWhileSomebodyWatches) {
     EXPECT_EQ(frames(1, later), (Frames{4, 5}));
 }
 
-TEST_F(HubLinkTest, APublisherWhoMovesToAnotherHubIsFollowedAndNoFrameComesTwice) {
+TEST_F(HubPeeringTest, APublisherWhoMovesToAnotherHubIsFollowedAndNoFrameComesTwice) {
     for (const auto i : {0, 1, 2}) start(i);
     const auto before = publisher(0);
     publish(0, before, {header(1), intra(0), tracked(1)});
@@ -217,7 +217,7 @@ TEST_F(HubLinkTest, APublisherWhoMovesToAnotherHubIsFollowedAndNoFrameComesTwice
     EXPECT_TRUE(stream(0)->far && !stream(1)->far && stream(2)->far);
 }
 
-TEST_F(HubLinkTest, AnotherSessionWaitsUntilThePublisherOnAnotherHubIsSilent) {
+TEST_F(HubPeeringTest, AnotherSessionWaitsUntilThePublisherOnAnotherHubIsSilent) {
     for (const auto i : {0, 1}) start(i);
     const auto anna = publisher(0);
     publish(0, anna, {header(1), intra(0)});
@@ -225,13 +225,13 @@ TEST_F(HubLinkTest, AnotherSessionWaitsUntilThePublisherOnAnotherHubIsSilent) {
     const auto other = hub(1).publish(
         "anna", [] {}, now);
     ASSERT_TRUE(other);
-    EXPECT_FALSE(hub(1).take(*other, header(2), now));
+    EXPECT_FALSE(hub(1).receive_packet(*other, header(2), now));
     hub(0).leave(anna, false, now);
     pass(2100ms);
-    EXPECT_TRUE(hub(1).take(publisher(1), header(2), now));
+    EXPECT_TRUE(hub(1).receive_packet(publisher(1), header(2), now));
 }
 
-TEST_F(HubLinkTest, OfTwoHubsThatClaimANameTheNewerSessionHoldsAndTheLoserIsTold) {
+TEST_F(HubPeeringTest, OfTwoHubsThatClaimANameTheNewerSessionHoldsAndTheLoserIsTold) {
     for (const auto i : {0, 1, 2}) start(i);
     connect(1, false);
     const auto older = publisher(0);
@@ -248,10 +248,10 @@ TEST_F(HubLinkTest, OfTwoHubsThatClaimANameTheNewerSessionHoldsAndTheLoserIsTold
     publish(1, newer, {intra(8)});
     EXPECT_EQ(frames(0, watching), (Frames{0, 7, 8}));
     EXPECT_EQ(frames(2, third), (Frames{0, 7, 8}));
-    EXPECT_EQ(machines[0]->link->counters().lost_claims, 1u);
+    EXPECT_EQ(machines[0]->peering->counters().lost_claims, 1u);
 }
 
-TEST_F(HubLinkTest, WhileTheNetworkIsAwayWhatIsLocalGoesOnAndTheRestComesBackWithIt) {
+TEST_F(HubPeeringTest, WhileTheNetworkIsAwayWhatIsLocalGoesOnAndTheRestComesBackWithIt) {
     for (const auto i : {0, 1}) start(i);
     const auto anna = publisher(0);
     publish(0, anna, {header(1), intra(0)});
@@ -278,7 +278,7 @@ TEST_F(HubLinkTest, WhileTheNetworkIsAwayWhatIsLocalGoesOnAndTheRestComesBackWit
     EXPECT_EQ(came.back(), 31u);
 }
 
-TEST_F(HubLinkTest, AStreamWhosePublisherEndedItEndsEverywhere) {
+TEST_F(HubPeeringTest, AStreamWhosePublisherEndedItEndsEverywhere) {
     for (const auto i : {0, 1}) start(i);
     const auto anna = publisher(0);
     publish(0, anna, {header(1), intra(0)});
@@ -294,7 +294,7 @@ TEST_F(HubLinkTest, AStreamWhosePublisherEndedItEndsEverywhere) {
     EXPECT_EQ(std::get<Closing>(end).code, CloseCode::ended);
 }
 
-TEST_F(HubLinkTest, TheStreamsOfAHubThatDiedWaitForTheirPublisherElsewhere) {
+TEST_F(HubPeeringTest, TheStreamsOfAHubThatDiedWaitForTheirPublisherElsewhere) {
     for (const auto i : {0, 1, 2}) start(i);
     publish(0, publisher(0), {header(1), intra(0)});
     pass(100ms);
@@ -313,21 +313,21 @@ TEST_F(HubLinkTest, TheStreamsOfAHubThatDiedWaitForTheirPublisherElsewhere) {
     EXPECT_FALSE(stream(2));
 }
 
-TEST_F(HubLinkTest, RequestsForAKeyFrameReachThePublisher) {
+TEST_F(HubPeeringTest, RequestsForAKeyFrameReachThePublisher) {
     for (const auto i : {0, 1}) start(i);
     const auto anna = publisher(0);
     publish(0, anna, {header(1), intra(0)});
     pass(100ms);
     const auto watching = viewer(1);
     deliver();
-    EXPECT_TRUE(hub(1).take_text(watching, write_text(KeyFrameRequest{}), now));
+    EXPECT_TRUE(hub(1).receive_text(watching, write_text(KeyFrameRequest{}), now));
     pass(100ms);
     bool asked = false;
     for (int texts = 0; texts < 5; ++texts) asked = asked || std::holds_alternative<KeyFrameRequest>(hub(0).next(anna));
     EXPECT_TRUE(asked);
 }
 
-TEST_F(HubLinkTest, HubsTellTheirPeopleOfEachOther) {
+TEST_F(HubPeeringTest, HubsTellTheirPeopleOfEachOther) {
     for (const auto i : {0, 1, 2}) start(i);
     pass(100ms);
     auto connection = hub(1).publish(
@@ -338,7 +338,7 @@ TEST_F(HubLinkTest, HubsTellTheirPeopleOfEachOther) {
     EXPECT_EQ(std::get<Hello>(hello).hubs, (std::vector<std::string>{"ws://hub0", "ws://hub2"}));
 }
 
-TEST_F(HubLinkTest, NobodySpeaksForAnotherHubOrOfAnotherStreamThanTheSubjectSays) {
+TEST_F(HubPeeringTest, NobodySpeaksForAnotherHubOrOfAnotherStreamThanTheSubjectSays) {
     for (const auto i : {0, 1}) start(i);
     const auto anna = publisher(0);
     publish(0, anna, {header(1), intra(0)});
@@ -349,14 +349,14 @@ TEST_F(HubLinkTest, NobodySpeaksForAnotherHubOrOfAnotherStreamThanTheSubjectSays
     const auto claim = Claim{1, now.time_since_epoch() / 1us};
     const auto say = [&](std::uint64_t hub, const std::string& subject, const HubMessage& message) {
         for (const auto& part : cut_into_parts(hub, 77, write_hub_message(message)))
-            machines[1]->link->receive(subject, part, now);
+            machines[1]->peering->receive(subject, part, now);
     };
-    const auto damaged = machines[1]->link->counters().damaged;
+    const auto damaged = machines[1]->peering->counters().damaged;
     say(9, packets_subject("anna"), PublishedPacket{"anna", claim, {2, intra(1)}});
     say(1, packets_subject("ben"), PublishedPacket{"anna", claim, {2, intra(1)}});
     say(9, announcements_subject(), StreamRequest{"anna", claim});
-    machines[1]->link->receive("htvm.v1.announcements", Bytes(100), now);
-    EXPECT_EQ(machines[1]->link->counters().damaged, damaged + 4);
+    machines[1]->peering->receive("htvm.v1.announcements", Bytes(100), now);
+    EXPECT_EQ(machines[1]->peering->counters().damaged, damaged + 4);
     EXPECT_EQ(frames(1, watching), Frames{});
     // Names that are no segment of a path are not listed.
     say(9, announcements_subject(), Announcement{"", "", {{"../x", 1, 1, true, {}, 0}, {"", 1, 1, true, {}, 0}}});
@@ -364,7 +364,7 @@ TEST_F(HubLinkTest, NobodySpeaksForAnotherHubOrOfAnotherStreamThanTheSubjectSays
 }
 
 // A publisher who moves between hubs, and hubs and network that fail; on every hub a viewer.
-TEST_F(HubLinkTest, WhateverHappensAViewerIsSentThePublishersPacketsAndCanDecodeEveryFrame) {
+TEST_F(HubPeeringTest, WhateverHappensAViewerIsSentThePublishersPacketsAndCanDecodeEveryFrame) {
     for (std::uint32_t seed = 0; seed < 12; ++seed) {
         random.seed(seed);
         machines.clear();

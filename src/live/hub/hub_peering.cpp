@@ -1,11 +1,11 @@
-#include "live/hub/hub_link.h"
+#include "live/hub/hub_peering.h"
 
 #include <algorithm>
 #include <set>
 #include <utility>
 
 #include "live/client/control.h"
-#include "live/server/access.h"
+#include "live/hub/stream_name.h"
 
 namespace htvm::live {
 namespace {
@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t most_hubs = 1000, most_streams = 10000;
 constexpr std::chrono::milliseconds answer_again{50};  // between two closures for one hub
 
-void add(HubLinkCounters& sum, const FarStreamCounters& stream) {
+void add(HubPeeringCounters& sum, const FarStreamCounters& stream) {
     sum.packets += stream.packets;
     sum.bytes += stream.bytes;
     sum.gaps += stream.gaps;
@@ -24,24 +24,24 @@ void add(HubLinkCounters& sum, const FarStreamCounters& stream) {
 
 }  // namespace
 
-HubLink::HubLink(Hub& hub, const HubLinkOptions& options, HubNetwork network)
+HubPeering::HubPeering(Hub& hub, const HubPeeringOptions& options, HubNetwork network)
     : hub_(hub), options_(options), network_(std::move(network)) {
     if (!options_.system_time) options_.system_time = system_microseconds;
-    // The hub has its connections for longer than the link.
+    // The hub has its connections for longer than the peering.
     const std::weak_ptr<bool> alive = alive_;
     HubListener listener;
     listener.changed = [this, alive](const std::string& stream) {
         if (!alive.expired()) stream_changed(stream);
     };
-    listener.taken = [this, alive](const std::string& stream, std::uint64_t place, const SharedPacket& packet) {
-        if (!alive.expired()) packet_taken(stream, place, packet);
+    listener.received = [this, alive](const std::string& stream, std::uint64_t place, const SharedPacket& packet) {
+        if (!alive.expired()) packet_received(stream, place, packet);
     };
     hub_.listen(std::move(listener));
 }
 
 // ---- What is heard --------------------------------------------------------------------------------------------------
 
-void HubLink::connected(Clock::time_point now) {
+void HubPeering::connected(Clock::time_point now) {
     now_ = now;
     connected_ = true;
     announce_soon_ = true;
@@ -51,15 +51,15 @@ void HubLink::connected(Clock::time_point now) {
 }
 
 // What is published elsewhere cannot be heard of: its streams stay, without a publisher, until the network is back.
-void HubLink::disconnected(Clock::time_point now) {
+void HubPeering::disconnected(Clock::time_point now) {
     now_ = now;
     connected_ = false;
     for (auto& [name, far] : far_) hub_.tell_from_afar(far.publisher, false, {}, now);
 }
 
-void HubLink::receive(const std::string& subject, std::span<const std::uint8_t> part, Clock::time_point now) {
+void HubPeering::receive(const std::string& subject, std::span<const std::uint8_t> part, Clock::time_point now) {
     now_ = now;
-    auto whole = parts_.take(part);
+    auto whole = parts_.add(part);
     if (!whole || whole->hub == options_.number) return;
     auto message = read_hub_message(whole->message);
     // Whoever may send on one subject only cannot speak of another stream, nor for another hub.
@@ -86,12 +86,12 @@ void HubLink::receive(const std::string& subject, std::span<const std::uint8_t> 
     const auto found = far_.find(name);
     if (found == far_.end() || !found->second.stream) return;
     auto& stream = *found->second.stream;
-    for (auto& bytes : packet ? stream.take(std::move(*packet)) : stream.take(std::move(*closure)))
-        static_cast<void>(hub_.take(found->second.publisher, std::move(bytes), now));
+    for (auto& bytes : packet ? stream.receive(std::move(*packet)) : stream.receive(std::move(*closure)))
+        static_cast<void>(hub_.receive_packet(found->second.publisher, std::move(bytes), now));
     if (stream.asks(now)) ask(name, found->second, true, now);
 }
 
-void HubLink::hear(const Announcement& message, std::uint64_t hub, Clock::time_point now) {
+void HubPeering::hear(const Announcement& message, std::uint64_t hub, Clock::time_point now) {
     if (!others_.contains(hub)) {
         if (others_.size() >= most_hubs) return;
         announce_soon_ = true;  // it has not heard of this one either
@@ -112,7 +112,7 @@ void HubLink::hear(const Announcement& message, std::uint64_t hub, Clock::time_p
     for (const auto& name : names) settle(name, now);
 }
 
-void HubLink::hear(StreamRequest message, std::uint64_t hub, Clock::time_point now) {
+void HubPeering::hear(StreamRequest message, std::uint64_t hub, Clock::time_point now) {
     const auto found = own_.find(message.stream);
     if (found == own_.end() || found->second.claim != message.claim) return;
     auto& wanted = found->second.wanted;
@@ -134,7 +134,7 @@ void HubLink::hear(StreamRequest message, std::uint64_t hub, Clock::time_point n
 
 // ---- Whose stream it is ---------------------------------------------------------------------------------------------
 
-HubLink::Newest HubLink::newest_claim(const std::string& name) const {
+HubPeering::Newest HubPeering::newest_claim(const std::string& name) const {
     Newest out;
     for (const auto& [number, other] : others_) {
         const auto found = other.streams.find(name);
@@ -148,7 +148,7 @@ HubLink::Newest HubLink::newest_claim(const std::string& name) const {
 }
 
 // Whether the stream is published here or there, by what is known now.
-void HubLink::settle(const std::string& name, Clock::time_point now) {
+void HubPeering::settle(const std::string& name, Clock::time_point now) {
     const auto newest = newest_claim(name);
     const auto own = own_.find(name);
     if (own != own_.end()) {
@@ -169,11 +169,11 @@ void HubLink::settle(const std::string& name, Clock::time_point now) {
     far->second.withdrawn_since = now;
 }
 
-void HubLink::follow(const std::string& name, const Newest& newest, Clock::time_point now) {
-    const auto session = static_cast<std::uint32_t>(newest.stream->session);
+void HubPeering::follow(const std::string& name, const Newest& newest, Clock::time_point now) {
+    const auto checksum = static_cast<std::uint32_t>(newest.stream->checksum);
     auto found = far_.find(name);
     if (found == far_.end()) {
-        const auto publisher = hub_.publish_from_afar(name, session, now);
+        const auto publisher = hub_.publish_from_afar(name, checksum, now);
         if (!publisher) return;  // too many streams; announced again each second
         found = far_.emplace(name, Far{newest.claim, *publisher}).first;
     }
@@ -189,10 +189,10 @@ void HubLink::follow(const std::string& name, const Newest& newest, Clock::time_
         }
     }
     // While packets come, they tell the session.
-    hub_.tell_from_afar(far.publisher, newest.stream->published, far.stream ? std::nullopt : std::optional(session),
+    hub_.tell_from_afar(far.publisher, newest.stream->published, far.stream ? std::nullopt : std::optional(checksum),
                         now);
     if (newest.stream->published && newest.stream->clock)
-        hub_.take(far.publisher, FromPublisher(HeartbeatFromPublisher{newest.stream->clock}), now);
+        hub_.receive_text(far.publisher, FromPublisher(HeartbeatFromPublisher{newest.stream->clock}), now);
     watch(name, far, now);
     if (!far.stream) return;
     far.stream->announced(newest.stream->next, now);
@@ -200,7 +200,7 @@ void HubLink::follow(const std::string& name, const Newest& newest, Clock::time_
 }
 
 // A publisher came to this hub, went, or began another session; or viewers came or went.
-void HubLink::stream_changed(const std::string& name) {
+void HubPeering::stream_changed(const std::string& name) {
     const auto info = hub_.stream(name, now_);
     const bool here = info && !info->far, published_here = here && info->published;
     if (!info) held_.erase(name);
@@ -228,14 +228,14 @@ void HubLink::stream_changed(const std::string& name) {
 
 // ---- Packets --------------------------------------------------------------------------------------------------------
 
-void HubLink::packet_taken(const std::string& name, std::uint64_t place, const SharedPacket& packet) {
+void HubPeering::packet_received(const std::string& name, std::uint64_t place, const SharedPacket& packet) {
     const auto own = own_.find(name);
     if (own == own_.end() || own->second.wanted.empty()) return;
     send(packets_subject(name), PublishedPacket{name, own->second.claim, {place, packet->bytes}});
 }
 
 // Asks for packets as soon as somebody watches, and notes when nobody does.
-void HubLink::watch(const std::string& name, Far& far, Clock::time_point now) {
+void HubPeering::watch(const std::string& name, Far& far, Clock::time_point now) {
     const auto info = hub_.stream(name, now);
     if (!info || info->viewers == 0) {
         if (!far.unwatched_since) far.unwatched_since = now;
@@ -248,7 +248,7 @@ void HubLink::watch(const std::string& name, Far& far, Clock::time_point now) {
     if (far.stream->asks(now)) ask(name, far, true, now);
 }
 
-void HubLink::stop_watching(const std::string& name, Far& far) {
+void HubPeering::stop_watching(const std::string& name, Far& far) {
     if (!far.stream) return;
     network_.unsubscribe(packets_subject(name));
     add(counters_, far.stream->counters());
@@ -256,7 +256,7 @@ void HubLink::stop_watching(const std::string& name, Far& far) {
 }
 
 // Says that packets are wanted, and whether the closure is too.
-void HubLink::ask(const std::string& name, Far& far, bool closure, Clock::time_point now) {
+void HubPeering::ask(const std::string& name, Far& far, bool closure, Clock::time_point now) {
     const auto info = hub_.stream(name, now);
     const auto viewers = static_cast<std::uint32_t>(info ? info->viewers : 0);
     far.asked = now;
@@ -264,7 +264,7 @@ void HubLink::ask(const std::string& name, Far& far, bool closure, Clock::time_p
          StreamRequest{name, far.claim, viewers, closure, std::exchange(far.key_frame, false)});
 }
 
-void HubLink::send(const std::string& subject, const HubMessage& message) {
+void HubPeering::send(const std::string& subject, const HubMessage& message) {
     const auto parts = connected_ ? cut_into_parts(options_.number, next_message_++, write_hub_message(message))
                                   : std::vector<Bytes>();
     parts.empty() ? ++counters_.unsent : ++counters_.sent;
@@ -273,7 +273,7 @@ void HubLink::send(const std::string& subject, const HubMessage& message) {
 
 // ---- As time goes by ------------------------------------------------------------------------------------------------
 
-void HubLink::tick(Clock::time_point now) {
+void HubPeering::tick(Clock::time_point now) {
     now_ = now;
     for (const auto publisher : std::exchange(replaced_, {})) hub_.leave(publisher, false, now);
     if (connected_) forget_silent_hubs(now);
@@ -289,7 +289,7 @@ void HubLink::tick(Clock::time_point now) {
 }
 
 // May end the stream.
-void HubLink::tick(const std::string& name, Far& far, Clock::time_point now) {
+void HubPeering::tick(const std::string& name, Far& far, Clock::time_point now) {
     if (far.withdrawn_since && now - *far.withdrawn_since >= options_.withdrawn) {
         stop_watching(name, far);
         const auto publisher = far.publisher;
@@ -316,7 +316,7 @@ void HubLink::tick(const std::string& name, Far& far, Clock::time_point now) {
 }
 
 // A hub that withdrew a stream has ended it; the streams of one that fell silent may come back on another.
-void HubLink::forget_silent_hubs(Clock::time_point now) {
+void HubPeering::forget_silent_hubs(Clock::time_point now) {
     std::set<std::string> names;
     const auto before = others_.size();
     std::erase_if(others_, [&](const auto& entry) {
@@ -334,7 +334,7 @@ void HubLink::forget_silent_hubs(Clock::time_point now) {
     }
 }
 
-void HubLink::announce(Clock::time_point now) {
+void HubPeering::announce(Clock::time_point now) {
     announced_ = now;
     announce_soon_ = false;
     Announcement message{options_.name, options_.url, {}};
@@ -345,8 +345,8 @@ void HubLink::announce(Clock::time_point now) {
     send(announcements_subject(), message);
 }
 
-// Of the hubs' addresses, those that connect here may try in turn.
-void HubLink::name_hubs() {
+// Tells those that connect here the other hubs' addresses, to try in turn.
+void HubPeering::name_hubs() {
     std::vector<std::string> addresses;
     for (const auto& [number, other] : others_)
         if (!other.url.empty()) addresses.push_back(other.url);
@@ -354,14 +354,14 @@ void HubLink::name_hubs() {
     hub_.name_other_hubs(std::move(addresses));
 }
 
-// Of the other hubs.
-void HubLink::count_viewers(const std::string& name, const Own& own) {
+// Sums the viewers on the other hubs.
+void HubPeering::count_viewers(const std::string& name, const Own& own) {
     std::size_t viewers = 0;
     for (const auto& [hub, wanted] : own.wanted) viewers += wanted.viewers;
     hub_.tell_viewers_afar(name, viewers);
 }
 
-HubLinkCounters HubLink::counters() const {
+HubPeeringCounters HubPeering::counters() const {
     auto out = counters_;
     out.connected = connected_;
     out.hubs = others_.size();

@@ -1,4 +1,4 @@
-#include "live/server/access.h"
+#include "live/server/credentials.h"
 
 #include <openssl/crypto.h>
 #include <openssl/evp.h>
@@ -16,6 +16,7 @@
 #include <optional>
 #include <span>
 
+#include "live/hub/stream_name.h"
 #include "live/server/http_request.h"
 
 namespace htvm::live {
@@ -118,16 +119,6 @@ Result<void> write_secret(const std::string& path, const Json& json) {
 bool exists(const std::string& path) { return access(path.c_str(), F_OK) == 0; }
 
 }  // namespace
-
-bool is_stream_name(std::string_view name) {
-    constexpr std::size_t longest = 64;
-    const auto fits = [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
-               c == '.';
-    };
-    return !name.empty() && name.size() <= longest && name.front() != '.' &&
-           std::all_of(name.begin(), name.end(), fits);
-}
 
 Result<Publishers> read_publishers(const std::string& path) {
     const auto json = read_json(path);

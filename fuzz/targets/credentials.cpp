@@ -1,8 +1,9 @@
 // What a client sends to be let in: no link but the hub's own is good, for the path and the time that it was made for;
 // tokens and names are parts of what was sent.
-#include "live/server/access.h"
+#include "live/server/credentials.h"
 
 #include "fuzz_input.h"
+#include "live/hub/stream_name.h"
 #include "live/server/http_request.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

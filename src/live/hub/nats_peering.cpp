@@ -1,4 +1,4 @@
-#include "live/hub/nats_link.h"
+#include "live/hub/nats_peering.h"
 
 #include <nats/nats.h>
 #include <unistd.h>
@@ -30,15 +30,15 @@ constexpr std::chrono::milliseconds reconnect{250}, connect_timeout{2000}, write
 constexpr int most_pending_messages = 65536;
 constexpr std::size_t most_troubles = 10;
 
-// What the library's threads reach. It outlives the link for as long as one of them may call back.
+// What the library's threads reach. It outlives the peering for as long as one of them may call back.
 struct Mailbox {
     Mailbox(net::io_context& given, Hub& its_hub, std::size_t bytes)
         : context(&given), hub(its_hub), most_waiting(bytes) {}
 
     std::mutex mutex;
-    net::io_context* context;  // null: the link is gone, and what comes goes nowhere
-    Hub& hub;                  // on the context's thread only,
-    HubLink* link = nullptr;   // as the link
+    net::io_context* context;       // null: the peering is gone, and what comes goes nowhere
+    Hub& hub;                       // on the context's thread only,
+    HubPeering* peering = nullptr;  // null: likewise
     const std::size_t most_waiting;
     std::size_t waiting = 0;  // bytes posted to the context
     NatsCounters counters{};
@@ -46,12 +46,12 @@ struct Mailbox {
     std::set<std::string> troubles{};  // that the log was told of since there was a connection
     std::condition_variable news{};
 
-    // Runs act(link) on the server's thread.
-    static void post(const std::shared_ptr<Mailbox>& box, std::function<void(HubLink&)> act) {
+    // Runs act(peering) on the server's thread.
+    static void post(const std::shared_ptr<Mailbox>& box, std::function<void(HubPeering&)> act) {
         const std::lock_guard lock(box->mutex);
         if (!box->context) return;
         net::post(*box->context, [box, act = std::move(act)] {
-            if (box->link) act(*box->link);
+            if (box->peering) act(*box->peering);
         });
     }
     // Says in the log why the hubs are not joined: each reason once, until they are.
@@ -60,7 +60,7 @@ struct Mailbox {
             const std::lock_guard lock(box->mutex);
             if (box->troubles.size() >= most_troubles || !box->troubles.insert(why).second) return;
         }
-        post(box, [box, why](HubLink&) {
+        post(box, [box, why](HubPeering&) {
             box->hub.tell({.name = "nats_trouble",
                            .text = "not joined with other hubs: " + why + "; streams of this hub go on",
                            .warning = true});
@@ -86,12 +86,12 @@ void on_message(natsConnection*, natsSubscription*, natsMsg* message, void* clos
     }
     if (room)
         Mailbox::post(box, [box, subject = std::string(natsMsg_GetSubject(message)),
-                            bytes = Bytes(data, data + size)](HubLink& link) {
+                            bytes = Bytes(data, data + size)](HubPeering& peering) {
             {
                 const std::lock_guard lock(box->mutex);
                 box->waiting -= bytes.size();
             }
-            link.receive(subject, bytes, HubLink::Clock::now());
+            peering.receive(subject, bytes, HubPeering::Clock::now());
         });
     natsMsg_Destroy(message);
 }
@@ -105,15 +105,15 @@ void on_connected(natsConnection*, void* closure) {
         ++box->counters.connections;
         box->troubles.clear();
     }
-    Mailbox::post(box, [box](HubLink& link) {
-        link.connected(HubLink::Clock::now());
+    Mailbox::post(box, [box](HubPeering& peering) {
+        peering.connected(HubPeering::Clock::now());
         box->hub.tell({.name = "nats_connected", .text = "joined with other hubs through NATS"});
     });
 }
 
 void on_disconnected(natsConnection*, void* closure) {
     const auto& box = mailbox(closure);
-    Mailbox::post(box, [](HubLink& link) { link.disconnected(HubLink::Clock::now()); });
+    Mailbox::post(box, [](HubPeering& peering) { peering.disconnected(HubPeering::Clock::now()); });
     Mailbox::tell_trouble(box, "the connection to NATS has broken");
 }
 
@@ -275,8 +275,8 @@ private:
         Bytes message;
     };
 
-    // Until the link ends: connects, again where that fails, and if the library gives up, as it does when it is refused
-    // twice.
+    // Until the peering ends: connects, again where that fails, and if the library gives up, as it does when it is
+    // refused twice.
     void run() {
         while (!ends_within(std::chrono::milliseconds(0))) {
             natsConnection* connection = nullptr;
@@ -382,30 +382,30 @@ private:
 
 }  // namespace
 
-struct NatsLink::State {
+struct NatsPeering::State {
     SharedMailbox box;
     Sender sender;
-    HubLink link;
+    HubPeering peering;
     std::shared_ptr<net::steady_timer> timer;
 
-    State(LibraryOptions library, const HubLinkOptions& options, std::size_t most_waiting, Hub& hub,
+    State(LibraryOptions library, const HubPeeringOptions& options, std::size_t most_waiting, Hub& hub,
           net::io_context& context)
         : box(std::make_shared<Mailbox>(context, hub, most_waiting)),
           sender(std::move(library), box),
-          link(hub, options,
-               {[this](const std::string& subject, Bytes message) { sender.send(subject, std::move(message)); },
-                [this](const std::string& subject) { sender.hear(subject, true); },
-                [this](const std::string& subject) { sender.hear(subject, false); }}),
+          peering(hub, options,
+                  {[this](const std::string& subject, Bytes message) { sender.send(subject, std::move(message)); },
+                   [this](const std::string& subject) { sender.hear(subject, true); },
+                   [this](const std::string& subject) { sender.hear(subject, false); }}),
           timer(std::make_shared<net::steady_timer>(context)) {
-        box->link = &link;
-        for (const auto& subject : link.subjects()) sender.hear(subject, true);
+        box->peering = &peering;
+        for (const auto& subject : peering.subjects()) sender.hear(subject, true);
         sender.start();
         wait(box, timer);
     }
     State(const State&) = delete;
     State& operator=(const State&) = delete;
     ~State() {
-        box->link = nullptr;
+        box->peering = nullptr;
         timer->cancel();
         {
             const std::lock_guard lock(box->mutex);
@@ -417,32 +417,32 @@ struct NatsLink::State {
     static void wait(const SharedMailbox& box, const std::shared_ptr<net::steady_timer>& timer) {
         timer->expires_after(tick);
         timer->async_wait([box, timer](const boost::system::error_code& error) {
-            if (error || !box->link) return;
-            box->link->tick(HubLink::Clock::now());
+            if (error || !box->peering) return;
+            box->peering->tick(HubPeering::Clock::now());
             wait(box, timer);
         });
     }
 };
 
-Result<NatsLink> NatsLink::open(const NatsOptions& options, Hub& hub, net::io_context& context) {
+Result<NatsPeering> NatsPeering::open(const NatsOptions& options, Hub& hub, net::io_context& context) {
     auto library = library_options(options);
     if (!library) return tl::unexpected(library.error());
-    HubLinkOptions link;
-    link.name = options.hub_name.empty() ? name_of_machine() : options.hub_name;
-    link.url = options.hub_url;
-    link.number = random_number();
-    return NatsLink(std::make_unique<State>(std::move(*library), link, options.most_waiting, hub, context));
+    HubPeeringOptions peering;
+    peering.name = options.hub_name.empty() ? name_of_machine() : options.hub_name;
+    peering.url = options.hub_url;
+    peering.number = random_number();
+    return NatsPeering(std::make_unique<State>(std::move(*library), peering, options.most_waiting, hub, context));
 }
 
-NatsLink::NatsLink(std::unique_ptr<State> state) : state_(std::move(state)) {}
-NatsLink::NatsLink(NatsLink&&) noexcept = default;
-NatsLink& NatsLink::operator=(NatsLink&&) noexcept = default;
-NatsLink::~NatsLink() = default;
+NatsPeering::NatsPeering(std::unique_ptr<State> state) : state_(std::move(state)) {}
+NatsPeering::NatsPeering(NatsPeering&&) noexcept = default;
+NatsPeering& NatsPeering::operator=(NatsPeering&&) noexcept = default;
+NatsPeering::~NatsPeering() = default;
 
-NatsCounters NatsLink::counters() const {
+NatsCounters NatsPeering::counters() const {
     const std::lock_guard lock(state_->box->mutex);
     auto out = state_->box->counters;
-    out.hubs = state_->link.counters();
+    out.hubs = state_->peering.counters();
     return out;
 }
 

@@ -1,7 +1,8 @@
-// A folder whose files others may read, and nothing outside of it.
+// The files that others may read: those of a folder, and nothing outside of it, or some that were named.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,7 +30,7 @@ private:
 struct ServedFile {
     OpenFile file;
     std::uint64_t size = 0;
-    std::string tag;  // an entity tag, quotes included: another one whenever size or modification time differ
+    std::string tag;  // an entity tag, quotes included: another one whenever size or modification time differs
 };
 
 struct FolderEntry {
@@ -54,6 +55,38 @@ private:
     explicit ServedFolder(std::string path, OpenFile folder) : path_(std::move(path)), folder_(std::move(folder)) {}
     std::string path_;
     OpenFile folder_;
+};
+
+// A file under a name of its own, wherever it lies.
+struct NamedFile {
+    std::string name;  // below /files/: segments joined by slashes
+    std::string path;
+};
+
+// A stream that can be read.
+struct ListedFile {
+    std::string path;  // below /files/
+    std::uint64_t size = 0;
+    std::string poster{};  // of the picture beside it; "": none
+};
+
+// What lies below /files/. Each call looks at the disk, since files may come and go.
+class ServedFiles {
+public:
+    // There are none.
+    ServedFiles() = default;
+    // The .htvm, .png and .jpg files of the folder ("": none), or, if there are any, the named ones. bad_input if there
+    // is no such folder.
+    static Result<ServedFiles> open(const std::string& folder, std::vector<NamedFile> named);
+
+    // As of ServedFolder.
+    Result<ServedFile> file(std::span<const std::string> segments) const;
+    // The streams of the folder sorted by their paths, or the named files in their order.
+    std::vector<ListedFile> list() const;
+
+private:
+    std::optional<ServedFolder> folder_;
+    std::vector<NamedFile> named_;
 };
 
 }  // namespace htvm::live
