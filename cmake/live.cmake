@@ -1,4 +1,4 @@
-# src/live: the web server of `htvm play` and `htvm serve`, and the player's files, which it carries inside.
+# src/live: live streams, the web server of `htvm play` and `htvm serve`, and the player's files, which it carries inside.
 find_package(Boost 1.81 REQUIRED)
 find_package(OpenSSL 3.0 REQUIRED)
 
@@ -8,13 +8,13 @@ if(HTVM_NATS)
   find_path(NATS_INCLUDE nats/nats.h)
   find_library(NATS_LIBRARY nats)
 endif()
-set(nats_source src/live/nats_link_absent.cpp)
+set(other_nats_source nats_peering.cpp)
 set(nats_library "")
 if(HTVM_NATS AND NATS_INCLUDE AND NATS_LIBRARY)
   add_library(htvm_libnats INTERFACE)
   target_include_directories(htvm_libnats SYSTEM INTERFACE ${NATS_INCLUDE})
   target_link_libraries(htvm_libnats INTERFACE ${NATS_LIBRARY})
-  set(nats_source src/live/nats_link.cpp)
+  set(other_nats_source nats_peering_absent.cpp)
   set(nats_library htvm_libnats)
 elseif(HTVM_NATS AND NOT HTVM_NATS STREQUAL "AUTO")
   message(FATAL_ERROR "HTVM_NATS: libnats-dev is not there")
@@ -49,7 +49,7 @@ foreach(path ${player_paths})
 endforeach()
 set(player_cpp ${PROJECT_BINARY_DIR}/live/player_files.cpp)
 file(CONFIGURE OUTPUT ${player_cpp} CONTENT "// Written by cmake/live.cmake.
-#include \"live/player_files.h\"
+#include \"live/server/player_files.h\"
 
 #include <vector>
 
@@ -65,37 +65,21 @@ std::span<const PlayerFile> player_files() {
 }  // namespace htvm::live
 " @ONLY)
 set_source_files_properties(${player_cpp} PROPERTIES OBJECT_DEPENDS "${player_paths}")
-# What programs of others need that publish; and what a server has besides.
-htvm_floor(live_client
-  SOURCES
-    src/live/broadcast.cpp
-    src/live/control.cpp
-    src/live/hub_address.cpp
-    src/live/hub_client.cpp
-    src/live/line.cpp
-    src/live/publisher.cpp
-    src/live/repeated_packets.cpp
-    src/live/watcher.cpp
+# The floors, from below: client, what publishers and watchers need; hub, the streams that hubs carry; server, which
+# connects them to the network.
+htvm_floor(live_client DIRECTORY src/live/client
   LINKS htvm_decoder htvm_core Boost::headers OpenSSL::SSL nlohmann_json::nlohmann_json)
 htvm_library(live FLOORS live_client LINKS decoder NEEDS OpenSSL::SSL)
-htvm_floor(live
-  SOURCES
-    src/live/access.cpp
-    src/live/event.cpp
-    src/live/far_stream.cpp
-    src/live/file_server.cpp
-    src/live/http_request.cpp
-    src/live/hub.cpp
-    src/live/hub_link.cpp
-    src/live/hub_message.cpp
-    src/live/live_connection.cpp
-    src/live/metrics.cpp
-    src/live/recorder.cpp
-    src/live/served_folder.cpp
-    ${nats_source}
-    ${player_cpp}
-  LINKS htvm_live_client htvm_io ${nats_library})
+file(GLOB hub_sources CONFIGURE_DEPENDS src/live/hub/*.cpp)
+list(FILTER hub_sources EXCLUDE REGEX "/${other_nats_source}$")
+htvm_floor(live_hub SOURCES ${hub_sources} LINKS htvm_live_client ${nats_library})
+file(GLOB server_sources CONFIGURE_DEPENDS src/live/server/*.cpp)
+htvm_floor(live SOURCES ${server_sources} ${player_cpp} LINKS htvm_live_hub htvm_io)
 if(HTVM_SANITIZE MATCHES "undefined" AND CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   # clang 14 cannot assemble its check of indirect calls in coroutines.
-  set_source_files_properties(src/live/file_server.cpp src/live/hub_client.cpp src/live/line.cpp src/live/live_connection.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)
+  set(coroutine_sources client/hub_client client/line server/handlers server/http_connections server/live_connection
+                        server/response server/server)
+  list(TRANSFORM coroutine_sources PREPEND src/live/)
+  list(TRANSFORM coroutine_sources APPEND .cpp)
+  set_source_files_properties(${coroutine_sources} PROPERTIES COMPILE_OPTIONS -fno-sanitize=function)
 endif()

@@ -22,7 +22,7 @@
 #include "io/output_file.h"
 #include "job_options.h"
 #include "line_rate.h"
-#include "live/hub_address.h"
+#include "live/client/hub_address.h"
 #include "rate_passes.h"
 #include "rate_report.h"
 #include "stream_file.h"

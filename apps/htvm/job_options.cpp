@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "io/number_text.h"
-#include "live/hub_address.h"
+#include "live/client/hub_address.h"
 
 namespace htvm::app {
 namespace {

@@ -8,7 +8,8 @@
 #include <string>
 
 #include "commands.h"
-#include "live/access.h"
+#include "live/hub/stream_name.h"
+#include "live/server/credentials.h"
 
 namespace htvm::app {
 namespace {

@@ -17,7 +17,8 @@
 #include "io/child_program.h"
 #include "io/number_text.h"
 #include "io/sequence.h"
-#include "live/file_server.h"
+#include "live/server/player_files.h"
+#include "live/server/server.h"
 
 namespace htvm::app {
 namespace {
@@ -136,9 +137,9 @@ Result<void> play(const PlayOptions& options) {
                     "this htvm was built without the web player: ./dev web builds it, then configure and build again");
     std::error_code error;
     const auto& inputs = options.inputs;
-    live::FileServerOptions server;
+    live::ServerOptions server;
     server.port = options.port;
-    server.loopback_names = true;
+    server.admission.loopback_names = true;
     server.drain_time = {};
     TemporaryFolder temporary, beside_temporary;
     std::string query;
@@ -164,7 +165,7 @@ Result<void> play(const PlayOptions& options) {
     }
     if (!options.orbit.empty())
         query += fmt::format("{}orbit={}", query.empty() ? "?" : "&", percent_encoded(options.orbit));
-    auto opened = live::FileServer::open(server);
+    auto opened = live::Server::open(server);
     if (!opened) return tl::unexpected(opened.error());
     const auto url = fmt::format("http://127.0.0.1:{}/{}", opened->port(), query);
     fmt::print("{}\n", url);

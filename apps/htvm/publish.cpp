@@ -15,7 +15,7 @@
 #include "commands.h"
 #include "encoder_options.h"
 #include "htvm/decoder.hpp"
-#include "live/hub_address.h"
+#include "live/client/hub_address.h"
 #include "live_rounds.h"
 #include "pacing.h"
 #include "publishing.h"

@@ -10,7 +10,7 @@
 
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
-#include "live/hub_address.h"
+#include "live/client/hub_address.h"
 
 namespace htvm::app {
 namespace {

@@ -10,24 +10,25 @@
 
 #include "command_line/terminal.h"
 #include "commands.h"
-#include "live/access.h"
-#include "live/file_server.h"
-#include "live/recorder.h"
+#include "live/server/credentials.h"
+#include "live/server/player_files.h"
+#include "live/server/recorder.h"
+#include "live/server/server.h"
 
 namespace htvm::app {
 namespace {
 
 struct Options {
-    live::FileServerOptions server;
+    live::ServerOptions server;
     live::HubLimits hub;
     live::RecorderOptions recorder;
     std::string add_publisher, congestion_control = "bbr";
     bool same_site = false, add_link_key = false, json = false;
     Options() {
         server.port = 8080;
-        server.connections = 4096;
-        server.connections_per_address = 256;
-        server.viewers_per_address = 200;
+        server.admission.connections = 4096;
+        server.admission.connections_per_address = 256;
+        server.admission.viewers_per_address = 200;
     }
 };
 
@@ -56,30 +57,30 @@ void write_event(const live::Event& event, bool json) {
 }
 
 // Where to open it in a browser.
-std::string address_of(const live::FileServerOptions& server, std::uint16_t port) {
+std::string address_of(const live::ServerOptions& server, std::uint16_t port) {
     const bool six = server.address.find(':') != std::string::npos;
     return fmt::format("{}://{}{}{}:{}/", server.certificate.empty() ? "http" : "https", six ? "[" : "", server.address,
                        six ? "]" : "", port);
 }
 
 Result<void> add_publisher(const Options& options) {
-    const auto token = live::add_publisher(options.server.publishers, options.add_publisher);
+    const auto token = live::add_publisher(options.server.admission.publishers, options.add_publisher);
     if (!token) return tl::unexpected(token.error());
     note(fmt::format(
         "the token of {}, which is shown only now: {} keeps no more than a hash of it. A hub that runs reads "
         "the file again when it is sent SIGHUP.",
-        options.add_publisher, options.server.publishers));
+        options.add_publisher, options.server.admission.publishers));
     fmt::print("{}\n", *token);
     return {};
 }
 
 Result<void> add_link_key(const Options& options) {
-    const auto number = live::add_link_key(options.server.link_keys);
+    const auto number = live::add_link_key(options.server.admission.link_keys);
     if (!number) return tl::unexpected(number.error());
     note(fmt::format(
         "{} has key {} now; links by the one before stay good until another is added. A hub that runs reads "
         "the file again when it is sent SIGHUP.",
-        options.server.link_keys, *number));
+        options.server.admission.link_keys, *number));
     return {};
 }
 
@@ -87,7 +88,7 @@ Result<void> serve(const Options& options) {
     const auto log = [json = options.json](const live::Event& event) { write_event(event, json); };
     live::Hub hub(options.hub, log);
     auto server = options.server;
-    server.other_sites = !options.same_site && server.origins.empty();
+    server.admission.other_sites = !options.same_site && server.admission.origins.empty();
     if (options.congestion_control != "system") server.congestion_control = options.congestion_control;
     server.hub = &hub;
     std::optional<live::Recorder> recorder;
@@ -97,8 +98,8 @@ Result<void> serve(const Options& options) {
         server.recorder = &recorder.emplace(std::move(*opened));
     }
     server.log = log;
-    allow_files(server.connections);
-    auto opened = live::FileServer::open(server);
+    allow_files(server.admission.connections);
+    auto opened = live::Server::open(server);
     if (!opened) return tl::unexpected(opened.error());
     if (!live::has_player()) warn("this htvm was built without the web player: it serves streams, but has no pages");
     if (const auto used = opened->congestion_control();
@@ -114,13 +115,13 @@ Result<void> serve(const Options& options) {
         fmt::print("{}\n", address);
         std::fflush(stdout);
     }
-    if (server.publishers.empty())
+    if (server.admission.publishers.empty())
         log({.name = "publishing_open",
              .text = "no publishers are known: programs on this machine may publish, under any name, and nobody else"});
     opened->run();
     if (recorder) {
         recorder->finish();
-        for (const auto& event : recorder->take_events()) log(event);
+        for (const auto& event : recorder->new_events()) log(event);
     }
     log({.name = "stopped", .text = "stopped"});
     return {};
@@ -187,7 +188,7 @@ void add_access_options(CLI::App& command, Options& options) {
     key->needs(certificate);
     auto* publishers =
         command
-            .add_option("--publishers", server.publishers,
+            .add_option("--publishers", server.admission.publishers,
                         "Who may publish: a file that --add-publisher writes (default: programs on this machine)")
             ->type_name("FILE");
     command
@@ -197,7 +198,7 @@ void add_access_options(CLI::App& command, Options& options) {
         ->needs(publishers)
         ->configurable(false);
     auto* keys = command
-                     .add_option("--link-keys", server.link_keys,
+                     .add_option("--link-keys", server.admission.link_keys,
                                  "Watching needs a link that htvm link signs with a key of this file, which "
                                  "--add-link-key writes (default: anyone may watch)")
                      ->type_name("FILE");
@@ -206,7 +207,7 @@ void add_access_options(CLI::App& command, Options& options) {
         ->needs(keys)
         ->configurable(false);
     auto* origins = command
-                        .add_option("--origin", server.origins,
+                        .add_option("--origin", server.admission.origins,
                                     "Pages of this site, such as https://a.example, may read and watch, and no other "
                                     "site's; may be given more than once (default: pages of all sites)")
                         ->type_name("SITE")
@@ -227,7 +228,7 @@ void add_recording(CLI::App& command, Options& options) {
             "Begin another file after so many minutes (default: a file a session)")
         ->check(CLI::Range(1, 100000))
         ->needs(folder);
-    command.add_flag("--metrics-anyone", options.server.metrics_anyone,
+    command.add_flag("--metrics-anyone", options.server.admission.metrics_anyone,
                      "Show /metrics to everybody (default: to programs on this machine)");
 }
 
@@ -236,12 +237,12 @@ void add_limits(CLI::App& command, Options& options) {
         command.add_option(name, limit, fmt::format("{} (default {})", text, limit))->check(CLI::Range(1, 1000000));
     };
     auto& server = options.server;
-    add("--connections", server.connections, "Connections at once");
-    add("--connections-per-address", server.connections_per_address,
+    add("--connections", server.admission.connections, "Connections at once");
+    add("--connections-per-address", server.admission.connections_per_address,
         "Of these from one address; an IPv6 network /64 is one");
     add("--streams", options.hub.streams, "Live streams at once");
     add("--viewers", options.hub.viewers, "Viewers of one live stream");
-    add("--viewers-per-address", server.viewers_per_address, "Viewers of live streams from one address");
+    add("--viewers-per-address", server.admission.viewers_per_address, "Viewers of live streams from one address");
     const auto add_bytes = [&](const char* name, std::size_t& limit, const std::string& text) {
         command.add_option(name, limit, fmt::format("{} (default {} MiB)", text, limit >> 20))
             ->transform(CLI::AsSizeValue(false));

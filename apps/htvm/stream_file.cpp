@@ -19,7 +19,7 @@
 #include "command_line/terminal.h"
 #include "htvm/decoder.hpp"
 #include "io/mesh_file.h"
-#include "live/hub_address.h"
+#include "live/client/hub_address.h"
 
 namespace htvm::app {
 

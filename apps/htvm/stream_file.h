@@ -15,7 +15,7 @@
 #include "htvm/result.hpp"
 #include "htvm/stream_index.hpp"
 #include "io/output_file.h"
-#include "live/watcher.h"
+#include "live/client/watcher.h"
 #include "pacing.h"
 #include "publishing.h"
 

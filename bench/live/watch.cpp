@@ -30,8 +30,8 @@
 
 #include "htvm/dependency.hpp"
 #include "htvm/packet.hpp"
-#include "live/control.h"
-#include "live/hub_list.h"
+#include "live/client/control.h"
+#include "live/client/hub_list.h"
 
 namespace htvm::live_bench {
 namespace {
@@ -207,7 +207,7 @@ public:
 
 private:
     static constexpr std::int64_t tick_us = 50000, pause_us = 1000;
-    static constexpr std::int64_t silence_us = 3000000, handshake_us = 5000000;  // as in live/hub_client.h
+    static constexpr std::int64_t silence_us = 3000000, handshake_us = 5000000;  // as in live/client/hub_client.h
 
     static bool fail(const std::string& what) {
         fmt::print(stderr, "live_watch: {}: {}\n", what, std::strerror(errno));

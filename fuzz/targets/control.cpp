@@ -1,6 +1,6 @@
 // Text messages from anybody, in every direction: what is read is in range, and is written so that it is read as the
 // same.
-#include "live/control.h"
+#include "live/client/control.h"
 
 #include "fuzz_input.h"
 

@@ -1,6 +1,6 @@
 // Addresses of hubs, which people type and hubs tell: what is taken has a host that can be looked up, and what is shown
 // of it means the same.
-#include "live/hub_address.h"
+#include "live/client/hub_address.h"
 
 #include "fuzz_input.h"
 

@@ -1,9 +1,9 @@
 // What hubs on other machines say, as one message and in parts: whatever is claimed, memory is bounded, and what is
 // understood can be written again. A stream watched from afar gives on nothing twice.
-#include "live/hub_message.h"
+#include "live/hub/hub_message.h"
 
 #include "fuzz_input.h"
-#include "live/far_stream.h"
+#include "live/hub/far_stream.h"
 
 namespace {
 
@@ -12,8 +12,8 @@ using fuzz::require;
 
 void follow(live::FarStream& stream, std::uint64_t& given, live::HubMessage message) {
     std::vector<live::Bytes> packets;
-    if (auto* packet = std::get_if<live::PublishedPacket>(&message)) packets = stream.take(std::move(*packet));
-    if (auto* closure = std::get_if<live::ClosureAnswer>(&message)) packets = stream.take(std::move(*closure));
+    if (auto* packet = std::get_if<live::PublishedPacket>(&message)) packets = stream.receive(std::move(*packet));
+    if (auto* closure = std::get_if<live::ClosureAnswer>(&message)) packets = stream.receive(std::move(*closure));
     given += packets.size();
     require(given == stream.counters().packets, "what goes on is counted");
 }
@@ -31,7 +31,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const bool in_parts = input.flag();
         const auto bytes = input.take(input.u16());
         if (in_parts) {
-            parts.take(bytes);
+            parts.add(bytes);
             require(parts.waiting_bytes() <= most_bytes, "what waits for its other parts is bounded");
         }
         auto message = live::read_hub_message(bytes);

@@ -1,5 +1,5 @@
 // Fan-out of a live stream: what each viewer is sent can be decoded, and slow viewers cost nobody else anything.
-#include "live/broadcast.h"
+#include "live/client/broadcast.h"
 
 #include <gtest/gtest.h>
 

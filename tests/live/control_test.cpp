@@ -1,5 +1,5 @@
 // The text messages of docs/live.md, section 2, as they are written, and what is made of any others.
-#include "live/control.h"
+#include "live/client/control.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Events as the lines that people and machines read.
-#include "live/event.h"
+#include "live/hub/event.h"
 
 #include <gtest/gtest.h>
 

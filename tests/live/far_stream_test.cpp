@@ -1,6 +1,6 @@
 // A stream watched from afar: whatever the network does to its messages, what goes on is the publisher's packets in
 // order, and every frame can be decoded to the same bits as there.
-#include "live/far_stream.h"
+#include "live/hub/far_stream.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include <random>
 
 #include "htvm/decoder.hpp"
-#include "live/broadcast.h"
+#include "live/client/broadcast.h"
 
 namespace htvm::live {
 namespace {
@@ -46,19 +46,19 @@ using Frames = std::vector<std::uint32_t>;
 TEST(FarStream, WhatComesBeforeTheClosureIsHeldBack) {
     FarStream stream(claim);
     EXPECT_TRUE(stream.asks(start));
-    for (const auto number : {8u, 9u, 10u}) EXPECT_TRUE(stream.take(published(number)).empty());
-    EXPECT_EQ(frames(stream.take(closure(9, {4, 8}))), (Frames{4, 8, 9, 10}));
-    EXPECT_EQ(frames(stream.take(published(11))), Frames{11});
+    for (const auto number : {8u, 9u, 10u}) EXPECT_TRUE(stream.receive(published(number)).empty());
+    EXPECT_EQ(frames(stream.receive(closure(9, {4, 8}))), (Frames{4, 8, 9, 10}));
+    EXPECT_EQ(frames(stream.receive(published(11))), Frames{11});
     EXPECT_FALSE(stream.asks(start + 1h));
 }
 
 TEST(FarStream, OfAClosureBehindAGapOnlyWhatIsMissingGoesOn) {
     FarStream stream(claim);
-    EXPECT_EQ(frames(stream.take(closure(3, {0, 1, 2}))), (Frames{0, 1, 2}));
-    EXPECT_TRUE(stream.take(published(5)).empty());
+    EXPECT_EQ(frames(stream.receive(closure(3, {0, 1, 2}))), (Frames{0, 1, 2}));
+    EXPECT_TRUE(stream.receive(published(5)).empty());
     EXPECT_TRUE(stream.asks(start));
-    EXPECT_EQ(frames(stream.take(closure(6, {0, 1, 2, 3}))), Frames{3});  // 4 and 5 are not needed any more
-    EXPECT_EQ(frames(stream.take(published(6))), Frames{6});
+    EXPECT_EQ(frames(stream.receive(closure(6, {0, 1, 2, 3}))), Frames{3});  // 4 and 5 are not needed any more
+    EXPECT_EQ(frames(stream.receive(published(6))), Frames{6});
     EXPECT_EQ(stream.counters().gaps, 1u);
 }
 
@@ -67,40 +67,40 @@ TEST(FarStream, AskingIsRepeatedUntilItIsAnswered) {
     EXPECT_TRUE(stream.asks(start));
     EXPECT_FALSE(stream.asks(start + 200ms));
     EXPECT_TRUE(stream.asks(start + 300ms));
-    stream.take(closure(0, {}));
+    stream.receive(closure(0, {}));
     EXPECT_FALSE(stream.asks(start + 10s));
 }
 
 TEST(FarStream, WhatCameLateIsTakenWithoutAClosure) {
     FarStream stream(claim);
-    stream.take(closure(0, {}));
-    EXPECT_TRUE(stream.take(published(1)).empty());
-    EXPECT_EQ(frames(stream.take(published(0))), (Frames{0, 1}));
+    stream.receive(closure(0, {}));
+    EXPECT_TRUE(stream.receive(published(1)).empty());
+    EXPECT_EQ(frames(stream.receive(published(0))), (Frames{0, 1}));
     EXPECT_FALSE(stream.asks(start));
-    EXPECT_TRUE(stream.take(published(1)).empty());
+    EXPECT_TRUE(stream.receive(published(1)).empty());
     EXPECT_EQ(stream.counters().doubled, 1u);
 }
 
 TEST(FarStream, ThatTheLastPacketsWereLostIsKnownFromTheAnnouncement) {
     FarStream stream(claim, {.overdue = 200ms});
-    stream.take(closure(3, {2}));
+    stream.receive(closure(3, {2}));
     stream.announced(4, start);
     EXPECT_FALSE(stream.asks(start + 100ms));  // it may be on its way
     EXPECT_TRUE(stream.asks(start + 200ms));
-    EXPECT_EQ(frames(stream.take(closure(4, {2, 3}))), Frames{3});
+    EXPECT_EQ(frames(stream.receive(closure(4, {2, 3}))), Frames{3});
     EXPECT_FALSE(stream.asks(start + 10s));
 }
 
 TEST(FarStream, MessagesOfAnotherClaimArePassedOver) {
     FarStream stream({7, 101});
-    EXPECT_TRUE(stream.take(closure(3, {0, 1, 2})).empty());
-    EXPECT_TRUE(stream.take(published(3)).empty());
+    EXPECT_TRUE(stream.receive(closure(3, {0, 1, 2})).empty());
+    EXPECT_TRUE(stream.receive(published(3)).empty());
 }
 
 TEST(FarStream, WhatIsHeldIsBounded) {
     FarStream stream(claim, {.held_bytes = 10 * packet(0).size()});
-    for (std::uint32_t number = 0; number < 100; ++number) stream.take(published(number));
-    EXPECT_EQ(frames(stream.take(closure(90, {}))), (Frames{90, 91, 92, 93, 94, 95, 96, 97, 98, 99}));
+    for (std::uint32_t number = 0; number < 100; ++number) stream.receive(published(number));
+    EXPECT_EQ(frames(stream.receive(closure(90, {}))), (Frames{90, 91, 92, 93, 94, 95, 96, 97, 98, 99}));
 }
 
 // A publisher of every kind of frame; its hub keeps what is needed.
@@ -203,13 +203,13 @@ TEST(FarStream, WhateverIsLostDoubledOrReorderedEveryFrameHasTheSameClosureAsAtT
                 came.clear();
             }
             while (network.size() > random() % 6 * (calm ? 0 : 1)) {
-                const auto whole = parts.take(network.front());
+                const auto whole = parts.add(network.front());
                 network.pop_front();
                 if (!whole) continue;
                 auto read = read_hub_message(whole->message);
                 ASSERT_TRUE(read);
-                if (auto* next = std::get_if<PublishedPacket>(&*read)) give_on(stream->take(std::move(*next)));
-                if (auto* next = std::get_if<ClosureAnswer>(&*read)) give_on(stream->take(std::move(*next)));
+                if (auto* next = std::get_if<PublishedPacket>(&*read)) give_on(stream->receive(std::move(*next)));
+                if (auto* next = std::get_if<ClosureAnswer>(&*read)) give_on(stream->receive(std::move(*next)));
             }
         }
         ASSERT_FALSE(came.empty()) << "seed " << seed;

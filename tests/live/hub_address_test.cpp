@@ -1,4 +1,4 @@
-#include "live/hub_address.h"
+#include "live/client/hub_address.h"
 
 #include <gtest/gtest.h>
 

@@ -1,8 +1,8 @@
-#include "live/hub_list.h"
+#include "live/client/hub_list.h"
 
 #include <gtest/gtest.h>
 
-#include "live/repeated_packets.h"
+#include "live/client/repeated_packets.h"
 #include "live_packets.h"
 
 namespace htvm::live {

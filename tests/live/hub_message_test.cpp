@@ -1,5 +1,5 @@
 // What hubs say to each other survives the way; what is damaged is refused, whatever counts it claims.
-#include "live/hub_message.h"
+#include "live/hub/hub_message.h"
 
 #include <gtest/gtest.h>
 
@@ -64,8 +64,8 @@ TEST(PartReader, PartsInAnyOrderAndDoubledMakeTheMessage) {
     auto parts = cut_into_parts(5, 1, message, 300);
     ASSERT_EQ(parts.size(), 4u);
     PartReader reader;
-    for (const auto i : {2, 0, 0, 3, 2}) EXPECT_FALSE(reader.take(parts[i]));
-    const auto whole = reader.take(parts[1]);
+    for (const auto i : {2, 0, 0, 3, 2}) EXPECT_FALSE(reader.add(parts[i]));
+    const auto whole = reader.add(parts[1]);
     ASSERT_TRUE(whole);
     EXPECT_EQ(whole->hub, 5u);
     EXPECT_EQ(whole->message, message);
@@ -75,29 +75,29 @@ TEST(PartReader, PartsInAnyOrderAndDoubledMakeTheMessage) {
 TEST(PartReader, MessagesOfDifferentHubsDoNotMix) {
     const auto message = long_message();
     PartReader reader;
-    EXPECT_FALSE(reader.take(cut_into_parts(1, 1, message, 500)[0]));
-    EXPECT_FALSE(reader.take(cut_into_parts(2, 1, message, 500)[1]));
-    EXPECT_TRUE(reader.take(cut_into_parts(1, 1, message, 500)[1]));
+    EXPECT_FALSE(reader.add(cut_into_parts(1, 1, message, 500)[0]));
+    EXPECT_FALSE(reader.add(cut_into_parts(2, 1, message, 500)[1]));
+    EXPECT_TRUE(reader.add(cut_into_parts(1, 1, message, 500)[1]));
 }
 
 TEST(PartReader, OfIncompleteMessagesTheOldestAreGivenUp) {
     PartReader reader(2000);
     for (std::uint64_t number = 0; number < 10; ++number) {
-        EXPECT_FALSE(reader.take(cut_into_parts(1, number, long_message(), 500)[0]));
+        EXPECT_FALSE(reader.add(cut_into_parts(1, number, long_message(), 500)[0]));
         EXPECT_LE(reader.waiting_bytes(), 2000u);
     }
     EXPECT_EQ(reader.incomplete(), 6u);
-    EXPECT_TRUE(reader.take(cut_into_parts(1, 9, long_message(), 500)[1]));
+    EXPECT_TRUE(reader.add(cut_into_parts(1, 9, long_message(), 500)[1]));
 }
 
 TEST(PartReader, WhatIsNoPartIsCounted) {
     PartReader reader;
     auto part = cut_into_parts(1, 1, long_message())[0];
-    EXPECT_FALSE(reader.take({}));
-    EXPECT_FALSE(reader.take(std::span(part).first(23)));
+    EXPECT_FALSE(reader.add({}));
+    EXPECT_FALSE(reader.add(std::span(part).first(23)));
     part[20] = 9;  // part 9 of 1
-    EXPECT_FALSE(reader.take(part));
-    EXPECT_FALSE(reader.take(Bytes(most_part_bytes + 100)));
+    EXPECT_FALSE(reader.add(part));
+    EXPECT_FALSE(reader.add(Bytes(most_part_bytes + 100)));
     EXPECT_EQ(reader.damaged(), 4u);
     EXPECT_TRUE(cut_into_parts(1, 1, long_message(), 10).empty());  // too many
 }

@@ -1,5 +1,5 @@
 // Who may publish a stream, and what of a publisher's messages goes on.
-#include "live/hub.h"
+#include "live/hub/hub.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ struct Fixture : testing::Test {
     // One that has begun to publish.
     Hub::Publisher publishing(std::uint32_t session_number = 1) {
         const auto out = publisher();
-        EXPECT_TRUE(hub.take(out, header(session_number), start));
+        EXPECT_TRUE(hub.receive_packet(out, header(session_number), start));
         return out;
     }
     Hub::Viewer viewer(const WatchOptions& options = {}, Hub::Clock::time_point now = start) {
@@ -98,18 +98,18 @@ using Frames = std::vector<std::uint32_t>;
 
 TEST_F(HubTest, WhatIsPublishedIsWatched) {
     const auto anna = publisher();
-    ASSERT_TRUE(hub.take(anna, header(1), start));
-    ASSERT_TRUE(hub.take(anna, intra(0), start));
+    ASSERT_TRUE(hub.receive_packet(anna, header(1), start));
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start));
     const auto late = viewer();
-    ASSERT_TRUE(hub.take(anna, intra(1), start));
+    ASSERT_TRUE(hub.receive_packet(anna, intra(1), start));
     EXPECT_EQ(frames(late), (Frames{0, 1}));
 }
 
 TEST_F(HubTest, AStreamBeginsWithASequenceHeader) {
     const auto headless = publisher(), garbage = publisher();
-    EXPECT_FALSE(hub.take(headless, intra(0), start));
+    EXPECT_FALSE(hub.receive_packet(headless, intra(0), start));
     EXPECT_EQ(closing(headless), "1008 the first packet must be a sequence header of version 2 or later");
-    EXPECT_FALSE(hub.take(garbage, {1, 2, 3}, start));
+    EXPECT_FALSE(hub.receive_packet(garbage, {1, 2, 3}, start));
     EXPECT_EQ(closing(garbage), "1008 the first message is not a packet");
     EXPECT_FALSE(hub.watch(
         "anna", [] {}, {}, start));
@@ -126,7 +126,7 @@ TEST_F(HubTest, DamagedMessagesAreCountedAndGoNoFurther) {
     longer.push_back(0);
     auto shorter = intra(0);
     shorter.pop_back();
-    for (const auto& wrong : {damaged, longer, shorter, Bytes{}}) EXPECT_TRUE(hub.take(anna, wrong, start));
+    for (const auto& wrong : {damaged, longer, shorter, Bytes{}}) EXPECT_TRUE(hub.receive_packet(anna, wrong, start));
     EXPECT_EQ(frames(watching), Frames{});
     EXPECT_EQ(info().publisher.damaged, 4u);
     EXPECT_EQ(info().publisher.packets, 1u);
@@ -135,13 +135,13 @@ TEST_F(HubTest, DamagedMessagesAreCountedAndGoNoFurther) {
 
 TEST_F(HubTest, TheSameSessionGoesOnOverAnotherConnection) {
     const auto before = publishing();
-    ASSERT_TRUE(hub.take(before, intra(0), start));
+    ASSERT_TRUE(hub.receive_packet(before, intra(0), start));
     const auto watching = viewer();
     const auto again = publisher();
-    ASSERT_TRUE(hub.take(again, header(1), start + 10ms));
+    ASSERT_TRUE(hub.receive_packet(again, header(1), start + 10ms));
     EXPECT_EQ(closing(before), "4000 this session was continued by another connection");
-    EXPECT_FALSE(hub.take(before, intra(1), start + 10ms));
-    ASSERT_TRUE(hub.take(again, intra(2), start + 20ms));
+    EXPECT_FALSE(hub.receive_packet(before, intra(1), start + 10ms));
+    ASSERT_TRUE(hub.receive_packet(again, intra(2), start + 20ms));
     hub.leave(before, false, start + 30ms);  // the connection that was replaced ends nothing
     EXPECT_TRUE(info().published);
     EXPECT_EQ(frames(watching), (Frames{0, 2}));
@@ -151,22 +151,22 @@ TEST_F(HubTest, TheSameSessionGoesOnOverAnotherConnection) {
 TEST_F(HubTest, AnotherSessionTakesOverOnlyOnceTheOldOneIsSilent) {
     const auto first = publishing();
     const auto second = publisher();
-    ASSERT_FALSE(hub.take(second, header(2), start + 1999ms));
+    ASSERT_FALSE(hub.receive_packet(second, header(2), start + 1999ms));
     EXPECT_EQ(closing(second), "1008 'anna' is being published by another session; end that one, or wait");
     // A heartbeat is heard as well as a packet.
-    ASSERT_TRUE(hub.take_text(first, R"({"type":"heartbeat"})", start + 1s));
-    EXPECT_FALSE(hub.take(publisher(), header(2), start + 2999ms));
-    ASSERT_TRUE(hub.take(publisher(), header(2), start + 3s));
+    ASSERT_TRUE(hub.receive_text(first, R"({"type":"heartbeat"})", start + 1s));
+    EXPECT_FALSE(hub.receive_packet(publisher(), header(2), start + 2999ms));
+    ASSERT_TRUE(hub.receive_packet(publisher(), header(2), start + 3s));
     EXPECT_EQ(closing(first), "4001 another session took the stream over");
-    EXPECT_FALSE(hub.take(first, intra(0), start + 3s));
+    EXPECT_FALSE(hub.receive_packet(first, intra(0), start + 3s));
     EXPECT_EQ(hub.counters().refused_publishers_busy, 2u);
 }
 
 TEST_F(HubTest, AfterThePublisherLeftAnotherSessionWaitsAMomentToo) {
     const auto first = publishing();
     hub.leave(first, false, start + 1s);
-    EXPECT_FALSE(hub.take(publisher(), header(2), start + 2s));
-    EXPECT_TRUE(hub.take(publisher(), header(2), start + 3s));
+    EXPECT_FALSE(hub.receive_packet(publisher(), header(2), start + 2s));
+    EXPECT_TRUE(hub.receive_packet(publisher(), header(2), start + 3s));
 }
 
 TEST_F(HubTest, AStreamWithoutAPublisherEndsAfterAWhile) {
@@ -183,9 +183,9 @@ TEST_F(HubTest, AStreamWithoutAPublisherEndsAfterAWhile) {
     EXPECT_EQ(closing(watching), "1000 the stream has ended");
     // Another stream of the same name is none of theirs.
     const auto again = publisher();
-    ASSERT_TRUE(hub.take(again, header(2), start + 11s));
+    ASSERT_TRUE(hub.receive_packet(again, header(2), start + 11s));
     const auto other = viewer();
-    ASSERT_TRUE(hub.take(again, intra(0), start + 11s));
+    ASSERT_TRUE(hub.receive_packet(again, intra(0), start + 11s));
     EXPECT_EQ(frames(watching), Frames{});
     hub.leave(watching);
     EXPECT_EQ(frames(other), Frames{0});
@@ -194,7 +194,7 @@ TEST_F(HubTest, AStreamWithoutAPublisherEndsAfterAWhile) {
 TEST_F(HubTest, AStreamThatItsPublisherEndedEndsWhenItsViewersHaveEverything) {
     const auto anna = publishing();
     const auto watching = viewer(), body = viewer({.texts = false});
-    ASSERT_TRUE(hub.take(anna, intra(0), start));
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start));
     hub.leave(anna, true, start);
     EXPECT_TRUE(hub.streams(start).empty());
     auto messages = all(watching);
@@ -209,7 +209,7 @@ TEST_F(HubTest, AStreamThatItsPublisherEndedEndsWhenItsViewersHaveEverything) {
     EXPECT_EQ(std::get<Closing>(messages[2]).code, CloseCode::ended);
     hub.leave(watching);
     hub.leave(body);
-    EXPECT_TRUE(hub.take(publisher(), header(2), start));  // nobody has to wait
+    EXPECT_TRUE(hub.receive_packet(publisher(), header(2), start));  // nobody has to wait
 }
 
 TEST_F(HubTest, StreamsAndViewersAreLimited) {
@@ -221,13 +221,13 @@ TEST_F(HubTest, StreamsAndViewersAreLimited) {
     hub.leave(*viewers.begin());
     viewer();
     const auto carl = publisher("carl");
-    ASSERT_TRUE(hub.take(publisher("ben"), header(1), start));
+    ASSERT_TRUE(hub.receive_packet(publisher("ben"), header(1), start));
     const auto third = hub.publish(
         "dora", [] {}, start);
     ASSERT_FALSE(third);
     EXPECT_EQ(third.error().kind, ErrorKind::limit);
-    // Of two who came while there was room for one, the second to send something is late.
-    EXPECT_FALSE(hub.take(carl, header(1), start));
+    // Two came while there was room for one: the second to send something is late.
+    EXPECT_FALSE(hub.receive_packet(carl, header(1), start));
     EXPECT_EQ(closing(carl), "1013 there are as many streams as this hub carries");
     EXPECT_TRUE(hub.publish(
         "ben", [] {}, start));
@@ -240,14 +240,14 @@ TEST_F(HubTest, MemoryForPacketsIsBounded) {
     const auto size = header(1).size();
     hub = Hub(HubLimits{.streams = 2, .viewers = 2, .memory = 2 * size + size / 2});
     const auto publisher = publishing();
-    EXPECT_TRUE(hub.take(publisher, intra(0), start));
+    EXPECT_TRUE(hub.receive_packet(publisher, intra(0), start));
     EXPECT_EQ(hub.counters().memory, 2 * size);
     const auto watching = viewer();
-    EXPECT_TRUE(hub.take(publisher, tracked(1), start));
+    EXPECT_TRUE(hub.receive_packet(publisher, tracked(1), start));
     EXPECT_EQ(hub.counters().dropped_for_memory, 1u);
     EXPECT_EQ(hub.counters().memory, 2 * size);
     EXPECT_EQ(frames(watching), std::vector<std::uint32_t>{0});
-    const auto held = hub.take(publisher, header(2), start);  // without its header nothing can be shown
+    const auto held = hub.receive_packet(publisher, header(2), start);  // without its header nothing can be shown
     EXPECT_FALSE(held);
     EXPECT_EQ(closing(publisher), "1013 this hub's memory for packets is used up");
 }
@@ -269,7 +269,7 @@ TEST_F(HubTest, WhereNoMemoryIsLeftNobodyIsLetIn) {
 
 TEST_F(HubTest, PacketsThatAreForgottenFreeTheirMemory) {
     const auto publisher = publishing();
-    for (std::uint32_t i = 0; i < 10; ++i) EXPECT_TRUE(hub.take(publisher, intra(i), start));
+    for (std::uint32_t i = 0; i < 10; ++i) EXPECT_TRUE(hub.receive_packet(publisher, intra(i), start));
     EXPECT_EQ(hub.counters().memory, 2 * header(1).size());  // the header and the newest frame
     hub.leave(publisher, true, start);
     EXPECT_EQ(hub.counters().memory, 0u);
@@ -281,19 +281,19 @@ TEST_F(HubTest, MessagesThatHaveComeInPartTakeMemoryToo) {
     const auto anna = publishing();
     const auto ben = publisher("ben");
     const auto watching = viewer();
-    EXPECT_TRUE(hub.take_part(anna, 300, start));
-    EXPECT_TRUE(hub.take_part(anna, 800, start));
-    EXPECT_TRUE(hub.take_part(watching, 100, start));
+    EXPECT_TRUE(hub.receive_part(anna, 300, start));
+    EXPECT_TRUE(hub.receive_part(anna, 800, start));
+    EXPECT_TRUE(hub.receive_part(watching, 100, start));
     EXPECT_EQ(hub.counters().memory, size + 900);
-    EXPECT_FALSE(hub.take_part(ben, 101, start));
+    EXPECT_FALSE(hub.receive_part(ben, 101, start));
     EXPECT_EQ(closing(ben), "1013 this hub's memory for packets is used up");
     hub.leave(ben, false, start);
     EXPECT_EQ(hub.counters().memory, size + 900);
-    EXPECT_TRUE(hub.take(anna, intra(0), start));  // whole
+    EXPECT_TRUE(hub.receive_packet(anna, intra(0), start));  // whole
     EXPECT_EQ(hub.counters().memory, 2 * size + 100);
-    EXPECT_TRUE(hub.take_text(watching, R"({"type":"key_frame"})", start));
+    EXPECT_TRUE(hub.receive_text(watching, R"({"type":"key_frame"})", start));
     EXPECT_EQ(hub.counters().memory, 2 * size);
-    EXPECT_TRUE(hub.take_part(watching, 100, start));
+    EXPECT_TRUE(hub.receive_part(watching, 100, start));
     hub.leave(watching);
     EXPECT_EQ(hub.counters().memory, 2 * size);
     EXPECT_EQ(hub.counters().refused_publishers_limit, 1u);
@@ -303,12 +303,12 @@ TEST_F(HubTest, WhoTakesTooLongForAMessageIsCutOff) {
     hub = Hub(HubLimits{.message_time = 5s});
     const auto slow = publishing(), quick = publisher("ben");
     const auto watching = viewer();
-    ASSERT_TRUE(hub.take(quick, header(2), start));
+    ASSERT_TRUE(hub.receive_packet(quick, header(2), start));
     for (auto now = start; now < start + 5s; now += 500ms) {
-        EXPECT_TRUE(hub.take_part(slow, 100, now));
-        EXPECT_TRUE(hub.take_part(watching, 100, now));
-        EXPECT_TRUE(hub.take_part(quick, 100, now));
-        EXPECT_TRUE(hub.take(quick, intra(0), now));
+        EXPECT_TRUE(hub.receive_part(slow, 100, now));
+        EXPECT_TRUE(hub.receive_part(watching, 100, now));
+        EXPECT_TRUE(hub.receive_part(quick, 100, now));
+        EXPECT_TRUE(hub.receive_packet(quick, intra(0), now));
         hub.tick(now);
     }
     EXPECT_EQ(closing(slow), "");
@@ -326,7 +326,7 @@ TEST_F(HubTest, TheLogSaysWhoPublishedLeftAndWasRefused) {
     std::vector<std::string> names;
     hub = Hub({}, [&](const Event& event) { names.push_back(event.stream + ' ' + event.name); });
     const auto first = publishing(1), second = publisher();
-    EXPECT_FALSE(hub.take(second, header(2), start));
+    EXPECT_FALSE(hub.receive_packet(second, header(2), start));
     hub.leave(first, true, start);
     EXPECT_EQ(names, (std::vector<std::string>{"anna published", "anna refused", "anna left", "anna ended"}));
 }
@@ -343,8 +343,8 @@ TEST_F(HubTest, HelloComesFirst) {
     EXPECT_EQ(hello.session, std::nullopt);
     EXPECT_EQ(hello.hubs, std::vector<std::string>{"wss://b.example"});
     EXPECT_TRUE(std::holds_alternative<std::monostate>(hub.next(anna)));
-    ASSERT_TRUE(hub.take(anna, real_header(0x1234), start));
-    ASSERT_TRUE(hub.take(anna, intra(0), start));
+    ASSERT_TRUE(hub.receive_packet(anna, real_header(0x1234), start));
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start));
     hello = std::get<Hello>(hub.next(viewer(), start));
     EXPECT_EQ(hello.stream, "anna");
     EXPECT_EQ(hello.session, 0x1234u);
@@ -371,7 +371,7 @@ TEST_F(HubTest, ViewersAreToldOfTheOtherHubsInTurn) {
 
 TEST_F(HubTest, HeartbeatsGoBothWaysEachSecond) {
     const auto anna = publisher();
-    ASSERT_TRUE(hub.take(anna, real_header(7), start));
+    ASSERT_TRUE(hub.receive_packet(anna, real_header(7), start));
     const auto watching = viewer();
     some<Hello>(anna), some<Hello>(watching);
     std::size_t to_publisher = 0, to_viewer = 0;
@@ -405,7 +405,7 @@ TEST_F(HubTest, ManyViewersWhoCameAtOnceAreNotAllToldAtOnce) {
     Hub large;
     const auto anna = large.publish(
         "anna", [] {}, start);
-    ASSERT_TRUE(large.take(*anna, header(1), start));
+    ASSERT_TRUE(large.receive_packet(*anna, header(1), start));
     std::vector<Hub::Viewer> viewers;
     for (int i = 0; i < 100; ++i)
         viewers.push_back(*large.watch(
@@ -430,28 +430,28 @@ TEST_F(HubTest, ThePublishersClockGoesOnByTheHubsOwn) {
         const auto heartbeats = some<HeartbeatToViewer>(watching, now);
         return heartbeats.empty() ? std::nullopt : heartbeats[0].clock;
     };
-    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":5000000})", start + 1s));
+    ASSERT_TRUE(hub.receive_text(anna, R"({"type":"heartbeat","clock":5000000})", start + 1s));
     EXPECT_EQ(clock(start + 1500ms), 5500000);
     // This one was late on its way, the one after it was not.
-    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":6000000})", start + 2030ms));
+    ASSERT_TRUE(hub.receive_text(anna, R"({"type":"heartbeat","clock":6000000})", start + 2030ms));
     EXPECT_EQ(clock(start + 2500ms), 6500000);
-    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":7010000})", start + 3s));
+    ASSERT_TRUE(hub.receive_text(anna, R"({"type":"heartbeat","clock":7010000})", start + 3s));
     EXPECT_EQ(clock(start + 3500ms), 7510000);
     // Set back.
-    ASSERT_TRUE(hub.take_text(anna, R"({"type":"heartbeat","clock":1000000})", start + 4s));
+    ASSERT_TRUE(hub.receive_text(anna, R"({"type":"heartbeat","clock":1000000})", start + 4s));
     EXPECT_EQ(clock(start + 4500ms), 1500000);
     EXPECT_EQ(info(start + 5s).clock, 2000000);
     // Another session's is another.
-    ASSERT_TRUE(hub.take(anna, header(2), start + 5s));
+    ASSERT_TRUE(hub.receive_packet(anna, header(2), start + 5s));
     EXPECT_EQ(clock(start + 5500ms), std::nullopt);
 }
 
 TEST_F(HubTest, ASilentPublishersConnectionEndsButNotOneThatHasNoFrames) {
     const auto silent = publishing(), without_frames = publisher("ben"), nothing = publisher("carl");
     const auto watching = viewer();
-    ASSERT_TRUE(hub.take(without_frames, header(2), start));
+    ASSERT_TRUE(hub.receive_packet(without_frames, header(2), start));
     for (auto now = start; now <= start + 2900ms; now += 100ms) hub.tick(now);
-    ASSERT_TRUE(hub.take_text(without_frames, R"({"type":"heartbeat"})", start + 2900ms));
+    ASSERT_TRUE(hub.receive_text(without_frames, R"({"type":"heartbeat"})", start + 2900ms));
     EXPECT_EQ(closing(silent), "");
     hub.tick(start + 3s);
     EXPECT_EQ(closing(silent), "dead");
@@ -467,7 +467,7 @@ TEST_F(HubTest, ASilentPublishersConnectionEndsButNotOneThatHasNoFrames) {
     // It comes back and goes on.
     hub.leave(silent, false, start + 4s);
     const auto again = publisher("anna", start + 5s);
-    ASSERT_TRUE(hub.take(again, header(1), start + 5s));
+    ASSERT_TRUE(hub.receive_packet(again, header(1), start + 5s));
     EXPECT_TRUE(info().published);
 }
 
@@ -475,7 +475,7 @@ TEST_F(HubTest, AKeyFrameIsAskedForAtMostOnceASecond) {
     const auto anna = publishing();
     const auto watching = viewer();
     const auto asked = [&] { return some<KeyFrameRequest>(anna).size(); };
-    const auto ask = [&](auto now) { EXPECT_TRUE(hub.take_text(watching, R"({"type":"key_frame"})", now)); };
+    const auto ask = [&](auto now) { EXPECT_TRUE(hub.receive_text(watching, R"({"type":"key_frame"})", now)); };
     EXPECT_EQ(asked(), 0u);
     woken = 0;
     ask(start);
@@ -488,7 +488,7 @@ TEST_F(HubTest, AKeyFrameIsAskedForAtMostOnceASecond) {
     EXPECT_EQ(asked(), 1u);
     // What comes meanwhile is what was asked for.
     ask(start + 1500ms);
-    ASSERT_TRUE(hub.take(anna, intra(0), start + 1600ms));
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start + 1600ms));
     hub.tick(start + 2s);
     EXPECT_EQ(asked(), 0u);
     EXPECT_EQ(info().key_frame_requests, 2u);
@@ -496,33 +496,35 @@ TEST_F(HubTest, AKeyFrameIsAskedForAtMostOnceASecond) {
 
 TEST_F(HubTest, WhereNoFrameCanBeDecodedAKeyFrameIsAskedFor) {
     const auto anna = publishing();
-    for (std::uint32_t frame : {0u, 1u, 2u}) ASSERT_TRUE(hub.take(anna, frame == 0 ? intra(0) : tracked(frame), start));
+    for (std::uint32_t frame : {0u, 1u, 2u})
+        ASSERT_TRUE(hub.receive_packet(anna, frame == 0 ? intra(0) : tracked(frame), start));
     const auto watching = viewer();
     hub.leave(anna, false, start);
     // It comes back and knows nothing of a gap: what the hub keeps is enough to go on.
     const auto again = publisher();
-    ASSERT_TRUE(hub.take(again, header(1), start));
-    ASSERT_TRUE(hub.take(again, tracked(3), start));
+    ASSERT_TRUE(hub.receive_packet(again, header(1), start));
+    ASSERT_TRUE(hub.receive_packet(again, tracked(3), start));
     EXPECT_TRUE(some<KeyFrameRequest>(again).empty());
     // Frame 4 was lost.
-    ASSERT_TRUE(hub.take(again, tracked(5), start));
+    ASSERT_TRUE(hub.receive_packet(again, tracked(5), start));
     EXPECT_EQ(some<KeyFrameRequest>(again).size(), 1u);
-    ASSERT_TRUE(hub.take(again, tracked(6), start + 100ms));
+    ASSERT_TRUE(hub.receive_packet(again, tracked(6), start + 100ms));
     EXPECT_EQ(some<KeyFrameRequest>(again).size(), 0u);
-    ASSERT_TRUE(hub.take(again, intra(7), start + 200ms));
-    ASSERT_TRUE(hub.take(again, tracked(8), start + 300ms));
+    ASSERT_TRUE(hub.receive_packet(again, intra(7), start + 200ms));
+    ASSERT_TRUE(hub.receive_packet(again, tracked(8), start + 300ms));
     EXPECT_EQ(frames(watching), (Frames{0, 1, 2, 3, 7, 8}));
     EXPECT_EQ(hub.counters().undecodable_frames, 2u);
 }
 
 TEST_F(HubTest, APublisherWhoComesBackMaySendAgainWhatWasKept) {
     const auto before = publishing();
-    for (std::uint32_t frame : {0u, 1u}) ASSERT_TRUE(hub.take(before, frame == 0 ? intra(0) : tracked(frame), start));
+    for (std::uint32_t frame : {0u, 1u})
+        ASSERT_TRUE(hub.receive_packet(before, frame == 0 ? intra(0) : tracked(frame), start));
     const auto watching = viewer();
     const auto again = publisher();
-    ASSERT_TRUE(hub.take(again, header(1), start));
+    ASSERT_TRUE(hub.receive_packet(again, header(1), start));
     for (std::uint32_t frame : {0u, 1u, 2u, 3u})  // 2 was lost with the first connection
-        ASSERT_TRUE(hub.take(again, frame == 0 ? intra(0) : tracked(frame), start));
+        ASSERT_TRUE(hub.receive_packet(again, frame == 0 ? intra(0) : tracked(frame), start));
     EXPECT_EQ(frames(watching), (Frames{0, 1, 2, 3}));
     EXPECT_TRUE(some<KeyFrameRequest>(again).empty());
 }
@@ -535,7 +537,7 @@ TEST_F(HubTest, AListenerIsToldWhatWentToTheViewers) {
                 .ended = [&](const std::string& stream) { ended.push_back(stream); }});
     const auto anna = publishing();
     for (const auto& one : {intra(0), intra(0), tracked(1), tracked(3), tracked(4), intra(5)})
-        ASSERT_TRUE(hub.take(anna, one, start));
+        ASSERT_TRUE(hub.receive_packet(anna, one, start));
     EXPECT_EQ(sent, (Frames{0, 0, 1, 5}));  // the header's, which is 0, and those that can be decoded, once
     EXPECT_TRUE(ended.empty());
     hub.leave(anna, true, start);
@@ -546,11 +548,11 @@ TEST_F(HubTest, StampsGoToThoseWhoAskedRightBeforeTheirPackets) {
     const auto anna = publishing();
     const auto with = viewer({.stamps = true}), without = viewer();
     frames(with), frames(without);
-    ASSERT_TRUE(hub.take_text(anna, R"({"type":"stamp","frame":0,"sent":123})", start));
-    ASSERT_TRUE(hub.take(anna, intra(0), start));
-    ASSERT_TRUE(hub.take(anna, tracked(1), start));
-    ASSERT_TRUE(hub.take_text(anna, R"({"type":"stamp","frame":9,"sent":124})", start));  // not of the next frame
-    ASSERT_TRUE(hub.take(anna, tracked(2), start));
+    ASSERT_TRUE(hub.receive_text(anna, R"({"type":"stamp","frame":0,"sent":123})", start));
+    ASSERT_TRUE(hub.receive_packet(anna, intra(0), start));
+    ASSERT_TRUE(hub.receive_packet(anna, tracked(1), start));
+    ASSERT_TRUE(hub.receive_text(anna, R"({"type":"stamp","frame":9,"sent":124})", start));  // not of the next frame
+    ASSERT_TRUE(hub.receive_packet(anna, tracked(2), start));
     const auto messages = all(with);
     ASSERT_EQ(messages.size(), 6u);
     const auto stamp = std::get<Stamp>(messages[1]);
@@ -566,7 +568,8 @@ TEST_F(HubTest, StampsGoToThoseWhoAskedRightBeforeTheirPackets) {
 TEST_F(HubTest, TextsComeBeforePacketsThatWait) {
     const auto anna = publishing();
     const auto watching = viewer();
-    for (std::uint32_t frame : {0u, 1u, 2u}) ASSERT_TRUE(hub.take(anna, frame == 0 ? intra(0) : tracked(frame), start));
+    for (std::uint32_t frame : {0u, 1u, 2u})
+        ASSERT_TRUE(hub.receive_packet(anna, frame == 0 ? intra(0) : tracked(frame), start));
     hub.tick(start + 1s);
     const auto messages = all(watching);
     EXPECT_TRUE(std::holds_alternative<Hello>(messages[0]));
@@ -577,13 +580,13 @@ TEST_F(HubTest, TextsComeBeforePacketsThatWait) {
 TEST_F(HubTest, WhoFloodsTextOrSendsWhatIsNoMessageIsClosed) {
     const auto anna = publishing();
     const auto flooding = viewer(), calm = viewer();
-    for (int i = 0; i < 50; ++i) ASSERT_TRUE(hub.take_text(flooding, R"({"type":"x"})", start));
-    EXPECT_FALSE(hub.take_text(flooding, R"({"type":"x"})", start));
+    for (int i = 0; i < 50; ++i) ASSERT_TRUE(hub.receive_text(flooding, R"({"type":"x"})", start));
+    EXPECT_FALSE(hub.receive_text(flooding, R"({"type":"x"})", start));
     EXPECT_EQ(closing(flooding), "1008 too many text messages");
-    for (int i = 0; i < 1000; ++i) ASSERT_TRUE(hub.take_text(calm, R"({"type":"x"})", start + i * 100ms));
-    EXPECT_FALSE(hub.take_text(calm, "hello", start));
+    for (int i = 0; i < 1000; ++i) ASSERT_TRUE(hub.receive_text(calm, R"({"type":"x"})", start + i * 100ms));
+    EXPECT_FALSE(hub.receive_text(calm, "hello", start));
     EXPECT_EQ(closing(calm), "1008 the text message is not a JSON object");
-    EXPECT_FALSE(hub.take_text(anna, std::string(5000, ' '), start));
+    EXPECT_FALSE(hub.receive_text(anna, std::string(5000, ' '), start));
     EXPECT_EQ(closing(anna), "1009 the text message is longer than 4096 bytes");
     EXPECT_FALSE(info().published);
     EXPECT_EQ(hub.counters().refused_viewers_message, 2u);

@@ -1,5 +1,5 @@
 // Publishing and watching over real connections, on this machine's loopback address.
-#include "live/live_connection.h"
+#include "live/server/live_connection.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 #include "htvm/decoder.hpp"
 #include "htvm/dependency.hpp"
-#include "live/recorder.h"
+#include "live/server/recorder.h"
 #include "live_packets.h"
 #include "server_test.h"
 #include "web_socket.h"
@@ -29,7 +29,7 @@ protected:
     LiveConnectionTest()
         : LiveConnectionTest(HubLimits{.streams = 2, .publisher_silence = std::chrono::seconds(600)}) {}
     explicit LiveConnectionTest(const HubLimits& limits) : hub(limits) {
-        options.connections_per_address = options.viewers_per_address = 300;
+        options.admission.connections_per_address = options.admission.viewers_per_address = 300;
         options.hub = &hub;
     }
     void SetUp() override { start(); }
@@ -138,7 +138,7 @@ TEST_F(LiveConnectionTest, AViewerWhoDoesNotReadDelaysNobodyAndGoesOnAtTheNewest
         if (i > 0) publisher.send(i % 30 == 0 ? live_intra(i, 60000) : live_tracked(i, 30000));
         ASSERT_EQ(quick.next_frame(), i);
     }
-    // Of nine megabytes it gets what the buffers on the way held, and then the newest I-frame with what followed.
+    // It gets what the buffers on the way held of nine megabytes, and then the newest I-frame with what followed.
     std::vector<PacketHeader> headers;
     while (headers.empty() || headers.back().frame + 1 < frames) {
         const auto next = paused.next();

@@ -1,5 +1,5 @@
 // What Prometheus reads: checked by a reader of its text format.
-#include "live/metrics.h"
+#include "live/server/metrics.h"
 
 #include <gtest/gtest.h>
 
@@ -71,14 +71,14 @@ TEST(MetricsTest, AHubIsToldInFull) {
     for (const auto& name : {std::string("anna"), odd}) {
         const auto publisher = *hub.publish(
             name, [] {}, start);
-        ASSERT_TRUE(hub.take(publisher, write_packet(live_header(1, 50)), start));
-        ASSERT_TRUE(hub.take(publisher, write_packet(live_intra(0, 50)), start));
+        ASSERT_TRUE(hub.receive_packet(publisher, write_packet(live_header(1, 50)), start));
+        ASSERT_TRUE(hub.receive_packet(publisher, write_packet(live_intra(0, 50)), start));
         if (name == "anna")
             viewer = hub.watch(
                 name, [] {}, {.texts = false}, start);
-        ASSERT_TRUE(hub.take(publisher, {1, 2, 3}, start));
-        ASSERT_TRUE(hub.take(publisher, write_packet(live_tracked(5, 50)), start));
-        ASSERT_TRUE(hub.take_text(publisher, R"({"type":"heartbeat"})", start + 1s));
+        ASSERT_TRUE(hub.receive_packet(publisher, {1, 2, 3}, start));
+        ASSERT_TRUE(hub.receive_packet(publisher, write_packet(live_tracked(5, 50)), start));
+        ASSERT_TRUE(hub.receive_text(publisher, R"({"type":"heartbeat"})", start + 1s));
     }
     ASSERT_TRUE(viewer);
     hub.next(*viewer, start);  // the header; the I-frame waits

@@ -17,9 +17,9 @@
 #include <optional>
 #include <thread>
 
-#include "live/control.h"
-#include "live/file_server.h"
-#include "live/watcher.h"
+#include "live/client/control.h"
+#include "live/client/watcher.h"
+#include "live/server/server.h"
 #include "live_packets.h"
 #include "soon.h"
 
@@ -36,10 +36,10 @@ using std::chrono::milliseconds;
 class TestHub {
 public:
     explicit TestHub(std::uint16_t port = 0) {
-        FileServerOptions options;
+        ServerOptions options;
         options.port = port;
         options.hub = &hub_;
-        auto opened = FileServer::open(options);
+        auto opened = Server::open(options);
         EXPECT_TRUE(opened) << opened.error().message;
         server_.emplace(std::move(*opened));
         thread_ = std::thread([this] { server_->run(); });
@@ -53,7 +53,7 @@ public:
 
 private:
     Hub hub_;
-    std::optional<FileServer> server_;
+    std::optional<Server> server_;
     std::thread thread_;
 };
 

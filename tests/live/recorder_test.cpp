@@ -1,5 +1,5 @@
 // Live streams as files: what is in them can be decoded, whatever happens to the disk, the line or the program.
-#include "live/recorder.h"
+#include "live/server/recorder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -68,9 +68,9 @@ protected:
         EXPECT_TRUE(out);
         return std::move(*out);
     }
-    bool take(Recorder& recorder, const SharedPacket& packet, Recorder::Clock::duration after = 0ms) {
-        return recorder.take("anna", packet, start + after,
-                             evening + std::chrono::duration_cast<std::chrono::seconds>(after));
+    bool record(Recorder& recorder, const SharedPacket& packet, Recorder::Clock::duration after = 0ms) {
+        return recorder.record("anna", packet, start + after,
+                               evening + std::chrono::duration_cast<std::chrono::seconds>(after));
     }
     std::vector<std::string> files() const {
         std::vector<std::string> out;
@@ -103,7 +103,7 @@ protected:
     }
     std::vector<std::string> events(Recorder& recorder) {
         std::vector<std::string> out;
-        for (const auto& event : recorder.take_events()) {
+        for (const auto& event : recorder.new_events()) {
             EXPECT_EQ(event.stream, "anna");
             out.push_back(event.name);
         }
@@ -118,8 +118,8 @@ using Names = std::vector<std::string>;
 TEST_F(RecorderTest, ASessionBecomesAFileWithItsIndexInFront) {
     {
         auto recorder = open();
-        EXPECT_FALSE(take(recorder, header(1)));
-        for (std::uint32_t i = 0; i < 10; ++i) EXPECT_FALSE(take(recorder, i % 5 == 0 ? intra(i) : tracked(i)));
+        EXPECT_FALSE(record(recorder, header(1)));
+        for (std::uint32_t i = 0; i < 10; ++i) EXPECT_FALSE(record(recorder, i % 5 == 0 ? intra(i) : tracked(i)));
         EXPECT_TRUE(soon([&] { return recorder.counters().packets == 11; }));
         // As it grows it has its name, and all that was written.
         EXPECT_EQ(files(), Names{"anna-20261122-130551.htvm"});
@@ -142,12 +142,12 @@ TEST_F(RecorderTest, ASessionBecomesAFileWithItsIndexInFront) {
 
 TEST_F(RecorderTest, AFileBeginsWithAFrameThatCanBeDecodedByItself) {
     auto recorder = open();
-    EXPECT_FALSE(take(recorder, tracked(8)));  // nothing is known of the stream yet
-    take(recorder, header(1));
-    EXPECT_TRUE(take(recorder, tracked(9)));
+    EXPECT_FALSE(record(recorder, tracked(8)));  // nothing is known of the stream yet
+    record(recorder, header(1));
+    EXPECT_TRUE(record(recorder, tracked(9)));
     EXPECT_TRUE(files().empty());
-    EXPECT_FALSE(take(recorder, intra(10)));
-    EXPECT_FALSE(take(recorder, tracked(11)));
+    EXPECT_FALSE(record(recorder, intra(10)));
+    EXPECT_FALSE(record(recorder, tracked(11)));
     EXPECT_TRUE(soon([&] { return recorder.counters().packets == 3; }));
     EXPECT_EQ(frames("anna-20261122-130551.htvm"), (Frames{10, 11}));
     EXPECT_EQ(recorder.counters().dropped_frames, 0u);
@@ -157,16 +157,16 @@ TEST_F(RecorderTest, AnotherSessionAndAnotherHourBeginAnotherFile) {
     options.file_length = 1h;
     {
         auto recorder = open();
-        take(recorder, header(1));
-        take(recorder, intra(0));
-        take(recorder, header(1));  // repeated
-        take(recorder, tracked(1), 30min);
-        EXPECT_TRUE(take(recorder, tracked(2), 60min));  // it goes on until one that can be decoded by itself comes
-        EXPECT_FALSE(take(recorder, intra(3), 61min));
-        take(recorder, header(2), 62min);
-        take(recorder, intra(0), 62min);
-        take(recorder, header(3), 62min);
-        take(recorder, intra(0), 62min);
+        record(recorder, header(1));
+        record(recorder, intra(0));
+        record(recorder, header(1));  // repeated
+        record(recorder, tracked(1), 30min);
+        EXPECT_TRUE(record(recorder, tracked(2), 60min));  // it goes on until one that can be decoded by itself comes
+        EXPECT_FALSE(record(recorder, intra(3), 61min));
+        record(recorder, header(2), 62min);
+        record(recorder, intra(0), 62min);
+        record(recorder, header(3), 62min);
+        record(recorder, intra(0), 62min);
     }
     EXPECT_EQ(files(), (Names{"anna-20261122-130551.htvm", "anna-20261122-140651.htvm", "anna-20261122-140751-2.htvm",
                               "anna-20261122-140751.htvm"}));
@@ -183,9 +183,9 @@ TEST_F(RecorderTest, WhatASlowDiskDoesNotTakeIsDroppedUpToAFrameThatCanBeDecoded
     std::uint64_t dropped = 0;
     {
         auto recorder = open();
-        take(recorder, header(1));
+        record(recorder, header(1));
         for (std::uint32_t more = 300; sent < most && more > 0; ++sent) {
-            take(recorder, sent % 10 == 0 ? intra(sent, 300000) : tracked(sent, 100000));
+            record(recorder, sent % 10 == 0 ? intra(sent, 300000) : tracked(sent, 100000));
             if (recorder.counters().dropped_frames > 0) --more;
         }
         dropped = recorder.counters().dropped_frames;
@@ -204,17 +204,17 @@ TEST_F(RecorderTest, WhatASlowDiskDoesNotTakeIsDroppedUpToAFrameThatCanBeDecoded
 TEST_F(RecorderTest, AFaultStopsTheRecordingUntilItIsTriedAgain) {
     options.retry = 1min;
     auto recorder = open();
-    take(recorder, header(1));
+    record(recorder, header(1));
     fs::remove_all(options.folder);
-    take(recorder, intra(0));
+    record(recorder, intra(0));
     EXPECT_TRUE(soon([&] { return recorder.counters().faults == 1; }));
     EXPECT_EQ(events(recorder), Names{"recording_failed"});
     fs::create_directories(options.folder);
-    take(recorder, tracked(1), 1s);
+    record(recorder, tracked(1), 1s);
     EXPECT_EQ(recorder.counters().streams, 0u);
-    take(recorder, intra(2), 60s);
+    record(recorder, intra(2), 60s);
     EXPECT_TRUE(files().empty());
-    take(recorder, intra(3), 61s);
+    record(recorder, intra(3), 61s);
     EXPECT_TRUE(soon([&] { return recorder.counters().packets == 2; }));
     EXPECT_EQ(frames("anna-20261122-130652.htvm"), Frames{3});
     EXPECT_EQ(events(recorder), Names{"recording"});
@@ -249,23 +249,23 @@ TEST_F(RecorderTest, WhereOnlyTrackedFramesWereDroppedItGoesOnAtOneThatNeedsNone
     };
     {
         auto recorder = open();
-        take(recorder, header(1));
-        take(recorder, intra(0));
-        for (std::uint32_t i = 1; i <= 20; ++i) take(recorder, tracked(i));
+        record(recorder, header(1));
+        record(recorder, intra(0));
+        for (std::uint32_t i = 1; i <= 20; ++i) record(recorder, tracked(i));
         const auto taken = 22 - recorder.counters().dropped_frames;
         EXPECT_LT(taken, 22u);
         stuck = false;
         EXPECT_TRUE(all_written(recorder, taken));
-        EXPECT_TRUE(take(recorder, tracked(21)));
-        EXPECT_FALSE(take(recorder, needs_reference(PacketKind::tracked, 22, 0)));
-        EXPECT_FALSE(take(recorder, tracked(23)));
+        EXPECT_TRUE(record(recorder, tracked(21)));
+        EXPECT_FALSE(record(recorder, needs_reference(PacketKind::tracked, 22, 0)));
+        EXPECT_FALSE(record(recorder, tracked(23)));
         EXPECT_TRUE(all_written(recorder, taken + 2));
         // A reference that is not in the file is nothing to go on from.
         stuck = true;
-        for (std::uint32_t i = 24; i <= 40; ++i) take(recorder, tracked(i));
-        EXPECT_TRUE(take(recorder, needs_reference(PacketKind::patched, 41, 0)));
+        for (std::uint32_t i = 24; i <= 40; ++i) record(recorder, tracked(i));
+        EXPECT_TRUE(record(recorder, needs_reference(PacketKind::patched, 41, 0)));
         stuck = false;
-        EXPECT_TRUE(take(recorder, needs_reference(PacketKind::tracked, 42, 41)));
+        EXPECT_TRUE(record(recorder, needs_reference(PacketKind::tracked, 42, 41)));
     }
     const auto recorded = frames("anna-20261122-130551.htvm");
     EXPECT_THAT(recorded, testing::IsSupersetOf({0u, 22u, 23u}));
@@ -288,13 +288,13 @@ TEST_F(RecorderTest, AFileThatGrowsIsOnTheDiskAfterAMomentAndNobodyElseWaitsForT
         EXPECT_NE(std::this_thread::get_id(), here);
     });
     auto recorder = open();
-    take(recorder, header(1));
-    take(recorder, intra(0));
+    record(recorder, header(1));
+    record(recorder, intra(0));
     EXPECT_TRUE(soon([&] { return recorder.counters().packets == 2; }));
     const auto first = fs::file_size(options.folder / name);
     EXPECT_TRUE(soon([&] { return waited_for(options.folder / name) == first; }));  // although nothing more comes
     EXPECT_EQ(waited_for(options.folder), 1u);                                      // its name
-    take(recorder, tracked(1));
+    record(recorder, tracked(1));
     EXPECT_TRUE(soon([&] { return waited_for(options.folder / name) > first; }));
 }
 
@@ -307,8 +307,8 @@ TEST_F(RecorderTest, TheFileWithItsIndexTakesThePlaceOfTheOtherOnceTheDiskHasIt)
             first.push_back(packets(fs::path(name).filename())[0].kind);
     });
     auto recorder = open();
-    take(recorder, header(1));
-    take(recorder, intra(0));
+    record(recorder, header(1));
+    record(recorder, intra(0));
     recorder.finish();
     EXPECT_EQ(first, (std::vector<PacketKind>{PacketKind::front_index, PacketKind::sequence}));
     EXPECT_EQ(packets(path.filename())[0].kind, PacketKind::front_index);
@@ -333,10 +333,10 @@ TEST_F(RecorderTest, AFullDiskLeavesAFileOfWholePackets) {
         const rlimit limit{5000, 5000};
         setrlimit(RLIMIT_FSIZE, &limit);
         auto recorder = open();
-        take(recorder, header(1));
-        for (std::uint32_t i = 0; i < 10; ++i) take(recorder, i == 0 ? intra(i, 1000) : tracked(i, 1000));
+        record(recorder, header(1));
+        for (std::uint32_t i = 0; i < 10; ++i) record(recorder, i == 0 ? intra(i, 1000) : tracked(i, 1000));
         while (recorder.counters().faults == 0) std::this_thread::sleep_for(1ms);
-        take(recorder, tracked(10));
+        record(recorder, tracked(10));
         _exit(recorder.counters().streams == 0 ? 0 : 1);
     });
     EXPECT_EQ(status, 0);
@@ -346,8 +346,8 @@ TEST_F(RecorderTest, AFullDiskLeavesAFileOfWholePackets) {
 TEST_F(RecorderTest, AProgramThatIsKilledLeavesAllThatItHadWritten) {
     const auto status = status_of([&] {
         auto recorder = open();
-        take(recorder, header(1));
-        for (std::uint32_t i = 0; i < 50; ++i) take(recorder, i == 0 ? intra(i) : tracked(i));
+        record(recorder, header(1));
+        for (std::uint32_t i = 0; i < 50; ++i) record(recorder, i == 0 ? intra(i) : tracked(i));
         while (recorder.counters().packets < 51) std::this_thread::sleep_for(1ms);
         std::raise(SIGKILL);
     });
@@ -359,9 +359,9 @@ TEST_F(RecorderTest, AProgramThatIsKilledLeavesAllThatItHadWritten) {
 TEST_F(RecorderTest, NoMoreStreamsAreRecordedThanAllowed) {
     options.streams = 1;
     auto recorder = open();
-    take(recorder, header(1));
-    EXPECT_FALSE(recorder.take("ben", header(1), start, evening));
-    EXPECT_FALSE(recorder.take("ben", intra(0), start, evening));
+    record(recorder, header(1));
+    EXPECT_FALSE(recorder.record("ben", header(1), start, evening));
+    EXPECT_FALSE(recorder.record("ben", intra(0), start, evening));
     EXPECT_EQ(recorder.counters().faults, 1u);
 }
 

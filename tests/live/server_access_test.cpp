@@ -13,7 +13,7 @@
 #include <mutex>
 #include <optional>
 
-#include "live/access.h"
+#include "live/server/credentials.h"
 #include "live_packets.h"
 #include "server_test.h"
 #include "web_socket.h"
@@ -60,7 +60,7 @@ protected:
         host = "hub.example";
         options.hub = &hub;
         options.header_time = seconds(1);
-        options.refusal_delay = {};
+        options.admission.refusal_delay = {};
         options.log = [this](const Event& event) {
             const std::lock_guard lock(mutex);
             events.push_back(event);
@@ -108,9 +108,9 @@ protected:
 };
 
 TEST_F(ServerAccessTest, PublishingNeedsTheTokenOfTheStreamAndRefusalsHurtNobody) {
-    options.publishers = file("publishers.json");
-    const auto anna = add_publisher(options.publishers, "anna").value();
-    const auto ben = add_publisher(options.publishers, "ben").value();
+    options.admission.publishers = file("publishers.json");
+    const auto anna = add_publisher(options.admission.publishers, "anna").value();
+    const auto ben = add_publisher(options.admission.publishers, "ben").value();
     start();
     auto publisher = open("/publish/anna", "Authorization", "Bearer " + anna);
     ASSERT_EQ(publisher.status, 101u);
@@ -132,9 +132,9 @@ TEST_F(ServerAccessTest, PublishingNeedsTheTokenOfTheStreamAndRefusalsHurtNobody
 }
 
 TEST_F(ServerAccessTest, AWrongTokenIsAnsweredLate) {
-    options.publishers = file("publishers.json");
-    ASSERT_TRUE(add_publisher(options.publishers, "anna"));
-    options.refusal_delay = seconds(1);
+    options.admission.publishers = file("publishers.json");
+    ASSERT_TRUE(add_publisher(options.admission.publishers, "anna"));
+    options.admission.refusal_delay = seconds(1);
     start();
     const auto begin = std::chrono::steady_clock::now();
     EXPECT_EQ(opened("/publish/anna?token=guess"), 401u);
@@ -142,14 +142,14 @@ TEST_F(ServerAccessTest, AWrongTokenIsAnsweredLate) {
 }
 
 TEST_F(ServerAccessTest, APublisherWhoIsAddedIsKnownAfterAHangup) {
-    options.publishers = file("publishers.json");
-    ASSERT_TRUE(add_publisher(options.publishers, "anna"));
+    options.admission.publishers = file("publishers.json");
+    ASSERT_TRUE(add_publisher(options.admission.publishers, "anna"));
     start();
-    const auto ben = add_publisher(options.publishers, "ben").value();
+    const auto ben = add_publisher(options.admission.publishers, "ben").value();
     EXPECT_EQ(opened("/publish/ben?token=" + ben), 401u);
     hang_up_and_wait_for("reloaded");
     EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
-    std::ofstream(options.publishers) << "{";
+    std::ofstream(options.admission.publishers) << "{";
     hang_up_and_wait_for("reload_failed");
     EXPECT_EQ(opened("/publish/ben?token=" + ben), 101u);
 }
@@ -166,12 +166,12 @@ TEST_F(ServerAccessTest, NamesThatAreNoNamesOfStreamsAreNotPublished) {
 }
 
 TEST_F(ServerAccessTest, WhatIsShownByLinkAloneNeedsOne) {
-    options.link_keys = file("keys.json");
-    ASSERT_TRUE(add_link_key(options.link_keys));
+    options.admission.link_keys = file("keys.json");
+    ASSERT_TRUE(add_link_key(options.admission.link_keys));
     start();
     auto publisher = open("/publish/anna");
     begin(publisher);
-    const auto keys = read_link_keys(options.link_keys).value();
+    const auto keys = read_link_keys(options.admission.link_keys).value();
     const auto link = [&](const std::string& path, int seconds_left) {
         return '/' + path + '?' + link_query(keys, path, system_clock::now() + seconds(seconds_left));
     };
@@ -206,7 +206,7 @@ TEST_F(ServerAccessTest, WhatIsShownByLinkAloneNeedsOne) {
 }
 
 TEST_F(ServerAccessTest, OnlyPagesOfTheGivenSitesWatchAndRead) {
-    options.origins = {"https://a.example", "https://b.example:8443"};
+    options.admission.origins = {"https://a.example", "https://b.example:8443"};
     start();
     auto publisher = open("/publish/anna");
     begin(publisher);
@@ -231,7 +231,7 @@ TEST_F(ServerAccessTest, OnlyPagesOfTheGivenSitesWatchAndRead) {
 }
 
 TEST_F(ServerAccessTest, AnAddressHasAFewViewers) {
-    options.viewers_per_address = 2;
+    options.admission.viewers_per_address = 2;
     start();
     auto publisher = open("/publish/anna");
     begin(publisher);
@@ -312,9 +312,9 @@ TEST_F(ServerAccessTest, ACertificateAndAKeyThatDoNotBelongTogetherAreRefused) {
     write_certificate(file("b.pem"), file("b.key"), "b.example");
     options.certificate = file("a.pem");
     options.private_key = file("b.key");
-    EXPECT_THAT(FileServer::open(options).error().message, HasSubstr("b.key"));
+    EXPECT_THAT(Server::open(options).error().message, HasSubstr("b.key"));
     options.certificate = file("none.pem");
-    EXPECT_THAT(FileServer::open(options).error().message, HasSubstr("none.pem"));
+    EXPECT_THAT(Server::open(options).error().message, HasSubstr("none.pem"));
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-#include "live/file_server.h"
+#include "live/server/server.h"
 #include "soon.h"
 
 namespace htvm::live {
@@ -34,7 +34,7 @@ protected:
     }
 
     void start() {
-        auto opened = FileServer::open(options);
+        auto opened = Server::open(options);
         ASSERT_TRUE(opened) << opened.error().message;
         server.emplace(std::move(*opened));
         thread = std::thread([this] { server->run(); });
@@ -82,8 +82,8 @@ protected:
 
     std::filesystem::path root;
     std::string host = "127.0.0.1";  // as clients call it
-    FileServerOptions options;
-    std::optional<FileServer> server;
+    ServerOptions options;
+    std::optional<Server> server;
     std::thread thread;
     boost::asio::io_context context;
 };

@@ -12,7 +12,7 @@
 #include <string>
 
 #include "htvm/packet.hpp"
-#include "live/control.h"
+#include "live/client/control.h"
 
 namespace htvm::live {
 

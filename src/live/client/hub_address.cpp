@@ -1,0 +1,99 @@
+#include "live/client/hub_address.h"
+
+#include <algorithm>
+#include <charconv>
+
+namespace htvm::live {
+namespace {
+
+constexpr std::string_view plain = "ws://", by_tls = "wss://";
+constexpr std::uint16_t plain_port = 80, tls_port = 443;
+constexpr std::size_t longest = 2048, longest_host = 253;
+
+std::string lower_case(std::string_view text) {
+    std::string out(text);
+    for (char& c : out)
+        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    return out;
+}
+
+bool is_in_name(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '-' ||
+           c == '_';
+}
+
+bool is_in_ipv6(char c) {
+    return (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F') || (c >= '0' && c <= '9') || c == ':' || c == '.';
+}
+
+}  // namespace
+
+bool looks_like_hub_address(std::string_view text) { return text.find("://") != std::string_view::npos; }
+
+Result<HubAddress> parse_hub_address(std::string_view text) {
+    const auto wrong = [&](const std::string& what) {
+        const auto query = text.find('?');  // not to be shown
+        return fail(ErrorKind::bad_input, "'" + std::string(text.substr(0, std::min(query, longest))) + "' " + what +
+                                              "; a live stream's address is ws://HOST:PORT/PATH or wss://HOST/PATH");
+    };
+    if (std::any_of(text.begin(), text.end(), [](char c) { return c <= ' ' || c >= 127; }))
+        return fail(ErrorKind::bad_input,
+                    "an address has no spaces, control characters or letters beyond ASCII; write them as %XX");
+    if (text.size() > longest) return fail(ErrorKind::bad_input, "an address has at most 2,048 characters");
+    HubAddress out;
+    const auto scheme_end = text.find("://");
+    const auto scheme = lower_case(text.substr(0, scheme_end == std::string_view::npos ? 0 : scheme_end + 3));
+    if (scheme != plain && scheme != by_tls) return wrong("does not begin with ws:// or wss://");
+    out.secure = scheme == by_tls;
+    out.port = out.secure ? tls_port : plain_port;
+    auto rest = text.substr(scheme.size());
+    if (rest.find('#') != std::string_view::npos) return wrong("has a #, which no server is sent");
+    const auto target = std::min(rest.find_first_of("/?"), rest.size());
+    out.target = rest.substr(target);
+    if (!out.target.starts_with('/')) out.target.insert(0, 1, '/');
+    rest = rest.substr(0, target);
+    if (rest.find('@') != std::string_view::npos)
+        return wrong("has a name or password before the host, which hubs do not know: give a token");
+    std::string_view port;
+    bool has_port = false;
+    if (rest.starts_with('[')) {
+        const auto end = rest.find(']');
+        if (end == std::string_view::npos) return wrong("has a [ without a ]");
+        out.host = rest.substr(1, end - 1);
+        if (!std::all_of(out.host.begin(), out.host.end(), is_in_ipv6) || out.host.find(':') == std::string::npos)
+            return wrong("has no IPv6 address between the brackets");
+        rest = rest.substr(end + 1);
+        has_port = rest.starts_with(':');
+        if (!rest.empty() && !has_port) return wrong("goes on after the ] with neither port nor path");
+        if (has_port) port = rest.substr(1);
+    } else {
+        const auto colon = std::min(rest.find(':'), rest.size());
+        out.host = rest.substr(0, colon);
+        if (!std::all_of(out.host.begin(), out.host.end(), is_in_name)) return wrong("has no valid host");
+        has_port = colon < rest.size();
+        if (has_port) port = rest.substr(colon + 1);
+        if (port.find(':') != std::string_view::npos)
+            return wrong("has several colons in its host; an IPv6 address stands in brackets, as in ws://[::1]:8080/");
+    }
+    if (out.host.empty()) return wrong("has no host");
+    if (out.host.size() > longest_host) return wrong("has a host of more than 253 characters");
+    if (!has_port) return out;
+    const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), out.port);
+    if (error != std::errc() || end != port.data() + port.size() || out.port == 0)
+        return wrong("has no port from 1 to 65535 behind the colon");
+    return out;
+}
+
+std::string host_header(const HubAddress& address) {
+    const bool six = address.host.find(':') != std::string::npos;
+    std::string out = six ? '[' + address.host + ']' : address.host;
+    if (address.port != (address.secure ? tls_port : plain_port)) out += ':' + std::to_string(address.port);
+    return out;
+}
+
+std::string shown(const HubAddress& address) {
+    return std::string(address.secure ? by_tls : plain) + host_header(address) +
+           address.target.substr(0, address.target.find('?'));
+}
+
+}  // namespace htvm::live

@@ -1,0 +1,156 @@
+#include "live/server/admission.h"
+
+#include <algorithm>
+
+#include "live/hub/stream_name.h"
+
+namespace htvm::live {
+namespace {
+
+namespace net = boost::asio;
+namespace http = boost::beast::http;
+
+net::ip::address counted_address(const net::ip::address& address) {
+    if (!address.is_v6()) return address;
+    auto bytes = address.to_v6().to_bytes();
+    if (address.to_v6().is_v4_mapped()) return net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
+    std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
+    return net::ip::address_v6(bytes);
+}
+
+}  // namespace
+
+Result<Credentials> read_credentials(const AdmissionOptions& options) {
+    Credentials out;
+    if (!options.publishers.empty()) {
+        auto publishers = read_publishers(options.publishers);
+        if (!publishers) return tl::unexpected(publishers.error());
+        out.publishers = std::move(*publishers);
+    }
+    if (!options.link_keys.empty()) {
+        auto keys = read_link_keys(options.link_keys);
+        if (!keys) return tl::unexpected(keys.error());
+        out.link_keys = std::move(*keys);
+    }
+    return out;
+}
+
+AddressCounts::Place::Place(AddressCounts& counts, const net::ip::address& address)
+    : counts_(&counts), address_(counted_address(address)) {
+    ++counts_->counts_[address_];
+    ++counts_->total_;
+}
+
+AddressCounts::Place::~Place() {
+    if (!counts_) return;
+    const auto found = counts_->counts_.find(address_);
+    if (--found->second == 0) counts_->counts_.erase(found);
+    --counts_->total_;
+}
+
+unsigned AddressCounts::at(const net::ip::address& address) const {
+    const auto found = counts_.find(counted_address(address));
+    return found == counts_.end() ? 0 : found->second;
+}
+
+std::optional<AddressCounts::Place> Admission::admit_connection(const Address& address) {
+    if (connections_.total() >= options_.connections || connections_.at(address) >= options_.connections_per_address)
+        return std::nullopt;
+    return AddressCounts::Place(connections_, address);
+}
+
+bool Admission::names_loopback(std::string_view host) const {
+    const auto suffix = ':' + std::to_string(port_);
+    if (host.ends_with(suffix)) host.remove_suffix(suffix.size());
+    return host == "127.0.0.1" || host == "localhost" || host == "[::1]";
+}
+
+// A page of another site whose name was made to point here (DNS rebinding) sends that name.
+bool Admission::host_allowed(const Request& request) const {
+    return !options_.loopback_names || names_loopback(request[http::field::host]);
+}
+
+// Whether a page, if it is one that asks, may do so; other programs name no origin.
+bool Admission::origin_allowed(const Request& request) const {
+    const auto origin = request[http::field::origin];
+    if (origin.empty() || host_of_origin(origin) == request[http::field::host]) return true;
+    if (options_.origins.empty()) return options_.other_sites;
+    return std::find(options_.origins.begin(), options_.origins.end(), origin) != options_.origins.end();
+}
+
+// Whether it comes from a program on this machine. A web page in a browser here is somebody else, and so is who comes
+// through a web server here.
+bool Admission::by_program_here(const Request& request, const Address& address) const {
+    const auto origin = request[http::field::origin];
+    const bool page_elsewhere = !origin.empty() && !names_loopback(host_of_origin(origin));
+    const bool forwarded = request.count("Forwarded") || request.count("X-Forwarded-For") || request.count("Via");
+    return counted_address(address).is_loopback() && !page_elsewhere && !forwarded;
+}
+
+// "" if nothing stands against it.
+std::string Admission::why_not_publish(const Request& request, const std::string& stream,
+                                       const Address& address) const {
+    if (credentials_.publishers) {
+        auto token = std::string(bearer_token(request[http::field::authorization]));
+        if (token.empty()) token = query_value(request.target(), "token").value_or("");
+        if (token.empty()) return "publishing needs a token: Authorization: Bearer TOKEN";
+        return may_publish(*credentials_.publishers, stream, token)
+                   ? ""
+                   : "this token is not that of the stream's publisher";
+    }
+    if (by_program_here(request, address)) return "";
+    return "this hub knows no publishers: only programs on its own machine may publish";
+}
+
+std::optional<Refusal> Admission::refuse_publishing(const Request& request, const std::string& stream,
+                                                    const Address& address) const {
+    if (!is_stream_name(stream)) return Refusal{"name", stream_name_rule, http::status::bad_request};
+    if (!origin_allowed(request)) return Refusal{"origin", "pages of this site may not publish here"};
+    const auto why = why_not_publish(request, stream, address);
+    if (why.empty()) return std::nullopt;
+    if (!credentials_.publishers) return Refusal{"token", why};
+    return Refusal{"token", why, http::status::unauthorized, CloseCode::refused, options_.refusal_delay};
+}
+
+tl::expected<AddressCounts::Place, Refusal> Admission::admit_viewer(const Request& request, const std::string& stream,
+                                                                    bool socket, const Address& address) {
+    if (socket && !origin_allowed(request))
+        return tl::unexpected(Refusal{"origin", "pages of this site may not watch here"});
+    if (auto refusal = refuse_path("watch/" + stream, request)) return tl::unexpected(std::move(*refusal));
+    if (viewers_.at(address) >= options_.viewers_per_address)
+        return tl::unexpected(Refusal{"address", "this address has as many viewers as it may",
+                                      http::status::service_unavailable, CloseCode::try_later});
+    return AddressCounts::Place(viewers_, address);
+}
+
+std::optional<Refusal> Admission::refuse_path(const std::string& path, const Request& request) const {
+    if (!credentials_.link_keys) return std::nullopt;
+    const auto check = check_link(*credentials_.link_keys, path, request.target(), std::chrono::system_clock::now());
+    if (check == LinkCheck::good) return std::nullopt;
+    const char* cause = check == LinkCheck::missing   ? "link_missing"
+                        : check == LinkCheck::expired ? "link_expired"
+                                                      : "link_forged";
+    return Refusal{cause, link_sentence(check)};
+}
+
+std::optional<Refusal> Admission::refuse_lists() const {
+    if (!credentials_.link_keys) return std::nullopt;
+    return Refusal{"link_missing", "this hub tells nobody what there is: it asks for links"};
+}
+
+bool Admission::may_read_metrics(const Request& request, const Address& address) const {
+    return options_.metrics_anyone || by_program_here(request, address);
+}
+
+void Admission::let_others_read(const Request& request, ResponseHeader& header) const {
+    if (options_.origins.empty()) {
+        if (options_.other_sites) header.set(http::field::access_control_allow_origin, "*");
+        return;
+    }
+    header.set(http::field::vary, "Origin");
+    const auto origin = request[http::field::origin];
+    if (std::find(options_.origins.begin(), options_.origins.end(), origin) != options_.origins.end())
+        header.set(http::field::access_control_allow_origin, origin);
+}
+
+}  // namespace htvm::live

@@ -1,0 +1,121 @@
+// Who may: which connections are let in, which requests are answered, who publishes and who watches. A request is
+// judged by where it comes from (its address, and the host and the origin that it names) and by what it shows: a token
+// or a link (live/server/credentials.h). What is answered and how is no business of this file.
+#pragma once
+
+#include <boost/asio/ip/address.hpp>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "htvm/result.hpp"
+#include "live/server/credentials.h"
+#include "live/server/http_request.h"
+#include "live/server/refusals.h"
+#include "live/server/response.h"
+
+namespace htvm::live {
+
+struct AdmissionOptions {
+    bool other_sites = false;            // whether pages of any other site may read the streams (CORS, WebSockets),
+    std::vector<std::string> origins{};  // or, if there are any, those of these sites alone: "https://a.example"
+    bool loopback_names = false;         // refuse requests whose Host is not this machine's loopback address
+    unsigned connections = 512;          // at once; more are closed
+    unsigned connections_per_address = 64;
+    unsigned viewers_per_address = 64;      // of live streams
+    std::chrono::seconds refusal_delay{1};  // for who publishes by a wrong token, so that many cannot be tried
+    bool metrics_anyone = false;            // /metrics for everybody, not for programs on this machine alone
+    // Files (live/server/credentials.h).
+    std::string publishers{};  // who may publish what; "": programs on this machine, anything
+    std::string link_keys{};   // of links, without which nothing can be watched; "": anyone may watch
+};
+
+// What the files say.
+struct Credentials {
+    std::optional<Publishers> publishers{};  // none: programs on this machine
+    std::optional<LinkKeys> link_keys{};     // none: anyone may watch
+};
+// bad_input if one of the files is not as it should be.
+Result<Credentials> read_credentials(const AdmissionOptions& options);
+
+// How many there are from each address. An IPv6 network /64 counts as one address: that is what one customer has at
+// least.
+class AddressCounts {
+public:
+    // One of them, for as long as this lives. The counts must live longer.
+    class Place {
+    public:
+        Place(AddressCounts& counts, const boost::asio::ip::address& address);
+        Place(Place&& other) noexcept : counts_(std::exchange(other.counts_, nullptr)), address_(other.address_) {}
+        Place& operator=(Place&&) = delete;
+        ~Place();
+
+    private:
+        AddressCounts* counts_;  // null: moved from
+        boost::asio::ip::address address_;
+    };
+
+    unsigned at(const boost::asio::ip::address& address) const;
+    unsigned total() const { return total_; }
+
+private:
+    std::map<boost::asio::ip::address, unsigned> counts_;  // none that are 0
+    unsigned total_ = 0;
+};
+
+class Admission {
+public:
+    using Address = boost::asio::ip::address;
+
+    // Until use() nobody but programs on this machine may publish, and everybody may watch.
+    explicit Admission(const AdmissionOptions& options) : options_(options) {}
+    Admission(const Admission&) = delete;
+    Admission& operator=(const Admission&) = delete;
+
+    // From here on these credentials decide.
+    void use(Credentials credentials) { credentials_ = std::move(credentials); }
+    // The server's port, which requests may name behind the host.
+    void listens_on(std::uint16_t port) { port_ = port; }
+
+    // A place for another connection from this address; none if there are too many, from it or in all.
+    std::optional<AddressCounts::Place> admit_connection(const Address& address);
+    unsigned connections() const { return connections_.total(); }
+
+    // Whether the request is for this server by a name that it may be called by.
+    bool host_allowed(const Request& request) const;
+
+    // Why somebody may not publish the stream, if so.
+    std::optional<Refusal> refuse_publishing(const Request& request, const std::string& stream,
+                                             const Address& address) const;
+    // A place for another viewer of the stream. socket: it asks for a WebSocket.
+    tl::expected<AddressCounts::Place, Refusal> admit_viewer(const Request& request, const std::string& stream,
+                                                             bool socket, const Address& address);
+    // Why the request may not read what is at this path, such as "files/anna.htvm", if so: there is need of a link.
+    std::optional<Refusal> refuse_path(const std::string& path, const Request& request) const;
+    // Why nobody may read what streams there are, if so.
+    std::optional<Refusal> refuse_lists() const;
+    bool may_read_metrics(const Request& request, const Address& address) const;
+
+    // Whether pages of other sites, of all or some, may read what is here.
+    bool has_other_sites() const { return options_.other_sites || !options_.origins.empty(); }
+    // Tells the browser whether pages of other sites may read the response (CORS).
+    void let_others_read(const Request& request, ResponseHeader& header) const;
+
+private:
+    bool names_loopback(std::string_view host) const;
+    bool by_program_here(const Request& request, const Address& address) const;
+    bool origin_allowed(const Request& request) const;
+    std::string why_not_publish(const Request& request, const std::string& stream, const Address& address) const;
+
+    AdmissionOptions options_;
+    Credentials credentials_;
+    std::uint16_t port_ = 0;
+    AddressCounts connections_, viewers_;
+};
+
+}  // namespace htvm::live

@@ -1,0 +1,224 @@
+#include "live/server/handlers.h"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+
+#include "live/client/control.h"
+#include "live/server/live_connection.h"
+#include "live/server/metrics.h"
+
+namespace htvm::live {
+namespace {
+
+namespace net = boost::asio;
+namespace http = boost::beast::http;
+
+constexpr auto awaited = net::as_tuple(net::use_awaitable);
+constexpr const char* json_type = "application/json";
+
+// What every response has.
+ResponseHeader common_header(const Site& site) {
+    ResponseHeader header{http::status::ok, 11};
+    header.set("X-Content-Type-Options", "nosniff");
+    header.set("Referrer-Policy", "no-referrer");
+    header.set("Cross-Origin-Resource-Policy", site.admission.has_other_sites() ? "cross-origin" : "same-origin");
+    return header;
+}
+
+// Names of files and streams may be any bytes.
+std::string json_text(const nlohmann::json& json) {
+    return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string file_list(const ServedFiles& files) {
+    nlohmann::json list = nlohmann::json::array();
+    for (const auto& file : files.list()) {
+        nlohmann::json entry = {{"path", file.path}, {"bytes", file.size}};
+        if (!file.poster.empty()) entry["poster"] = file.poster;
+        list.push_back(std::move(entry));
+    }
+    return json_text(list);
+}
+
+std::string stream_list(const Hub& hub) {
+    nlohmann::json list = nlohmann::json::array();
+    for (const auto& stream : hub.streams(Hub::Clock::now())) {
+        nlohmann::json entry = {{"name", stream.name},
+                                {"published", stream.published},
+                                {"far", stream.far},
+                                {"viewers", stream.viewers},
+                                {"viewers_afar", stream.viewers_afar},
+                                {"packets", stream.publisher.packets},
+                                {"bytes", stream.publisher.bytes},
+                                {"damaged_messages", stream.publisher.damaged},
+                                {"undecodable_frames", stream.undecodable_frames},
+                                {"dropped_frames", stream.dropped_frames}};
+        if (stream.header) {
+            if (stream.header->session != 0) entry["session"] = session_text(stream.header->session);
+            entry["frames_per_second"] =
+                static_cast<double>(stream.header->fps_numerator) / static_cast<double>(stream.header->fps_denominator);
+        }
+        if (stream.clock) entry["clock"] = *stream.clock;
+        if (stream.since_packet)
+            entry["seconds_since_packet"] = static_cast<double>(stream.since_packet->count()) / 1000;
+        list.push_back(std::move(entry));
+    }
+    return json_text(list);
+}
+
+std::string metrics(const Site& site) {
+    return metrics_text({.hub = site.hub,
+                         .recorder = site.recorder,
+                         .nats = site.nats ? std::optional(site.nats->counters()) : std::nullopt,
+                         .refused = site.refusals.by_cause(),
+                         .connections = site.admission.connections(),
+                         .started = site.started},
+                        Hub::Clock::now());
+}
+
+// segments: below /files/.
+Response answer_file(const Site& site, const std::vector<std::string>& segments, const Request& request,
+                     ResponseHeader header) {
+    std::string path = "files";
+    for (const auto& segment : segments) path += '/' + segment;
+    site.admission.let_others_read(request, header);
+    if (header.count(http::field::access_control_allow_origin))
+        header.set(http::field::access_control_expose_headers, "Content-Range, ETag");
+    if (const auto refusal = site.admission.refuse_path(path, request)) {
+        site.refusals.count(refusal->cause);
+        return refusing_response(*refusal, std::move(header));
+    }
+    auto file = site.files.file(segments);
+    if (!file) return empty_response(http::status::not_found, std::move(header));
+    header.set(http::field::etag, file->tag);
+    header.set(http::field::accept_ranges, "bytes");
+    header.set(http::field::cache_control, "no-cache");  // kept, but asked for again whether it is still the same
+    if (names_tag(request[http::field::if_none_match], file->tag))
+        return empty_response(http::status::not_modified, std::move(header));
+    const auto condition = request[http::field::if_range];
+    const bool ranges = condition.empty() || condition == file->tag;
+    const auto part = requested_part(ranges ? request[http::field::range] : "", file->size);
+    if (part.kind == FilePart::Kind::beyond) {
+        header.set(http::field::content_range, "bytes */" + std::to_string(file->size));
+        return empty_response(http::status::range_not_satisfiable, std::move(header));
+    }
+    if (part.kind == FilePart::Kind::part) {
+        header.result(http::status::partial_content);
+        header.set(http::field::content_range, "bytes " + std::to_string(part.first) + '-' +
+                                                   std::to_string(part.first + part.count - 1) + '/' +
+                                                   std::to_string(file->size));
+    }
+    header.set(http::field::content_type, media_type(segments.back()));
+    return {.header = std::move(header), .file = std::move(*file), .first = part.first, .count = part.count};
+}
+
+Response answer_page(const Site& site, const std::string& name, const Request& request, ResponseHeader header) {
+    const auto found = site.pages.find(name);
+    if (found == site.pages.end()) return empty_response(http::status::not_found, std::move(header));
+    return page_response(found->second, request, std::move(header));
+}
+
+Response answer_health(const Site& site, ResponseHeader header) {
+    if (site.ending) header.result(http::status::service_unavailable);
+    return text_response(site.ending ? "ending\n" : "ok\n", "text/plain; charset=utf-8", std::move(header));
+}
+
+// Answers with a sentence and ends the connection.
+net::awaitable<void> refuse(const Site& site, Line line, ResponseHeader header, Refusal refusal) {
+    auto response = refusing_response(refusal, std::move(header));
+    response.header.keep_alive(false);
+    co_await send(line, response, true, site.stall_time);
+    co_await line.close();
+}
+
+net::awaitable<void> publish(const Site& site, Line line, Request request, std::string stream,
+                             net::ip::address address) {
+    const auto refusal = site.admission.refuse_publishing(request, stream, address);
+    if (!refusal) {
+        co_await publish_by_socket(std::move(line), std::move(request), std::move(stream), *site.hub);
+        co_return;
+    }
+    site.refusals.tell(*refusal, stream, address);
+    auto header = common_header(site);
+    if (refusal->status == http::status::unauthorized) header.set(http::field::www_authenticate, "Bearer");
+    if (refusal->delay.count() > 0) {
+        net::steady_timer delay(line.get_executor(), refusal->delay);
+        co_await delay.async_wait(awaited);
+    }
+    co_await refuse(site, std::move(line), std::move(header), *refusal);
+}
+
+net::awaitable<void> watch(const Site& site, Line line, Request request, Route route, net::ip::address address) {
+    auto header = common_header(site);
+    site.admission.let_others_read(request, header);
+    const auto place = site.admission.admit_viewer(request, route.name, route.socket, address);
+    if (!place) {
+        const auto refusal = place.error();
+        site.refusals.tell(refusal, route.name, address);
+        // A browser tells a page nothing of a WebSocket that was refused before it was opened.
+        if (route.socket)
+            co_await refuse_socket(std::move(line), std::move(request), refusal.code, refusal.why);
+        else
+            co_await refuse(site, std::move(line), std::move(header), refusal);
+        co_return;
+    }
+    if (route.socket) {
+        co_await watch_by_socket(std::move(line), std::move(request), std::move(route.name), *site.hub);
+    } else {
+        co_await watch_by_body(line, std::move(header), std::move(route.name), *site.hub);
+        co_await line.close();
+    }
+}
+
+}  // namespace
+
+Response answer(const Site& site, const Route& route, const Request& request, const net::ip::address& address) {
+    auto header = common_header(site);
+    if (!site.admission.host_allowed(request))
+        return empty_response(http::status::misdirected_request, std::move(header));
+    switch (route.handler) {
+        case Handler::wrong_method:
+            header.set(http::field::allow, "GET, HEAD");
+            return empty_response(http::status::method_not_allowed, std::move(header));
+        case Handler::bad_path:
+            return empty_response(http::status::bad_request, std::move(header));
+        case Handler::page:
+            return answer_page(site, "index.html", request, std::move(header));
+        case Handler::player_file:
+            return answer_page(site, route.name, request, std::move(header));
+        case Handler::file:
+            return answer_file(site, route.path, request, std::move(header));
+        case Handler::file_list:
+            if (const auto refusal = site.admission.refuse_lists())
+                return refusing_response(*refusal, std::move(header));
+            return text_response(file_list(site.files), json_type, std::move(header));
+        case Handler::stream_list:
+            if (const auto refusal = site.admission.refuse_lists())
+                return refusing_response(*refusal, std::move(header));
+            return text_response(site.hub ? stream_list(*site.hub) : "null", json_type, std::move(header));
+        case Handler::health:
+            return answer_health(site, std::move(header));
+        case Handler::metrics:
+            if (!site.admission.may_read_metrics(request, address))
+                return empty_response(http::status::forbidden, std::move(header));
+            return text_response(metrics(site), metrics_type, std::move(header));
+        case Handler::publish:
+        case Handler::watch:  // carry() does
+        case Handler::nothing:
+            break;
+    }
+    return empty_response(http::status::not_found, std::move(header));
+}
+
+net::awaitable<void> carry(const Site& site, Line line, Request request, Route route, net::ip::address address) {
+    if (route.handler == Handler::publish)
+        co_await publish(site, std::move(line), std::move(request), std::move(route.name), address);
+    else
+        co_await watch(site, std::move(line), std::move(request), std::move(route), address);
+}
+
+}  // namespace htvm::live

@@ -1,0 +1,44 @@
+// What answers requests, once routing.h has said which handler. Each asks Admission whether it may. Some send one
+// response, and the connection goes on; those for live streams have the connection to its end.
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/address.hpp>
+#include <chrono>
+
+#include "live/client/line.h"
+#include "live/hub/hub.h"
+#include "live/hub/nats_peering.h"
+#include "live/server/admission.h"
+#include "live/server/http_request.h"
+#include "live/server/player_pages.h"
+#include "live/server/recorder.h"
+#include "live/server/refusals.h"
+#include "live/server/response.h"
+#include "live/server/routing.h"
+#include "live/server/served_files.h"
+
+namespace htvm::live {
+
+// What the handlers answer from. They change nothing of it but what is called: admission, refusals and the hub.
+struct Site {
+    Admission& admission;
+    Refusals& refusals;
+    ServedFiles files{};
+    PlayerPages pages{};
+    Hub* hub = nullptr;                  // null: there are no live streams
+    const Recorder* recorder = nullptr;  // null: nothing is recorded
+    const NatsPeering* nats = nullptr;   // null: the hub is joined with no others
+    std::chrono::seconds stall_time{};   // for a client to take the next 64 KB of a response
+    Hub::Clock::time_point started = Hub::Clock::now();
+    bool ending = false;  // the server is
+};
+
+// The response to a request for which there is no live stream to be carried.
+Response answer(const Site& site, const Route& route, const Request& request, const boost::asio::ip::address& address);
+
+// Publishes or watches, or says why not; then the connection has ended. route: a live one.
+boost::asio::awaitable<void> carry(const Site& site, Line line, Request request, Route route,
+                                   boost::asio::ip::address address);
+
+}  // namespace htvm::live

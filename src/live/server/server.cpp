@@ -1,0 +1,296 @@
+#include "live/server/server.h"
+
+#include <netinet/tcp.h>
+
+#include <array>
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/ssl/context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+#include "live/client/control.h"
+#include "live/client/line.h"
+#include "live/server/handlers.h"
+#include "live/server/http_connections.h"
+#include "live/server/recorder.h"
+#include "live/server/refusals.h"
+
+namespace htvm::live {
+namespace {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+using tcp = net::ip::tcp;
+
+constexpr auto awaited = net::as_tuple(net::use_awaitable);
+
+// For TLS 1.2 and 1.3, with the certificate chain and the private key of two PEM files; nothing if there is no
+// certificate. bad_input if they cannot be read or do not belong together.
+Result<std::optional<net::ssl::context>> read_certificate(const ServerOptions& options) {
+    if (options.certificate.empty()) return std::nullopt;
+    net::ssl::context context(net::ssl::context::tls_server);
+    auto* native = context.native_handle();
+    SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION);
+    SSL_CTX_set_options(native, SSL_OP_NO_RENEGOTIATION | SSL_OP_CIPHER_SERVER_PREFERENCE);
+    SSL_CTX_set_mode(native, SSL_MODE_RELEASE_BUFFERS);  // of connections on which nothing is under way
+    beast::error_code error;
+    context.use_certificate_chain_file(options.certificate, error);
+    if (error)
+        return fail(ErrorKind::bad_input,
+                    "no certificate can be read from " + options.certificate + ": " + error.message());
+    context.use_private_key_file(options.private_key, net::ssl::context::pem, error);
+    if (error)
+        return fail(ErrorKind::bad_input,
+                    "no key of that certificate can be read from " + options.private_key + ": " + error.message());
+    return std::optional(std::move(context));
+}
+
+Result<void> listen(tcp::acceptor& acceptor, const ServerOptions& options) {
+    beast::error_code error;
+    const auto address = net::ip::make_address(options.address, error);
+    if (error) return fail(ErrorKind::bad_input, options.address + " is not an IP address");
+    const tcp::endpoint endpoint(address, options.port);
+    acceptor.open(endpoint.protocol(), error);
+    if (!error) acceptor.set_option(net::socket_base::reuse_address(true), error);
+    if (!error) acceptor.bind(endpoint, error);
+    // Connections inherit it.
+    if (const auto& name = options.congestion_control; !error && !name.empty())
+        ::setsockopt(acceptor.native_handle(), IPPROTO_TCP, TCP_CONGESTION, name.data(),
+                     static_cast<socklen_t>(name.size()));
+    if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
+    if (error)
+        return fail(ErrorKind::bad_input, "cannot listen on " + options.address + " port " +
+                                              std::to_string(options.port) + ": " + error.message());
+    return {};
+}
+
+// Records what goes to the viewers of the hub's streams.
+void record(Hub& hub, Recorder& recorder) {
+    const auto sent = [&](const std::string& stream, const SharedPacket& packet, Hub::Clock::time_point now) {
+        if (recorder.record(stream, packet, now, std::chrono::system_clock::now())) hub.ask_for_key_frame(stream, now);
+    };
+    hub.listen({.sent = sent, .ended = [&](const std::string& stream) { recorder.end(stream); }});
+}
+
+// Tells the log how many watch.
+class ViewerReport {
+public:
+    // Nothing if nobody came or left since the last one.
+    std::optional<Event> next(const Hub& hub) {
+        std::size_t watching = 0;
+        const auto streams = hub.streams(Hub::Clock::now());
+        for (const auto& stream : streams) watching += stream.viewers;
+        const auto joined = hub.counters().joined;
+        const auto came = joined - joined_;
+        if (came == 0 && watching == watching_) return std::nullopt;
+        const auto left = watching_ + came - watching;
+        joined_ = joined;
+        watching_ = watching;
+        const auto number = [](std::size_t value) { return static_cast<std::int64_t>(value); };
+        return Event{.name = "viewers",
+                     .text = std::to_string(watching) + " watch " + std::to_string(streams.size()) +
+                             " streams; since the last time " + std::to_string(came) + " came and " +
+                             std::to_string(left) + " left",
+                     .numbers = {{"viewers", number(watching)},
+                                 {"streams", number(streams.size())},
+                                 {"came", number(came)},
+                                 {"left", number(left)}}};
+    }
+
+private:
+    std::size_t joined_ = 0, watching_ = 0;  // as the last one said
+};
+
+}  // namespace
+
+// The lifecycle. What coroutines use comes before the context, which destroys those that have not ended.
+struct Server::State {
+    ServerOptions options;
+    std::optional<net::ssl::context> tls;
+    Refusals refusals{options.log};
+    Admission admission{options.admission};
+    Site site;
+    HttpConnections connections{site, options.header_time};
+    ViewerReport viewers;
+    std::uint16_t port = 0;
+    bool draining = false;
+    net::io_context context{1};
+    tcp::acceptor acceptor{context};
+    std::optional<NatsPeering> nats;  // if the hub is joined with others
+
+    explicit State(const ServerOptions& given)
+        : options(given),
+          site{.admission = admission,
+               .refusals = refusals,
+               .pages = player_pages(),
+               .hub = options.hub,
+               .recorder = options.recorder,
+               .stall_time = options.stall_time} {}
+
+    Result<void> read_access_files();
+    void tell(const Event& event) const {
+        if (options.log) options.log(event);
+    }
+    net::awaitable<void> accept();
+    net::awaitable<void> serve(Line line, net::ip::address address, AddressCounts::Place place);
+    net::awaitable<void> tick_hub();
+    net::awaitable<void> each_second();
+    net::awaitable<void> reload_on_hangup();
+    net::awaitable<void> drain_on_signal();
+};
+
+// All that decides who may and by which certificate, or nothing of it.
+Result<void> Server::State::read_access_files() {
+    auto credentials = read_credentials(options.admission);
+    if (!credentials) return tl::unexpected(credentials.error());
+    auto certificate = read_certificate(options);
+    if (!certificate) return tl::unexpected(certificate.error());
+    admission.use(std::move(*credentials));
+    tls = std::move(*certificate);
+    return {};
+}
+
+net::awaitable<void> Server::State::accept() {
+    for (;;) {
+        auto [error, socket] = co_await acceptor.async_accept(awaited);
+        if (error == net::error::operation_aborted || draining) co_return;
+        if (error) {
+            // Out of file descriptors, most likely: others have to end first.
+            net::steady_timer pause(context, std::chrono::milliseconds(100));
+            co_await pause.async_wait(awaited);
+            continue;
+        }
+        beast::error_code unknown;
+        const auto address = socket.remote_endpoint(unknown).address();
+        auto place = unknown ? std::nullopt : admission.admit_connection(address);
+        if (!place) {
+            refusals.count("connections");
+            continue;
+        }
+        beast::tcp_stream tcp(std::move(socket));
+        Line line = tls ? Line(std::move(tcp), *tls) : Line(std::move(tcp));
+        net::co_spawn(context, serve(std::move(line), address, std::move(*place)), net::detached);
+    }
+}
+
+net::awaitable<void> Server::State::serve(Line line, net::ip::address address, AddressCounts::Place place) {
+    {
+        const auto counted = std::move(place);
+        co_await connections.serve(std::move(line), address);
+    }
+    if (draining && admission.connections() == 0) context.stop();
+}
+
+net::awaitable<void> Server::State::tick_hub() {
+    net::steady_timer timer(context);
+    for (;;) {
+        timer.expires_after(std::chrono::milliseconds(100));
+        co_await timer.async_wait(awaited);
+        options.hub->tick(Hub::Clock::now());
+        if (options.recorder)
+            for (const auto& event : options.recorder->new_events()) tell(event);
+    }
+}
+
+net::awaitable<void> Server::State::each_second() {
+    constexpr int seconds_between_viewers = 60;
+    int seconds_to_viewers = seconds_between_viewers;
+    net::steady_timer timer(context);
+    for (;;) {
+        timer.expires_after(std::chrono::seconds(1));
+        co_await timer.async_wait(awaited);
+        refusals.end_second();
+        if (options.hub && --seconds_to_viewers == 0) {
+            seconds_to_viewers = seconds_between_viewers;
+            if (const auto event = viewers.next(*options.hub)) tell(*event);
+        }
+    }
+}
+
+net::awaitable<void> Server::State::reload_on_hangup() {
+    net::signal_set hangup(context, SIGHUP);
+    for (;;) {
+        co_await hangup.async_wait(awaited);
+        if (const auto read = read_access_files())
+            tell({.name = "reloaded", .text = "certificate, publishers and keys were read again"});
+        else
+            tell({.name = "reload_failed",
+                  .text = read.error().message + "; certificate, publishers and keys stay as they were",
+                  .warning = true});
+    }
+}
+
+net::awaitable<void> Server::State::drain_on_signal() {
+    net::signal_set signals(context, SIGINT, SIGTERM);
+    co_await signals.async_wait(awaited);
+    draining = true;
+    site.ending = true;
+    beast::error_code ignored;
+    acceptor.close(ignored);
+    connections.drain();
+    if (options.hub) options.hub->close_all(CloseCode::shut_down, "the hub shuts down");
+    if (admission.connections() == 0) context.stop();
+    net::steady_timer timer(context, options.drain_time);
+    timer.async_wait([this](const beast::error_code& cancelled) {
+        if (!cancelled) context.stop();
+    });
+    co_await signals.async_wait(awaited);
+    context.stop();
+}
+
+Server::Server(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Server::Server(Server&&) noexcept = default;
+Server& Server::operator=(Server&&) noexcept = default;
+Server::~Server() = default;
+
+Result<Server> Server::open(const ServerOptions& options) {
+    auto state = std::make_unique<State>(options);
+    if (auto read = state->read_access_files(); !read) return tl::unexpected(read.error());
+    auto files = ServedFiles::open(options.folder, options.files);
+    if (!files) return tl::unexpected(files.error());
+    state->site.files = std::move(*files);
+    if (auto listening = listen(state->acceptor, options); !listening) return tl::unexpected(listening.error());
+    state->port = state->acceptor.local_endpoint().port();
+    state->admission.listens_on(state->port);
+    if (options.hub && !options.nats.servers.empty()) {
+        auto nats = NatsPeering::open(options.nats, *options.hub, state->context);
+        if (!nats) return tl::unexpected(nats.error());
+        state->site.nats = &state->nats.emplace(std::move(*nats));
+    }
+    if (options.hub && options.recorder) record(*options.hub, *options.recorder);
+    return Server(std::move(state));
+}
+
+std::uint16_t Server::port() const { return state_->port; }
+
+std::string Server::congestion_control() const {
+    std::array<char, 16> name{};  // TCP_CA_NAME_MAX of the kernel
+    auto size = static_cast<socklen_t>(name.size());
+    ::getsockopt(state_->acceptor.native_handle(), IPPROTO_TCP, TCP_CONGESTION, name.data(), &size);
+    return {name.data(), ::strnlen(name.data(), name.size())};
+}
+
+void Server::run() {
+    auto& state = *state_;
+    const auto& options = state.options;
+    net::co_spawn(state.context, state.accept(), net::detached);
+    net::co_spawn(state.context, state.each_second(), net::detached);
+    if (options.hub) net::co_spawn(state.context, state.tick_hub(), net::detached);
+    net::co_spawn(state.context, state.drain_on_signal(), net::detached);
+    if (!options.certificate.empty() || !options.admission.publishers.empty() || !options.admission.link_keys.empty())
+        net::co_spawn(state.context, state.reload_on_hangup(), net::detached);
+    state.context.run();
+}
+
+void Server::stop() { state_->context.stop(); }
+
+}  // namespace htvm::live
