@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "codec/encoder/tracked/tracking_numbers.h"
+#include "codec/encoder/tracking_numbers.h"
 #include "htvm/encoder.hpp"
 
 namespace htvm::internal {

@@ -6,7 +6,6 @@
 #include "codec/format/frame_kinds.h"
 #include "codec/intra/intra_frame.h"
 #include "codec/reference/reference.h"
-#include "htvm/decoder.hpp"
 
 namespace htvm::internal {
 namespace {
@@ -57,7 +56,7 @@ OutgoingFrame outgoing(const Configuration& configuration, CodedFrame frame, con
             continue;
         }
         packet.flags |= flags_of(frame);
-        out.info = *inspect(packet);
+        out.info = *describe(packet);
         if (rules_of(frame.type).is_run) {
             out.info.source_vertices = frame.captured.vertices;
             out.info.source_triangles = frame.captured.triangles;

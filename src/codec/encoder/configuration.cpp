@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "codec/encoder/tracked/tracking_numbers.h"
+#include "codec/encoder/tracking_numbers.h"
 
 namespace htvm::internal {
 namespace {

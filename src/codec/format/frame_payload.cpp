@@ -112,13 +112,7 @@ FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView&
     return out;
 }
 
-}  // namespace htvm::internal
-
-namespace htvm {
-
-using namespace internal;
-
-Result<FrameInfo> inspect(const Packet& packet) {
+Result<FrameInfo> describe(const Packet& packet) {
     const auto type = frame_type(packet.kind);
     if (!type) return fail(ErrorKind::bad_input, "the packet is not a frame");
     if (rules_of(*type).is_run) return describe(packet, *type);
@@ -126,5 +120,11 @@ Result<FrameInfo> inspect(const Packet& packet) {
     if (!payload) return tl::unexpected(payload.error());
     return describe(packet, *type, *payload);
 }
+
+}  // namespace htvm::internal
+
+namespace htvm {
+
+Result<FrameInfo> inspect(const Packet& packet) { return internal::describe(packet); }
 
 }  // namespace htvm

@@ -62,6 +62,8 @@ LayerBytes with_overhead(LayerBytes layers, const Packet& packet);
 // What a packet of this kind says by itself; and what it says with its payload, where that is no run
 // (FrameRules::is_run).
 FrameInfo describe(const Packet& packet, FrameType type);
+// What inspect() gives.
+Result<FrameInfo> describe(const Packet& packet);
 FrameInfo describe(const Packet& packet, FrameType type, const FramePayloadView& payload);
 
 // The fewest bytes that the payload of an I- or EP-frame of so many vertices and triangles may have: it bounds what a

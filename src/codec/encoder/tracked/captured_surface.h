@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "codec/encoder/tracked/tracking_numbers.h"
+#include "codec/encoder/tracking_numbers.h"
 #include "codec/intra/duplicates.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/lattice.h"

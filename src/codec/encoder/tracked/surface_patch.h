@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "codec/encoder/tracked/captured_surface.h"
-#include "codec/encoder/tracked/tracking_numbers.h"
+#include "codec/encoder/tracking_numbers.h"
 #include "codec/tracked/surface_patch.h"
 #include "core/lattice.h"
 #include "core/length.h"

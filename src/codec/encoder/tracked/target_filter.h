@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "codec/encoder/tracked/captured_surface.h"
-#include "codec/encoder/tracked/tracking_numbers.h"
+#include "codec/encoder/tracking_numbers.h"
 #include "core/length.h"
 #include "htvm/mesh.hpp"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "codec/encoder/tracked/target_filter.h"
-#include "codec/encoder/tracked/tracking_numbers.h"
+#include "codec/encoder/tracking_numbers.h"
 #include "codec/tracked/tracked_frame.h"
 #include "core/length.h"
 #include "core/thread.h"

@@ -14,7 +14,7 @@
 #include "codec/encoder/tracked/captured_surface.h"
 #include "codec/encoder/tracked/tracked_frame.h"
 #include "codec/encoder/tracked/tracking_effort.h"
-#include "codec/encoder/tracked/tracking_numbers.h"
+#include "codec/encoder/tracking_numbers.h"
 #include "codec/reference/reference.h"
 
 namespace htvm::internal {
