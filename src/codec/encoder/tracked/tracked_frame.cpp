@@ -165,7 +165,7 @@ namespace {
 struct FrameSource {
     const LatticeMesh& captured;
     const SurfaceIndex& surface;
-    const TrackedReference& reference;
+    const NodeReference& reference;
     const NodeRegistration& registered;
     const TrackedState* before;
     const TrackedFrameOptions& options;
