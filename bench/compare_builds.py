@@ -9,7 +9,7 @@ BEFORE and AFTER are htvm programs, or what --save kept of one. With BEFORE alon
   --captures A,B,...   which of them, and synth, which is made on the spot (default: those there of samba, liam; synth)
   --frames N           of each capture (default 12)
   --counted N          frames that are encoded and decoded under callgrind (default 3; 0: none). Instructions are those
-                       within Encoder::push and Decoder::push, on one thread; unlike times, they can be compared on a
+                       within Encoder::push and Decoder::decode_copy, on one thread; unlike times, they can be compared on a
                        busy machine
   --save FILE          keeps what was measured of the last build, as JSON
 """
@@ -34,12 +34,13 @@ def run(*command):
 
 
 def function_name(program, begins):
-    """The whole name, as callgrind prints it, of the function whose name begins so."""
-    for line in run("nm", "-C", "--defined-only", program).stdout.splitlines():
-        name = line.split(" ", 2)[2]
-        if name.startswith(begins) and name.endswith(")"):
-            return name
-    sys.exit(f"{program} has no function {begins}...)")
+    """The whole name, as callgrind prints it, of the first function whose name begins in one of these ways."""
+    names = [line.split(" ", 2)[2] for line in run("nm", "-C", "--defined-only", program).stdout.splitlines()]
+    for begin in begins:
+        for name in names:
+            if name.startswith(begin) and name.endswith(")"):
+                return name
+    sys.exit(f"{program} has no function {' or '.join(begins)}...)")
 
 
 def instructions(program, begins, *arguments):
