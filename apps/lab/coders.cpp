@@ -210,7 +210,7 @@ Result<std::vector<char>> encode(const Mesh& mesh, const DracoSettings& settings
     return std::vector<char>(buffer.data(), buffer.data() + buffer.size());
 }
 
-void take_vertices(const draco::PointCloud& cloud, int colour_step, Mesh& mesh) {
+void read_vertices(const draco::PointCloud& cloud, int colour_step, Mesh& mesh) {
     const auto* positions = cloud.GetNamedAttribute(GeometryAttribute::POSITION);
     const auto* colours = cloud.GetNamedAttribute(GeometryAttribute::COLOR);
     mesh.positions.resize(cloud.num_points());
@@ -248,7 +248,7 @@ Result<Mesh> decode(const std::vector<char>& bytes, const DracoSettings& setting
         if (!decoded.ok()) return fail(ErrorKind::corrupt_stream, "Draco cannot decode what it coded");
         cloud = std::move(decoded).value();
     }
-    take_vertices(*cloud, settings.colour_step, mesh);
+    read_vertices(*cloud, settings.colour_step, mesh);
     return mesh;
 }
 

@@ -495,7 +495,7 @@ const Codebook* book_of(const std::optional<NumberedCodebook>& codebook) {
     return codebook ? &codebook->codebook : nullptr;
 }
 
-Result<void> take_intra(OpenDecoder& decoder, const Packet& packet) {
+Result<void> keep_intra(OpenDecoder& decoder, const Packet& packet) {
     const auto payload = read_frame_payload(packet.payload);
     if (!payload) return tl::unexpected(payload.error());
     const auto& header = *decoder.header;
@@ -509,7 +509,7 @@ Result<void> take_intra(OpenDecoder& decoder, const Packet& packet) {
     return {};
 }
 
-Result<void> take_codebook(OpenDecoder& decoder, const Packet& packet) {
+Result<void> keep_codebook(OpenDecoder& decoder, const Packet& packet) {
     auto codebook = read_codebook_payload(packet.payload);
     if (!codebook) return tl::unexpected(codebook.error());
     (codebook->purpose == codebook_for_geometry ? decoder.geometry_codebook : decoder.colour_codebook) =
@@ -575,16 +575,16 @@ Result<std::optional<SeamStages>> take_apart(const OpenDecoder& decoder, const P
     return std::optional<SeamStages>(std::move(out));
 }
 
-Result<std::optional<SeamStages>> take(OpenDecoder& decoder, const Packet& packet) {
+Result<std::optional<SeamStages>> stages_of(OpenDecoder& decoder, const Packet& packet) {
     Result<void> taken;
     if (packet.kind == PacketKind::sequence) {
         auto header = read_sequence_header(packet.payload);
         if (!header) return tl::unexpected(header.error());
         decoder.header = std::move(*header);
     } else if (packet.kind == PacketKind::intra) {
-        taken = take_intra(decoder, packet);
+        taken = keep_intra(decoder, packet);
     } else if (packet.kind == PacketKind::codebook) {
-        taken = take_codebook(decoder, packet);
+        taken = keep_codebook(decoder, packet);
     } else if (packet.kind == PacketKind::enhanced) {
         return take_apart(decoder, packet);
     }
@@ -611,7 +611,7 @@ Result<std::vector<SeamStages>> code_in_stages(const std::vector<std::shared_ptr
         const auto pushed = encoder->push(frame->mesh, frame->pose ? &*frame->pose : nullptr, frame->timestamp_us);
         if (!pushed) return tl::unexpected(pushed.error());
         while (auto packet = encoder->pull()) {
-            auto stages = take(decoder, *packet);
+            auto stages = stages_of(decoder, *packet);
             if (!stages) return tl::unexpected(stages.error());
             if (!*stages) continue;
             (*stages)->frame = frame->index;

@@ -38,12 +38,12 @@ template <class Piece>
 void run_pieces(Threads threads, std::size_t pieces, const Piece& piece) {
     FirstFailure failure;
     std::atomic<std::size_t> next = 0;
-    const auto take_pieces = [&](std::size_t) {
+    const auto run_those_left = [&](std::size_t) {
         for (std::size_t p = next++; p < pieces; p = next++) failure.guard([&] { piece(p); });
     };
-    const std::function<void(std::size_t)> task = std::ref(take_pieces);
+    const std::function<void(std::size_t)> task = std::ref(run_those_left);
     failure.guard([&] { (*threads.runner)(std::min<std::size_t>(threads.count, pieces), task); });
-    take_pieces(0);  // what a failed runner has left
+    run_those_left(0);  // what a failed runner has left
     failure.rethrow();
 }
 

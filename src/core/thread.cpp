@@ -66,7 +66,7 @@ public:
             Job job{task, tasks};
             post(job);
             task(0);
-            for (std::size_t t = take(job); t < tasks; t = take(job)) task(t);
+            for (std::size_t t = next_task(job); t < tasks; t = next_task(job)) task(t);
             await(job);
         } else {
             for (std::size_t t = 0; t < tasks; ++t) task(t);
@@ -95,7 +95,7 @@ private:
     }
 
     // The next task, or job.tasks if there is none left. The mutex must be locked.
-    std::size_t take_locked(Job& job) {
+    std::size_t next_task_locked(Job& job) {
         if (job.next == job.tasks) return job.tasks;
         const std::size_t t = job.next++;
         if (job.next == job.tasks) {
@@ -107,9 +107,9 @@ private:
         return t;
     }
 
-    std::size_t take(Job& job) {
+    std::size_t next_task(Job& job) {
         const std::lock_guard lock(mutex_);
-        return take_locked(job);
+        return next_task_locked(job);
     }
 
     void await(Job& job) {
@@ -126,7 +126,7 @@ private:
         while (!ending_) {
             if (newest_) {
                 Job& job = *newest_;
-                const std::size_t t = take_locked(job);
+                const std::size_t t = next_task_locked(job);
                 job.running.fetch_add(1, std::memory_order_relaxed);
                 lock.unlock();
                 job.task(t);

@@ -1024,8 +1024,8 @@ Compared around_limb(const DeformableMesh& mesh, const SurfaceIndex& target, con
 
 }  // namespace
 
-bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
-                       const DeformationOptions& options, std::vector<RigidMotion>& motions, DeformationForm* form) {
+bool follow_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
+                         const DeformationOptions& options, std::vector<RigidMotion>& motions, DeformationForm* form) {
     const Limit limit{.reach = options.scale.on_lattice(options.near_reach), .agreement = options.agreement};
     std::vector<bool> differs(motions.size());
     for (std::size_t h = 0; h < motions.size(); ++h) differs[h] = is_elsewhere(mesh, h, motions[h], other[h], options);

@@ -56,9 +56,9 @@ std::vector<RigidMotion> moved_on(const DeformableMesh& mesh, std::span<const Ri
 // Parts of the reference that `other`, another registration to the same target, takes elsewhere follow it where they
 // lie nearer to the target then, by deformation_error(); the whole is settled once more. Gives whether any did.
 // motions: one per handle. form: as above, if any did.
-bool take_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
-                       const DeformationOptions& options, std::vector<RigidMotion>& motions,
-                       DeformationForm* form = nullptr);
+bool follow_nearer_limbs(const DeformableMesh& mesh, const SurfaceIndex& target, std::span<const RigidMotion> other,
+                         const DeformationOptions& options, std::vector<RigidMotion>& motions,
+                         DeformationForm* form = nullptr);
 
 // Mean distance of the samples to the target's planes and of the target's samples to the reference, each limited to
 // near_reach; by this the encoder chooses between starts.

@@ -63,14 +63,14 @@ public:
         // All of it goes in, and what comes out is taken meanwhile; of a sound temporal unit that is one picture.
         while (data.sz > 0) {
             const int sent = dav1d_send_data(context_, &data);
-            const auto [taken, error] = take_pictures(last);
+            const auto [taken, error] = receive_pictures(last);
             if ((sent < 0 && sent != DAV1D_ERR(EAGAIN)) || error || (sent < 0 && !taken)) {
                 dav1d_data_unref(&data);
                 dav1d_flush(context_);
                 return corrupt("it is no sound AV1");
             }
         }
-        if (take_pictures(last).error) {
+        if (receive_pictures(last).error) {
             dav1d_flush(context_);
             return corrupt("it is no sound AV1");
         }
@@ -91,10 +91,10 @@ public:
 
 private:
     Av1() = default;
-    struct Taken {
+    struct Received {
         bool any, error;
     };
-    Taken take_pictures(std::shared_ptr<Dav1dPicture>& last) {
+    Received receive_pictures(std::shared_ptr<Dav1dPicture>& last) {
         for (bool any = false;; any = true) {
             auto picture = std::shared_ptr<Dav1dPicture>(new Dav1dPicture{}, [](Dav1dPicture* one) {
                 dav1d_picture_unref(one);
@@ -219,7 +219,7 @@ struct PictureDecoder::State {
         return vp9->decode(read.coded);
     }
 
-    Result<void> take_video(const TexturePicture& read, const PacketHeader& header) {
+    Result<void> show_video(const TexturePicture& read, const PacketHeader& header) {
         if (!is_key_picture(header) && (goes_on != read.coder || referred != header.reference))
             return corrupt("the one that it needs, of frame " + std::to_string(header.reference) + ", is not there");
         goes_on.reset();
@@ -237,7 +237,7 @@ struct PictureDecoder::State {
         return {};
     }
 
-    Result<void> take_file(const TexturePicture& read) {
+    Result<void> show_file(const TexturePicture& read) {
         if (!options.read_image_file)
             return fail(ErrorKind::unsupported,
                         std::string("picture: ") + name_of(read.coder) + " files are not read here");
@@ -272,7 +272,7 @@ Result<void> PictureDecoder::decode(const Packet& packet) {
     if (!read) return tl::unexpected(read.error());
     if (read->width > its.options.largest_side || read->height > its.options.largest_side)
         return fail(ErrorKind::limit, "picture: it is larger than allowed");
-    auto taken = is_video(read->coder) ? its.take_video(*read, packet) : its.take_file(*read);
+    auto taken = is_video(read->coder) ? its.show_video(*read, packet) : its.show_file(*read);
     if (!taken) return taken;
     its.picture = *read;
     its.picture.coded = {};

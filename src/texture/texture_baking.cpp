@@ -466,14 +466,14 @@ Result<BakedTexture> TextureBaker::bake(const TexturedMesh& captured, const Mesh
         for (std::size_t l = 0; l < 256; ++l)
             level[c][l] =
                 static_cast<std::uint8_t>(std::clamp(std::lround(static_cast<double>(l) / out.gains[c]), 0L, 255L));
-    const auto take = [&](Texel texel) {
+    const auto keep = [&](Texel texel) {
         for (std::size_t c = 0; c < 3; ++c) picture_.rgb[3 * texel + c] = level[c][drawn_.rgb[3 * texel + c]];
         is_known_[texel] = 1;
     };
     std::size_t seen = 0;
     for (const auto texel : layout_.inside) {
         if (nearness_[texel] == undrawn) continue;
-        take(texel);
+        keep(texel);
         ++seen;
     }
     out.seen = layout_.inside.empty() ? 0 : static_cast<double>(seen) / static_cast<double>(layout_.inside.size());
@@ -484,7 +484,7 @@ Result<BakedTexture> TextureBaker::bake(const TexturedMesh& captured, const Mesh
     }
     for (const auto& [texel, source] : layout_.gutter) {
         if (nearness_[texel] != undrawn) {
-            take(texel);
+            keep(texel);
             continue;
         }
         for (std::size_t c = 0; c < 3; ++c) picture_.rgb[3 * texel + c] = picture_.rgb[3 * source + c];

@@ -377,12 +377,12 @@ TEST(TakeNearerLimbs, TakesThePartThatLiesNearerAndLeavesTheRest) {
     std::vector<RigidMotion> motions(9), other(9);
     motions[7] = motions[8] = away;         // this has lost one end,
     other[0] = other[1] = other[2] = away;  // this the other
-    EXPECT_TRUE(take_nearer_limbs(mesh, target, other, options, motions));
+    EXPECT_TRUE(follow_nearer_limbs(mesh, target, other, options, motions));
     EXPECT_LT(rest_after(mesh, target, motions).rms, 0.3);
     for (std::size_t h = 0; h < motions.size(); ++h)
         EXPECT_LT((motions[h](mesh.handles[h]) - mesh.handles[h]).norm(), 5) << h;
     const auto settled = motions;
-    EXPECT_FALSE(take_nearer_limbs(mesh, target, other, options, motions));
+    EXPECT_FALSE(follow_nearer_limbs(mesh, target, other, options, motions));
     EXPECT_EQ(motions[0].shift, settled[0].shift);
 }
 
@@ -413,7 +413,7 @@ TEST(ReachedForExtremities, FindsALimbThatClosestPointsLose) {
     auto near = options;
     near.coarse_rounds = 0;
     const auto other = register_deformation(mesh, target, reached, near);
-    EXPECT_TRUE(take_nearer_limbs(mesh, target, other, options, motions));
+    EXPECT_TRUE(follow_nearer_limbs(mesh, target, other, options, motions));
     EXPECT_LT(rms_from_triangles(mesh, target, motions), 6);
 }
 

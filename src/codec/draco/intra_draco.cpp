@@ -71,8 +71,8 @@ Result<std::vector<std::uint8_t>> encode(const LatticeMesh& mesh) {
 }
 
 template <class Value>
-bool take(const draco::PointCloud& cloud, const draco::PointAttribute* attribute, std::size_t components,
-          draco::DataType type, std::vector<Value>& out) {
+bool read_values(const draco::PointCloud& cloud, const draco::PointAttribute* attribute, std::size_t components,
+                 draco::DataType type, std::vector<Value>& out) {
     if (!attribute) return true;
     if (attribute->num_components() != static_cast<int>(components) || attribute->data_type() != type) return false;
     out.resize(cloud.num_points());
@@ -111,12 +111,14 @@ Result<LatticeMesh> decode(std::span<const std::uint8_t> bytes) {
         }
         using draco::GeometryAttribute;
         const auto* positions = cloud->GetNamedAttribute(GeometryAttribute::POSITION);
-        bool sound = positions && take(*cloud, positions, 3, draco::DT_INT32, mesh.positions) &&
-                     take(*cloud, cloud->GetNamedAttribute(GeometryAttribute::COLOR), 3, draco::DT_UINT8, mesh.colours);
+        bool sound =
+            positions && read_values(*cloud, positions, 3, draco::DT_INT32, mesh.positions) &&
+            read_values(*cloud, cloud->GetNamedAttribute(GeometryAttribute::COLOR), 3, draco::DT_UINT8, mesh.colours);
         for (int i = 0; sound && i < cloud->NumNamedAttributes(GeometryAttribute::GENERIC); ++i) {
             const auto* attribute = cloud->GetNamedAttribute(GeometryAttribute::GENERIC, i);
-            sound = attribute->num_components() == 3 ? take(*cloud, attribute, 3, draco::DT_INT32, mesh.normals)
-                                                     : take(*cloud, attribute, 2, draco::DT_INT32, mesh.texcoords);
+            sound = attribute->num_components() == 3
+                        ? read_values(*cloud, attribute, 3, draco::DT_INT32, mesh.normals)
+                        : read_values(*cloud, attribute, 2, draco::DT_INT32, mesh.texcoords);
         }
         if (!sound) return corrupt;
     } catch (const std::bad_alloc&) {

@@ -68,14 +68,14 @@ std::array<std::int64_t, std::tuple_size_v<Value>> predict(const std::vector<Val
                                                            const AttributeSource<Value>& source, std::size_t rank,
                                                            AttributePredictor predictor) {
     std::array<std::int64_t, std::tuple_size_v<Value>> out{};
-    const auto take = [&](const Value& value) { std::copy(value.begin(), value.end(), out.begin()); };
+    const auto predict_by = [&](const Value& value) { std::copy(value.begin(), value.end(), out.begin()); };
     const bool by_mesh = predictor != AttributePredictor::previous && predictor != AttributePredictor::given &&
                          !source.neighbours->neighbours_of(rank).empty();
     if (by_mesh) return predict_from_mesh(values, *source.neighbours, rank, predictor);
     if (predictor == AttributePredictor::given)
-        take((*source.given)[rank]);
+        predict_by((*source.given)[rank]);
     else if (rank > 0)
-        take(values[source.vertex_at(rank - 1)]);
+        predict_by(values[source.vertex_at(rank - 1)]);
     return out;
 }
 

@@ -157,8 +157,8 @@ std::uint8_t decoded_weight_for(std::int32_t step) {
 }
 
 // Enters a colour that both sides know, if it is one.
-bool take_known(std::span<const std::uint8_t> known, std::span<const Colour> colours, std::uint32_t vertex,
-                ColourHistory& history) {
+bool enter_known(std::span<const std::uint8_t> known, std::span<const Colour> colours, std::uint32_t vertex,
+                 ColourHistory& history) {
     if (known.empty() || known[vertex] == 0) return false;
     for (std::size_t k = 0; k < 3; ++k)
         history.level[vertex][k] = static_cast<std::int16_t>(16 * colours[vertex][colour_order[k]]);
@@ -185,7 +185,7 @@ void write_colours(std::vector<Colour>& colours, const ColourSource& source, con
     Followed rows(source.ordered);
     for (std::size_t rank = 0; rank < end; ++rank) {
         rows.wait_beyond(rank);
-        if (!take_known(source.known, colours, neighbours.order[rank], history))
+        if (!enter_known(source.known, colours, neighbours.order[rank], history))
             code_colour(coder, std::span(colours), source.positions, neighbours, rank, predictor, source.step, history,
                         *contexts);
     }
@@ -257,7 +257,7 @@ Result<std::vector<Colour>> decode_intra_colours(std::span<const std::uint8_t> b
     for (std::size_t rank = 0; rank < vertex_count; ++rank) {
         others.wait_beyond(rank);
         const auto v = neighbours.order[rank];
-        if (take_known(known.is, known.value, v, history)) {
+        if (enter_known(known.is, known.value, v, history)) {
             colours[v] = known.value[v];
             continue;
         }

@@ -484,8 +484,8 @@ VertexWeights weights_of(const NearNodes& list, Distance spacing) {
 }
 
 // Vertices that no node reaches are assigned to the node nearest in space, of equally near ones the lower.
-void take_nearest_in_space(std::span<const LatticePoint> positions, const std::vector<std::uint32_t>& nodes,
-                           std::vector<NearNodes>& lists) {
+void assign_nearest_in_space(std::span<const LatticePoint> positions, const std::vector<std::uint32_t>& nodes,
+                             std::vector<NearNodes>& lists) {
     for (std::size_t v = 0; v < positions.size(); ++v) {
         if (lists[v].count > 0) continue;
         std::pair<std::int64_t, std::size_t> best{std::numeric_limits<std::int64_t>::max(), 0};
@@ -522,7 +522,7 @@ void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>&
     std::vector<std::uint32_t> from(count, 0);
     std::vector<bool> inside(count, false);
     std::vector<NodePair> added;
-    auto take_group = [&](std::uint32_t group) {
+    auto add_group = [&](std::uint32_t group) {
         for (std::uint32_t n = 0; n < count; ++n) {
             if (groups.of(n) != group) continue;
             inside[n] = true;
@@ -534,7 +534,7 @@ void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>&
             }
         }
     };
-    take_group(groups.of(0));
+    add_group(groups.of(0));
     for (;;) {
         std::uint32_t next = 0;
         bool found = false;
@@ -543,7 +543,7 @@ void connect_groups(std::span<const LatticePoint> places, std::vector<NodePair>&
         if (!found) break;
         added.push_back({static_cast<std::uint16_t>(std::min(next, from[next])),
                          static_cast<std::uint16_t>(std::max(next, from[next]))});
-        take_group(groups.of(next));
+        add_group(groups.of(next));
     }
     pairs.insert(pairs.end(), added.begin(), added.end());  // of different groups, so there are no repeats
     std::sort(pairs.begin(), pairs.end());
@@ -593,7 +593,7 @@ DeformationNodes choose_deformation_nodes(std::span<const LatticePoint> position
         covered = cover_all(graph, {}, static_cast<Distance>(spacing), most, cover);
     }
     nodes.near = nearest_nodes(graph, cover.nodes, goes_on ? kept : KeptNodes{});
-    if (!covered) take_nearest_in_space(positions, cover.nodes, nodes.near);
+    if (!covered) assign_nearest_in_space(positions, cover.nodes, nodes.near);
 
     nodes.vertex = std::move(cover.nodes);
     nodes.searched = cover.searched;

@@ -134,8 +134,8 @@ struct MotionPrefix {
     bool history = false, surface = false;
 };
 
-// Takes it off the layer.
-Result<MotionPrefix> take_motion_prefix(std::span<const std::uint8_t>& layer) {
+// What is read is cut off the layer.
+Result<MotionPrefix> read_motion_prefix(std::span<const std::uint8_t>& layer) {
     if (layer.size() < 3 || layer[0] > (history_flag | surface_flag) || layer[1] > NodeMotionSteps::most_rotation ||
         layer[2] > NodeMotionSteps::most_shift)
         return fail(ErrorKind::corrupt_stream, "node motion layer: its flags or steps are out of range");
@@ -149,7 +149,7 @@ struct FieldPrefix {
     bool history = false;
 };
 
-Result<FieldPrefix> take_field_prefix(std::span<const std::uint8_t>& layer, std::size_t components) {
+Result<FieldPrefix> read_field_prefix(std::span<const std::uint8_t>& layer, std::size_t components) {
     ByteReader reader(layer);
     const std::uint8_t flags = reader.u8();
     FieldPrefix out;
@@ -210,21 +210,21 @@ Result<void> decode_tracked_layers(const FramePayloadView& payload, const NodeRe
     LayerSources from;
     from.head.captured = {header.source_vertices, header.source_triangles};
 
-    const auto of_motion = take_motion_prefix(motion);
+    const auto of_motion = read_motion_prefix(motion);
     if (!of_motion) return tl::unexpected(of_motion.error());
     from.head.motion = of_motion->steps;
     if (!of_motion->surface) from.syntax = NodeMotionSyntax::axes_of_space;
     if (of_motion->history && !before && !reference.graph.pivots.empty()) return no_frame_before("node motion layer");
     if (of_motion->history && before) from.motion_before = before->transforms;
 
-    const auto of_displacement = take_field_prefix(displacement, 1);
+    const auto of_displacement = read_field_prefix(displacement, 1);
     if (!of_displacement) return tl::unexpected(of_displacement.error());
     from.head.displacement = of_displacement->steps;
     if (of_displacement->history && !before) return no_frame_before("displacement layer");
     if (of_displacement->history) from.displacement_before = &before->displacement;
 
     if (!mesh.colours.empty()) {
-        const auto of_colour = take_field_prefix(colour, 3);
+        const auto of_colour = read_field_prefix(colour, 3);
         if (!of_colour) return tl::unexpected(of_colour.error());
         from.head.colour = of_colour->steps;
         if (of_colour->history && !before) return no_frame_before("colour layer");

@@ -297,16 +297,16 @@ public:
         low_ = low;
         width_ = static_cast<std::int32_t>((high[0] - low[0]) / cell_) + 2;
         height_ = static_cast<std::int32_t>((high[1] - low[1]) / cell_) + 2;
-        taken_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), false);
+        covered_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), false);
     }
 
     bool hides(std::uint32_t t) const {
         bool out = false;
-        cells(t, [&](std::size_t at) { out = out || taken_[at]; });
+        cells(t, [&](std::size_t at) { out = out || covered_[at]; });
         return out;
     }
-    void take(std::uint32_t t) {
-        cells(t, [&](std::size_t at) { taken_[at] = true; });
+    void cover(std::uint32_t t) {
+        cells(t, [&](std::size_t at) { covered_[at] = true; });
     }
 
 private:
@@ -328,7 +328,7 @@ private:
     double cell_ = 1;
     std::array<double, 2> low_{};
     std::int32_t width_ = 0, height_ = 0;
-    std::vector<bool> taken_;
+    std::vector<bool> covered_;
 };
 
 // Whether all of them are seen from the direction, and none hides another.
@@ -339,7 +339,7 @@ bool lie_side_by_side(const Faces& faces, const Mesh2& mesh, std::span<const std
     Shadow shadow(mesh, frame_of(direction), of);
     for (const auto t : of) {
         if (shadow.hides(t)) return false;
-        shadow.take(t);
+        shadow.cover(t);
     }
     return true;
 }
@@ -363,7 +363,7 @@ void cut_overlaps(const Faces& faces, const Mesh2& mesh, Labels& labels, std::ui
                 out.push_back(t);
                 return false;
             }
-            shadow.take(t);
+            shadow.cover(t);
             return true;
         };
         // From the middle on, so that what is cut off hangs together.

@@ -97,7 +97,7 @@ void learn(FrameSizeModel& model, const FrameCost& frame) {
 
 RateController::RateController(const RateControlOptions& options, std::vector<FrameCost> first_pass)
     : options_(sane(options)), first_pass_(std::move(first_pass)) {
-    take_line();
+    follow_bitrate();
     level_ = (options_.lowest_quality + options_.highest_quality) / 2;
     model_.intra_extra = options_.intra_extra;
     // Before any frame is seen, assume as many I-frames as the key interval asks for.
@@ -117,7 +117,7 @@ RateController::RateController(const RateControlOptions& options, std::vector<Fr
     }
 }
 
-void RateController::take_line() {
+void RateController::follow_bitrate() {
     per_frame_ = options_.bits_per_second / options_.frames_per_second;
     capacity_ = options_.bits_per_second * options_.buffer_seconds;
     // With a large buffer there is no need to follow small changes.
@@ -128,7 +128,7 @@ void RateController::change_rate(double bits_per_second) {
     const double before = options_.bits_per_second;
     if (!std::isfinite(bits_per_second) || !(bits_per_second > 0) || bits_per_second == before) return;
     options_.bits_per_second = bits_per_second;
-    take_line();
+    follow_bitrate();
     plan_.clear();
     // A slower line has more waiting than it may have: dropping frames until that is gone would stop the picture, so
     // the line is taken to begin half full. What it did not carry before is not made up for.

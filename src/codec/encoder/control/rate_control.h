@@ -79,7 +79,7 @@ public:
     void change_rate(double bits_per_second);
 
 private:
-    void take_line();            // what follows from the bitrate
+    void follow_bitrate();       // what follows from the bitrate
     double wanted_bits() const;  // per frame on average, from now on
     double live_quality(FrameType type) const;
     double planned_quality() const;

@@ -54,7 +54,7 @@ double price_of_motion(const DeformationForm& form, const TrackedFrameOptions& o
 }
 
 // What was taken off, as long as the values can be coded without it.
-void take_off(std::vector<std::int32_t>& values, const std::vector<std::int32_t>& noise) {
+void subtract(std::vector<std::int32_t>& values, const std::vector<std::int32_t>& noise) {
     for (std::size_t i = 0; i < noise.size(); ++i)
         values[i] = std::clamp(values[i] - noise[i], -field_limit, field_limit);
 }
@@ -148,7 +148,7 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
     bool any = false;
     for (std::size_t i = 0; i < others.size(); ++i)
         if (i != registered.start &&
-            take_nearer_limbs(deformable, surface, others[i], options, registered.motion, &registered.form))
+            follow_nearer_limbs(deformable, surface, others[i], options, registered.motion, &registered.form))
             any = true;
     const auto reached =
         reached_for_extremities(deformable, surface, registered.motion, starts.last, {.scale = options.scale});
@@ -156,7 +156,7 @@ bool follow_lost_limbs(const DeformableMesh& deformable, const SurfaceIndex& sur
     auto near = options;  // the body is where it should be already
     near.coarse_rounds = 0;
     const auto other = register_deformation(deformable, surface, reached, near);
-    return take_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form) || any;
+    return follow_nearer_limbs(deformable, surface, other, options, registered.motion, &registered.form) || any;
 }
 
 namespace {
@@ -211,8 +211,8 @@ void denoise(const TargetFilterOptions& how, const FrameSource& source, const Ta
     else
         out.targets = filter_targets(targets, source.reference.mesh.triangles, history, how);
     if (!options.keeps_noise) return;
-    take_off(out.noise.targets.displacement, targets.displacement);
-    take_off(out.noise.targets.colours, targets.colours);
+    subtract(out.noise.targets.displacement, targets.displacement);
+    subtract(out.noise.targets.colours, targets.colours);
 }
 
 struct CodedFields {
@@ -300,8 +300,8 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
         denoise(*options.denoise, source, targets_before, targets, out);
         clock.done("denoising");
     } else if (options.noise) {
-        take_off(targets.displacement, options.noise->targets.displacement);
-        take_off(targets.colours, options.noise->targets.colours);
+        subtract(targets.displacement, options.noise->targets.displacement);
+        subtract(targets.colours, options.noise->targets.colours);
     }
     // With motion alone, a step so large that every difference from the prediction becomes zero.
     const auto step = options.motion_alone ? LatticeUnits(field_limit) : options.geometry_step;
