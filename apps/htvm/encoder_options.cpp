@@ -221,9 +221,7 @@ void add_scene_options(CLI::App& command, EncodingOptions& options) {
 // All options except those that depend on the capture.
 EncoderOptions without_capture(const EncodingOptions& options) {
     auto out = default_options(profile_by(options.profile));
-    const auto steps = quality_steps(options.quality);
-    out.geometry_step = steps.geometry_step;
-    out.colour_step = steps.colour_step;
+    out.quality = options.quality;
     for (const auto& [option, value] : options.given) option->set(out, value);
     return out;
 }
@@ -252,7 +250,7 @@ std::uint64_t random_session() {
 void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     add_quality(command, options);
     for (const auto& option : option_list())
-        if (*option.flag) add_option(command, options, option);
+        if (*option.flag && &option != find_option("quality")) add_option(command, options, option);
     add_what_is_beside_the_list(command, options);
     add_scene_options(command, options);
     command.get_option("--buffer")->needs(command.get_option("--bitrate"));
@@ -340,7 +338,6 @@ std::string options_in_markdown() {
         "| field | `htvm encode` | meaning |\n|---|---|---|\n"
         "| `profile` | `--profile` | tracked (default), topology or paper: `default_options(profile)`, and "
         "`htvm_encoder_options_create` in C, give its defaults |\n"
-        "| `geometry_step`, `colour_step` | `--quality` | both steps at once: `quality_steps(quality)` |\n"
         "| `runner` | | the caller's own threads (`htvm_encoder_options_set_run_tasks` in C) |\n"
         "| `skeleton` | `--skeleton` | the capture's joints and bones; none: one bone that spans the mesh is used |\n"
         "| `radii` | `--radii` | radii of the bones, from `calibrate()` or `htvm calibrate` |\n"
