@@ -8,6 +8,7 @@
 #include <cctype>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <random>
 #include <string_view>
 
@@ -272,8 +273,11 @@ void check_together(const EncodingOptions& options) {
 
 Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture) {
     auto out = without_capture(options);
-    out.fps_numerator = capture.frame_rate().numerator;
-    out.fps_denominator = capture.frame_rate().denominator;
+    // In its lowest terms, so that 30 frames a second are the library's default, 30 / 1, however they were given.
+    const auto rate = capture.frame_rate();
+    const auto divisor = std::max(std::gcd(rate.numerator, rate.denominator), 1u);
+    out.fps_numerator = rate.numerator / divisor;
+    out.fps_denominator = rate.denominator / divisor;
     out.unit_micrometres =
         static_cast<std::uint32_t>(std::clamp(std::round(capture.millimetres_per_unit() * 1000), 1.0, 4294967295.0));
     out.up = capture.up();

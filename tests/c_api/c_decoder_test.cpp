@@ -122,7 +122,7 @@ TEST(CDecoder, TellsWhatTheSequenceHeaderSays) {
     htvm_sequence_info info;
     EXPECT_EQ(htvm_decoder_sequence(decoder.get(), &info, sizeof info), HTVM_AGAIN);
     Decoder cpp;
-    ASSERT_TRUE(cpp.push(coded_person().packets[0]).has_value());
+    ASSERT_TRUE(cpp.decode_copy(coded_person().packets[0]).has_value());
     const auto bytes = write_packet(coded_person().packets[0]);
     ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
     ASSERT_EQ(htvm_decoder_receive_frame(decoder.get(), nullptr, 0), HTVM_AGAIN);
@@ -160,7 +160,7 @@ TEST(CDecoder, ConcealsAsTheCppDecoder) {
     htvm_frame_info info;
     EXPECT_EQ(htvm_decoder_conceal(decoder.get(), 1, 5, &info, sizeof info), HTVM_AGAIN);
     for (const auto& packet : {coded_person().packets[0], coded_person().packets[1]}) {
-        ASSERT_TRUE(cpp.push(packet).has_value());
+        ASSERT_TRUE(cpp.decode_copy(packet).has_value());
         const auto bytes = write_packet(packet);
         ASSERT_EQ(htvm_decoder_send_packet(decoder.get(), bytes.data(), bytes.size()), HTVM_OK);
         (void)htvm_decoder_receive_frame(decoder.get(), nullptr, 0);
@@ -486,7 +486,7 @@ TEST(CInterface, TellsWhatFramesNeedAsTheCppOneDoes) {
         EXPECT_EQ(info.bytes, bytes.size());
         std::uint64_t place = 99;
         ASSERT_EQ(htvm_dependencies_push(dependencies, &info, &place), HTVM_OK);
-        EXPECT_EQ(place, cpp.push(packet));
+        EXPECT_EQ(place, cpp.decode_copy(packet));
         ASSERT_EQ(htvm_dependencies_closure(dependencies, places.data(), places.size(), &count), HTVM_OK);
         EXPECT_EQ(std::vector<std::uint64_t>(places.begin(), places.begin() + count), cpp.closure());
         ASSERT_EQ(htvm_dependencies_kept(dependencies, places.data(), places.size(), &count), HTVM_OK);
