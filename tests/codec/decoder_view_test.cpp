@@ -42,13 +42,13 @@ bool same(std::span<const Element> a, std::span<const Element> b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end());
 }
 
-TEST(DecoderView, LendsTheArraysThatPushCopies) {
+TEST(DecoderView, LendsTheArraysThatDecodeCopyCopies) {
     for (const auto& [name, packets] : conformance_streams()) {
         SCOPED_TRACE(name);
         Decoder lending(with_draco()), copying(with_draco());
         for (const auto& packet : packets) {
             const auto lent = lending.decode(packet);
-            const auto copied = copying.push(packet);
+            const auto copied = copying.decode_copy(packet);
             ASSERT_EQ(lent.has_value(), copied.has_value());
             if (!lent) continue;
             ASSERT_EQ(lent->has_value(), copied->has_value());

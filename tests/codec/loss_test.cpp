@@ -188,7 +188,7 @@ Result<std::optional<DecodedFrame>> changed_frame_in_part(const Change& change) 
     change(payload);
     Packet packet = packets[at];
     packet.payload = write_frame_payload(payload);
-    return decoder_before(packets, at).push(packet);
+    return decoder_before(packets, at).decode_copy(packet);
 }
 
 TEST(MotionBased, TheCodedBonesAreOneBitForEveryBone) {
