@@ -27,7 +27,6 @@ const timeMs = (): number => performance.timeOrigin + performance.now();
 type Source = Pick<LiveSource, 'connect' | 'close' | 'askForKeyFrame'>;
 
 export class LiveSession implements Session {
-    #url: string;
     #page: Page;
     #decoder: PacketDecoder;
     #source: Source;
@@ -53,7 +52,6 @@ export class LiveSession implements Session {
         request: OpenRequest, module: DecoderModule, post: Post,
         makeSource: (listener: LiveListener) => Source = (listener) => new LiveSource(request.url, listener), now = timeMs,
     ) {
-        this.#url = request.url;
         this.#now = now;
         this.#page = new Page(request, module, post, () => this.#queueBytes);
         this.#decoder = new PacketDecoder(module, this.#page, now);

@@ -16,8 +16,8 @@ export class PictureSender {
     }
 
     /**
-     * Sends the pictures among packets of frames and pictures, in order. False for a picture that cannot be read; one that is not behind its
-     * frame, or a second one, is passed over.
+     * Sends the pictures among packets of frames and pictures, in order. False for a picture that cannot be read; one that is
+     * not behind its frame, or a second one, is passed over.
      */
     send(packet: Packet, serial: number, presentUs: number): boolean {
         if (isFrame(packet.kind)) this.passed(packet);
