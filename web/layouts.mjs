@@ -76,7 +76,7 @@ export const constants = {
 ${Object.entries(constants).map(([name, value]) => `    ${name}: ${value},`).join('\n')}
 } as const;
 
-/** Of each struct its size, and of each field its offset and type. */
+/** Each struct's size, and each field's offset and type. */
 export const layouts = {
 ${Object.entries(layouts()).map(struct).join('\n')}
 } as const;

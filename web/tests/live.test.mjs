@@ -144,7 +144,7 @@ async function showing() {
         ['opened', 'extent', 'arrived', 'sound', 'jumped', 'sought', 'waiting', 'ended', 'notice', 'failed', 'restarted', 'live'].map((name) =>
             [name, () => said.push(name)]));
     const playback = new Playback(async () => worker, 'decoder.wasm', () => state.now, listener);
-    playback.open('ws://a.example/watch/me', true);
+    playback.open('ws://a.example/watch/me', 'live');
     playback.play();
     await new Promise(setImmediate);
     const { serial } = sent[0];
@@ -250,8 +250,8 @@ test('what is said of a live stream', () => {
         const { state: name, text } = state.describe(shown, behindMs);
         return `${name}: ${text}`;
     };
-    const link = (name, reason = '') => state.take({ type: 'link', link: name, reason });
-    const beat = (published) => state.take({ type: 'heartbeat', atMs: 0, published, clockUs: 0, viewers: 3, dropped: 7 });
+    const link = (name, reason = '') => state.report({ type: 'link', link: name, reason });
+    const beat = (published) => state.report({ type: 'heartbeat', atMs: 0, published, clockUs: 0, viewers: 3, dropped: 7 });
     assert.equal(say(false), 'connecting: Connecting');
     link('open');
     assert.equal(say(false), 'waiting: Waiting for the first picture');
@@ -262,7 +262,7 @@ test('what is said of a live stream', () => {
     beat(true);
     assert.equal(say(), 'live: Live');
     assert.deepEqual([state.viewers, state.droppedByHub], [3, 7]);
-    state.take({ type: 'gone', reason: 'its connection ended' });
+    state.report({ type: 'gone', reason: 'its connection ended' });
     assert.equal(say(), 'gone: Publisher gone');
     state.frame();
     assert.equal(say(), 'live: Live');
@@ -459,13 +459,13 @@ function decoding({ room = 100 } = {}) {
     const state = { now: 1e6 };
     let listener;
     const session = new LiveSession(
-        { type: 'open', url: 'ws://a.example/watch/me', serial: 1, live: true }, module, (report) => reports.push(report),
+        { type: 'open', url: 'ws://a.example/watch/me', serial: 1, source: 'live' }, module, (report) => reports.push(report),
         (given) => {
             listener = given;
             return { connect: () => asked.push('connect'), close: () => asked.push('close'), askForKeyFrame: () => asked.push('key frame') };
         },
         () => state.now);
-    session.take({ type: 'room', frames: room });
+    session.request({ type: 'room', frames: room });
     void session.run();
     let first = true;
     return {
@@ -564,8 +564,8 @@ test('a page that takes no frames holds up a bounded number of packets, and goes
     await settle();
     const buffer = reports.find(({ type }) => type === 'frame').buffer;
     assert.equal(frames().length, 1);
-    session.take({ type: 'room', frames: 100 });
-    session.take({ type: 'done', buffer });
+    session.request({ type: 'room', frames: 100 });
+    session.request({ type: 'done', buffer });
     await settle();
     const shown = frames();
     assert.ok(shown.length <= group.length && shown.at(-1) === 40 * group.length - 1, `${shown}`);
@@ -599,8 +599,8 @@ test('a page that falls behind goes on at the newest frame that needs the refere
     await settle();
     const buffer = reports.find(({ type }) => type === 'frame').buffer;
     assert.deepEqual(frames(), [0]);
-    session.take({ type: 'room', frames: 100 });
-    session.take({ type: 'done', buffer });
+    session.request({ type: 'room', frames: 100 });
+    session.request({ type: 'done', buffer });
     await settle();
     assert.deepEqual(frames(), [1, 93, 94]);
     assert.deepEqual(asked, ['connect']);
@@ -620,7 +620,7 @@ test('where T-frames alone were thrown away, it goes on at the next one that nee
     }
     await settle();
     assert.deepEqual(asked, ['connect', 'key frame']);
-    session.take({ type: 'room', frames: 100 });
+    session.request({ type: 'room', frames: 100 });
     for (const one of stream.slice(110)) give(one);
     await settle();
     assert.deepEqual(frames(), [120, 121]);
@@ -628,7 +628,7 @@ test('where T-frames alone were thrown away, it goes on at the next one that nee
 
 test('a hidden page closes the connection, and a shown one begins a new one', async () => {
     const { session, asked } = decoding();
-    session.take({ type: 'rest' });
-    session.take({ type: 'seek', serial: 2, timeUs: 0 });
+    session.request({ type: 'rest' });
+    session.request({ type: 'seek', serial: 2, timeUs: 0 });
     assert.deepEqual(asked, ['connect', 'close', 'connect']);
 });

@@ -56,7 +56,7 @@ test('the unlit picture is that of htvm compare --pictures', { skip: program ? f
                 return context.getImageData(0, 0, size, size).data;
             };
             const drawn = await pixels(await test.player.screenshot(), (playerSize - size) / 2);
-            // Of the three pictures side by side the first.
+            // The first of the three pictures side by side.
             const wanted = await pixels(await (await fetch('/as-is/expected.png')).blob(), 0);
             const inside = (x, y) => drawn[4 * (y * size + x) + 3] === 255 && [0, 1, 2].some((c) => wanted[4 * (y * size + x) + c] < 255);
             let count = 0, covered = 0, squared = 0;

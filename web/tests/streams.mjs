@@ -49,7 +49,7 @@ export function packetsOf(stream) {
 
 const bytesOf = (array) => (array ? new Uint8Array(array.buffer, array.byteOffset, array.byteLength) : new Uint8Array(0));
 
-/** Of a decoded frame, as in `digests`. */
+/** The line of a decoded frame, as in `digests`. */
 export function lineOf(frame) {
     let crc = 0;
     for (const array of [frame.positions, frame.indices, frame.colours, frame.normals, frame.texcoords]) crc = crc32(bytesOf(array), crc);

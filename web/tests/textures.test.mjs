@@ -148,7 +148,7 @@ function begin({ needed = () => true, fast = true } = {}) {
     const settled = [];
     const pictures = new Pictures({ settled: (id) => settled.push(id), isNeeded: needed, notice: (text) => notices.push(text) });
     const take = (frame, key = false, more = {}) =>
-        pictures.take({
+        pictures.add({
             type: 'picture', coder: 'VP9', matrix: 'bt709', fullRange: false, width: 128, height: 128, gains: [1, 1, 1], frame,
             reference: key ? frame : frame - 1, key, presentUs: frame * 33333, coded: Uint8Array.of(0x82), bytes: 50, ...more,
         });

@@ -74,7 +74,7 @@ export async function playDraco(canvas, { framesPerSecond, files }, shown) {
     });
 }
 
-// Of the last two seconds or so.
+// Measured over the last two seconds or so.
 const mean = (frames, name) => frames.reduce((sum, frame) => sum + frame[name], 0) / frames.length;
 
 const side = new URLSearchParams(location.search).get('side');

@@ -38,7 +38,7 @@ async function makeSite() {
     return { frames: files.length, bytes: { htvm: (await stat(join(out, 'person.htvm'))).size, draco: dracoBytes } };
 }
 
-// Of the first frames, millimetres: M2 of `htvm compare`.
+// M2 of `htvm compare` for the first frames, millimetres.
 function surfaceError(coded) {
     const words = ['compare', capture, join(out, coded), '--only', 'm2', '--frames', '5', '--json'];
     const { frames } = JSON.parse(execFileSync(program, words, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] }));

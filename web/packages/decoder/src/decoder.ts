@@ -63,7 +63,7 @@ export interface Frame {
     sourceTriangles: number;
     vertices: number;
     triangles: number;
-    /** Of its packet. */
+    /** Size of its packet. */
     bytes: number;
     /** Frames of one decoder with the same number have the same triangles and texture coordinates. */
     topology: number;
@@ -91,7 +91,7 @@ export interface IndexEntry {
     offset: number;
     /** How many entries before this one is the frame that it refers to; 0: it refers to nothing. */
     back: number;
-    /** Of its packet, as in `PacketHeader`; 0 where the index does not tell them. */
+    /** Those of its packet, as in `PacketHeader`; 0 where the index does not tell them. */
     flags: number;
 }
 
@@ -141,7 +141,7 @@ export class DecoderModule {
         return new DecoderModule(instance.exports as unknown as Functions);
     }
 
-    /** Of the module's memory, which only grows, up to 512 MB. */
+    /** How large the module's memory is; it only grows, up to 512 MB. */
     get memoryBytes(): number {
         return this.#functions.memory.buffer.byteLength;
     }

@@ -26,7 +26,7 @@ export interface PacketHeader {
     frame: number;
     reference: number;
     timestampUs: number;
-    /** Of the whole packet, header and checksums included. */
+    /** Bytes of the whole packet, header and checksums included. */
     size: number;
 }
 

@@ -15,7 +15,7 @@ export interface TexturePicture {
     /** Pixels, 1 to 4096. */
     width: number;
     height: number;
-    /** Of red, green and blue: what is decoded is multiplied by them. */
+    /** Red, green and blue are multiplied by them once decoded. */
     gains: [number, number, number];
     /** What the coder wrote, in a copy. */
     coded: Uint8Array;
@@ -73,7 +73,7 @@ const vp9Levels: readonly [number, number][] = [
     [36864, 10], [73728, 11], [122880, 20], [245760, 21], [552960, 30], [983040, 31], [2228224, 40], [8912896, 50], [35651584, 60],
 ];
 
-// Of the sequence header OBU: the AV1 specification, sections 5.3 to 5.5. Streams are of 8 bits (section 14).
+// Reads the sequence header OBU: the AV1 specification, sections 5.3 to 5.5. Streams are of 8 bits (section 14).
 function av1String(coded: Uint8Array): string | null {
     for (let at = 0; at < coded.length;) {
         const header = coded[at]!;

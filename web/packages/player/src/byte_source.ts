@@ -24,7 +24,7 @@ const keptBytes = 1 << 26;
 const retries = [0, 500, 1500]; // ms
 
 export class ByteSource {
-    /** Of the whole file, or null while it is not known. */
+    /** Bytes of the whole file, or null while that is not known. */
     size: number | null = null;
     /** Whether any offset may be read without all before it. */
     ranges = false;

@@ -31,7 +31,7 @@ const largestIndex = 1 << 16; // looked for in so many bytes at the end of a fil
 const largestSurvey = 1 << 24; // of a file without an index
 
 export class FilePackets {
-    /** Of a frame, as the stream's header tells it; set by whoever decodes that. */
+    /** How long a frame lasts, as the stream's header tells it; set by whoever decodes that. */
     frameUs = 1e6 / 30;
     /** Whether an index told the places to start. */
     indexed = false;
@@ -119,7 +119,7 @@ export class FilePackets {
             }
             if (point) this.#goOn(point, packet);
             if (packet.kind === packetKind.sequence) this.#sequence = packet.bytes.slice();
-            if (isIndex(packet)) this.#takeIndex(packet);
+            if (isIndex(packet)) this.#readIndex(packet);
             if (isFrame(packet.kind)) return this.#timed(packet);
             const timed = packet.kind === packetKind.audio || packet.kind === packetKind.texture;
             const timeUs = timed ? packet.timestampUs - (this.#base ?? packet.timestampUs) : 0;
@@ -138,7 +138,7 @@ export class FilePackets {
             const splitter = new PacketSplitter(end?.offset);
             if (end) splitter.push(end.bytes);
             for (let packet = splitter.next(); packet; packet = splitter.next())
-                if (isIndex(packet)) this.#takeIndex(packet);
+                if (isIndex(packet)) this.#readIndex(packet);
             if (this.indexed) return true;
         }
         const { size, contentType } = source;
@@ -209,7 +209,7 @@ export class FilePackets {
         return { ...packet, timeUs };
     }
 
-    #takeIndex(packet: Packet): void {
+    #readIndex(packet: Packet): void {
         if (this.indexed) return; // of joined files the first
         let entries;
         try {

@@ -34,7 +34,7 @@ export class StampBook {
     }
 
     /** All that were complete since the last call but for the newest second, which may still be drawn. */
-    take(): FrameStamps[] {
+    collect(): FrameStamps[] {
         const until = (performance.timeOrigin + performance.now() - 1000) * 1000;
         const out: FrameStamps[] = [];
         for (const [frame, known] of this.#frames) {

@@ -2,9 +2,8 @@ export { browserClock, ManualClock } from './clock.js';
 export type { Clock } from './clock.js';
 export { HtvmPlayerElement } from './element.js';
 export type { FrameStamps } from './frame_stamps.js';
-export type { LiveStateDetail, LiveStateName } from './live_state.js';
-export type { LiveNumbers } from './playback.js';
-export type { FramePresentedDetail, PlayerErrorDetail, PlayerView, PlayerStatistics } from './element.js';
+export type { LiveNumbers, LiveStateDetail, LiveStateName } from './live_state.js';
+export type { FramePresentedDetail, PlayerErrorDetail, PlayerView, PlayerStatistics } from './details.js';
 export { streamVersion, type Axis } from '@htvm/decoder';
 import { HtvmPlayerElement } from './element.js';
 

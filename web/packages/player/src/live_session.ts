@@ -1,15 +1,12 @@
 // What the worker does with a live stream: decodes packets as they come, sends the frames on, and where the machine cannot
 // keep up, goes on at the newest place to start. What waits is bounded in time and bytes.
 import {
-    Decoder, DecoderError, isAccess, isFrame, isReference, isReferred, isStart, packetKind, readAudio, type DecoderModule,
-    type Packet,
+    isAccess, isFrame, isReference, isReferred, isStart, packetKind, type DecoderModule, type Packet,
 } from '@htvm/decoder';
-import { SourceError } from './byte_source.js';
-import { FrameSender } from './frame_sender.js';
 import { LiveSource, type HubMessage, type LiveListener } from './live_source.js';
-import type { Report, Request } from './messages.js';
+import type { Request } from './messages.js';
 import { otherTasks } from './other_tasks.js';
-import { PictureSender } from './picture_sender.js';
+import { PacketDecoder, Page, type OpenRequest, type Post, type Session } from './session.js';
 
 interface Waiting {
     packet: Packet;
@@ -27,20 +24,15 @@ const jumpUs = 500000; // so far back, timestamps are of another run
 // The clock that all of this machine's threads share.
 const timeMs = (): number => performance.timeOrigin + performance.now();
 
-export class LiveSession {
-    #url: string;
-    #module: DecoderModule;
-    #decoder: Decoder;
-    #source: Pick<LiveSource, 'connect' | 'close' | 'askForKeyFrame'>;
-    #post: (report: Report, transfer?: Transferable[]) => void;
-    #sender: FrameSender;
-    #pictures: PictureSender;
+type Source = Pick<LiveSource, 'connect' | 'close' | 'askForKeyFrame'>;
+
+export class LiveSession implements Session {
+    #page: Page;
+    #decoder: PacketDecoder;
+    #source: Source;
     #now: () => number;
-    #serial: number;
     #queue: Waiting[] = [];
     #queueBytes = 0;
-    #wake: (() => void) | null = null;
-    #resting = false;
     #failed = false;
     // From timestamps to present time, which goes on through sessions as far as arrivals are apart.
     #header: Uint8Array | null = null;
@@ -55,68 +47,47 @@ export class LiveSession {
     #lost: 'nothing' | 'tracked' | 'reference' = 'nothing'; // what the next frames need: T-frames alone, or the reference too
     #leftOut = 0;
     #busyUntilMs = 0;
-    #noticed = new Set<string>();
-    #frames = 0;
 
     constructor(
-        request: Request & { type: 'open' }, module: DecoderModule, post: (report: Report, transfer?: Transferable[]) => void,
-        makeSource: (listener: LiveListener) => Pick<LiveSource, 'connect' | 'close' | 'askForKeyFrame'> =
-            (listener) => new LiveSource(request.url, listener),
-        now = timeMs,
+        request: OpenRequest, module: DecoderModule, post: Post,
+        makeSource: (listener: LiveListener) => Source = (listener) => new LiveSource(request.url, listener), now = timeMs,
     ) {
-        this.#url = request.url;
-        this.#serial = request.serial;
-        this.#module = module;
-        this.#post = post;
         this.#now = now;
-        this.#sender = new FrameSender(post);
-        this.#pictures = new PictureSender(post);
-        this.#decoder = module.createDecoder();
+        this.#page = new Page(request, module, post, () => this.#queueBytes);
+        this.#decoder = new PacketDecoder(module, this.#page, now);
         this.#source = makeSource({
             packet: (packet, first) => this.#arrive(packet, first),
             message: (message) => this.#pass(message),
             link: (link, reason) => {
-                this.#post({ type: 'link', link, reason });
-                if (link === 'ended') this.#post({ type: 'ended', serial: this.#serial, frames: this.#frames, durationUs: 0 });
+                const { serial, frames } = this.#page;
+                this.#page.report({ type: 'link', link, reason });
+                if (link === 'ended') this.#page.report({ type: 'ended', serial, frames, durationUs: 0 });
             },
-            failed: (error) => this.#fail(error),
+            failed: (error) => this.#fail(error, 0),
         });
     }
 
-    take(request: Request): void {
-        switch (request.type) {
-            case 'seek':
-                this.#serial = request.serial;
-                this.#resting = false;
-                this.#sender.forgetTopology();
-                this.#rejoin();
-                this.#source.connect();
-                break;
-            case 'room':
-                this.#sender.room = request.frames;
-                break;
-            case 'done':
-                this.#sender.takeBack(request.buffer);
-                break;
-            case 'rest':
-                this.#resting = true;
-                this.#source.close();
-                this.#rejoin();
-                break;
-            case 'loop':
-            case 'open':
-                break;
+    request(request: Request): void {
+        this.#page.request(request);
+        if (request.type === 'seek') {
+            this.#page.forgetTopology();
+            this.#rejoin();
+            this.#source.connect();
         }
-        this.#wake?.();
+        if (request.type === 'rest') {
+            this.#source.close();
+            this.#rejoin();
+        }
+        this.#page.wake();
     }
 
     async run(): Promise<void> {
         this.#source.connect();
         while (!this.#failed) {
             this.#shed();
-            const next = this.#sender.hasRoom && !this.#resting ? this.#queue.shift() : undefined;
+            const next = this.#page.takesFrames ? this.#queue.shift() : undefined;
             if (!next) {
-                await new Promise<void>((resolve) => (this.#wake = resolve));
+                await this.#page.woken();
                 continue;
             }
             this.#queueBytes -= next.packet.size;
@@ -124,9 +95,7 @@ export class LiveSession {
                 this.#decode(next);
             } catch (error) {
                 this.#source.close();
-                if (error instanceof DecoderError && error.code === 'trap')
-                    return this.#post({ type: 'trapped', text: error.message, atUs: next.presentUs });
-                return this.#fail(error);
+                return this.#fail(error, next.presentUs);
             }
             if (this.#queue.length > 0) await otherTasks(); // packets and requests are heard between frames
         }
@@ -148,20 +117,15 @@ export class LiveSession {
         // A picture has the time of its frame, which has come.
         const untimedUs = packet.kind === packetKind.texture ? packet.timestampUs + this.#shiftUs : (this.#last?.presentUs ?? 0);
         const presentUs = timed ? this.#present(packet, receivedMs) : untimedUs;
-        if (packet.kind === packetKind.audio) {
-            const audio = readAudio(packet);
-            if (!audio) this.#notice('Some of the sound cannot be played.');
-            else this.#post({ type: 'audio', serial: this.#serial, presentUs, ...audio }, audio.opus.map(({ buffer }) => buffer));
-        } else {
-            this.#put({ packet, presentUs, receivedMs });
-        }
+        if (packet.kind === packetKind.audio) this.#page.sendSound(packet, this.#page.serial, presentUs);
+        else this.#put({ packet, presentUs, receivedMs });
     }
 
     #put(waiting: Waiting): void {
         this.#queue.push(waiting);
         this.#queueBytes += waiting.packet.size;
         if (this.#queueBytes > mostBytes) this.#shed(); // the page may not take anything for long
-        this.#wake?.();
+        this.#page.wake();
     }
 
     // Another run of the publisher goes on in present time where the one before was, as much later as it arrives.
@@ -179,7 +143,7 @@ export class LiveSession {
     #rejoin(): void {
         this.#queue = [];
         this.#queueBytes = 0;
-        this.#decoder.discard();
+        this.#decoder.begin();
         this.#joining = this.#now();
         this.#lost = 'nothing';
     }
@@ -188,9 +152,9 @@ export class LiveSession {
         if (message.type === 'heartbeat') {
             const { published, viewers, dropped, clockUs } = message;
             const present = clockUs === null || !this.#last ? null : clockUs + this.#shiftUs;
-            this.#post({ type: 'heartbeat', atMs: this.#now(), published, viewers, dropped, clockUs: present });
+            this.#page.report({ type: 'heartbeat', atMs: this.#now(), published, viewers, dropped, clockUs: present });
         } else if (message.type !== 'hello') {
-            this.#post(message);
+            this.#page.report(message);
         }
     }
 
@@ -245,49 +209,43 @@ export class LiveSession {
     // ---- decoding -------------------------------------------------------------------------------------------------
 
     #decode({ packet, presentUs, receivedMs }: Waiting): void {
-        const frameKind = isFrame(packet.kind);
-        if (!this.#pictures.take(packet, this.#serial, presentUs)) this.#notice('Some of the pictures cannot be shown.');
+        this.#page.sendPicture(packet, this.#page.serial, presentUs);
         if (packet.kind === packetKind.texture) return;
         if (isStart(packet) || (this.#lost === 'tracked' && isAccess(packet))) this.#lost = 'nothing';
         const later = this.#queue.some(({ packet: { kind } }) => isFrame(kind));
         const begin = this.#now();
         const late = later && begin - receivedMs > skipAfterMs && !isReferred(packet);
-        if (frameKind && (this.#lost !== 'nothing' || late)) {
+        if (isFrame(packet.kind) && (this.#lost !== 'nothing' || late)) {
             if (this.#lost !== 'nothing') this.#source.askForKeyFrame();
             ++this.#leftOut;
             return;
         }
         try {
-            this.#decoder.sendPacket(packet.bytes);
-            const frame = this.#decoder.receive();
-            if (packet.kind === packetKind.sequence) this.#tellSequence();
-            if (!frame) return;
-            const decodeMs = this.#now() - begin;
-            const how = this.#howToSend(presentUs, later);
-            if (how !== 'no') {
-                const decodedMs = begin + decodeMs;
-                const readyMs = Math.max(receivedMs, this.#busyUntilMs) + decodeMs;
-                this.#sender.send(this.#decoder, frame, {
-                    serial: this.#serial, timeUs: packet.timestampUs, presentUs, durationUs: this.#frameUs, preview: how === 'preview',
-                    decodeMs, live: { receivedMs, decodedMs, readyMs, leftOut: this.#leftOut },
-                });
-                if (how === 'frame') this.#sentUs = presentUs;
-                this.#previewed = true;
-                if (++this.#frames % 64 === 1)
-                    this.#post({ type: 'memory', wasmBytes: this.#module.memoryBytes, heldBytes: this.#queueBytes });
-            }
-        } catch (error) {
-            if (!(error instanceof DecoderError) || error.code === 'trap') throw error;
-            if (packet.kind === packetKind.sequence && error.code === 'unsupported')
-                throw new SourceError('version', `This page's player cannot show this stream: ${error.message}`);
-            if (error.code === 'limit') this.#notice(`A frame is beyond what the player takes: ${error.message}`);
-            if (frameKind) this.#source.askForKeyFrame();
+            this.#decodeAndSend({ packet, presentUs, receivedMs }, begin, later);
         } finally {
             this.#busyUntilMs = Math.max(receivedMs, this.#busyUntilMs) + this.#now() - begin;
         }
     }
 
-    // Of what the newest frame needs only the first is shown, at once, where there was no picture yet.
+    // later: whether there are frames behind it already.
+    #decodeAndSend({ packet, presentUs, receivedMs }: Waiting, begin: number, later: boolean): void {
+        const { frame, error, decodeMs } = this.#decoder.decode(packet);
+        if (error && isFrame(packet.kind)) this.#source.askForKeyFrame();
+        if (packet.kind === packetKind.sequence && !error) this.#tellSequence();
+        if (!frame) return;
+        const how = this.#howToSend(presentUs, later);
+        if (how === 'no') return;
+        const decodedMs = begin + decodeMs;
+        const readyMs = Math.max(receivedMs, this.#busyUntilMs) + decodeMs;
+        this.#page.sendFrame(this.#decoder, frame, {
+            serial: this.#page.serial, timeUs: packet.timestampUs, presentUs, durationUs: this.#frameUs, preview: how === 'preview',
+            decodeMs, live: { receivedMs, decodedMs, readyMs, leftOut: this.#leftOut },
+        });
+        if (how === 'frame') this.#sentUs = presentUs;
+        this.#previewed = true;
+    }
+
+    // While what the newest frame needs is decoded, its first frame is shown, at once, where there was no picture yet.
     #howToSend(presentUs: number, later: boolean): 'frame' | 'preview' | 'no' {
         if (this.#joining !== null) {
             const going = later && this.#now() - this.#joining < catchUpMs;
@@ -298,23 +256,16 @@ export class LiveSession {
     }
 
     #tellSequence(): void {
-        const sequence = this.#decoder.sequence();
+        const { sequence } = this.#decoder;
         if (!sequence) return;
         this.#frameUs = 1e6 / sequence.framesPerSecond;
-        this.#post({ type: 'opened', sequence, layerNames: this.#module.layerNames, version: this.#module.version });
+        this.#page.opened(sequence);
     }
 
-    #notice(text: string): void {
-        if (this.#noticed.has(text) || this.#noticed.size >= 8) return;
-        this.#noticed.add(text);
-        this.#post({ type: 'notice', text });
-    }
-
-    #fail(error: unknown): void {
+    #fail(error: unknown, atUs: number): void {
         this.#failed = true;
-        this.#wake?.();
-        if (error instanceof SourceError) this.#post({ type: 'failed', code: error.code, text: error.message });
-        else this.#post({ type: 'failed', code: 'decoder', text: `${this.#url}: ${error instanceof Error ? error.message : error}` });
+        this.#page.fail(error, atUs);
+        this.#page.wake();
     }
 }
 

@@ -3,6 +3,7 @@
 // slower until they are within 2 ms again; more than 30 ms are a gap, which is left silent or passed over.
 import { opusSamples } from '@htvm/decoder';
 import type { AudioReport } from './messages.js';
+import type { SoundOutput, SoundTrack } from './sound_track.js';
 
 /** What tells when sound is due. Milliseconds are those of the player's clock. */
 export interface LiveTime {
@@ -10,11 +11,6 @@ export interface LiveTime {
     speed(): number;
     /** A piece of sound for that present time could be heard from then on. */
     ready(readyMs: number, presentUs: number): void;
-}
-
-/** Whether this browser, on this page, can play it. */
-export function livePossible(): boolean {
-    return typeof AudioDecoder !== 'undefined';
 }
 
 interface Expected {
@@ -36,12 +32,10 @@ const leadSeconds = 0.005; // before its time, so that it starts in time
 const mostInDecoder = 100; // packets
 const mostFailures = 3;
 
-export class LiveSound {
-    #context: AudioContext;
-    #out: AudioNode;
-    #now: () => number;
+export class LiveSound implements SoundTrack {
+    #output: SoundOutput;
     #time: LiveTime;
-    #notice: (text: string) => void;
+    #saidImpossible = false;
     #decoder: AudioDecoder | null = null;
     #channels = 0;
     #expected: Expected[] = [];
@@ -51,15 +45,14 @@ export class LiveSound {
     #nextSeconds: number | null = null; // context time at the end of what was started
     #following = false;
 
-    constructor(context: AudioContext, out: AudioNode, now: () => number, time: LiveTime, notice: (text: string) => void) {
-        this.#context = context;
-        this.#out = out;
-        this.#now = now;
+    constructor(output: SoundOutput, time: LiveTime) {
+        this.#output = output;
         this.#time = time;
-        this.#notice = notice;
     }
 
-    take({ presentUs, channels, gain, skipBegin, skipEnd, samples, opus }: AudioReport): void {
+    add({ presentUs, channels, gain, skipBegin, skipEnd, samples, opus }: AudioReport): void {
+        if (typeof AudioDecoder === 'undefined') return this.#sayImpossible();
+        if (!this.#output.open() || !this.#output.runs()) return;
         const decoder = this.#ready(channels);
         if (!decoder) return;
         let at = 0;
@@ -83,10 +76,21 @@ export class LiveSound {
         this.#sources.clear();
     }
 
+    playFile(): void {} // a live stream is heard alone
+
+    update(): void {} // each piece is started when it comes
+
     close(): void {
         this.jumped();
         this.#forgetDecoder();
         this.#failures = mostFailures;
+    }
+
+    #sayImpossible(): void {
+        if (this.#saidImpossible) return;
+        this.#saidImpossible = true;
+        const why = isSecureContext ? 'this browser has no WebCodecs' : 'browsers allow it only on pages by https';
+        this.#output.notice(`Live sound is not possible here: ${why}.`);
     }
 
     #forgetDecoder(): void {
@@ -106,7 +110,7 @@ export class LiveSound {
             error: () => {
                 if (decoder !== this.#decoder) return;
                 this.#forgetDecoder();
-                if (++this.#failures >= mostFailures) this.#notice('This browser cannot play the sound.');
+                if (++this.#failures >= mostFailures) this.#output.notice('This browser cannot play the sound.');
             },
         });
         decoder.configure({ codec: 'opus', sampleRate: 48000, numberOfChannels: channels });
@@ -133,9 +137,10 @@ export class LiveSound {
     }
 
     #schedule(buffer: AudioBuffer, presentUs: number): void {
-        const { currentTime, outputLatency, baseLatency } = this.#context;
+        const context = this.#output.context!;
+        const { currentTime, outputLatency, baseLatency } = context;
         const latency = outputLatency || baseLatency || 0;
-        this.#time.ready(this.#now() + 1000 * (latency + leadSeconds), presentUs);
+        this.#time.ready(this.#output.now() + 1000 * (latency + leadSeconds), presentUs);
         const due = currentTime + (presentUs - this.#time.presentUs()) / 1e6 - latency;
         const next = this.#nextSeconds;
         const off = next === null ? Infinity : due - next;
@@ -155,8 +160,8 @@ export class LiveSound {
             this.#nextSeconds = null;
             return;
         }
-        const source = new AudioBufferSourceNode(this.#context, { buffer, playbackRate: rate });
-        source.connect(this.#out);
+        const source = new AudioBufferSourceNode(context, { buffer, playbackRate: rate });
+        source.connect(this.#output.node);
         source.onended = () => {
             source.disconnect();
             this.#sources.delete(source);

@@ -176,8 +176,8 @@ export class LiveSource {
         };
         socket.onmessage = ({ data }: MessageEvent<ArrayBuffer | string>) => {
             this.#heard();
-            if (typeof data === 'string') return this.#takeText(data);
-            this.#takeBytes(new Uint8Array(data));
+            if (typeof data === 'string') return this.#readText(data);
+            this.#readBytes(new Uint8Array(data));
             // A message is one packet: what is left over is damage.
             if (attempt === this.#attempt && this.#splitter.pendingBytes > 0) this.#splitter = new PacketSplitter(0, largestPacket);
         };
@@ -212,11 +212,11 @@ export class LiveSource {
             if (!current()) return;
             if (done) return this.#reconnect('');
             this.#heard();
-            this.#takeBytes(value);
+            this.#readBytes(value);
         }
     }
 
-    #takeBytes(bytes: Uint8Array): void {
+    #readBytes(bytes: Uint8Array): void {
         const attempt = this.#attempt;
         this.#splitter.push(bytes);
         for (let packet = this.#splitter.next(); packet; packet = this.#splitter.next()) {
@@ -229,7 +229,7 @@ export class LiveSource {
         }
     }
 
-    #takeText(text: string): void {
+    #readText(text: string): void {
         const message = readHubMessage(text);
         if (!message) return;
         if (message.type === 'hello') this.#learnHubs(message.hubs ?? []);

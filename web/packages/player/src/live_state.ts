@@ -11,6 +11,21 @@ export interface LiveStateDetail {
     behind: number;
 }
 
+/** What the player measures of a live stream. */
+export interface LiveNumbers extends LiveStateDetail {
+    /** How long frames that come without delay wait before they are shown, and the 98th percentile of arrivals' jitter: ms. */
+    bufferMs: number;
+    jitterMs: number;
+    /** 1 but while the clock follows the publisher's. */
+    speed: number;
+    /** Frames that the hub did not send, and, among those it sent, how many were not decoded, and decoded but not shown in time. */
+    droppedByHub: number;
+    leftOut: number;
+    notShown: number;
+    /** People who watch the stream; NaN while that is not known. */
+    viewers: number;
+}
+
 const sayBehindMs = 1000;
 
 export class LiveState {
@@ -21,7 +36,7 @@ export class LiveState {
     #reason = '';
     #published = true;
 
-    take(report: LiveReport): void {
+    report(report: LiveReport): void {
         switch (report.type) {
             case 'link':
                 this.#link = report.link;

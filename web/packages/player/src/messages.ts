@@ -1,11 +1,17 @@
 // The messages between the player and its worker.
 import type { AudioPacket, SequenceInfo, TexturePicture } from '@htvm/decoder';
 
+/**
+ * What packets come from. file: the whole is there, and is read as fast as it is shown. live: packets come when they are made,
+ * and there is nothing but now.
+ */
+export type SourceKind = 'file' | 'live';
+
 /** To the worker. `serial` counts seeks: frames of older ones are thrown away. */
 export type Request =
-    /** traps: media times of frames that stopped a decoder before, to be left out. live: the stream is a live one. */
-    | { type: 'open'; url: string; wasmUrl: string; serial: number; timeUs: number; loop: boolean; traps: number[]; live: boolean }
-    /** Of a live stream: to what comes now. */
+    /** traps: media times of frames that stopped a decoder before, to be left out. */
+    | { type: 'open'; source: SourceKind; url: string; wasmUrl: string; serial: number; timeUs: number; loop: boolean; traps: number[] }
+    /** In a live stream, to what comes now. */
     | { type: 'seek'; serial: number; timeUs: number }
     | { type: 'loop'; on: boolean }
     /** How many frames may be with the player at once. */
@@ -18,8 +24,8 @@ export type Request =
 /** From the worker. */
 export type Report =
     | { type: 'opened'; sequence: SequenceInfo; layerNames: readonly string[]; version: string }
-    /** durationUs: null while it is unknown. seekable: whether all of it can be reached directly. */
-    | { type: 'extent'; durationUs: number | null; seekable: boolean }
+    /** durationUs: null while it is unknown. */
+    | { type: 'extent'; durationUs: number | null }
     | FrameReport
     | AudioReport
     | PictureReport
@@ -33,7 +39,7 @@ export type Report =
     | { type: 'memory'; wasmBytes: number; heldBytes: number }
     | LiveReport;
 
-/** Of live streams. Times in ms are since 1970, by this machine's clock. */
+/** What a live stream's hub and connection say. Times in ms are since 1970, by this machine's clock. */
 export type LiveReport =
     /** How the connection to the hub is. reason: the hub's words, or ''. */
     | { type: 'link'; link: 'connecting' | 'open' | 'reconnecting' | 'ended'; reason: string }
@@ -62,11 +68,11 @@ export interface PictureReport extends TexturePicture {
     /** Number of the frame whose picture it needs; its own where it is a key picture. */
     reference: number;
     key: boolean;
-    /** Of its packet. */
+    /** Size of its packet. */
     bytes: number;
 }
 
-/** Of a frame of a live stream; ms since 1970, by this machine's clock. */
+/** When a frame of a live stream came; ms since 1970, by this machine's clock. */
 export interface LiveTimes {
     receivedMs: number;
     decodedMs: number;
@@ -113,6 +119,6 @@ export interface FrameReport {
     texcoords: Float32Array | null;
     /** Set by the page. Number of the texture picture to be shown with it; null: there is none; undefined: not known yet. */
     picture?: number | null;
-    /** Of the picture's packet, if it has one of its own. */
+    /** Size of the picture's packet, if it has one of its own. */
     pictureBytes?: number;
 }

@@ -16,10 +16,10 @@ export class PictureSender {
     }
 
     /**
-     * Takes packets of frames and of pictures, in order. False for a picture that cannot be read; one that is not behind its
-     * frame, or a second one, is passed over.
+     * Sends the pictures among packets of frames and pictures, in order. False for a picture that cannot be read; one that is
+     * not behind its frame, or a second one, is passed over.
      */
-    take(packet: Packet, serial: number, presentUs: number): boolean {
+    send(packet: Packet, serial: number, presentUs: number): boolean {
         if (isFrame(packet.kind)) this.passed(packet);
         if (packet.kind !== packetKind.texture || packet.frame !== this.#frame) return true;
         this.#frame = null;

@@ -6,7 +6,7 @@ import type { PictureReport } from './messages.js';
 /** A decoded picture. Close its image once it is on the graphics card. */
 export interface DecodedPicture {
     image: VideoFrame | ImageBitmap;
-    /** Of red, green and blue. */
+    /** Red, green and blue are multiplied by them. */
     gains: [number, number, number];
     coder: string;
     width: number;
@@ -59,7 +59,7 @@ export class Pictures {
     }
 
     /** The next picture of the stream. Its number, by which it is asked for, is told before anything becomes of it. */
-    take(report: PictureReport, numbered: (id: number) => void = () => undefined): number {
+    add(report: PictureReport, numbered: (id: number) => void = () => undefined): number {
         const id = ++this.#newest;
         numbered(id);
         this.#waiting.push({ ...report, id });

@@ -1,20 +1,20 @@
-// Decides which frame is shown when. Frames arrive from the worker ahead of time, and each is shown from its timestamp on.
-//
-// There are two times. Media time is the stream's: 0 is its first frame. Present time continues through loops, and starts
-// again at the media time with each seek; the clock runs in it. Of a live stream, present time is what live_clock.ts says,
-// and there is no other place to go to than now.
-//
-// A frame of a textured stream is shown together with its picture: while that is still being decoded, the frame before it stays.
-// A mesh that goes on without its picture would slide under it, and after a new reference show nonsense.
+// Plays one stream: asks a worker for its frames, keeps those decoded ahead (frame_queue.ts), and shows each when its timeline
+// says that it is due (timeline.ts).
 import type { SequenceInfo } from '@htvm/decoder';
-import { LiveClock } from './live_clock.js';
-import { LiveState, type LiveStateDetail } from './live_state.js';
-import type { AudioReport, FailureCode, FrameReport, LiveReport, PictureReport, Report, Request } from './messages.js';
-import { Pictures, type DecodedPicture } from './pictures.js';
+import { FileTimeline } from './file_timeline.js';
+import { FrameQueue } from './frame_queue.js';
+import type { LiveNumbers, LiveStateDetail } from './live_state.js';
+import { LiveTimeline } from './live_timeline.js';
+import type { AudioReport, FailureCode, FrameReport, LiveReport, Report, SourceKind } from './messages.js';
+import type { DecodedPicture } from './pictures.js';
+import type { PlaybackTime, SoundOutput, SoundTrack } from './sound_track.js';
+import type { TimedPlayback, Timeline } from './timeline.js';
+import { WorkerLink } from './worker_link.js';
 
 export interface PlaybackListener {
     opened(sequence: SequenceInfo, layerNames: readonly string[]): void;
-    extent(durationUs: number | null, seekable: boolean): void;
+    /** Another duration is known. */
+    extent(): void;
     /** Something arrived, perhaps a frame: a picture may be due. */
     arrived(frame?: FrameReport): void;
     /** Sound, to be heard at its present time. */
@@ -33,154 +33,178 @@ export interface PlaybackListener {
     live(report: LiveReport): void;
 }
 
-/** Of a live stream. */
-export interface LiveNumbers extends LiveStateDetail {
-    /** How long frames that come without delay wait before they are shown, and the 98th percentile of arrivals' jitter: ms. */
-    bufferMs: number;
-    jitterMs: number;
-    /** 1 but while the clock follows the publisher's. */
-    speed: number;
-    /** Frames that the hub did not send, and of those it sent, how many were not decoded, and decoded but not shown in time. */
-    droppedByHub: number;
-    leftOut: number;
-    notShown: number;
-    /** Of the stream; NaN while that is not known. */
-    viewers: number;
-}
+const timelines: Record<SourceKind, new (playback: TimedPlayback) => Timeline> = { file: FileTimeline, live: LiveTimeline };
 
-/** What belongs to a live stream alone. */
-interface Live {
-    clock: LiveClock;
-    state: LiveState;
-    /** Nothing is asked of the hub: paused, or hidden. */
-    resting: boolean;
-    leftOut: number;
-    notShown: number;
-    /** When the frames could be shown from, by the player's clock. */
-    readyMs: WeakMap<FrameReport, number>;
-}
-
-const mostFrames = 12; // decoded ahead, the one shown included
-const mostFramesLive = 40; // as many as may wait in the jitter buffer
-const mostBytes = 96 << 20; // that they may take, if at least 3 can be had
-const lateFramesUs = 50000; // a live frame that comes so much later than its end is not shown any more
+const leastFrames = 3; // that there must be room for
+const mostBytes = 96 << 20; // that frames may take beyond these
 const mostTraps = 3;
 const texturedFrom = 6; // version of streams whose frames have pictures
-const catchUpUs = 100000; // a picture that is so late is not waited for where decoding can go on with a later one
-const stallUs = 500000; // for one that is so late, time stands still
 
-export class Playback {
+export class Playback implements TimedPlayback {
+    playing = false;
+    hidden = false;
+    loop = false;
+    rate = 1;
     durationUs: number | null = null;
-    seekable = false;
+    awaiting = false;
+    soughtUs = 0;
     wasmBytes = 0;
     heldBytes = 0;
+    readonly now: () => number;
     #listener: PlaybackListener;
-    #makeWorker: () => Promise<Worker>;
-    #now: () => number;
+    #timeline: Timeline = new FileTimeline(this);
+    #queue: FrameQueue;
+    #worker: WorkerLink;
     #wasmUrl: string;
     #url = '';
-    #live: Live | null = null;
-    #worker: Worker | null = null;
-    #opening = 0; // counts open() and close(), so that results of earlier ones can be ignored
     #serial = 0;
-    #ring: FrameReport[] = [];
-    #preview: FrameReport | null = null;
-    #current: FrameReport | null = null;
-    #foreign: FrameReport | null = null; // still shown, but from a worker that has ended
-    #room = 3;
-    #roomSetFor = 0;
-    #awaiting = false; // the frame that a seek asked for
-    #soughtUs = 0;
     #endedSerial = -1;
-    #playing = false;
-    #stalled = false;
-    #hidden = false;
-    #loop = false;
-    #rate = 1;
-    #anchorUs = 0; // present time at #anchorNow
-    #anchorNow = 0;
+    #room = leastFrames;
+    #roomSetFor = 0;
     #failed = false;
     #traps: number[] = [];
-    #pictures: Pictures;
-    #textured = false;
-    #lateFor: FrameReport | null = null; // time stands still until its picture is there
-    #arrived: FrameReport | null = null; // the last frame that came
-    #picture: number | null = null; // the last picture that came
     #idleWaiting: (() => void)[] = [];
 
     constructor(makeWorker: () => Promise<Worker>, wasmUrl: string, now: () => number, listener: PlaybackListener) {
-        this.#makeWorker = makeWorker;
         this.#wasmUrl = wasmUrl;
-        this.#now = now;
+        this.now = now;
         this.#listener = listener;
-        this.#pictures = new Pictures({
-            settled: (id) => this.#pictureSettled(id),
-            isNeeded: (id) => this.#preview?.picture === id || this.#ring.some(({ picture }) => picture === id),
+        this.#worker = new WorkerLink(makeWorker, {
+            report: (report) => this.#hear(report),
+            notStarted: (error) => this.#fail('decoder', `The player's worker could not be started: ${error}.`),
+            stopped: (text) => this.#restart(text),
+        });
+        this.#queue = new FrameQueue({
+            done: ({ buffer }) => this.#worker.send({ type: 'done', buffer }, [buffer]),
+            pictureSettled: (frame) => {
+                if (frame) this.#timeline.pictureSettled(frame);
+                listener.arrived();
+                this.#checkIdle();
+            },
             notice: (text) => listener.notice(text),
         });
     }
 
-    get playing(): boolean {
-        return this.#playing;
+    // ---- what there is ----------------------------------------------------------------------------------------------
+
+    get current(): FrameReport | null {
+        return this.#queue.current;
+    }
+    get ahead(): number {
+        return this.#queue.ahead;
+    }
+    get picturesAhead(): number {
+        return this.#queue.picturesAhead;
     }
     get stalled(): boolean {
-        return this.#stalled || this.#awaiting;
+        return this.#timeline.stalled || this.awaiting;
     }
-    get rate(): number {
-        return this.#rate;
+    get ended(): boolean {
+        return this.#endedSerial === this.#serial;
     }
-    get current(): FrameReport | null {
-        return this.#current;
+    get canSeek(): boolean {
+        return this.#timeline.canSeek;
     }
-    get buffered(): number {
-        return this.#ring.length;
+    get canChangeRate(): boolean {
+        return this.#timeline.canChangeRate;
     }
-
-    /** Microseconds; continues through loops. */
-    get presentUs(): number {
-        return this.#presentUs();
+    get state(): LiveStateDetail | null {
+        return this.#timeline.state;
     }
-    /** Present time at which media time 0 was last. */
-    get loopUs(): number {
-        return this.#current ? this.#current.presentUs - this.#current.timeUs : 0;
-    }
-    /** Whether present time advances, and pictures are shown. */
-    get advances(): boolean {
-        return this.#playing && !this.stalled && !this.#hidden;
-    }
-
-    /** Null for files. */
-    get liveState(): LiveStateDetail | null {
-        return this.#live?.state.describe(this.#current !== null && !this.#awaiting, this.#behindMs()) ?? null;
-    }
-
-    /** Null for files. */
     get live(): LiveNumbers | null {
-        if (!this.#live) return null;
-        const { clock, state, leftOut, notShown } = this.#live;
-        return {
-            ...this.liveState!, bufferMs: clock.bufferMs, jitterMs: clock.jitterMs,
-            speed: clock.speed, droppedByHub: state.droppedByHub, viewers: state.viewers, leftOut, notShown,
-        };
+        return this.#timeline.live;
     }
 
-    /** Of a live stream: how fast present time goes now. */
-    get speed(): number {
-        return this.#live?.clock.speed ?? 1;
+    /** Media time, microseconds. */
+    get timeUs(): number {
+        const { current } = this;
+        if (this.awaiting || !current) return this.soughtUs;
+        const since = this.#timeline.presentUs - current.presentUs;
+        return current.timeUs + Math.min(Math.max(since, 0), current.durationUs);
     }
 
-    /** Of a live stream: a piece of sound could be heard from then on, in the time of `now`. */
-    soundReady(readyMs: number, presentUs: number): void {
-        if (this.#playing && !this.#awaiting) this.#live?.clock.ready('sound', readyMs, presentUs);
+    /** What sound has to keep step with. */
+    get time(): PlaybackTime {
+        const { current, durationUs, loop, rate } = this;
+        const loopUs = current ? current.presentUs - current.timeUs : 0;
+        const advances = this.playing && !this.stalled && !this.hidden;
+        return { advances, presentUs: this.#timeline.presentUs, loopUs, durationUs, loop, rate };
     }
 
-    /** The picture of the frame that is shown now, to be shown with it and closed: once; null where that is the one before. */
-    takePicture(): DecodedPicture | null {
-        return this.#current?.picture != null ? this.#pictures.show(this.#current.picture) : null;
+    /** How long, at this rate, until a frame is missing: microseconds; Infinity if there is none after the last. */
+    get usAhead(): number {
+        const { last } = this.#queue;
+        if (this.awaiting || !last) return 0;
+        if (this.ended) return Infinity;
+        return Math.max(0, last.presentUs + last.durationUs - this.#timeline.presentUs) / this.rate;
     }
 
-    get picturesAhead(): number {
-        return this.#pictures.held;
+    /** The stream's sound; for another stream it is another one. */
+    makeSound(output: SoundOutput): SoundTrack {
+        return this.#timeline.makeSound(output);
+    }
+
+    // ---- what people do -----------------------------------------------------------------------------------------------
+
+    open(url: string, source: SourceKind = 'file'): void {
+        this.close();
+        this.#url = url;
+        this.#timeline = new timelines[source](this);
+        this.#traps = [];
+        this.#failed = false;
+        this.durationUs = null;
+        this.#start(0);
+    }
+
+    close(): void {
+        this.#worker.stop();
+        this.#queue.close();
+        this.#roomSetFor = 0;
+        this.awaiting = false;
+        this.#url = '';
+        this.#checkIdle();
+    }
+
+    play(): void {
+        if (this.playing) return;
+        this.#timeline.play();
+        this.playing = true;
+        this.#checkIdle();
+    }
+
+    pause(): void {
+        this.#timeline.pause();
+        this.playing = false;
+    }
+
+    /** Where the rate can be changed. */
+    setRate(rate: number): void {
+        if (!this.canChangeRate) return;
+        this.#timeline.hold();
+        this.rate = rate;
+    }
+
+    setLoop(on: boolean): void {
+        this.loop = on;
+        this.#worker.send({ type: 'loop', on });
+    }
+
+    /** To the frame at a media time, where there are other places. */
+    seek(timeUs: number): void {
+        if (this.#url === '' || !this.canSeek) return;
+        if (this.durationUs !== null) timeUs = Math.min(timeUs, this.durationUs - 1);
+        this.goTo(Math.max(0, timeUs));
+    }
+
+    /** By frames, from the one shown; paused. */
+    step(frames: number): void {
+        this.pause();
+        const { current } = this;
+        const { next } = this.#queue;
+        if (!current || this.awaiting || !this.canSeek) return;
+        if (frames === 1 && next) return this.#timeline.standAt(next.presentUs);
+        const target = current.timeUs + frames * current.durationUs + current.durationUs / 2;
+        this.seek(frames > 0 && this.ended && !next && this.loop ? 0 : target);
     }
 
     /** Decodes the frame shown once more, with its picture, which the graphics card has lost. */
@@ -188,184 +212,44 @@ export class Playback {
         this.seek(this.timeUs);
     }
 
-    /** Whether the picture that was taken last is that of the frame shown now. */
-    get hasPicture(): boolean {
-        return this.#current?.picture != null && this.#pictures.state(this.#current.picture) === 'ready';
-    }
-
-    /** How long, at this rate, until a frame is missing: microseconds; Infinity if there is none after the last. */
-    get usAhead(): number {
-        const last = this.#ring.at(-1) ?? this.#current;
-        if (this.#awaiting || !last) return 0;
-        if (this.#endedSerial === this.#serial) return Infinity;
-        return Math.max(0, last.presentUs + last.durationUs - this.#presentUs()) / this.#rate;
-    }
-
-    /** Media time, microseconds. */
-    get timeUs(): number {
-        if (this.#awaiting || !this.#current) return this.#soughtUs;
-        const since = this.#presentUs() - this.#current.presentUs;
-        return this.#current.timeUs + Math.min(Math.max(since, 0), this.#current.durationUs);
-    }
-
-    open(url: string, live = false): void {
-        this.close();
-        this.#url = url;
-        this.#live = live ? { clock: new LiveClock(), state: new LiveState(), resting: false, leftOut: 0, notShown: 0, readyMs: new WeakMap() } : null;
-        this.#traps = [];
-        this.#failed = false;
-        this.#textured = false;
-        this.durationUs = null;
-        this.seekable = false;
-        void this.#start(0);
-    }
-
-    close(): void {
-        ++this.#opening;
-        this.#worker?.terminate();
-        this.#worker = null;
-        this.#ring = [];
-        this.#preview = null;
-        this.#current = null;
-        this.#roomSetFor = 0;
-        this.#awaiting = false;
-        this.#forgetPictures();
-        this.#pictures.close();
-        this.#url = '';
-        this.#checkIdle();
-    }
-
-    play(): void {
-        if (this.#playing) return;
-        if (this.#live) return this.#playLive(this.#live);
-        if (this.#endedSerial === this.#serial && this.#ring.length === 0 && !this.#awaiting) this.seek(0);
-        this.#anchor();
-        this.#playing = true;
-        this.#checkIdle();
-    }
-
-    pause(): void {
-        this.#anchor();
-        this.#playing = false;
-        this.#stalled = false;
-        this.#lateFor = null;
-        if (this.#live && this.#current) this.#rest(this.#live);
-    }
-
-    /** Not of live streams. */
-    setRate(rate: number): void {
-        if (this.#live) return;
-        this.#anchor();
-        this.#rate = rate;
-    }
-
-    setLoop(on: boolean): void {
-        this.#loop = on;
-        this.#send({ type: 'loop', on });
-    }
-
-    /** To the frame at a media time. Not of live streams. */
-    seek(timeUs: number): void {
-        if (this.#url === '' || this.#live) return;
-        if (this.durationUs !== null) timeUs = Math.min(timeUs, this.durationUs - 1);
-        this.#goTo(Math.max(0, timeUs));
-    }
-
-    #goTo(timeUs: number): void {
-        this.#soughtUs = timeUs;
-        // Before frames are returned: with room for more, the worker would decode on from the old place.
-        this.#send({ type: 'seek', serial: ++this.#serial, timeUs: this.#soughtUs });
-        for (const frame of this.#ring.splice(0)) this.#done(frame);
-        if (this.#preview) this.#done(this.#preview);
-        this.#preview = null;
-        this.#forgetPictures();
-        this.#awaiting = true;
-        this.#stalled = false;
-        this.#anchorUs = this.#soughtUs;
-        this.#anchorNow = this.#now();
-        this.#listener.jumped();
-    }
-
-    /** By frames, from the one shown; paused. */
-    step(frames: number): void {
-        this.pause();
-        const current = this.#current;
-        if (!current || this.#awaiting || this.#live) return;
-        if (frames === 1 && this.#ring.length > 0) {
-            this.#anchorUs = this.#ring[0]!.presentUs;
-            this.#anchorNow = this.#now();
-        } else {
-            const ended = this.#endedSerial === this.#serial && this.#ring.length === 0;
-            const target = current.timeUs + frames * current.durationUs + current.durationUs / 2;
-            this.seek(frames > 0 && ended && this.#loop ? 0 : target);
-        }
-    }
-
-    /** The page is hidden: stops decoding; the clock continues. */
+    /** The page is hidden. */
     hide(): void {
-        this.#hidden = true;
-        if (this.#live) this.#rest(this.#live);
-        else if (this.#playing) this.#send({ type: 'rest' });
+        this.hidden = true;
+        this.#timeline.hide();
         this.#checkIdle();
     }
 
-    /** It is visible again: seeks to where the clock is now. */
+    /** It is visible again. */
     show(): void {
-        if (!this.#hidden) return;
-        this.#hidden = false;
-        if (this.#live) {
-            if (this.#playing || !this.#current) this.#goLive(this.#live);
-            return;
-        }
-        if (!this.#playing || this.#awaiting) return;
-        const current = this.#current;
-        let timeUs = this.#presentUs();
-        if (current) timeUs += current.timeUs - current.presentUs;
-        if (this.#loop && this.durationUs) timeUs %= this.durationUs;
-        this.seek(timeUs);
+        if (!this.hidden) return;
+        this.hidden = false;
+        this.#timeline.show();
     }
+
+    // ---- what is shown ------------------------------------------------------------------------------------------------
 
     /** The frame to show from now on, or null if it is still the same. Its arrays are valid until the next one is returned. */
     tick(): FrameReport | null {
-        let show: FrameReport | null = null;
-        if (this.#preview && !this.#isComing(this.#preview)) {
-            show = this.#preview;
-            this.#preview = null;
-        }
-        if (!this.#awaiting) {
-            const at = this.#presentUs();
-            while (this.#ring.length > 0 && this.#ring[0]!.presentUs <= at) {
-                if (this.#isComing(this.#ring[0]!)) {
-                    this.#waitForPicture(this.#ring[0]!, at);
-                    break;
-                }
-                const next = this.#ring.shift()!;
-                if (next === this.#lateFor) this.#goOn();
-                if (this.#preview) this.#passOver(this.#preview, next);
-                this.#preview = null;
-                const beyond = this.#ring[0];
-                if (this.#isGone(next) && beyond && beyond.presentUs <= at) {
-                    this.#passOver(next, beyond);
-                    continue;
-                }
-                if (show && this.#live && !show.preview) ++this.#live.notShown;
-                if (show) this.#passOver(show, next);
-                show = next;
-            }
-            if (show && this.#live && !show.preview) show = this.#inTime(this.#live, show);
-            if (this.#playing && this.#ring.length === 0) this.#runDry(show ?? this.#current, at);
-        }
-        if (show) {
-            if (this.#current) this.#done(this.#current);
-            this.#current = show;
-        }
+        const at = this.awaiting ? null : this.#timeline.presentUs;
+        const show = this.#queue.advance(at, this.#timeline);
+        if (at !== null && this.playing && this.ahead === 0) this.#timeline.ranDry(this.current, at);
         this.#checkIdle();
         return show;
     }
 
+    /** The picture of the frame that is shown now, to be shown with it and closed: once; null where that is the one before. */
+    takePicture(): DecodedPicture | null {
+        return this.#queue.takePicture();
+    }
+
+    /** Whether the picture that was taken last is that of the frame shown now. */
+    get hasPicture(): boolean {
+        return this.#queue.hasPicture;
+    }
+
     /** Whether time must be looked at again soon. */
     get needsTicks(): boolean {
-        return !this.#failed && ((this.#playing && !this.#hidden && !this.stalled) || this.#preview !== null || this.#due());
+        return !this.#failed && ((this.playing && !this.hidden && !this.stalled) || this.#queue.hasPreview || this.#isDue());
     }
 
     /** Resolves once frames are decoded as far ahead as there is room for, or to the end, or playing failed. */
@@ -378,231 +262,84 @@ export class Playback {
 
     /** Whether idle() would resolve at once. */
     get settled(): boolean {
-        if (this.#url === '' || this.#failed || (this.#hidden && this.#playing)) return true;
-        if (this.#live) return !this.#awaiting;
-        const held = this.#ring.length + (this.#current ? 1 : 0) + (this.#preview ? 1 : 0);
-        const holds = this.#due() && this.#isComing(this.#ring[0]!);
-        return !this.#awaiting && !holds && (held >= this.#room || this.#endedSerial === this.#serial);
+        if (this.#url === '' || this.#failed || (this.hidden && this.playing)) return true;
+        if (this.awaiting || !this.#timeline.fillsRoom) return !this.awaiting;
+        return !this.#queue.isHeldUp(this.#timeline.presentUs) && (this.#queue.held >= this.#room || this.ended);
     }
 
-    #due(): boolean {
-        return !this.#awaiting && this.#ring.length > 0 && this.#ring[0]!.presentUs <= this.#presentUs();
-    }
-
-    // ---- texture pictures -----------------------------------------------------------------------------------------
-
-    // Whether the frame's picture may still come.
-    #isComing({ picture }: FrameReport): boolean {
-        return picture === undefined || (picture !== null && this.#pictures.state(picture) === 'coming');
-    }
-
-    #isGone({ picture }: FrameReport): boolean {
-        return picture != null && this.#pictures.state(picture) === 'gone';
-    }
-
-    // What comes after a frame tells whether it has a picture of its own; otherwise it shows the last one.
-    #frameArrived(frame: FrameReport | null): void {
-        if (this.#arrived && this.#arrived.picture === undefined) this.#arrived.picture = this.#picture;
-        this.#arrived = frame;
-        if (frame && !this.#textured) frame.picture = null;
-    }
-
-    #takePictureReport(report: PictureReport): void {
-        if (report.serial !== this.#serial) return;
-        const frame = this.#arrived;
-        const ofFrame = frame?.presentUs === report.presentUs && frame.picture == null;
-        if (ofFrame) frame.pictureBytes = report.bytes;
-        this.#textured = true;
-        this.#picture = this.#pictures.take(report, (id) => {
-            if (ofFrame) frame.picture = id;
-        });
-    }
-
-    #pictureSettled(id: number): void {
-        const live = this.#live;
-        const frame = this.#ring.find(({ picture }) => picture === id);
-        if (live && frame) {
-            const now = this.#now();
-            live.clock.ready('picture', now, frame.presentUs);
-            live.readyMs.set(frame, Math.max(now, live.readyMs.get(frame) ?? now));
-        }
-        this.#listener.arrived();
-        this.#checkIdle();
-    }
-
-    #forgetPictures(): void {
-        this.#pictures.jumped();
-        this.#lateFor = null;
-        this.#arrived = null;
-        this.#picture = null;
-    }
-
-    // The frame is due, but its picture is not there.
-    #waitForPicture(frame: FrameReport, at: number): void {
-        const lateUs = at - frame.presentUs;
-        if (lateUs > catchUpUs) this.#pictures.catchUp(at);
-        if (this.#live || !this.#playing || this.#stalled || lateUs <= stallUs * this.#rate) return;
-        this.#anchorUs = frame.presentUs;
-        this.#anchorNow = this.#now();
-        this.#stalled = true;
-        this.#lateFor = frame;
-        this.#listener.waiting();
-    }
-
-    #goOn(): void {
-        this.#lateFor = null;
-        this.#stalled = false;
-        this.#anchorNow = this.#now();
+    #isDue(): boolean {
+        const { next } = this.#queue;
+        return !this.awaiting && next !== null && next.presentUs <= this.#timeline.presentUs;
     }
 
     #checkIdle(): void {
         if (this.settled) for (const resolve of this.#idleWaiting.splice(0)) resolve();
     }
 
-    #presentUs(): number {
-        if (this.#live) return this.#playing ? this.#live.clock.presentUs(this.#now()) : -Infinity;
-        if (!this.#playing || this.#stalled || this.#awaiting) return this.#anchorUs;
-        return this.#anchorUs + (this.#now() - this.#anchorNow) * 1000 * this.#rate;
+    // ---- for the timeline ---------------------------------------------------------------------------------------------
+
+    keep(frame: FrameReport): void {
+        this.#queue.keep(frame);
     }
 
-    #anchor(): void {
-        this.#anchorUs = this.#presentUs();
-        this.#anchorNow = this.#now();
+    found(): void {
+        this.awaiting = false;
+        this.#listener.sought();
     }
 
-    // A live frame that is to be shown, or null if it came too late for that: it stays until one comes that did not. Where only
-    // drawing is late, the frame is shown.
-    #inTime({ clock, readyMs }: Live, frame: FrameReport): FrameReport | null {
-        const lateUs = clock.timeAt(readyMs.get(frame) ?? NaN) - frame.presentUs - frame.durationUs;
-        if (lateUs <= lateFramesUs) {
-            clock.inTime();
-            return frame;
-        }
-        clock.tooLate(this.#now(), frame.presentUs);
-        this.#ring.unshift(frame);
-        return null;
-    }
-
-    #playLive(live: Live): void {
-        this.#playing = true;
-        if (live.resting || this.#endedSerial === this.#serial) this.#goLive(live);
-    }
-
-    #rest(live: Live): void {
-        if (live.resting) return;
-        live.resting = true;
-        this.#send({ type: 'rest' });
-        for (const frame of this.#ring.splice(0)) this.#done(frame);
+    goTo(timeUs: number): void {
+        this.soughtUs = timeUs;
+        // Before frames are returned: with room for more, the worker would decode on from the old place.
+        this.#worker.send({ type: 'seek', serial: ++this.#serial, timeUs });
+        this.#queue.forgetAll();
+        this.awaiting = true;
+        this.#timeline.standAt(timeUs);
         this.#listener.jumped();
     }
 
-    #goLive(live: Live): void {
-        if (this.#hidden) return;
-        live.resting = false;
-        live.clock = new LiveClock();
-        this.#goTo(0);
+    rest(): void {
+        this.#worker.send({ type: 'rest' });
     }
 
-    #behindMs(): number {
-        const live = this.#live;
-        if (!live || !this.#current || !this.#playing || this.#awaiting) return NaN;
-        const now = this.#now();
-        const { presentUs, durationUs } = this.#current;
-        return live.clock.behindMs(now, Math.min(live.clock.presentUs(now), presentUs + durationUs));
+    forgetAhead(): void {
+        this.#queue.forgetAhead();
+        this.#listener.jumped();
     }
 
-    // A time of the worker's, by the player's clock.
-    #fromWorker(ms: number): number {
-        return this.#now() - (performance.timeOrigin + performance.now() - ms);
+    waits(): void {
+        this.#listener.waiting();
     }
 
-    #takeLive(live: Live, report: LiveReport): void {
-        live.state.take(report);
-        if (report.type === 'heartbeat' && report.clockUs !== null) live.clock.publisher(this.#fromWorker(report.atMs), report.clockUs);
-        if (report.type === 'link' && report.link === 'open') live.clock.reconnected(this.#now());
-        this.#listener.live(report);
+    finish(): void {
+        this.playing = false;
+        this.#listener.ended();
     }
 
-    // There is no frame after this one, yet or at all.
-    #runDry(last: FrameReport | null, at: number): void {
-        if (this.#live && this.#endedSerial !== this.#serial) return; // its clock goes on
-        if (!last || at < last.presentUs + last.durationUs) return;
-        this.#anchorUs = last.presentUs + last.durationUs;
-        this.#anchorNow = this.#now();
-        if (this.#endedSerial === this.#serial) {
-            if (this.#loop && !this.#live) {
-                this.seek(0);
-            } else {
-                this.#playing = false;
-                this.#listener.ended();
-            }
-        } else if (!this.#stalled) {
-            this.#stalled = true;
-            this.#listener.waiting();
-        }
-    }
+    // ---- the worker ---------------------------------------------------------------------------------------------------
 
-    // Skips a frame because the next is due already; the next takes over its triangles if it needs them.
-    #passOver(frame: FrameReport, next: FrameReport): void {
-        if (frame.indices && !next.indices && next.topology === frame.topology) {
-            next.indices = frame.indices;
-            next.texcoords = frame.texcoords;
-        }
-        this.#done(frame);
-    }
-
-    #done(frame: FrameReport): void {
-        if (frame === this.#foreign) return;
-        this.#send({ type: 'done', buffer: frame.buffer }, [frame.buffer]);
-    }
-
-    #send(request: Request, transfer: Transferable[] = []): void {
-        this.#worker?.postMessage(request, transfer);
-    }
-
-    async #start(timeUs: number): Promise<void> {
-        const opening = ++this.#opening;
-        this.#soughtUs = timeUs;
-        this.#awaiting = true;
+    #start(timeUs: number): void {
+        this.soughtUs = timeUs;
+        this.awaiting = true;
         const serial = ++this.#serial;
-        this.#anchorUs = timeUs;
+        this.#timeline.standAt(timeUs);
         this.#listener.jumped();
-        let worker: Worker;
-        try {
-            worker = await this.#makeWorker();
-        } catch (error) {
-            if (opening === this.#opening) this.#fail('decoder', `The player's worker could not be started: ${error}.`);
-            return;
-        }
-        if (opening !== this.#opening) {
-            worker.terminate();
-            return;
-        }
-        this.#worker = worker;
-        worker.onmessage = ({ data }: MessageEvent<Report>) => {
-            if (worker === this.#worker) this.#take(data);
-        };
-        worker.onerror = (event) => {
-            event.preventDefault();
-            if (worker === this.#worker) this.#restart(event.message || 'its worker stopped');
-        };
-        this.#send({
-            type: 'open', url: this.#url, wasmUrl: this.#wasmUrl, serial, timeUs, loop: this.#loop, traps: this.#traps,
-            live: this.#live !== null,
+        void this.#worker.start(() => {
+            this.#worker.send({
+                type: 'open', source: this.#timeline.source, url: this.#url, wasmUrl: this.#wasmUrl, serial, timeUs,
+                loop: this.loop, traps: this.#traps,
+            });
+            this.#timeline.workerOpened();
+            this.#queue.forgetPictures();
+            this.#roomSetFor = 0;
+            this.#worker.send({ type: 'room', frames: this.#room });
+            if (this.#serial !== serial) this.#worker.send({ type: 'seek', serial: this.#serial, timeUs: this.soughtUs });
         });
-        if (this.#live?.resting) this.#send({ type: 'rest' });
-        this.#forgetPictures();
-        this.#roomSetFor = 0;
-        this.#send({ type: 'room', frames: this.#room });
-        if (this.#serial !== serial) this.#send({ type: 'seek', serial: this.#serial, timeUs: this.#soughtUs });
     }
 
+    // Without what stopped the decoder, a few times.
     #restart(text: string, atUs?: number): void {
-        this.#worker?.terminate();
-        this.#worker = null;
-        this.#ring = [];
-        this.#preview = null;
-        this.#foreign = this.#current;
+        this.#worker.stop();
+        this.#queue.abandon();
         if (atUs !== undefined) this.#traps.push(atUs);
         if (atUs === undefined || this.#traps.length > mostTraps) {
             this.#fail('decoder', `This stream cannot be played: ${text}.`);
@@ -610,48 +347,39 @@ export class Playback {
         }
         this.#listener.notice(`A part of the stream stopped the decoder, which was started again: ${text}.`);
         this.#listener.restarted();
-        if (this.#live) this.#live.clock = new LiveClock();
-        void this.#start(this.timeUs);
+        this.#start(this.timeUs);
     }
 
     #fail(code: FailureCode, text: string): void {
         this.#failed = true;
-        this.#awaiting = false;
-        this.#playing = false;
-        this.#worker?.terminate();
-        this.#worker = null;
+        this.awaiting = false;
+        this.playing = false;
+        this.#worker.stop();
         this.#listener.failed(code, text);
         this.#checkIdle();
     }
 
-    #take(report: Report): void {
+    #hear(report: Report): void {
         switch (report.type) {
             case 'opened':
-                this.#textured ||= report.sequence.streamVersion >= texturedFrom;
+                if (report.sequence.streamVersion >= texturedFrom) this.#queue.expectPictures();
                 this.#listener.opened(report.sequence, report.layerNames);
                 break;
             case 'extent':
                 this.durationUs = report.durationUs;
-                this.seekable = report.seekable;
-                this.#listener.extent(report.durationUs, report.seekable);
+                this.#listener.extent();
                 break;
             case 'frame':
-                this.#takeFrame(report);
+                this.#frameArrived(report);
                 break;
             case 'audio':
                 if (report.serial === this.#serial) this.#listener.sound(report);
                 break;
             case 'picture':
-                this.#takePictureReport(report);
+                if (report.serial === this.#serial) this.#queue.addPicture(report);
                 break;
             case 'ended':
-                if (report.serial !== this.#serial) break;
-                this.#endedSerial = report.serial;
-                this.#frameArrived(null);
-                // After a seek beyond the last frame, the picture stays.
-                this.#awaiting = false;
-                this.#stalled = false;
-                this.#listener.arrived();
+                if (report.serial === this.#serial) this.#allArrived();
                 break;
             case 'notice':
                 this.#listener.notice(report.text);
@@ -667,62 +395,35 @@ export class Playback {
                 this.heldBytes = report.heldBytes;
                 break;
             default:
-                if (this.#live) this.#takeLive(this.#live, report);
+                this.#timeline.report(report);
+                this.#listener.live(report);
         }
         this.#checkIdle();
     }
 
-    #takeFrame(frame: FrameReport): void {
+    #frameArrived(frame: FrameReport): void {
+        const { buffer } = frame;
         if (frame.serial !== this.#serial) {
-            this.#done(frame);
+            this.#worker.send({ type: 'done', buffer }, [buffer]);
             return;
         }
-        if (frame.buffer.byteLength > this.#roomSetFor) {
-            this.#roomSetFor = frame.buffer.byteLength;
-            const most = this.#live ? mostFramesLive : mostFrames;
-            this.#room = Math.max(3, Math.min(most, Math.floor(mostBytes / (frame.buffer.byteLength + 1))));
-            this.#send({ type: 'room', frames: this.#room });
+        if (buffer.byteLength > this.#roomSetFor) {
+            this.#roomSetFor = buffer.byteLength;
+            const fit = Math.floor(mostBytes / (buffer.byteLength + 1));
+            this.#room = Math.max(leastFrames, Math.min(this.#timeline.mostFrames, fit));
+            this.#worker.send({ type: 'room', frames: this.#room });
         }
-        this.#frameArrived(frame);
-        if (this.#live) this.#takeLiveFrame(this.#live, frame);
-        else if (frame.preview) {
-            if (this.#preview) this.#passOver(this.#preview, frame);
-            this.#preview = frame;
-        } else {
-            this.#ring.push(frame);
-            if (this.#awaiting) {
-                this.#awaiting = false;
-                const end = frame.presentUs + frame.durationUs;
-                this.#anchorUs = Math.max(frame.presentUs, Math.min(this.#soughtUs, end - 1));
-                this.#anchorNow = this.#now();
-                this.#listener.sought();
-            } else if (this.#stalled && !this.#lateFor) {
-                this.#stalled = false;
-                this.#anchorUs = Math.max(this.#anchorUs, frame.presentUs);
-                this.#anchorNow = this.#now();
-            }
-        }
+        this.#queue.arrived(frame);
+        this.#timeline.arrived(frame);
         this.#listener.arrived(frame);
     }
 
-    #takeLiveFrame(live: Live, frame: FrameReport): void {
-        const { clock, state } = live;
-        state.frame();
-        live.leftOut = frame.live!.leftOut;
-        const sought = this.#awaiting;
-        this.#awaiting = false;
-        if (!this.#playing) frame.preview = true; // the one picture there is until somebody plays
-        if (frame.preview) {
-            if (this.#preview) this.#passOver(this.#preview, frame);
-            this.#preview = frame;
-        } else {
-            clock.arrived(this.#fromWorker(frame.live!.receivedMs), frame.presentUs);
-            const readyMs = this.#fromWorker(frame.live!.readyMs);
-            live.readyMs.set(frame, readyMs);
-            clock.ready('frame', readyMs, frame.presentUs);
-            this.#ring.push(frame);
-        }
-        if (sought) this.#listener.sought();
-        if (!this.#playing) this.#rest(live);
+    #allArrived(): void {
+        this.#endedSerial = this.#serial;
+        this.#queue.arrived(null);
+        // After a seek beyond the last frame, the picture stays.
+        this.awaiting = false;
+        this.#timeline.allArrived();
+        this.#listener.arrived();
     }
 }

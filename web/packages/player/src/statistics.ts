@@ -1,7 +1,7 @@
 // The panel's numbers, computed from the last frames shown.
+import type { LiveNumbers } from './live_state.js';
 import type { FrameReport } from './messages.js';
 import type { DecodedPicture } from './pictures.js';
-import type { LiveNumbers } from './playback.js';
 
 const kept = 60; // frames
 
@@ -16,7 +16,7 @@ interface Shown {
 
 export interface StatisticsSummary {
     framesPerSecond: number;
-    /** Of frames and pictures. */
+    /** The rate of frames and pictures together. */
     megabitsPerSecond: number;
     /** The texture pictures: what coded the last one, its size in pixels, and their rate. Null where there are none. */
     pictures: { coder: string; width: number; height: number; megabitsPerSecond: number } | null;
