@@ -9,8 +9,9 @@
 //
 // What a frame needs, and what may be left out, is in dependency.hpp: EP- and P-frames refer only to I-frames (and to
 // codebook packets), so any of them may be left out; a lost codebook costs the frames that use it, until the next one.
-// T-frames refer to the I-frame or, by default, to the previous T-frame: then a lost one costs those up to the next
-// frame that refers to an I-frame, or is one. A decoder may start at any I-frame once it has the sequence header.
+// T-frames refer to the reference, the last I- or TP-frame, or, by default, to the previous T-frame: then a lost one
+// costs those up to the next frame that refers to the reference alone, or is one. A decoder may start at any I-frame
+// once it has the sequence header.
 #pragma once
 
 #include <cstdint>
@@ -48,7 +49,7 @@ struct DecoderOptions {
 
 // The contents of the sequence header.
 struct SequenceInfo {
-    std::uint16_t version = 2;  // of the stream
+    std::uint16_t version = 0;  // of the stream
     // Number of this sequence in the stream, from 0. A different header begins another sequence; in joined files, so
     // does a header at which the frame numbers start again.
     std::uint32_t ordinal = 0;
@@ -70,8 +71,8 @@ struct SequenceInfo {
 struct FrameView {
     FrameInfo info;
     // Frames with the same number have the same triangles and texture coordinates, so these need not be sent to a
-    // graphics card again. T- and P-frames have the number of their I-frame; every other frame has a new one. Never 0;
-    // numbers of different decoders are unrelated.
+    // graphics card again. T- and P-frames have the number of the I- or TP-frame that is their reference; every
+    // other frame has a new one. Never 0; numbers of different decoders are unrelated.
     std::uint32_t topology = 0;
     MeshView mesh;  // mm
     // Never null. For an I-frame, the skeleton as sent; for other frames, that of the I-frame moved by the transforms.

@@ -39,8 +39,8 @@ constexpr const FrameKind* kind_of_letter(std::string_view letter) {
     return nullptr;
 }
 
-// The parts of a frame's payload. Each can be decoded by itself, except a T-frame's. The numbers are those of the
-// stream; docs/bitstream.md, section 4, describes the contents for each kind of frame.
+// The parts of a frame's payload. A reader may skip each by its length, except a T-frame's. The numbers are those of
+// the stream; docs/bitstream.md, section 4, describes the contents for each kind of frame.
 enum class Layer : std::uint8_t {
     pose = 1,
     transforms = 2,
@@ -100,9 +100,9 @@ struct LayerBytes {
 struct FrameInfo {
     FrameType type = FrameType::intra;
     std::uint32_t frame = 0;
-    std::uint32_t reference = 0;    // number of the frame it refers to; for a T-frame the I-frame or the previous frame
-    std::uint32_t sequence = 0;     // of a decoded frame: SequenceInfo::ordinal
-    std::int64_t timestamp_us = 0;  // microseconds
+    std::uint32_t reference = 0;  // number of the frame it refers to; for a T-frame the reference or the previous frame
+    std::uint32_t sequence = 0;   // of a decoded frame: SequenceInfo::ordinal
+    std::int64_t timestamp_us = 0;                            // microseconds
     std::uint32_t source_vertices = 0, source_triangles = 0;  // of the captured mesh
     std::uint32_t vertices = 0, triangles = 0;                // of the decoded mesh
     // T-frames: how many its group has, and which of them it is, from 1. The bytes are those of its packet, which may

@@ -293,7 +293,7 @@ enum {
     HTVM_PACKET_DROPPABLE = 4, /* of a frame or picture: it may be left out without affecting any other */
     HTVM_PACKET_COLOUR = 8,    /* of a codebook: of the colours, not of the geometry */
     HTVM_PACKET_SESSION = 16,  /* of a sequence header: its session is not 0 */
-    HTVM_PACKET_TOLD = 128     /* the other bits are valid */
+    HTVM_PACKET_FLAGS_VALID = 128     /* the other bits are valid */
 };
 
 typedef struct htvm_packet_info {
@@ -312,7 +312,7 @@ htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_inf
 
 /* The same from the first HTVM_PACKET_HEADER bytes of a packet alone, for programs that go from packet to packet in a
  * file. HTVM_AGAIN: there are fewer bytes. HTVM_CORRUPT_STREAM: no undamaged header begins here. Whether what follows
- * is undamaged is not known. In streams of version 1, flags lack HTVM_PACKET_TOLD: only htvm_packet_read() derives
+ * is undamaged is not known. In streams of version 1, flags lack HTVM_PACKET_FLAGS_VALID: only htvm_packet_read() derives
  * them. */
 enum { HTVM_PACKET_HEADER = 32 };
 htvm_status htvm_packet_header_read(const uint8_t* bytes, size_t size, htvm_packet_info* info, size_t info_size);

@@ -1,4 +1,5 @@
-// The stream: a sequence header, then self-delimiting packets, one per frame. docs/bitstream.md is normative.
+// The stream: self-delimiting packets. A sequence header comes first, then at least one packet per frame.
+// docs/bitstream.md is normative.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +18,9 @@ enum class PacketKind : std::uint8_t {
     intra = 2,        // I-frame
     enhanced = 3,     // EP-frame: refers to an I-frame
     codebook = 4,     // a codebook that later EP-frames refer to
-    index = 5,        // positions of the I-frames, at the end of a stream; optional
+    index = 5,        // where the I-frames are, at the end of a stream; optional
     predicted = 6,    // P-frame: the I-frame's mesh moved
-    tracked = 7,      // T-frame: the I-frame's mesh laid on the captured surface
+    tracked = 7,      // T-frame: the reference's mesh laid on the captured surface
     front_index = 8,  // contents of a finished file and where they are, at its beginning; optional
     audio = 10,       // sound of the time from a frame to the next (audio.hpp); optional. 9 is not used
     patched = 11,     // TP-frame: a T-frame of which a part is replaced; a reference itself

@@ -168,7 +168,7 @@ class _Packets:
             _address(self.data, at), c.HTVM_PACKET_HEADER, info, ctypes.sizeof(info))
         if status != c.HTVM_OK or info.bytes > self._most_bytes:
             return None
-        if not info.flags & c.HTVM_PACKET_TOLD and self._have(offset + info.bytes):
+        if not info.flags & c.HTVM_PACKET_FLAGS_VALID and self._have(offset + info.bytes):
             # Streams of version 1: what they do not tell is derived from the whole packet.
             whole = c.htvm_packet_info()
             if c.library.htvm_packet_read(

@@ -22,7 +22,7 @@ struct htvm_dependencies {
 static_assert(HTVM_PACKET_REFERRED == htvm::packet_flag::referred && HTVM_PACKET_ACCESS == htvm::packet_flag::access &&
               HTVM_PACKET_DROPPABLE == htvm::packet_flag::droppable &&
               HTVM_PACKET_COLOUR == htvm::packet_flag::colour && HTVM_PACKET_SESSION == htvm::packet_flag::session &&
-              HTVM_PACKET_TOLD == htvm::packet_flag::flags_valid);
+              HTVM_PACKET_FLAGS_VALID == htvm::packet_flag::flags_valid);
 static_assert(HTVM_PACKET_HEADER == htvm::packet_header_bytes);
 static_assert(HTVM_PACKET_AUDIO == static_cast<int>(htvm::PacketKind::audio) &&
               HTVM_PACKET_PICTURE == static_cast<int>(htvm::PacketKind::texture));

@@ -31,7 +31,7 @@ const Lattice lattice = {.origin = {0, 0, 0}, .bits = 4};
 TEST(PoseTracker, WithoutASkeletonOneBoneSpansTheMeshAndFollowsItsMiddle) {
     auto tracker = make_pose_tracker({}, tall(), nullptr);
     ASSERT_TRUE(tracker.has_value());
-    EXPECT_FALSE(tracker->tracked);
+    EXPECT_FALSE(tracker->has_skeleton);
     ASSERT_EQ(tracker->skeleton.bones.size(), 1u);
     EXPECT_EQ(tracker->next(tall(), nullptr, lattice)->joints, (std::vector<LatticePoint>{{80, 0, 0}, {80, 1600, 0}}));
     EXPECT_EQ(tracker->next(moved(tall(), 1000), nullptr, lattice)->joints,
@@ -50,7 +50,7 @@ TEST(PoseTracker, KeepsTheLastPoseWhereThereIsNone) {
     const auto first = pose_at(0), second = pose_at(20);
     auto tracker = make_pose_tracker(one_bone(), tall(), &first);
     ASSERT_TRUE(tracker.has_value());
-    EXPECT_TRUE(tracker->tracked);
+    EXPECT_TRUE(tracker->has_skeleton);
     const auto at_second = tracker->next(tall(), &second, lattice);
     const auto lost = tracker->next(tall(), nullptr, lattice);
     EXPECT_EQ(lost->joints, at_second->joints);

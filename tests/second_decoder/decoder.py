@@ -143,7 +143,7 @@ def decode_stream(data):
                 joints, _ = decode_pose(frame.layer(POSE), len(header.joints), len(header.bones))
                 mesh, step = decode_intra_mesh(frame), frame.geometry_step
                 if header.version >= 4 and header.node_spacing > 0:
-                    if not packet.settled():
+                    if not packet.of_tracked_mesh():
                         mesh.positions = smoothed(mesh.positions, mesh.triangles, step, at_seams=bool(mesh.texcoords))
                     step = 1
                 textured = textured_surface(header, frame, mesh)

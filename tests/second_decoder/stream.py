@@ -9,17 +9,17 @@ from conventions import Bytes, L, Unsupported, check
 # ---------------------------------------------------------------------------------------------- 2. packets
 
 SEQUENCE, INTRA, ENHANCED, CODEBOOK, INDEX, PREDICTED, TRACKED, AUDIO, PATCHED, PICTURE = 1, 2, 3, 4, 5, 6, 7, 10, 11, 12
-REFERRED, SETTLED, TOLD = 1, 32, 128  # flags
+REFERRED, OF_TRACKED_MESH, FLAGS_VALID = 1, 32, 128  # flags
 
 
 class Packet:
     def referred(self):
         """Whether later frames may refer to this I-, T- or TP-frame (2.1)."""
-        return not self.flags & TOLD or self.flags & REFERRED != 0
+        return not self.flags & FLAGS_VALID or self.flags & REFERRED != 0
 
-    def settled(self):
+    def of_tracked_mesh(self):
         """Whether this I-frame's positions are not smoothed (2.1)."""
-        return self.flags & TOLD and self.flags & SETTLED
+        return self.flags & FLAGS_VALID and self.flags & OF_TRACKED_MESH
 
 
 def packets(data, max_payload=1 << 28):

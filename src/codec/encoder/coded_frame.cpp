@@ -15,7 +15,7 @@ std::uint32_t count(std::size_t n) { return static_cast<std::uint32_t>(n); }
 std::uint8_t flags_of(const CodedFrame& frame) {
     using namespace packet_flag;
     return static_cast<std::uint8_t>((frame.referred ? referred : droppable) | (frame.access ? access : 0) |
-                                     (frame.renewal ? of_tracked_mesh : 0));
+                                     (frame.of_tracked_mesh ? packet_flag::of_tracked_mesh : 0));
 }
 
 ShownMesh shown(CodedFrame& frame, const TexturedSurface* of_reference) {

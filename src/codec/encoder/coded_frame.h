@@ -25,25 +25,25 @@ struct CapturedFrame {
     CodedPose pose;
     std::int64_t timestamp_us = 0;
     bool force_intra = false;
-    int effort = 5;                         // Encoder::set_effort()
+    int effort = TrackedOptions{}.effort;   // Encoder::set_effort()
     std::function<bool()> may_repair = {};  // Encoder::set_repair()
 };
 
 // Coded in one way: what controlling its size, showing it and sending it take. Packets are numbered when it is sent.
 struct CodedFrame {
     FrameType type = FrameType::intra;
-    std::vector<Packet> packets;  // new codebooks first, the frame last
-    std::uint32_t reference = 0;  // number of the frame that it refers to; of an I-frame, its own
-    bool referred = false;        // whether later frames may refer to it
-    bool access = true;           // whether it is an I-frame or refers to a reference
-    bool renewal = false;         // I: whether it was made of the tracked mesh, not of the capture
-    LatticeMesh decoded;          // the mesh that the decoder will have, without the seams of charts
-    TexturedSurface textured;     // I, TP: of `decoded`, if the stream has charts
-    CapturedCounts captured;      // of the mesh that it was made of
-    LayerBytes shares;            // of a payload that is a run (FrameRules::is_run): its layers' bytes
-    double renewed = 0;           // TP: the share of its vertices that are new
-    double quality = 50;          // the quality setting used, under rate or error control
-    bool stands_in = false;       // motion alone, because nothing better fits the buffer
+    std::vector<Packet> packets;   // new codebooks first, the frame last
+    std::uint32_t reference = 0;   // number of the frame that it refers to; of an I-frame, its own
+    bool referred = false;         // whether later frames may refer to it
+    bool access = true;            // whether it is an I-frame or refers to a reference
+    bool of_tracked_mesh = false;  // I: whether it was made of that, not of the capture
+    LatticeMesh decoded;           // the mesh that the decoder will have, without the seams of charts
+    TexturedSurface textured;      // I, TP: of `decoded`, if the stream has charts
+    CapturedCounts captured;       // of the mesh that it was made of
+    LayerBytes shares;             // of a payload that is a run (FrameRules::is_run): its layers' bytes
+    double renewed = 0;            // TP: the share of its vertices that are new
+    double quality = 50;           // the quality setting used, under rate or error control
+    bool stands_in = false;        // motion alone, because nothing better fits the buffer
     std::size_t bytes() const;
 };
 

@@ -46,7 +46,7 @@ FrameSteps steps_of(const Configuration& configuration, const QualitySteps& step
 
 }  // namespace
 
-Result<PoseTracker> complete(Configuration& configuration, const Mesh& mesh, const Pose* pose) {
+Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, const Pose* pose) {
     const auto& options = configuration.options;
     auto& header = configuration.header;
     const auto origin = lattice_origin(mesh);

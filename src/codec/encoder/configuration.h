@@ -22,7 +22,7 @@ struct Configuration {
 // Completes the configuration, whose options and threads are set, from the first frame: the origin of the lattice, the
 // subject's size and, where the options do not give them, the skeleton and the radii. Gives what tracks the poses from
 // then on. Errors: bad_input, as of Encoder::push().
-Result<PoseTracker> complete(Configuration& configuration, const Mesh& first, const Pose* pose);
+Result<PoseTracker> configure(Configuration& configuration, const Mesh& first, const Pose* pose);
 
 // How coarsely a frame is quantised, as asked for.
 struct FrameSteps {

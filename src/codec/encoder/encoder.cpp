@@ -57,8 +57,8 @@ struct Encoder::State {
     std::function<bool()> may_repair;  // Encoder::set_repair()
     Output output;
     std::optional<std::int64_t> last_timestamp;
-    Queued queued;  // by the last call; if it queued none, by the last one before
-    bool queued_none = true;
+    Queued queued;            // by the last call that queued any
+    bool queued_none = true;  // whether the last call did not
     std::vector<StageTime> stages;
 };
 
@@ -70,7 +70,7 @@ std::size_t waiting_frames(const State& state) {
     return std::visit([](const auto& strategy) { return strategy.waiting.size(); }, state.strategy);
 }
 
-std::size_t frames_of_group(const State& state) {
+std::size_t frames_held(const State& state) {
     const auto* tracked = std::get_if<TrackedStrategy>(&state.strategy);
     return tracked ? tracked->held.size() : 0;
 }
@@ -82,7 +82,7 @@ std::uint32_t next_frame(const State& state) {
 // ---- 1. Onto the lattice --------------------------------------------------------------------------------------------
 
 Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
-    auto poses = complete(state.configuration, mesh, pose);
+    auto poses = internal::configure(state.configuration, mesh, pose);
     if (!poses) return tl::unexpected(poses.error());
     state.poses = std::move(*poses);
     return {};
@@ -239,8 +239,7 @@ struct Mark {
 
 Mark mark(const State& state) {
     const auto& output = state.output;
-    return {output.packets.size(), output.index.size(), output.stream_bytes, output.header_sent,
-            frames_of_group(state)};
+    return {output.packets.size(), output.index.size(), output.stream_bytes, output.header_sent, frames_held(state)};
 }
 
 void return_to(State& state, const Mark& before) {
@@ -258,7 +257,7 @@ void return_to(State& state, const Mark& before) {
         state.strategy);
 }
 
-// Does the work, or leaves the state as it was.
+// Does the work; or leaves packets, sequence and held frames as they were.
 template <class Work>
 Result<void> whole_or_not(State& state, const Work& work) {
     const auto before = mark(state);
@@ -423,7 +422,7 @@ std::optional<Packet> Encoder::pull() {
 std::span<const EncodedFrame> Encoder::coded_frames() const {
     return state_->queued_none ? std::span<const EncodedFrame>() : state_->queued.coded;
 }
-std::size_t Encoder::held_frames() const { return frames_of_group(*state_) + waiting_frames(*state_); }
+std::size_t Encoder::held_frames() const { return frames_held(*state_) + waiting_frames(*state_); }
 
 const FrameInfo& Encoder::last_frame() const {
     static const FrameInfo none;

@@ -1,5 +1,5 @@
 // A smooth vector field on the vertices of a mesh that both sides know: how far a tracked surface lies from where its
-// reference was moved to, or how its colours differ from the reference's (design, section 4).
+// reference was moved to, or how its colours differ from the reference's.
 //
 // The field is coded from coarse to fine over a VertexHierarchy: the mean of all vertices, then for each pair of nodes
 // the difference of their two means, predicted from the slopes of the decoded means round the pair (and, where there is

@@ -10,8 +10,9 @@ double bits_of(const CodedFrame& frame, const HeaderBits& header) {
     return 8.0 * static_cast<double>(frame.bytes()) + (stands_alone(frame.type) ? header.if_alone : header.otherwise);
 }
 
-tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, double bits) {
-    const double capacity = options.bits_per_second * options.buffer_seconds;
+tl::unexpected<Error> does_not_fit(const RateController& rate, double bits) {
+    const auto& options = rate.options();
+    const double room = rate.room(), capacity = options.bits_per_second * options.buffer_seconds;
     const auto number = [](double x) {
         std::array<char, 32> text{};
         std::snprintf(text.data(), text.size(), "%.3g", x);

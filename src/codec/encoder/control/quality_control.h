@@ -1,6 +1,6 @@
 // Control: at which quality a frame is coded, where that follows from a rate or an error. It wraps either strategy and
-// knows no meshes and no kinds of frames; a strategy's work gives it expected_type(), choose(), code_stand_in(),
-// can_be_moved(), errors_of() and coded_frame().
+// looks into no frame: what it must know of a kind, it reads in the table of kinds. A strategy's work gives it
+// expected_type(), choose(), code_stand_in(), can_be_moved(), errors_of() and coded_frame().
 #pragma once
 
 #include <cmath>
@@ -27,8 +27,8 @@ struct HeaderBits {
 };
 double bits_of(const CodedFrame& frame, const HeaderBits& header);
 
-// The error for a frame that takes this many bits even at the lowest quality. room: bits, of the buffer.
-tl::unexpected<Error> does_not_fit(const RateOptions& options, double room, double bits);
+// The error for a frame that takes this many bits even at the lowest quality.
+tl::unexpected<Error> does_not_fit(const RateController& rate, double bits);
 
 // Lowers the quality until the frame fits the buffer; at last, only its motion is coded. The first frames of a kind are
 // coded up to four times, until their quality is the one that the rate allows.
@@ -66,7 +66,7 @@ Result<typename Work::Frame> code_within_buffer(const Work& work, typename Work:
         frame.quality = quality;
         if (bits_of(frame, header) <= rate.room()) return stand_in;
     }
-    auto error = does_not_fit(work.configuration.options.rate, rate.room(), bits);
+    auto error = does_not_fit(rate, bits);
     rate.dropped(quality);
     return error;
 }

@@ -63,6 +63,7 @@ public:
     double quality(FrameType type) const;
     // The most bits that the next frame may take without overflowing the buffer.
     double room() const;
+    const RateControlOptions& options() const { return options_; }  // with the rate in force
     // For a frame that took too many bits, more than room(), at this quality: a lower quality at which it should fit.
     // The fifth call for the same frame, at the latest, returns lowest_quality; if that is still too much, the frame
     // must become a P-frame or be dropped.

@@ -144,7 +144,7 @@ struct JudgedMotion {
     bool lost = false;
     // What patches are planned on, if the frame is lost and may be patched, and that is not what was coded.
     std::optional<EncodedTrackedFrame> for_patches = {};
-    const EncodedTrackedFrame& alone() const { return for_patches ? *for_patches : coded.encoded; }
+    const EncodedTrackedFrame& to_patch() const { return for_patches ? *for_patches : coded.encoded; }
 };
 
 Result<JudgedMotion> code_and_judge(const TrackedWork& work, const NodeRegistration& registered,
@@ -165,32 +165,32 @@ bool may_be_patched(const TrackedWork& work, bool due) {
 // where they are, what was coded meanwhile is coded again, and the T-frame with it, unless it stays lost.
 Result<void> look_for_limbs(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps, bool patches,
                             JudgedMotion& motion) {
-    const auto code_alone = [&](const NodeRegistration& registered) {
+    const auto code_of_reference = [&](const NodeRegistration& registered) {
         return code_for_patches(work, registered, steps, motion.coded.encoded.near);
     };
     const bool to_code = patches && !motion.coded.of_reference;
-    std::optional<Result<EncodedTrackedFrame>> alone;
+    std::optional<Result<EncodedTrackedFrame>> of_reference;
     FoundLimbs limbs;
     std::vector<StageTime> of_limbs;
     if (tracking.searched_limbs) {
-        if (to_code) alone = code_alone(*tracking.registered);
+        if (to_code) of_reference = code_of_reference(*tracking.registered);
     } else {
         parallel_invoke(
             work.configuration.threads, [&] { limbs = find_lost_limbs(work, *tracking.registered, of_limbs); },
             [&] {
-                if (to_code) alone = code_alone(*tracking.registered);
+                if (to_code) of_reference = code_of_reference(*tracking.registered);
             });
         work.stages.insert(work.stages.end(), of_limbs.begin(), of_limbs.end());
         tracking.searched_limbs = true;
         tracking.registered = std::move(limbs.registered);
         tracking.moved_limbs = tracking.moved_limbs || limbs.any;
     }
-    if (patches && limbs.any) alone = code_alone(*tracking.registered);
-    if (alone) {
-        if (!*alone) return tl::unexpected(alone->error());
-        motion.for_patches = std::move(**alone);
+    if (patches && limbs.any) of_reference = code_of_reference(*tracking.registered);
+    if (of_reference) {
+        if (!*of_reference) return tl::unexpected(of_reference->error());
+        motion.for_patches = std::move(**of_reference);
     }
-    if (!limbs.any || (patches && is_lost(work, fit_of(work, motion.alone())))) return {};
+    if (!limbs.any || (patches && is_lost(work, fit_of(work, motion.to_patch())))) return {};
     auto again = code_and_judge(work, *tracking.registered, steps);
     if (!again) return tl::unexpected(again.error());
     again->for_patches = std::move(motion.for_patches);
@@ -222,13 +222,11 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     const auto send = [&](CodedMotion coded, double best) {
         return Frame(chosen_motion(work, *tracking.registered, std::move(coded), best));
     };
-    registered(work, tracking);
-
     // 1. Its motion alone, where no more is wanted.
     if (work.effort.motion_alone && !due) {
-        auto alone = code_motion(work, *tracking.registered, steps, MotionParts::motion_alone);
-        if (!alone) return tl::unexpected(alone.error());
-        if (!falls_apart(work, fit_of(work, alone->encoded))) return send(std::move(*alone), best_before);
+        auto bare = code_motion(work, *tracking.registered, steps, MotionParts::motion_alone);
+        if (!bare) return tl::unexpected(bare.error());
+        if (!falls_apart(work, fit_of(work, bare->encoded))) return send(std::move(*bare), best_before);
     }
 
     // 2. A T-frame, and how well it fits. Behind an I-frame it is not known yet how well its T-frames can fit; where
@@ -256,7 +254,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
         may_be_intra(work) && static_cast<double>(motion->coded.bytes()) > work.reference().intra_bytes;
     const bool anew = expensive || texture_is_laid_out_anew(work, tracked.mesh);
     if (!anew && motion->lost && was_lost && patches) {
-        auto patched = patch(work, *tracking.registered, steps, motion->alone());
+        auto patched = patch(work, *tracking.registered, steps, motion->to_patch());
         if (!patched) return tl::unexpected(patched.error());
         if (*patched) return Frame(std::move(**patched));
     }
@@ -282,7 +280,7 @@ Result<Frame> choose(const TrackedWork& work, Tracking& tracking, const FrameSte
 }
 
 Result<Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
-    auto coded = code_motion(work, registered(work, tracking), steps, MotionParts::motion_alone);
+    auto coded = code_motion(work, register_once(work, tracking), steps, MotionParts::motion_alone);
     if (!coded) return tl::unexpected(coded.error());
     return Frame(chosen_motion(work, *tracking.registered, std::move(*coded), work.sequence.history.best_fit));
 }

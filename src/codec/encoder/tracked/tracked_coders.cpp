@@ -85,7 +85,7 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& m
     frame.textured = std::move(charts->textured);
     frame.decoded = std::move(coded->decoded);
     frame.captured = captured;
-    frame.renewal = renewal;
+    frame.of_tracked_mesh = renewal;
     // Under rate control also what stands in for a frame that does not fit may refer to it.
     frame.referred = carries_surface(work.mesh()) && !frame.decoded.triangles.empty() &&
                      (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);

@@ -177,7 +177,7 @@ struct MovedSurface {
     std::vector<Vector3d> normals;
 };
 
-EncodedNodeMotion code_motion(const FrameSource& source, const NodeMotionSteps& steps) {
+EncodedNodeMotion code_nodes(const FrameSource& source, const NodeMotionSteps& steps) {
     const auto& [captured, surface, reference, registered, before, options] = source;
     return encode_node_motion(
         quantised(registered.motion, reference.graph.pivots), reference.graph,
@@ -290,7 +290,7 @@ Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const 
     const FrameSource source{mesh, surface, reference, registered, before, options};
     EncodedTrackedFrame out;
     const auto steps = options.motion.value_or(motion_steps(options.geometry_step, options.scale));
-    auto motion = code_motion(source, steps);
+    auto motion = code_nodes(source, steps);
     MovedSurface moved{moved_by_nodes(reference, motion.transforms, options.threads), {}};
     moved.normals = vertex_normals(moved.positions, reference.mesh.triangles);
     auto targets = targets_of(source, moved);

@@ -45,7 +45,7 @@ struct TrackedFrameOptions {
     Threads threads = {};
 };
 
-// The reference, prepared for registration; made once per I-frame.
+// The reference, prepared for registration; made once per reference.
 DeformableMesh make_tracked_deformable(const NodeReference& reference, const DeformationOptions& options,
                                        std::span<const Colour> colours = {});
 
@@ -90,7 +90,7 @@ struct EncodedTrackedFrame {
 };
 
 // mesh: as captured; surface: its index, see captured_surface(). registered: to this surface. before: state of the
-// frame that this one refers to; null if that is the I-frame. targets: what filtering left of the last frame.
+// frame that this one refers to; null if that is the reference. targets: what filtering left of the last frame.
 Result<EncodedTrackedFrame> encode_tracked_frame(const LatticeMesh& mesh, const SurfaceIndex& surface,
                                                  const NodeReference& reference, const NodeRegistration& registered,
                                                  const TrackedState* before, const TargetHistory& targets,

@@ -13,14 +13,16 @@ TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy
     if (!ahead.surface) ahead.surface = surface_of(configuration, captured, stages);
     tracking.registered = std::move(ahead.registered);
     const auto effort = tracking_effort(captured.effort);
-    return {configuration, strategy.sequence, stages, std::move(captured), effort, std::move(*ahead.surface)};
+    TrackedWork work{configuration, strategy.sequence, stages, std::move(captured), effort, std::move(*ahead.surface)};
+    if (can_refer(work)) register_once(work, tracking);
+    return work;
 }
 
 // ---- Frames in flight -----------------------------------------------------------------------------------------------
 
-TrackedAssumption assume(const TrackedWork& work, Tracking& tracking) {
+TrackedAssumption assume(const TrackedWork& work, const Tracking& tracking) {
     TrackedAssumption out;
-    if (can_refer(work)) out.nodes = registered(work, tracking);
+    if (can_refer(work)) out.nodes = *tracking.registered;
     return out;
 }
 

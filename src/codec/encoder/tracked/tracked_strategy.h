@@ -33,7 +33,8 @@ struct TrackedStrategy {
     std::optional<GroupAnchor> anchor;  // what the next group may refer to; none: the reference alone
 };
 
-// 1. What is found of the frame before it is coded; what was found while it waited goes into the work and the progress.
+// 1. What is found of the frame before it is coded: its search structures and, where it may refer to the reference, how
+// that lies on it. What was found while it waited is not found again.
 TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy& strategy,
                        TrackedStrategy::Waiting frame, Tracking& tracking, std::vector<StageTime>& stages);
 
@@ -42,7 +43,7 @@ TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy
 struct TrackedAssumption {
     std::optional<NodeRegistration> nodes;
 };
-TrackedAssumption assume(const TrackedWork& work, Tracking& tracking);
+TrackedAssumption assume(const TrackedWork& work, const Tracking& tracking);
 // Goes on with the frames that wait, one or two, the next one first. Not finished once this frame is found lost.
 void work_ahead(const TrackedWork& work, const Tracking& tracking, const TrackedAssumption& assumed,
                 std::span<TrackedStrategy::Waiting> waiting, std::vector<StageTime>& stages);

@@ -65,7 +65,7 @@ NodeRegistration register_frame(const Configuration& configuration, const Tracke
     return out;
 }
 
-const NodeRegistration& registered(const TrackedWork& work, Tracking& tracking) {
+const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking) {
     if (!tracking.registered) {
         const auto& history = work.sequence.history;
         tracking.registered = register_frame(work.configuration, work.reference(), work.surface, work.captured,

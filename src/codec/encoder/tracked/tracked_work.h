@@ -47,8 +47,8 @@ struct MotionHistory {
     std::vector<RigidMotion> last, before_last;  // of each node, as registered; empty if there is none
     TrackedState state;                          // of the last one
     TargetHistory targets;                       // what filtering left of the last one
-    std::vector<RigidMotion> gone_on;  // where each node goes next if it goes on as it did before a patch made
-                                       // it; empty but after a TP-frame
+    std::vector<RigidMotion> gone_on;  // behind a TP-frame: a start for each node of the new reference, from how the
+                                       // surface there moved on the old one; else empty
     double best_fit = 0;               // RMS of the best so far; 0: none yet
 };
 
@@ -65,8 +65,8 @@ struct TrackedAhead {
     std::optional<NodeRegistration> registered;  // as if the frame before had been a T-frame
 };
 
-// How the reference lies on a frame, and what attempts at coding it have found out so far: rate and error control make
-// several.
+// How the reference lies on the frame that is coded, and what attempts at coding it have found out so far: rate and
+// error control make several.
 struct Tracking {
     std::optional<NodeRegistration> registered;
     bool searched_limbs = false, moved_limbs = false;  // whether lost limbs were looked for, and any was found
@@ -139,8 +139,8 @@ SurfaceIndex surface_of(const Configuration& configuration, const CapturedFrame&
 NodeRegistration register_frame(const Configuration& configuration, const TrackedReference& reference,
                                 const SurfaceIndex& surface, const CapturedFrame& captured, NodeStarts starts,
                                 std::vector<StageTime>& stages, const std::atomic<bool>* in_vain = nullptr);
-// The same of the frame that is coded, once.
-const NodeRegistration& registered(const TrackedWork& work, Tracking& tracking);
+// The same of the frame that is coded, unless it is registered already.
+const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking);
 
 // Where tracking was lost: the registration with the limbs that another start finds, and whether there are any.
 struct FoundLimbs {

@@ -18,7 +18,7 @@ struct TrackingEffort {
     TargetSamples target_samples = TargetSamples::middles;  // see TargetSearch
     bool always_other_starts = false;  // other starts are registered for every frame, not for lost ones alone
     int group = 1;                     // TrackedOptions::group where that is not given
-    bool motion_alone = false;  // nothing but the motion of the nodes is coded, nor is it judged how well it fits
+    bool motion_alone = false;         // nothing but the motion of the nodes is coded, unless the picture falls apart
 };
 
 // effort: 0 to most_effort. 0 is what a frame gets that would be late: see Encoder::set_effort().

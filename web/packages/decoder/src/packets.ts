@@ -7,8 +7,8 @@ export const packetKind = {
     patched: 11, texture: 12,
 } as const;
 
-/** Bits of the flags; without `told` the others are not valid. */
-export const packetFlag = { referred: 1, access: 2, told: 128 } as const;
+/** Bits of the flags; without `flagsValid` the others are not valid. */
+export const packetFlag = { referred: 1, access: 2, flagsValid: 128 } as const;
 
 const frameKinds: readonly number[] = [
     packetKind.intra, packetKind.enhanced, packetKind.predicted, packetKind.tracked, packetKind.patched,
@@ -60,7 +60,7 @@ export function isFrame(kind: number): boolean {
 
 /** True for frames that later ones may refer to: I-, T- and TP-frames, unless their flags say otherwise. */
 export function isReferred({ kind, flags }: PacketHeader): boolean {
-    return referredKinds.includes(kind) && ((flags & packetFlag.told) === 0 || (flags & packetFlag.referred) !== 0);
+    return referredKinds.includes(kind) && ((flags & packetFlag.flagsValid) === 0 || (flags & packetFlag.referred) !== 0);
 }
 
 /** True for I-frames from which decoding can start: all but those that later frames may not refer to. */
@@ -78,8 +78,8 @@ export function isReference(header: PacketHeader): boolean {
  * T-frames that refer to no other T-frame and to which later ones may refer.
  */
 export function isAccess(header: PacketHeader): boolean {
-    const { told, access } = packetFlag;
-    return isReference(header) || (isReferred(header) && (header.flags & (told | access)) === (told | access));
+    const { flagsValid, access } = packetFlag;
+    return isReference(header) || (isReferred(header) && (header.flags & (flagsValid | access)) === (flagsValid | access));
 }
 
 /**

@@ -227,8 +227,8 @@ export class FilePackets {
             points.push({ timeUs: timestampUs - base, offset, frame, reference, base, sequence: null, fromIndex: true });
         }
         // Those from which all that follows can be decoded, where there are any.
-        const unless = packetFlag.told | packetFlag.referred;
-        const lasting = points.filter((_, i) => (entries[i]!.flags & unless) !== packetFlag.told);
+        const unless = packetFlag.flagsValid | packetFlag.referred;
+        const lasting = points.filter((_, i) => (entries[i]!.flags & unless) !== packetFlag.flagsValid);
         for (const point of lasting.length > 0 ? lasting : points) this.#add(point);
         this.indexed = true;
         this.#framesInIndex = packet.frame;
