@@ -27,6 +27,7 @@
 #include "htvm/running_time.hpp"     // IWYU pragma: export
 #include "htvm/scene.hpp"            // IWYU pragma: export
 #include "htvm/skeleton.hpp"         // IWYU pragma: export
+#include "htvm/stage_time.hpp"       // IWYU pragma: export
 #include "htvm/stream_index.hpp"     // IWYU pragma: export
 #include "htvm/texture.hpp"          // IWYU pragma: export
 #include "htvm/texture_layout.hpp"   // IWYU pragma: export

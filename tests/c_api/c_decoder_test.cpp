@@ -486,7 +486,7 @@ TEST(CInterface, TellsWhatFramesNeedAsTheCppOneDoes) {
         EXPECT_EQ(info.bytes, bytes.size());
         std::uint64_t place = 99;
         ASSERT_EQ(htvm_dependencies_push(dependencies, &info, &place), HTVM_OK);
-        EXPECT_EQ(place, cpp.decode_copy(packet));
+        EXPECT_EQ(place, cpp.push(packet));
         ASSERT_EQ(htvm_dependencies_closure(dependencies, places.data(), places.size(), &count), HTVM_OK);
         EXPECT_EQ(std::vector<std::uint64_t>(places.begin(), places.begin() + count), cpp.closure());
         ASSERT_EQ(htvm_dependencies_kept(dependencies, places.data(), places.size(), &count), HTVM_OK);
