@@ -166,14 +166,18 @@ public:
     explicit FrontPageHelp(FrontPage page) : page_(std::move(page)) {}
 
 private:
-    std::string make_groups(const CLI::App* app, CLI::AppFormatMode) const override {
+    std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode) const override {
+        return make_description(app) + make_usage(app, std::move(name)) + make_positionals(app) + make_flags(app) +
+               "\n" + make_footer(app);
+    }
+    std::string make_flags(const CLI::App* app) const {
         std::vector<const CLI::Option*> flags;
         for (const auto& entry : page_.options) {
             const auto* option = app->get_option(entry.option);
             if (option->nonpositional()) flags.push_back(option);
         }
         flags.push_back(app->get_option("--help"));
-        return make_group("Options", false, flags);
+        return make_group("Options", false, std::move(flags));
     }
     std::string make_option_desc(const CLI::Option* option) const override {
         for (const auto& entry : page_.options)
