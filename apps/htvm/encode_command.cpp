@@ -179,8 +179,8 @@ FrontPage front_page() {
                 {"--frames", "Use at most so many frames (default: all)"},
                 {"--skeleton", "The tracked skeleton, if there is one: JSON or BVH"},
                 {"--texture-as",
-                 "How images go into the stream: picture, as video on the tracked mesh; others for other\n"
-                 "profiles; or colours at the vertices (default)"},
+                 "What becomes of a texture: colours at the vertices (default), or a picture, which\n"
+                 "is coded as video and keeps details; --help-all has the others"},
                 {"--audio", "Sound that begins with the first frame"},
                 {"--deadline", "Live: milliseconds that a frame may take; where time is short, less is searched"},
             },
@@ -195,12 +195,12 @@ FrontPage front_page() {
 void add_encode(CLI::App& app, Run& run) {
     auto request = std::make_shared<EncodeRequest>();
     auto* command = app.add_subcommand("encode", "Compress a sequence of meshes into an .htvm stream");
-    add_output(*command, *request);
     add_capture_options(*command, request->capture);
     add_trouble_options(*command, *request);
-    add_encoding_options(*command, request->encoding);
     add_texture_picture_options(*command, request->pictures);
     add_audio_options(*command, request->audio);
+    add_output(*command, *request);
+    add_encoding_options(*command, request->encoding);
     add_live_options(*command, *request);
     add_job_options(*command, *request);
     add_script_options(*command, *request);
