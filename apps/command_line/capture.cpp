@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "command_line/headings.h"
 #include "command_line/terminal.h"
-#include "io/mesh_file.h"
 #include "io/skeleton_align.h"
 #include "io/skeleton_file.h"
 #include "io/texture_colours.h"
@@ -16,15 +16,18 @@
 namespace htvm::app {
 namespace {
 
+// 0 for x, 1 for y, 2 for z, of an axis that is known.
+std::size_t number_of(UpAxis up) { return (static_cast<std::size_t>(up) - 1) / 2; }
+bool is_downwards(UpAxis up) { return static_cast<std::size_t>(up) % 2 == 0; }
+
 // From the lowest to the highest vertex, in the mesh's unit; up: as in CaptureOptions.
-double height_of(const Mesh& mesh, const std::string& up) {
+double height_of(const Mesh& mesh, UpAxis up) {
     const auto along = [&](std::size_t axis) {
         const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
                                                      [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
         return mesh.positions.empty() ? 0.0 : static_cast<double>((*high)[axis]) - static_cast<double>((*low)[axis]);
     };
-    if (up.empty()) return std::max(along(1), along(2));
-    return along(static_cast<std::size_t>(up.back() - 'x'));
+    return up == UpAxis::unknown ? std::max(along(1), along(2)) : along(number_of(up));
 }
 
 std::string length_text(double millimetres) {
@@ -48,9 +51,9 @@ std::string key_of_rate(const FrameRate& rate) {
                                     : fmt::format("{}/{}", rate.numerator, rate.denominator);
 }
 
-}  // namespace
+// ---- Options --------------------------------------------------------------------------------------------------------
 
-void add_capture_options(CLI::App& command, CaptureOptions& options) {
+void add_meshes(CLI::App& command, CaptureOptions& options) {
     command
         .add_option("input", options.inputs,
                     "The meshes, one file per frame (.ply, .obj, .drc, .glb, .gltf): a folder, a pattern such as\n"
@@ -59,12 +62,13 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
         ->type_name("FILE")
         ->expected(1, -1)
         ->required();
-    command
-        .add_option("-s,--skeleton", options.skeleton,
-                    "The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON. It pays with\n"
-                    "--profile topology, where limbs cost more bits without it. By default it only helps to begin\n"
-                    "where limbs are fast, and may be left out")
-        ->type_name("FILE");
+    command.add_option("--frames", options.frames, "Use at most this many frames; 0: all (default: all)")
+        ->group(heading::input);
+    command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)")
+        ->group(heading::input);
+}
+
+void add_times(CLI::App& command, CaptureOptions& options) {
     command
         .add_option_function<std::string>(
             "--fps",
@@ -75,52 +79,72 @@ void add_capture_options(CLI::App& command, CaptureOptions& options) {
             },
             "Frames per second of the meshes: 25, 29.97 or 30000/1001 (default: the skeleton's rate, else by the\n"
             "timestamps, or of standard input as its first PLY says in a comment 'fps 25', else 30)")
-        ->type_name("RATE");
+        ->type_name("RATE")
+        ->group(heading::input);
     command
         .add_option("--timestamps", options.timestamps,
                     "When each frame was captured, a file: CSV with the time in seconds or timecode, or\n"
                     "frame,timestamp; or JSON, as 'htvm info --json' prints it. Default: what the PLY files say in a\n"
                     "comment 'timestamp', unless --fps is given; else the numbers in the files' names, at --fps")
-        ->type_name("FILE");
-    std::vector<std::string> units = {"auto"};
-    for (const auto& unit : length_units) units.emplace_back(unit.symbol);
-    command
-        .add_option(
-            "--unit", options.unit,
-            "Unit of the mesh files: mm, cm, dm, m, in or ft (default: mm, cm or m, guessed from the first mesh's\n"
-            "size; m for glTF)")
-        ->check(CLI::IsMember(units));
+        ->type_name("FILE")
+        ->group(heading::input);
+}
+
+void add_size(CLI::App& command, CaptureOptions& options) {
+    add_choice(command, "--unit", options.unit, units_or("auto"),
+               "Unit of the mesh files: mm, cm, dm, m, in or ft (default: mm, cm or m, guessed from the first mesh's\n"
+               "size; m for glTF)")
+        ->group(heading::input);
     auto* scale =
         command
             .add_option("--scale", options.scale,
                         "Multiplies the positions, on top of the unit, where the capture is too large or too\n"
                         "small. The skeleton stays as it is")
-            ->check(CLI::Range(1e-6, 1e6));
+            ->check(CLI::Range(1e-6, 1e6))
+            ->group(heading::input);
     command
         .add_option("--height", options.height,
                     "Scales the positions so that the subject is that tall in the first frame, metres")
         ->check(CLI::Range(0.001, 1e4))
-        ->excludes(scale);
+        ->excludes(scale)
+        ->group(heading::input);
+    add_choice(command, "--up", options.up, up_axes,
+               "Where the head is: x, -x, y, -y, z or -z (default: not known; for --height, y or z, whichever way\n"
+               "the subject is longer)")
+        ->group(heading::input);
+}
+
+}  // namespace
+
+std::vector<Choice<std::optional<LengthUnit>>> units_or(const char* none) {
+    std::vector<Choice<std::optional<LengthUnit>>> out = {{none, std::nullopt}};
+    for (const auto& unit : length_units) out.push_back({unit.symbol, unit.unit});
+    return out;
+}
+
+void add_capture_options(CLI::App& command, CaptureOptions& options) {
+    add_meshes(command, options);
+    add_times(command, options);
+    add_size(command, options);
     command
-        .add_option(
-            "--up", options.up,
-            "Where the head is: x, -x, y, -y, z or -z (default: not known; for --height, y or z, whichever way\n"
-            "the subject is longer)")
-        ->check(CLI::IsMember({"x", "-x", "y", "-y", "z", "-z"}));
-    command.add_option("--frames", options.frames, "Use at most this many frames; 0: all (default: all)");
-    command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)");
-    command.add_option("--skeleton-offset", options.skeleton_offset,
-                       "Seconds to add to the skeleton's clock, if it is early or late");
+        .add_option("-s,--skeleton", options.skeleton,
+                    "The tracked skeleton: htvm's JSON (docs/skeleton.md), BVH, or Azure Kinect's JSON. It pays with\n"
+                    "--profile topology, where limbs cost more bits without it. By default it only helps to begin\n"
+                    "where limbs are fast, and may be left out")
+        ->type_name("FILE")
+        ->group(heading::skeleton);
+    command
+        .add_option("--skeleton-offset", options.skeleton_offset,
+                    "Seconds to add to the skeleton's clock, if it is early or late")
+        ->group(heading::skeleton);
     add_texture_options(command, options.texture);
-    command
-        .add_option(
-            "--texture-as", options.texture_as,
-            "What becomes of a texture: picture, drawn anew in a layout that lasts, and coded as video (with "
-            "--profile\n"
-            "tracked); captured, coordinates as they are and images coded as video (with --profile topology); keep,\n"
-            "the same with the images' files as they are; coordinates, the same without images; or colours at the\n"
-            "vertices. Default: colours, unless the meshes have vertex colours of their own")
-        ->check(CLI::IsMember(std::vector<std::string>(std::begin(texture_uses), std::end(texture_uses))));
+    add_choice(
+        command, "--texture-as", options.texture_as, texture_uses,
+        "What becomes of a texture: picture, drawn anew in a layout that lasts, and coded as video (with --profile\n"
+        "tracked); captured, coordinates as they are and images coded as video (with --profile topology); keep,\n"
+        "the same with the images' files as they are; coordinates, the same without images; or colours at the\n"
+        "vertices. Default: colours, unless the meshes have vertex colours of their own")
+        ->group(heading::textures);
 }
 
 void add_texture_options(CLI::App& command, TextureOptions& options) {
@@ -130,20 +154,19 @@ void add_texture_options(CLI::App& command, TextureOptions& options) {
             "The texture, PNG, JPEG or WebP: an image for all meshes, a pattern such as tex_%05d.jpg for one each,\n"
             "a video of one each, which ffmpeg decodes, or none (default: the image that the meshes' files name, else\n"
             "the one beside a mesh that is called like it)")
-        ->type_name("FILE");
-    command
-        .add_option_function<std::string>(
-            "--texture-origin",
-            [&options](const std::string& edge) {
-                options.origin = edge == "top" ? TextureOrigin::top : TextureOrigin::bottom;
-            },
-            "From which edge of the image the files count texture coordinates (default: top for glTF; bottom for OBJ\n"
-            "and PLY; for Draco as both sides of the texture's seams agree)")
-        ->check(CLI::IsMember({"bottom", "top"}));
+        ->type_name("FILE")
+        ->group(heading::textures);
+    constexpr std::array edges = {Choice<TextureOrigin>{"bottom", TextureOrigin::bottom},
+                                  Choice<TextureOrigin>{"top", TextureOrigin::top}};
+    add_choice(
+        command, "--texture-origin", options.origin, edges,
+        "From which edge of the image the files count texture coordinates (default: top for glTF; bottom for OBJ\n"
+        "and PLY; for Draco as both sides of the texture's seams agree)")
+        ->group(heading::textures);
 }
 
-bool keeps_pictures(const CaptureOptions& options) {
-    return options.texture_as == "picture" || options.texture_as == "captured" || options.texture_as == "keep";
+bool keeps_pictures(TextureAs use) {
+    return use == TextureAs::picture || use == TextureAs::captured || use == TextureAs::keep;
 }
 
 bool is_piped(const CaptureOptions& options) { return options.inputs == std::vector<std::string>{"-"}; }
@@ -156,12 +179,14 @@ std::string input_name(const CaptureOptions& options) {
 
 std::string key_of(const CaptureOptions& options) {
     std::string key = fmt::format("first {}, frames {}, fps {}, unit {}, offset {}", options.first, options.frames,
-                                  key_of_rate(options.fps), options.unit, options.skeleton_offset);
+                                  key_of_rate(options.fps), options.unit ? names_of(*options.unit).symbol : "auto",
+                                  options.skeleton_offset);
     if (options.scale != 1) key += fmt::format(", scale {}", options.scale);
-    if (options.height > 0) key += fmt::format(", height {}, up {}", options.height, options.up);
+    if (options.height > 0) key += fmt::format(", height {}, up {}", options.height, word_of(options.up, up_axes));
     if (!options.timestamps.empty()) key += ", timestamps " + options.timestamps;
     if (!options.texture.files.empty()) key += ", texture " + options.texture.files;
-    if (!options.texture_as.empty()) key += ", texture as " + options.texture_as;
+    if (options.texture_as != TextureAs::by_default)
+        key += fmt::format(", texture as {}", word_of(options.texture_as, texture_uses));
     if (options.texture.origin != TextureOrigin::by_format)
         key += options.texture.origin == TextureOrigin::top ? ", texture from the top" : ", texture from the bottom";
     return key;
@@ -176,7 +201,7 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
         return tl::unexpected(found.error());
     }
     auto texture_options = options.texture;
-    texture_options.keep_files = options.texture_as == "keep";
+    texture_options.keep_files = options.texture_as == TextureAs::keep;
     auto textures = TextureFiles::open(texture_options, capture.files_);
     if (!textures) return tl::unexpected(textures.error());
     capture.textures_ = std::move(*textures);
@@ -332,10 +357,9 @@ Result<void> Capture::find_unit() {
     if (!peeked_ && error) return tl::unexpected(*error);
     if (!peeked_)
         return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
-    const bool guessed = options_.unit == "auto" && options_.height == 0 && options_.scale == 1;
+    const bool guessed = !options_.unit && options_.height == 0 && options_.scale == 1;
     const auto of_format = pipe_ ? std::nullopt : unit_of_format(files_.paths[peeked_at_]);
-    const auto unit =
-        options_.unit == "auto" ? of_format.value_or(guess_unit(peeked_->mesh)) : *length_unit(options_.unit);
+    const auto unit = options_.unit ? *options_.unit : of_format.value_or(guess_unit(peeked_->mesh));
     millimetres_per_unit_ = options_.scale * millimetres_per(unit);
     const double tall = height_of(peeked_->mesh, options_.up);
     if (options_.height > 0) {
@@ -365,10 +389,10 @@ Result<void> Capture::find_unit() {
 
 // Of --up: which axis it is, and where the first mesh ends on it.
 void Capture::find_floor() {
-    if (options_.up.empty()) return;
-    const auto axis = static_cast<std::size_t>(options_.up.back() - 'x');
-    const bool down = options_.up.front() == '-';
-    up_ = static_cast<UpAxis>(1 + 2 * axis + (down ? 1 : 0));
+    up_ = options_.up;
+    if (up_ == UpAxis::unknown) return;
+    const auto axis = number_of(up_);
+    const bool down = is_downwards(up_);
     bool any = false;
     for (const auto& p : peeked_->mesh.positions) {
         const double c = static_cast<double>(p[axis]);
@@ -379,26 +403,28 @@ void Capture::find_floor() {
 // ---- Frames ---------------------------------------------------------------------------------------------------------
 
 TextureUse Capture::texture_use() const {
-    if (options_.texture_as == "coordinates") return TextureUse::none;
-    return options_.texture_as.empty() ? TextureUse::where_colourless : TextureUse::always;
+    if (options_.texture_as == TextureAs::coordinates) return TextureUse::none;
+    return options_.texture_as == TextureAs::by_default ? TextureUse::where_colourless : TextureUse::always;
 }
 
 // What becomes of the first mesh's texture.
 void Capture::tell_of_texture() const {
     const auto& image = textures_.image_name();
     const auto& [mesh, texture, file] = *peeked_;
-    if (texture && keeps_pictures(options_)) {
+    if (texture && keeps_pictures(options_.texture_as)) {
         note(fmt::format("the texture ({}, {} x {} pixels) is {}", image, texture->width, texture->height,
-                         options_.texture_as == "keep"      ? "kept as it is"
-                         : options_.texture_as == "picture" ? "drawn anew in a layout that lasts, and coded as video"
-                                                            : "coded as video, with its coordinates as captured"));
+                         options_.texture_as == TextureAs::keep ? "kept as it is"
+                         : options_.texture_as == TextureAs::picture
+                             ? "drawn anew in a layout that lasts, and coded as video"
+                             : "coded as video, with its coordinates as captured"));
     } else if (texture) {
         note(
             fmt::format("the colours are those of the texture ({}, {} x {} pixels) at the vertices; --texture-as "
                         "coordinates keeps its coordinates instead",
                         image, texture->width, texture->height));
     } else if (mesh.texcoords.empty()) {
-        const bool asked = options_.texture_as == "coordinates" || options_.texture.origin != TextureOrigin::by_format;
+        const bool asked =
+            options_.texture_as == TextureAs::coordinates || options_.texture.origin != TextureOrigin::by_format;
         if (asked)
             note(
                 "the meshes have no texture coordinates, so there is nothing to do for --texture-as or "
@@ -409,7 +435,7 @@ void Capture::tell_of_texture() const {
             "that are written without them take fewer bits");
     } else if (image.empty()) {
         note("the meshes have texture coordinates, but no image was found for them; --texture gives its place");
-    } else if (options_.texture_as == "coordinates") {
+    } else if (options_.texture_as == TextureAs::coordinates) {
         note(fmt::format("the texture coordinates are encoded, their image ({}) is not", image));
     } else {
         note(
@@ -445,8 +471,8 @@ Result<Capture::Encodable> Capture::read(TextureFiles& files, std::size_t place,
 }
 
 Capture::PicturesOf Capture::pictures_of() const {
-    if (!keeps_pictures(options_)) return PicturesOf::nothing;
-    return options_.texture_as == "picture" ? PicturesOf::stream : PicturesOf::capture;
+    if (!keeps_pictures(options_.texture_as)) return PicturesOf::nothing;
+    return options_.texture_as == TextureAs::picture ? PicturesOf::stream : PicturesOf::capture;
 }
 
 MeshFileOptions Capture::mesh_options() const {

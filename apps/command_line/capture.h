@@ -2,6 +2,7 @@
 // time.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <future>
@@ -10,11 +11,13 @@
 #include <string>
 #include <vector>
 
+#include "command_line/choice.h"
 #include "command_line/mesh_pipe.h"
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "htvm/scene.hpp"
 #include "htvm/skeleton.hpp"
+#include "io/mesh_file.h"
 #include "io/sequence.h"
 #include "io/texture_file.h"
 #include "io/timestamps.h"
@@ -25,35 +28,50 @@ class App;
 
 namespace htvm::app {
 
+// What becomes of a texture.
+enum class TextureAs : std::uint8_t {
+    by_default,   // colours at the vertices of meshes that have no colours of their own
+    colours,      // colours at the vertices, whatever the meshes have
+    coordinates,  // coordinates stay as they are, and the image is left out
+    picture,      // it is drawn anew in a layout that lasts, and coded as video
+    captured,     // coordinates and images stay as they are, the images coded as video
+    keep,         // the same, with the images' files as they are
+};
+inline constexpr std::array texture_uses = {
+    Choice<TextureAs>{"colours", TextureAs::colours}, Choice<TextureAs>{"coordinates", TextureAs::coordinates},
+    Choice<TextureAs>{"picture", TextureAs::picture}, Choice<TextureAs>{"captured", TextureAs::captured},
+    Choice<TextureAs>{"keep", TextureAs::keep},
+};
+
+inline constexpr std::array up_axes = {
+    Choice<UpAxis>{"x", UpAxis::plus_x},   Choice<UpAxis>{"-x", UpAxis::minus_x}, Choice<UpAxis>{"y", UpAxis::plus_y},
+    Choice<UpAxis>{"-y", UpAxis::minus_y}, Choice<UpAxis>{"z", UpAxis::plus_z},   Choice<UpAxis>{"-z", UpAxis::minus_z},
+};
+
+// The units of length by their symbols, behind a word for none of them.
+std::vector<Choice<std::optional<LengthUnit>>> units_or(const char* none);
+
 struct CaptureOptions {
     // A folder, pattern, glob or file of meshes; several files; or - for PLY after PLY on standard input.
     std::vector<std::string> inputs;
-    std::string skeleton;        // file; empty: none
-    FrameRate fps;               // of the meshes; not given: the skeleton's, else of their timestamps, else 30
-    std::string timestamps;      // file; empty: as the PLY files say, else by the files' numbers and the frame rate
-    std::string unit = "auto";   // of the mesh files: one of length_units, or auto
-    double scale = 1;            // of the mesh files' positions besides
-    double height = 0;           // metres: scales so that the first frame is that tall; 0: not
-    std::string up;              // y, -y, z, ...: where the head is; empty: y or z, along which the subject is longer
-    std::size_t frames = 0;      // at most; 0: all
-    std::size_t first = 0;       // frames to leave out at the beginning
-    double skeleton_offset = 0;  // seconds added to the skeleton's clock
-    TextureOptions texture;      // where images are
-    std::string texture_as;      // one of texture_uses; empty: colours of what has no vertex colours of its own
+    std::string skeleton;            // file; empty: none
+    FrameRate fps;                   // of the meshes; not given: the skeleton's, else of their timestamps, else 30
+    std::string timestamps;          // file; empty: as the PLY files say, else by the files' numbers and the frame rate
+    std::optional<LengthUnit> unit;  // of the mesh files; not given: by their format, else guessed from the first mesh
+    double scale = 1;                // of the mesh files' positions besides
+    double height = 0;               // metres: scales so that the first frame is that tall; 0: not
+    UpAxis up = UpAxis::unknown;     // where the head is; unknown: y or z, along which the subject is longer
+    std::size_t frames = 0;          // at most; 0: all
+    std::size_t first = 0;           // frames to leave out at the beginning
+    double skeleton_offset = 0;      // seconds added to the skeleton's clock
+    TextureOptions texture;          // where images are
+    TextureAs texture_as = TextureAs::by_default;
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
                                              // taken
 };
 
-// What becomes of a texture:
-inline constexpr const char* texture_uses[] = {
-    "colours",      // those of vertices are made from it
-    "coordinates",  // are kept as they are, and the image is left out
-    "picture",      // is drawn anew in a layout that lasts, and coded as video
-    "captured",     // its coordinates and images as they are, these coded as video
-    "keep",         // the same, with the images' files as they are
-};
-// Whether its images go into the stream.
-bool keeps_pictures(const CaptureOptions& options);
+// Whether images go into the stream.
+bool keeps_pictures(TextureAs use);
 
 // Adds the options above to a command.
 void add_capture_options(CLI::App& command, CaptureOptions& options);

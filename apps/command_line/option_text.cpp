@@ -12,6 +12,9 @@
 #include <set>
 #include <sstream>
 #include <string_view>
+#include <utility>
+
+#include "command_line/program.h"
 
 namespace htvm::app {
 namespace {
@@ -50,7 +53,6 @@ void tell_value(const CLI::Option& option, OptionText& out) {
 
 std::string names_of(const std::set<CLI::Option*>& options) {
     std::vector<std::string> names;
-    // Not by get_name(), which is empty for what a short help hides.
     for (const auto* option : options) names.push_back("--" + option->get_lnames().at(0));
     std::sort(names.begin(), names.end());
     return fmt::format("{}", fmt::join(names, ", "));
@@ -124,6 +126,7 @@ void tell_meaning(const CLI::Option& option, OptionText& text) {
 // The overview names what each command does in a few words; its own help has the rest. Values and conditions of options
 // are named as in the man pages.
 class Help : public CLI::Formatter {
+protected:
     std::string make_subcommand(const CLI::App* command) const override {
         std::ostringstream out;
         CLI::detail::format_help(out, command->get_name(), wrapped(summary_of(*command), beside()), column_width_);
@@ -140,25 +143,72 @@ class Help : public CLI::Formatter {
         const auto words = meaning.substr(0, meaning.find("\n "));
         return in_column(words + " (" + conditions + ")" + meaning.substr(words.size()));
     }
-    std::string make_description(const CLI::App* app) const override {
-        return wrapped(app->get_description(), width_) + "\n";
-    }
+    std::string make_description(const CLI::App* app) const override { return filled(app->get_description()) + "\n"; }
     std::string make_footer(const CLI::App* app) const override {
-        return app->get_footer().empty() ? "" : wrapped(app->get_footer(), width_) + "\n";
+        return app->get_footer().empty() ? "" : filled(app->get_footer()) + "\n";
     }
 
     // The space beside the column of flags.
     std::size_t beside() const { return width_ - column_width_; }
+    std::string filled(const std::string& text) const { return wrapped(text, width_); }
     std::string in_column(const std::string& meaning) const {
         const auto table = std::min(meaning.find("\n "), meaning.size());
         return broken(joined(meaning.substr(0, table)), beside()) + meaning.substr(table);
     }
+
+private:
     std::size_t width_ = terminal_width();
+};
+
+// Few options, in the page's order and words.
+class FrontPageHelp : public Help {
+public:
+    explicit FrontPageHelp(FrontPage page) : page_(std::move(page)) {}
+
+private:
+    std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode) const override {
+        return make_description(app) + make_usage(app, std::move(name)) + make_positionals(app) + make_flags(app) +
+               "\n" + make_footer(app);
+    }
+    std::string make_flags(const CLI::App* app) const {
+        std::vector<const CLI::Option*> flags;
+        for (const auto& entry : page_.options) {
+            const auto* option = app->get_option(entry.option);
+            if (option->nonpositional()) flags.push_back(option);
+        }
+        flags.push_back(app->get_option("--help"));
+        return make_group("Options", false, std::move(flags));
+    }
+    std::string make_option_desc(const CLI::Option* option) const override {
+        for (const auto& entry : page_.options)
+            if (*entry.meaning && option->check_name(entry.option)) return in_column(entry.meaning);
+        return Help::make_option_desc(option);
+    }
+    std::string make_footer(const CLI::App* app) const override {
+        const auto more =
+            static_cast<std::size_t>(std::ranges::count_if(app->get_options(), [&](const CLI::Option* option) {
+                return !option->get_positional() && !shows(*option);
+            }));
+        const auto& footer = page_.footer.empty() ? app->get_footer() : page_.footer;
+        return filled(fmt::format("{}{}--help-all shows {} more options, by what they are for.", footer,
+                                  footer.empty() ? "" : "\n", more)) +
+               "\n";
+    }
+    bool shows(const CLI::Option& option) const {
+        return option.check_name("--help") || option.check_name("--help-all") ||
+               std::ranges::any_of(page_.options, [&](const auto& entry) { return option.check_name(entry.option); });
+    }
+
+    FrontPage page_;
 };
 
 }  // namespace
 
 std::shared_ptr<CLI::FormatterBase> help_formatter() { return std::make_shared<Help>(); }
+
+std::shared_ptr<CLI::FormatterBase> front_page_formatter(FrontPage page) {
+    return std::make_shared<FrontPageHelp>(std::move(page));
+}
 
 std::vector<OptionText> option_texts(const CLI::App& command) {
     std::vector<OptionText> out;

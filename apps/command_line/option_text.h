@@ -13,6 +13,8 @@ class FormatterBase;
 
 namespace htvm::app {
 
+struct FrontPage;
+
 struct OptionText {
     std::vector<std::string> names;  // "-o", "--output"; empty: given by position only
     std::string place;               // name of the positional argument; "": none
@@ -33,6 +35,8 @@ std::string range_of(const CLI::Option& option);
 
 // Lays out --help for the width of the terminal (or COLUMNS), with the same words for values as the man pages.
 std::shared_ptr<CLI::FormatterBase> help_formatter();
+// The same for a front page (program.h), which lists few options.
+std::shared_ptr<CLI::FormatterBase> front_page_formatter(FrontPage page);
 
 // The first clause of the description: what the command does, in a few words.
 std::string summary_of(const CLI::App& command);

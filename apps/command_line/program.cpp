@@ -100,7 +100,7 @@ std::string usage_message(const CLI::App* app, const CLI::Error& error) {
         if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*app));
     for (const auto* named : app->get_subcommands()) {
         command += " " + named->get_name();
-        // The everyday help may lack the very option that was wrong.
+        // The front page may lack the very option that was wrong.
         if (named->get_option_no_throw("--help-all")) help = "--help-all";
         for (const auto& word : named->remaining())
             if (meant.empty() && word.starts_with("--")) meant = meant_by(word, flags_of(*named));
@@ -195,25 +195,15 @@ int exit_with(const Program& program, const Error& error) {
 
 }  // namespace
 
-void show_first(CLI::App& command, std::vector<std::string> names) {
+void add_front_page(CLI::App& command, FrontPage page) {
     command.set_help_flag();
     command.add_flag_callback(
         "-h,--help",
-        [&command, names = std::move(names)] {
-            std::size_t hidden = 0;
-            for (auto* option : command.get_options([](const CLI::Option*) { return true; })) {
-                const bool is_first =
-                    option->get_positional() || option->check_name("--help") || option->check_name("--help-all") ||
-                    option->check_name("--quiet") ||
-                    std::any_of(names.begin(), names.end(), [&](auto& name) { return option->check_name(name); });
-                if (is_first) continue;
-                option->group("");
-                ++hidden;
-            }
-            command.footer(fmt::format("{}\n--help-all shows {} more options.", command.get_footer(), hidden));
+        [&command, formatter = front_page_formatter(std::move(page))] {
+            command.formatter(formatter);
             throw CLI::CallForHelp();
         },
-        "Print the everyday options and exit");
+        "Print what people need most, and exit");
     command.add_flag_callback(
         "--help-all", [] { throw CLI::CallForHelp(); }, "Print all options and exit");
 }

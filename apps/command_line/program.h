@@ -46,7 +46,16 @@ inline constexpr std::array exit_codes = {
 // build calls it, so pages and completions always match the options that the program parses.
 int run_program(const Program& program, int argc, char** argv);
 
-// Of a command with many options: --help shows these alone, and --help-all shows all of them.
-void show_first(CLI::App& command, std::vector<std::string> names);
+// What --help shows of a command with many options: those that people need, in plain words. --help-all and the man page
+// have all of them, under headings.
+struct FrontPage {
+    struct Entry {
+        const char* option;        // a flag, or the name of a positional argument
+        const char* meaning = "";  // "": as --help-all has it
+    };
+    std::vector<Entry> options;  // flags in the order of the page; positional arguments are there in any case
+    std::string footer = "";     // "": as --help-all has it
+};
+void add_front_page(CLI::App& command, FrontPage page);
 
 }  // namespace htvm::app

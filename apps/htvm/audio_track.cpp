@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "command_line/headings.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "core/opus_packet.h"
@@ -29,7 +30,7 @@ void add_audio_options(CLI::App& command, AudioOptions& options) {
         "--audio", options.file,
         "Sound, which begins with the first frame, mono or stereo: WAV, FLAC, MP3, Ogg, AIFF and others, coded as\n"
         "Opus; Opus files are taken as they are");
-    file->type_name("FILE");
+    file->type_name("FILE")->group(heading::sound);
     command
         .add_option(
             "--audio-delay", options.delay,
@@ -37,13 +38,15 @@ void add_audio_options(CLI::App& command, AudioOptions& options) {
             "left out")
         ->type_name("SECONDS")
         ->check(CLI::Range(-1e6, 1e6))
-        ->needs(file);
+        ->needs(file)
+        ->group(heading::sound);
     command
         .add_option("--audio-bitrate", options.kilobits,
                     "--audio: kbit/s of the sound, 6 to 510 (default: 48 mono, 96 stereo); Opus files are coded again")
         ->type_name("KBIT/S")
         ->check(CLI::Range(6.0, 510.0))
-        ->needs(file);
+        ->needs(file)
+        ->group(heading::sound);
 }
 
 Result<std::optional<AudioTrack>> AudioTrack::open(const AudioOptions& options) {

@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -17,6 +18,8 @@
 #include <vector>
 
 #include "command_line/capture.h"
+#include "command_line/choice.h"
+#include "command_line/headings.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/thread.h"
@@ -452,7 +455,8 @@ struct Options {
     std::vector<std::string> others;     // names behind it
     std::vector<std::string> originals;  // of these
     std::string decoded;                 // and the last
-    std::string unit = "auto", timestamps;
+    std::optional<LengthUnit> unit;      // of files; not given: guessed from the first one
+    std::string timestamps;
     std::string truth;       // folder; empty: no drift
     std::size_t frames = 0;  // 0: all
     std::vector<std::string> only;
@@ -630,8 +634,8 @@ struct Marks {
 };
 
 Result<Marks> open_marks(const Options& options, const MeshSource& original) {
-    auto source =
-        open_meshes({(std::filesystem::path(options.truth) / "marks").string()}, {"mm", "", options.limits, {}});
+    auto source = open_meshes({(std::filesystem::path(options.truth) / "marks").string()},
+                              {LengthUnit::millimetre, "", options.limits, {}});
     if (!source) return tl::unexpected(source.error());
     Marks marks{std::move(*source), std::vector<std::size_t>(original.frames)};
     const auto& numbers = marks.source.numbers;
@@ -850,7 +854,62 @@ void take_apart(Options& options) {
             "DECODED", options.decoded + " is one mesh, behind several originals; give patterns in quotes, or folders");
 }
 
-void add_view_options(CLI::App& command, Options& o) {
+void add_sequences(CLI::App& command, Options& o) {
+    command.add_option("ORIGINAL", o.first, "A mesh file, folder, glob or %05d pattern; or several files")
+        ->type_name("FILE")
+        ->required();
+    command
+        .add_option("DECODED", o.others,
+                    "The same for the decoded meshes, or an .htvm stream; behind several originals a stream or a "
+                    "folder")
+        ->type_name("FILE")
+        ->expected(1, -1)
+        ->required();
+    command.add_option("--frames", o.frames, "Compare at most this many frames; 0: all (default: all)")
+        ->group(heading::input);
+    constexpr std::array<Choice<std::optional<LengthUnit>>, 4> units = {{{"auto", std::nullopt},
+                                                                         {"mm", LengthUnit::millimetre},
+                                                                         {"cm", LengthUnit::centimetre},
+                                                                         {"m", LengthUnit::metre}}};
+    add_choice(command, "--unit", o.unit, units, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
+        ->default_str("auto")
+        ->group(heading::input);
+    command
+        .add_option(
+            "--timestamps", o.timestamps,
+            "When each original was captured, as for 'htvm encode', if frames of a stream are to find theirs by it")
+        ->type_name("FILE")
+        ->group(heading::input);
+    add_texture_options(command, o.texture);
+}
+
+void add_measurements(CLI::App& command, Options& o) {
+    command.option_defaults()->group(heading::measurements);
+    command
+        .add_option("--only", o.only,
+                    "Measure only some of m1, m2, regions, texcoords, d1, d2, m3, flicker, topology, separated by\n"
+                    "commas")
+        ->delimiter(',')
+        ->check(CLI::IsMember({"m1", "m2", "regions", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
+        ->option_text("LIST");
+    command
+        .add_option("--truth", o.truth,
+                    "What 'htvm synth --truth' wrote beside the originals: measures how far the decoded surface\n"
+                    "slides along the true one while its triangles stay the same, by frames since they were new")
+        ->type_name("FOLDER");
+    command.add_option("--samples", o.compare.surface_options.samples,
+                       "Samples for M2, in each direction (default: 10 times the triangles, like METRO)");
+    command.add_option("--seed", o.compare.surface_options.seed, "Seed of M2's samples")->capture_default_str();
+    command.add_option("--peak", o.peak_mm, "Peak of D1 and D2, mm (default: the originals' bounding box diagonal)")
+        ->check(CLI::PositiveNumber);
+    command.add_option("--crack-width", o.compare.topology_options.crack_width,
+                       "Widest crack, mm (default: half of the mean edge length)");
+    command.add_option("--flap-distance", o.compare.topology_options.flap_distance,
+                       "Largest distance of a flap's layers, mm (default: the same)");
+}
+
+void add_pictures(CLI::App& command, Options& o) {
+    command.option_defaults()->group(heading::pictures);
     ViewOptions& v = o.compare.views;
     command.add_option("--views", v.views, "Views around the body for M3 and flicker; 0: neither")
         ->check(CLI::Range(0, 1000))
@@ -867,83 +926,62 @@ void add_view_options(CLI::App& command, Options& o) {
         ->capture_default_str();
 }
 
+void add_results(CLI::App& command, Options& o) {
+    command.option_defaults()->group(heading::output);
+    command
+        .add_option("--csv", o.csv,
+                    "One line per frame to this file, or - for standard output; an infinite PSNR is inf")
+        ->type_name("FILE");
+    command.add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
+    command.add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same")
+        ->group(heading::parallel);
+}
+
+constexpr const char* what_is_measured =
+    "Measure decoded meshes against their originals, frame by frame: by the numbers in their names, or in\n"
+    "the order of their names if they have none:\n"
+    "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
+    "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
+    "  regions  the worst region of the surface, a ball of 10 cm: RMS distance there, in the worse direction; of\n"
+    "      frames their median, 99th percentile and largest, of a stream's I-frames and its others apart\n"
+    "  texture coordinates, at closest points of the surface; where they differ by more than 1/16 of the atlas "
+    "they\n"
+    "      are elsewhere in it, and counted by themselves\n"
+    "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
+    "  M3  PSNR and SSIM of pictures from all sides; unlit M3: of the same pictures without shading, which show\n"
+    "      texture, where there are colours\n"
+    "  flicker  how such pictures change from frame to frame, decoded beside original: a ratio of 1 is as calm "
+    "as\n"
+    "      the original; and how much the decoded ones change where the original is still; of a stream by kind of\n"
+    "      frame, and beside the T-frames around it\n"
+    "  topology  components, boundaries, cracks, flaps";
+
 }  // namespace
 
 void add_compare(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto& o = *options;
     CLI::App* command = app.add_subcommand("compare", "Measure decoded meshes against their originals");
-    command->description(
-        "Measure decoded meshes against their originals, frame by frame: by the numbers in their names, or in\n"
-        "the order of their names if they have none:\n"
-        "  M1  vertex to nearest vertex, and the colour there (RMS, both ways; the paper's eq. 9, 10)\n"
-        "  M2  point to surface, as METRO samples it (RMS, mean, largest; both ways; eq. 11, 12)\n"
-        "  regions  the worst region of the surface, a ball of 10 cm: RMS distance there, in the worse direction; of\n"
-        "      frames their median, 99th percentile and largest, of a stream's I-frames and its others apart\n"
-        "  texture coordinates, at closest points of the surface; where they differ by more than 1/16 of the atlas "
-        "they\n"
-        "      are elsewhere in it, and counted by themselves\n"
-        "  D1, D2  point-to-point and point-to-plane PSNR, as MPEG's point cloud metric\n"
-        "  M3  PSNR and SSIM of pictures from all sides; unlit M3: of the same pictures without shading, which show\n"
-        "      texture, where there are colours\n"
-        "  flicker  how such pictures change from frame to frame, decoded beside original: a ratio of 1 is as calm "
-        "as\n"
-        "      the original; and how much the decoded ones change where the original is still; of a stream by kind of\n"
-        "      frame, and beside the T-frames around it\n"
-        "  topology  components, boundaries, cracks, flaps");
-    command->add_option("ORIGINAL", o.first, "A mesh file, folder, glob or %05d pattern; or several files")
-        ->type_name("FILE")
-        ->required();
-    command
-        ->add_option("DECODED", o.others,
-                     "The same for the decoded meshes, or an .htvm stream; behind several originals a stream or a "
-                     "folder")
-        ->type_name("FILE")
-        ->expected(1, -1)
-        ->required();
-    command->add_option("--frames", o.frames, "Compare at most this many frames; 0: all (default: all)");
-    command
-        ->add_option("--only", o.only,
-                     "Measure only some of m1, m2, regions, texcoords, d1, d2, m3, flicker, topology, separated by\n"
-                     "commas")
-        ->delimiter(',')
-        ->check(CLI::IsMember({"m1", "m2", "regions", "texcoords", "d1", "d2", "m3", "flicker", "topology"}))
-        ->option_text("LIST");
-    command->add_option("--unit", o.unit, "Unit of the files: mm, cm, m, or auto (by the first frame's size)")
-        ->check(CLI::IsMember({"auto", "mm", "cm", "m"}))
-        ->capture_default_str();
-    command
-        ->add_option(
-            "--timestamps", o.timestamps,
-            "When each original was captured, as for 'htvm encode', if frames of a stream are to find theirs by it")
-        ->type_name("FILE");
-    command
-        ->add_option("--truth", o.truth,
-                     "What 'htvm synth --truth' wrote beside the originals: measures how far the decoded surface\n"
-                     "slides along the true one while its triangles stay the same, by frames since they were new")
-        ->type_name("FOLDER");
-    command->add_option("--samples", o.compare.surface_options.samples,
-                        "Samples for M2, in each direction (default: 10 times the triangles, like METRO)");
-    command->add_option("--seed", o.compare.surface_options.seed, "Seed of M2's samples")->capture_default_str();
-    command->add_option("--peak", o.peak_mm, "Peak of D1 and D2, mm (default: the originals' bounding box diagonal)")
-        ->check(CLI::PositiveNumber);
-    command->add_option("--crack-width", o.compare.topology_options.crack_width,
-                        "Widest crack, mm (default: half of the mean edge length)");
-    command->add_option("--flap-distance", o.compare.topology_options.flap_distance,
-                        "Largest distance of a flap's layers, mm (default: the same)");
-    add_view_options(*command, o);
-    command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
-    command->add_flag("--json", o.json, "Everything as JSON on standard output; an infinite PSNR is null");
-    add_texture_options(*command, o.texture);
+    command->description(what_is_measured);
+    add_sequences(*command, o);
+    add_measurements(*command, o);
+    add_pictures(*command, o);
+    add_results(*command, o);
     add_decoder_limits(*command, o.limits);
-    command
-        ->add_option("--csv", o.csv,
-                     "One line per frame to this file, or - for standard output; an infinite PSNR is inf")
-        ->type_name("FILE");
+    command->option_defaults()->group("Options");
     command->footer(
         "Examples:\n"
         "  htvm compare capture/ person.htvm\n"
         "  htvm compare 'scan_%05d.obj' meshes/ --only m1,m2 --csv errors.csv");
+    add_front_page(*command, {{{"--only"},
+                               {"--frames"},
+                               {"--unit"},
+                               {"--views"},
+                               {"--shading"},
+                               {"--pictures"},
+                               {"--csv"},
+                               {"--json"},
+                               {"--threads"}}});
     command->callback([options, &run] {
         take_apart(*options);
         run = [options] { return compare(*options); };

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
@@ -16,6 +17,8 @@
 #include <utility>
 
 #include "command_line/capture.h"
+#include "command_line/choice.h"
+#include "command_line/headings.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"
@@ -35,12 +38,24 @@
 namespace htvm::app {
 namespace {
 
+// What is written for a lost frame.
+enum class Conceal { gap, animate };
+
+constexpr std::array conceal_uses = {Choice<Conceal>{"gap", Conceal::gap},
+                                     Choice<Conceal>{"animate", Conceal::animate}};
+constexpr std::array image_formats = {Choice<ImageFormat>{"png", ImageFormat::png},
+                                      Choice<ImageFormat>{"jpeg", ImageFormat::jpeg}};
+
 struct Options {
-    std::string input, output, audio, timestamps, format = "ply", images = "png", unit = "capture", conceal = "gap";
+    std::string input, output, audio, timestamps;
+    std::string format = "ply";         // of meshes in a folder: the end of their names
+    std::optional<ImageFormat> images;  // not given: PNG
+    std::optional<LengthUnit> unit;     // not given: the capture's
+    Conceal conceal = Conceal::gap;
     std::uint64_t first = 0;
     std::size_t frames = 0;
     unsigned threads = 0;
-    bool images_given = false, json = false;
+    bool json = false;
     DecoderOptions limits;
     HubTrust trust;
 };
@@ -71,7 +86,7 @@ public:
         if (out.standard_) return out;
         auto names = mesh_output_names(options.output, "." + options.format);
         if (!names) return tl::unexpected(names.error());
-        out.in_metres_ = unit_of_format(output_path(*names, 0)) && options.unit == "capture";
+        out.in_metres_ = unit_of_format(output_path(*names, 0)) && !options.unit;
         out.animated_ = names->one_file && unit_of_format(output_path(*names, 0));
         out.names_ = std::move(*names);
         std::error_code error;
@@ -169,9 +184,8 @@ private:
     bool in_metres_ = false;  // whatever the capture was in
 };
 
-Result<double> output_unit(const Options& options, const SequenceInfo& info) {
-    if (options.unit == "capture") return info.unit_micrometres / 1000.0;
-    return millimetres_per(*length_unit(options.unit));
+double output_unit(const Options& options, const SequenceInfo& info) {
+    return options.unit ? millimetres_per(*options.unit) : info.unit_micrometres / 1000.0;
 }
 
 // Frames in a row that came, but cannot be decoded: told in one line, as most of them are lost with the first.
@@ -195,7 +209,7 @@ struct Decoding {
     std::uint64_t promised = 0;     // frames of the stream, by indices in front
     SoundOutput* sound = nullptr;   // takes what is read, if sound is asked for
     std::uint32_t next_number = 0;  // of the frame after the last
-    TextureOutput textures = TextureOutput(options.images);
+    TextureOutput textures = TextureOutput(options.images.value_or(ImageFormat::png));
     std::optional<DecodedFrame> held = {};  // the last frame, until its picture has come
     std::optional<SequenceInfo> held_sequence = {};
 };
@@ -203,11 +217,9 @@ struct Decoding {
 bool is_enough(const Decoding& d) { return d.options.frames > 0 && d.summary.written() >= d.options.frames; }
 
 Result<void> write_now(Decoding& d, DecodedFrame& frame, const SequenceInfo& sequence) {
-    const auto unit = output_unit(d.options, sequence);
-    if (!unit) return tl::unexpected(unit.error());
     const auto image = frame.mesh.texcoords.empty() ? Result<ImageFile>(ImageFile{}) : d.textures.image();
     if (!image) return tl::unexpected(image.error());
-    const auto name = d.output.write(frame.mesh, frame.info, sequence, *unit, *image);
+    const auto name = d.output.write(frame.mesh, frame.info, sequence, output_unit(d.options, sequence), *image);
     if (!name) return tl::unexpected(name.error());
     d.summary.times.numbers.push_back(frame.info.frame);
     d.summary.times.microseconds.push_back(frame.info.timestamp_us);
@@ -240,7 +252,7 @@ constexpr std::size_t most_concealed_in_a_row = 300;
 
 // Writes a stand-in for a frame. False if there is none.
 Result<bool> conceal(Decoding& d, std::uint32_t number, std::int64_t timestamp_us) {
-    if (d.options.conceal != "animate" || d.summary.concealed_in_a_row >= most_concealed_in_a_row) return false;
+    if (d.options.conceal != Conceal::animate || d.summary.concealed_in_a_row >= most_concealed_in_a_row) return false;
     auto frame = d.decoder.conceal_copy(number, timestamp_us);
     if (!frame) return false;
     if (auto ok = write(d, std::move(*frame)); !ok) return tl::unexpected(ok.error());
@@ -349,7 +361,7 @@ Result<bool> decode_next(Decoding& d) {
         if (auto ok = d.sound->take(*packet); !ok) return tl::unexpected(ok.error());
     const bool is_frame = frame_type(packet->kind).has_value();
     const auto sequences = d.numbers.dependencies().sequences();
-    d.numbers.push(*packet);
+    d.numbers.take(*packet);
     if (d.numbers.dependencies().sequences() != sequences) d.textures.begin_sequence();
     if (d.numbers.begins_sequence()) d.summary.timestamp_us.reset();  // frames before its first one never existed
     if (is_frame || packet->kind == PacketKind::index) {              // the index gives the number of frames
@@ -401,8 +413,7 @@ void tell_what_was_written(const Options& options, const MeshOutput& output, con
     if (summary.concealed > 0) frames += fmt::format(" ({} concealed)", summary.concealed);
     note(fmt::format("{} to {}, decoded at {:.1f} frames/s", frames,
                      options.output == "-" ? "standard output" : options.output, summary.frames_per_second()));
-    if (options.images_given && !summary.any_picture)
-        note("there are no pictures of a texture, so --images does nothing");
+    if (options.images && !summary.any_picture) note("there are no pictures of a texture, so --images does nothing");
     const auto others = output.other_meshes();
     if (others > 0 && summary.written() > 0)
         warn(fmt::format(
@@ -511,60 +522,84 @@ Result<void> decode(const Options& options) {
     return judge(options, *output, *input, summary);
 }
 
+// ---- Options --------------------------------------------------------------------------------------------------------
+
+void add_places(CLI::App& command, Options& options) {
+    command
+        .add_option("input", options.input,
+                    "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
+                    "Ctrl-C ends it")
+        ->type_name("FILE")
+        ->required();
+    command
+        .add_option("-o,--output", options.output,
+                    "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one .glb (all\n"
+                    "frames, as an animation), of one .ply or .obj (the first frame only), or - for concatenated PLY\n"
+                    "on standard output")
+        ->type_name("FILE")
+        ->group(heading::output);
+    command
+        .add_option("--audio", options.audio,
+                    "Where the sound goes: an .opus or .ogg file, with the packets as they are in the stream, or a\n"
+                    ".wav. It begins with the first frame asked for. Without -o, only the sound is written")
+        ->type_name("FILE")
+        ->group(heading::output);
+    command
+        .add_option("--timestamps", options.timestamps,
+                    "Write when each frame was captured to this file too, CSV, as 'htvm encode --timestamps' reads it\n"
+                    "(PLY files say it in a comment anyway)")
+        ->type_name("FILE")
+        ->group(heading::output);
+}
+
+void add_formats(CLI::App& command, Options& options) {
+    command.add_option("--format", options.format, "Format in a folder: ply (default), obj or glb")
+        ->check(CLI::IsMember({"ply", "obj", "glb"}))
+        ->group(heading::output);
+    add_choice(command, "--images", options.images, image_formats,
+               "Format of the pictures of a texture, which go beside the meshes, or into a .glb: png (default) or\n"
+               "jpeg. Image files that were kept (encode --texture-as keep) stay as they are")
+        ->group(heading::output);
+    add_choice(command, "--unit", options.unit, units_or("capture"),
+               "Unit of the positions: the capture's (default; metres for .glb), mm, cm, dm, m, in or ft")
+        ->group(heading::output);
+    add_choice(command, "--conceal", options.conceal, conceal_uses,
+               "What to write for a lost frame: gap (default), nothing, and the numbers continue; or animate,\n"
+               "the I-frame's mesh moved as in the last known frame, for up to 300 in a row")
+        ->group(heading::output);
+}
+
+void add_frames(CLI::App& command, Options& options) {
+    command.add_option("--first", options.first, "First frame to decode, counted from 0 (default: 0)")
+        ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{0xFFFFFFFF}))
+        ->group(heading::input);
+    command.add_option("--frames", options.frames, "Decode at most this many frames; 0: all (default: all)")
+        ->group(heading::input);
+}
+
+std::string contradiction_in(const Options& options) {
+    if (options.output == "-" && options.json)
+        return "--json: prints on standard output, where -o - puts the meshes; choose one";
+    if (options.output.empty() && options.audio.empty()) return "-o: is required, or --audio for the sound alone";
+    if (!options.audio.empty() && !is_written_sound_name(options.audio))
+        return fmt::format("--audio: '{}' does not end in one of {}", options.audio, written_sound_extensions);
+    return {};
+}
+
 }  // namespace
 
 void add_decode(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto* command = app.add_subcommand("decode", "Turn an .htvm stream back into meshes, their textures, and sound");
+    add_places(*command, *options);
+    add_formats(*command, *options);
+    add_frames(*command, *options);
     command
-        ->add_option("input", options->input,
-                     "The stream: a file, - for standard input, or a live one, ws://HOST:PORT/watch/NAME, until it or\n"
-                     "Ctrl-C ends it")
-        ->type_name("FILE")
-        ->required();
-    command
-        ->add_option("-o,--output", options->output,
-                     "Where the meshes go: a folder, a pattern such as out/frame_%05d.obj, the name of one .glb (all\n"
-                     "frames, as an animation), of one .ply or .obj (the first frame only), or - for concatenated PLY\n"
-                     "on standard output")
-        ->type_name("FILE");
-    command
-        ->add_option("--audio", options->audio,
-                     "Where the sound goes: an .opus or .ogg file, with the packets as they are in the stream, or a\n"
-                     ".wav. It begins with the first frame asked for. Without -o, only the sound is written")
-        ->type_name("FILE");
-    command
-        ->add_option(
-            "--timestamps", options->timestamps,
-            "Write when each frame was captured to this file too, CSV, as 'htvm encode --timestamps' reads it\n"
-            "(PLY files say it in a comment anyway)")
-        ->type_name("FILE");
-    command->add_option("--format", options->format, "Format in a folder: ply (default), obj or glb")
-        ->check(CLI::IsMember({"ply", "obj", "glb"}));
-    command
-        ->add_option(
-            "--images", options->images,
-            "Format of the pictures of a texture, which go beside the meshes, or into a .glb: png (default) or\n"
-            "jpeg. Image files that were kept (encode --texture-as keep) stay as they are")
-        ->check(CLI::IsMember({"png", "jpeg"}));
-    std::vector<std::string> units = {"capture"};
-    for (const auto& unit : length_units) units.emplace_back(unit.symbol);
-    command
-        ->add_option("--unit", options->unit,
-                     "Unit of the positions: the capture's (default; metres for .glb), mm, cm, dm, m, in or ft")
-        ->check(CLI::IsMember(units));
-    command
-        ->add_option("--conceal", options->conceal,
-                     "What to write for a lost frame: gap (default), nothing, and the numbers continue; or animate,\n"
-                     "the I-frame's mesh moved as in the last known frame, for up to 300 in a row")
-        ->check(CLI::IsMember({"gap", "animate"}));
-    command->add_option("--first", options->first, "First frame to decode, counted from 0 (default: 0)")
-        ->check(CLI::Range(std::uint64_t{0}, std::uint64_t{0xFFFFFFFF}));
-    command->add_option("--frames", options->frames, "Decode at most this many frames; 0: all (default: all)");
-    command->add_option("--threads", options->threads,
-                        "Threads (default: one per core); the meshes do not depend on it");
-    command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output");
-    add_hub_trust(*command, options->trust, "Hubs");
+        ->add_option("--threads", options->threads, "Threads (default: one per core); the meshes do not depend on it")
+        ->group(heading::parallel);
+    command->add_flag("--json", options->json, "Print what was decoded as JSON on standard output")
+        ->group(heading::scripts);
+    add_hub_trust(*command, options->trust);
     add_decoder_limits(*command, options->limits);
     command->footer(
         "If a stream is damaged or truncated, every undamaged frame is decoded, losses are reported, and the\n"
@@ -579,15 +614,26 @@ void add_decode(CLI::App& app, Run& run) {
         "  htvm decode person.htvm --audio voice.wav\n"
         "  htvm decode - -o - < person.htvm | viewer --ply\n"
         "  htvm decode ws://localhost:8080/watch/person -o - | viewer --ply");
-    command->callback([options, command, &run] {
-        options->images_given = command->count("--images") > 0;
-        if (options->output == "-" && options->json)
-            throw CLI::ValidationError("--json", "prints on standard output, where -o - puts the meshes; choose one");
-        if (options->output.empty() && options->audio.empty())
-            throw CLI::ValidationError("-o", "is required, or --audio for the sound alone");
-        if (!options->audio.empty() && !is_written_sound_name(options->audio))
-            throw CLI::ValidationError(
-                "--audio", fmt::format("'{}' does not end in one of {}", options->audio, written_sound_extensions));
+    add_front_page(*command,
+                   {{{"--output",
+                      "Where the meshes go: a folder, a pattern such as out/%05d.obj, one .glb of all frames,\n"
+                      "or - for PLY after PLY on standard output"},
+                     {"--format"},
+                     {"--audio", "Where the sound goes: an .opus, .ogg or .wav file"},
+                     {"--first", "The first frame, counted from 0"},
+                     {"--frames", "At most so many frames (default: all)"},
+                     {"--unit", "Unit of the positions (default: the capture's; metres for .glb)"},
+                     {"--conceal", "What to write for a lost frame: nothing (gap, default), or the last mesh, moved"},
+                     {"--max-memory"},
+                     {"--threads"},
+                     {"--json"}},
+                    "Losses in a damaged stream are told, and the exit code is then 3.\n"
+                    "Examples:\n"
+                    "  htvm decode person.htvm -o meshes/\n"
+                    "  htvm decode person.htvm -o person.glb\n"
+                    "  htvm decode ws://localhost:8080/watch/person -o - | viewer --ply"});
+    command->callback([options, &run] {
+        if (const auto why = contradiction_in(*options); !why.empty()) throw CLI::ValidationError(why);
         run = [options] { return decode(*options); };
     });
 }

@@ -27,7 +27,7 @@ struct CodedGroup {
 
 // What the encoders share.
 struct Work {
-    const EncodeOptions& options;
+    const EncodePlan& plan;
     EncoderOptions settings;
     const Mesh& first_mesh;
     const Pose* first_pose;
@@ -56,7 +56,7 @@ std::string frames_text(const Range& group) {
 
 // The frame before the group stands in for its first ones, if it has to.
 void find_stand_in(Pass& pass, const Range& group) {
-    if (group.begin == 0 || (!pass.options.fill && pass.options.on_bad_frame != "repeat")) return;
+    if (group.begin == 0 || (!pass.plan.fill && pass.plan.bad_frames != BadFrames::repeat)) return;
     pass.capture.restrict_to(group.begin - 1, group.count() + 1);
     auto before = pass.capture.next();
     if (!before || !*before) return;
@@ -71,7 +71,7 @@ Result<CodedGroup> code_group(Work& work, Capture& capture, const Range& group) 
     if (auto begun = encoder->begin(work.first_mesh, work.first_pose); !begun) return tl::unexpected(begun.error());
     CodedGroup out;
     RateReport rate(work.settings);
-    Pass pass{.options = work.options,
+    Pass pass{.plan = work.plan,
               .capture = capture,
               .encoder = *encoder,
               .write =
@@ -90,7 +90,7 @@ Result<CodedGroup> code_group(Work& work, Capture& capture, const Range& group) 
               .summary = out.summary,
               .rate = rate,
               .saw_triangles = !work.first_mesh.triangles.empty()};
-    auto pictures = picture_track(work.options, capture, work.settings);
+    auto pictures = picture_track(work.plan, capture, work.settings);
     if (!pictures) return tl::unexpected(pictures.error());
     if (*pictures) pass.pictures = &**pictures;
     capture.restrict_to(group.begin, group.count());
@@ -170,21 +170,21 @@ std::size_t frames_of_group(int key_interval) {
     return interval * ((least_of_group + interval - 1) / interval);
 }
 
-std::vector<Range> groups_of(const EncodeOptions& options, int key_interval, std::size_t frames) {
+std::vector<Range> groups_of(const EncodePlan& plan, int key_interval, std::size_t frames) {
     std::vector<Range> out;
-    if (options.chunks > 1) {
-        const auto chunks = std::min(options.chunks, frames);
+    if (plan.chunks > 1) {
+        const auto chunks = std::min(plan.chunks, frames);
         for (std::size_t k = 1; k <= chunks; ++k) out.push_back(part_of({k, chunks}, frames));
         return out;
     }
     const auto of_each = frames_of_group(key_interval);
     const auto groups = (frames + of_each - 1) / of_each;
-    const auto [begin, end] = options.job.of > 0 ? part_of(options.job, groups) : Range{0, groups};
+    const auto [begin, end] = plan.job.of > 0 ? part_of(plan.job, groups) : Range{0, groups};
     for (auto k = begin; k < end; ++k) out.push_back({k * of_each, std::min((k + 1) * of_each, frames)});
     return out;
 }
 
-Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& settings, Capture& capture,
+Result<void> encode_groups(const EncodePlan& plan, const EncoderOptions& settings, Capture& capture,
                            std::vector<Range> groups, StreamOutput& output, Summary& summary, RateReport& rate) {
     const auto start = std::chrono::steady_clock::now();
     const auto pose = capture.first_pose() ? std::optional(*capture.first_pose()) : std::nullopt;
@@ -192,10 +192,10 @@ Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& s
     std::size_t frames = 0;
     for (const auto& group : groups) frames += group.count();
     const auto of_machine = internal::thread_count(settings.threads);
-    const auto at_once = options.chunks > 1 ? of_machine : std::max<std::size_t>(options.jobs, 1);
+    const auto at_once = plan.chunks > 1 ? of_machine : std::max<std::size_t>(plan.jobs, 1);
     const auto threads = std::min(at_once, groups.size());
     Progress progress("encoding", frames);
-    Work work{.options = options,
+    Work work{.plan = plan,
               .settings = settings,
               .first_mesh = mesh,
               .first_pose = pose ? &*pose : nullptr,

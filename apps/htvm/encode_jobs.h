@@ -23,10 +23,10 @@ struct Range {
     std::size_t count() const { return end - begin; }
 };
 // The frames of each group that so many make: of a job's groups alone, where there is one.
-std::vector<Range> groups_of(const EncodeOptions& options, int key_interval, std::size_t frames);
+std::vector<Range> groups_of(const EncodePlan& plan, int key_interval, std::size_t frames);
 
 // Encodes groups, several at a time, and writes them in their order. Where one fails, the others stop.
-Result<void> encode_groups(const EncodeOptions& options, const EncoderOptions& settings, Capture& capture,
+Result<void> encode_groups(const EncodePlan& plan, const EncoderOptions& settings, Capture& capture,
                            std::vector<Range> groups, StreamOutput& output, Summary& summary, RateReport& rate);
 
 }  // namespace htvm::app

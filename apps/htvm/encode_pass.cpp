@@ -49,7 +49,7 @@ Result<void> take_coded(Pass& pass) {
         ++coded;
         add(summary.totals, info);
         add_coded(pass.rate, cost);
-        if (!pass.options.json || !pass.write) continue;
+        if (!pass.plan.json || !pass.write) continue;
         summary.list.push_back({info, pass.rate.controlled() ? std::optional(cost.quality) : std::nullopt});
     }
     extend(summary.bounds, pass.encoder.bounds());
@@ -90,7 +90,7 @@ Result<int> choose_effort(Pass& pass, double waited) {
     const auto place = pass.deadline->frames().size();
     if (!pass.efforts.empty() && place >= pass.efforts.size()) {
         pass.may_go_on = false;
-        return fail(ErrorKind::bad_input, too_few_efforts(pass.options.repeat_efforts, pass.efforts.size(), "more"));
+        return fail(ErrorKind::bad_input, too_few_efforts(pass.plan.repeat_efforts, pass.efforts.size(), "more"));
     }
     const int effort = pass.efforts.empty() ? pass.deadline->effort(waited) : pass.efforts[place].effort;
     if (auto set = pass.encoder.set_effort(effort); !set) return tl::unexpected(set.error());
@@ -209,7 +209,7 @@ Result<void> take_gap(Pass& pass) {
     auto& summary = pass.summary;
     const auto missing = pass.capture.missing_before();
     if (missing == 0) return {};
-    const bool fill = pass.options.fill && pass.last;
+    const bool fill = pass.plan.fill && pass.last;
     warn_of_frame(pass, FrameWarnings::missing,
                   fmt::format("{} missing before {}, by the numbers in the names; {}",
                               counted(missing, "frame") + (missing == 1 ? " is" : " are"), pass.capture.name(),
@@ -225,17 +225,18 @@ Result<void> take_gap(Pass& pass) {
 // A frame that cannot be read or coded.
 Result<void> take_bad(Pass& pass, const Error& error) {
     auto& summary = pass.summary;
-    const auto& policy = pass.options.on_bad_frame;
+    const auto policy = pass.plan.bad_frames;
     if (pass.is_stopped() || error.kind == ErrorKind::disk_full) return tl::unexpected(error);
     if (!pass.may_go_on || is_of_rate(pass, error)) return tl::unexpected(error);  // no frame is bad
     if (!pass.capture.survives_errors())
-        return policy == "stop"
+        return policy == BadFrames::stop
                    ? tl::unexpected(error)
                    : fail(error.kind, fmt::format("{} (--on-bad-frame {} goes on behind meshes that came whole, which "
                                                   "is not known of this one)",
-                                                  error.message, policy));
-    if (policy == "stop") return fail(error.kind, error.message + " (--on-bad-frame skip goes on without such frames)");
-    const bool repeats = policy == "repeat" && pass.last;
+                                                  error.message, word_of(policy, bad_frame_uses)));
+    if (policy == BadFrames::stop)
+        return fail(error.kind, error.message + " (--on-bad-frame skip goes on without such frames)");
+    const bool repeats = policy == BadFrames::repeat && pass.last;
     warn_of_frame(pass, FrameWarnings::bad,
                   error.message + (repeats ? "; the frame before is repeated in its place" : "; it is left out"));
     ++(repeats ? summary.repeated : summary.left_out);
@@ -253,18 +254,19 @@ Result<void> check_triangles(Pass& pass, const Mesh& mesh) {
     }
     const bool first = !pass.saw_triangles;
     const auto name = pass.capture.name();
-    if (first && pass.options.encoding.profile == "tracked" && !mesh.positions.empty())
+    if (first && pass.plan.encoder.profile == Profile::tracked && !mesh.positions.empty())
         return fail(ErrorKind::bad_input,
                     name +
                         " has points, but no triangles, and --profile tracked codes surfaces: make a mesh of the "
                         "points first, or give --profile topology, which codes points as they are");
-    if (!first && pass.options.on_bad_frame != "stop") return fail(ErrorKind::bad_input, name + " has no triangles");
+    if (!first && pass.plan.bad_frames != BadFrames::stop)
+        return fail(ErrorKind::bad_input, name + " has no triangles");
     ++summary.without_triangles;
     return {};
 }
 
 void keep_last(Pass& pass, Mesh mesh) {
-    if (!pass.options.fill && pass.options.on_bad_frame != "repeat") return;
+    if (!pass.plan.fill && pass.plan.bad_frames != BadFrames::repeat) return;
     pass.last = std::move(mesh);
     if (const auto* pose = pass.capture.pose()) pass.last_pose = *pose;
     if (pass.pictures) pass.last_textured = pass.capture.textured();
@@ -311,16 +313,17 @@ void FrameWarnings::tell(Kind kind, const std::string& line) {
     if (told <= most) warn(told < most ? line : line + "; others like it follow");
 }
 
-Result<std::optional<PictureTrack>> picture_track(const EncodeOptions& options, const Capture& capture,
+Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const Capture& capture,
                                                   const EncoderOptions& settings) {
-    if (!keeps_pictures(options.capture)) return std::nullopt;
+    const auto use = plan.capture.texture_as;
+    if (!keeps_pictures(use)) return std::nullopt;
     PictureTrack::Settings out;
-    out.options = options.pictures;
-    out.keep = options.capture.texture_as == "keep";
-    out.bake = options.capture.texture_as == "picture";
+    out.options = plan.pictures;
+    out.keep = use == TextureAs::keep;
+    out.bake = use == TextureAs::picture;
     out.width = settings.texture.width;
     out.height = settings.texture.height;
-    out.quality = options.encoding.quality;
+    out.quality = plan.quality;
     out.frames_per_second = capture.fps();
     if (settings.rate.bits_per_second > 0) out.bits_per_second = settings.rate.bits_per_second / share_of_meshes;
     out.buffer_seconds = settings.rate.buffer_seconds;

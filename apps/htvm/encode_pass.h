@@ -13,7 +13,7 @@
 #include "command_line/layer_table.h"
 #include "deadline.h"
 #include "effort_log.h"
-#include "encode.h"
+#include "encode_plan.h"
 #include "htvm/encoder.hpp"
 #include "picture_track.h"
 #include "rate_report.h"
@@ -55,7 +55,7 @@ private:
 };
 
 struct Pass {
-    const EncodeOptions& options;
+    const EncodePlan& plan;
     Capture& capture;
     Encoder& encoder;
     std::function<Result<void>(Packet)> write;     // empty: the packets go nowhere, as of a first pass of several
@@ -80,8 +80,8 @@ struct Pass {
     std::shared_ptr<const TexturedMesh> last_textured = {};
 };
 
-// The pictures of a capture that keeps them, as the options say; nothing for others.
-Result<std::optional<PictureTrack>> picture_track(const EncodeOptions& options, const Capture& capture,
+// The pictures of a capture that keeps them, as the plan says; nothing for others.
+Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const Capture& capture,
                                                   const EncoderOptions& settings);
 
 // Ends with an error of any kind where it is stopped.

@@ -6,48 +6,34 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cmath>
-#include <nlohmann/json.hpp>
-#include <numeric>
-#include <random>
 #include <string_view>
 
-#include "io/mesh_file.h"
-#include "io/number_text.h"
+#include "command_line/choice.h"
+#include "command_line/headings.h"
+#include "publishing.h"
 
 namespace htvm::app {
 namespace {
 
-constexpr std::array profiles = {Profile::tracked, Profile::topology, Profile::paper};
+constexpr std::array profiles = {
+    Choice<Profile>{"tracked", Profile::tracked},
+    Choice<Profile>{"topology", Profile::topology},
+    Choice<Profile>{"paper", Profile::paper},
+};
+constexpr std::array intra_coders = {
+    Choice<IntraCoder>{"tfan", IntraCoder::tfan},
+    Choice<IntraCoder>{"draco", IntraCoder::draco},
+};
 
-// The heading above the options of each group in the help.
-const char* heading(OptionGroup group) {
-    constexpr std::array<const char*, 4> headings = {"Encoding", "Rate control, instead of a quality",
-                                                     "Profile tracked (the default)", "Profiles topology and paper"};
-    return headings[static_cast<std::size_t>(group)];
-}
+bool is(const Option& option, std::string_view name) { return option.name == name; }
 
-Result<std::vector<double>> read_radii(const std::string& path, std::size_t bones) {
-    const auto bytes = read_file(path);
-    if (!bytes) return tl::unexpected(bytes.error());
-    const auto json = nlohmann::json::parse(bytes->begin(), bytes->end(), nullptr, false);
-    if (!json.is_object() || !json.contains("radii") || !json["radii"].is_array())
-        return fail(ErrorKind::bad_input,
-                    path + " is not a calibration: it has no list \"radii\" (see htvm calibrate)");
-    std::vector<double> radii;
-    for (const auto& value : json["radii"]) {
-        if (!value.is_number()) return fail(ErrorKind::bad_input, path + ": a radius is not a number");
-        radii.push_back(value.get<double>());
-    }
-    if (radii.size() != bones)
-        return fail(ErrorKind::bad_input,
-                    fmt::format("{} has {} radii, but the skeleton has {} bones", path, radii.size(), bones));
-    return radii;
-}
-
-Profile profile_by(const std::string& name) {
-    return *std::find_if(profiles.begin(), profiles.end(),
-                         [&](Profile profile) { return name == profile_name(profile); });
+// Under which heading the help lists an option.
+const char* heading_of(const Option& option) {
+    if (option.group == OptionGroup::topology) return heading::experiments;
+    if (option.group == OptionGroup::tracked && !is(option, "tracked.effort")) return heading::tracked;
+    if (is(option, "threads") || is(option, "latency_frames")) return heading::parallel;
+    if (is(option, "session")) return heading::live;
+    return is(option, "subject_size") ? heading::input : heading::quality;
 }
 
 // The option as it is on the command line: with the name and the unit of its flag.
@@ -80,24 +66,24 @@ std::string default_text(const Option& option) {
 
 // What `htvm encode` takes in place of the library's default, and where; empty: nothing else.
 std::string own_default(const Option& option) {
-    if (&option == find_option("session")) return "random where the output is no file";
-    if (&option == find_option("latency_frames")) return "1 for files";
+    if (is(option, "session")) return "random where the output is no file";
+    if (is(option, "latency_frames")) return "1 for files";
     return "";
 }
 
 std::string help_of(const Option& option) {
-    if (&option == find_option("topology.merge_duplicates"))
+    if (is(option, "topology.merge_duplicates"))
         return "Vertices that decode to the same point and attributes are merged by default, and triangles that "
                "collapse are dropped; with this, the decoded set of triangles is exactly the input's";
     if (option.kind == OptionKind::on_or_off) return (option.flag_off ? "Do without " : "") + meaning_text(option);
     auto text = capitalised(meaning_text(option));
-    if (&option == find_option("rate.bits_per_second"))
+    if (is(option, "rate.bits_per_second"))
         text +=
             ". A warning says how many frames have the lowest quality, have their motion alone, or were dropped, "
             "for which the exit code is 5";
     const std::string own = own_default(option);
     return fmt::format("{} ({}{}; default {}{})", text, range_text(as_flag(option)),
-                       &option == find_option("session") ? ", or random" : "", own.empty() ? "" : own + ", else ",
+                       is(option, "session") ? ", or random" : "", own.empty() ? "" : own + ", else ",
                        default_text(option));
 }
 
@@ -107,11 +93,12 @@ void add_option(CLI::App& command, EncodingOptions& options, const Option& optio
             .add_flag_callback(
                 option.flag, [&options, &option] { options.given.emplace_back(&option, option.flag_off ? 0 : 1); },
                 help_of(option))
-            ->group(heading(option.group));
+            ->group(heading_of(option));
         return;
     }
     const auto take = [&options, &option](const std::string& text) {
-        const bool drawn = text == "random" && &option == find_option("session");
+        const bool drawn = text == "random" && is(option, "session");
+        options.draws_session = options.draws_session || drawn;
         const auto value =
             drawn ? Result<double>(static_cast<double>(random_session())) : parse_value(as_flag(option), text);
         if (!value) throw CLI::ValidationError(value.error().message);
@@ -120,7 +107,7 @@ void add_option(CLI::App& command, EncodingOptions& options, const Option& optio
     command.add_option_function<std::string>(option.flag, take, help_of(option))
         ->type_name(option.kind == OptionKind::word ? fmt::format("WORD:{{{}}}", fmt::join(option.words, ","))
                                                     : "NUMBER")
-        ->group(heading(option.group));
+        ->group(heading_of(option));
 }
 
 // Options that are not in the library's list, or set several.
@@ -138,33 +125,29 @@ void add_quality(CLI::App& command, EncodingOptions& options) {
                 default_quality))
         ->check(CLI::Range(0.0, 100.0))
         ->type_name("NUMBER")
-        ->group(heading(OptionGroup::common));
-    command
-        .add_option("--profile", options.profile,
-                    "What the stream keeps. tracked (default): the fewest bits. Each frame is the last "
-                    "I-frame's mesh laid on the "
-                    "frame's surface (T-frames), with or without a skeleton; connectivity and sampling are not "
-                    "the capture's. topology: keeps every frame's own connectivity, for several times the "
-                    "bits. paper: the same with the choices of the published method")
-        ->check(CLI::IsMember({"tracked", "topology", "paper"}))
+        ->group(heading::quality);
+    add_choice(command, "--profile", options.profile, profiles,
+               "What the stream keeps. tracked (default): the fewest bits. Each frame is the last "
+               "I-frame's mesh laid on the "
+               "frame's surface (T-frames), with or without a skeleton; connectivity and sampling are not "
+               "the capture's. topology: keeps every frame's own connectivity, for several times the "
+               "bits. paper: the same with the choices of the published method")
         ->type_name("WORD")
-        ->group(heading(OptionGroup::common));
+        ->group(heading::quality);
 }
 
 void add_what_is_beside_the_list(CLI::App& command, EncodingOptions& options) {
-    command
-        .add_option("--intra", options.intra,
-                    "Coder of the I-frames: tfan (default; keeps every triangle) or draco (drops isolated "
-                    "vertices, splits non-manifold ones)")
-        ->check(CLI::IsMember({"tfan", "draco"}))
+    add_choice(command, "--intra", options.intra, intra_coders,
+               "Coder of the I-frames: tfan (default; keeps every triangle) or draco (drops isolated "
+               "vertices, splits non-manifold ones)")
         ->type_name("WORD")
-        ->group(heading(OptionGroup::common));
+        ->group(heading::quality);
     command
         .add_option("--radii", options.radii_file,
                     "Bone radii from htvm calibrate (default: the skeleton file's, else calibrated on the "
                     "first frame)")
         ->type_name("FILE")
-        ->group(heading(OptionGroup::common));
+        ->group(heading::skeleton);
     command
         .add_option(
             "--passes", options.passes,
@@ -173,20 +156,17 @@ void add_what_is_beside_the_list(CLI::App& command, EncodingOptions& options) {
             "than 5 %, as they can be on short captures)")
         ->check(CLI::Range(1, 2))
         ->type_name("NUMBER")
-        ->group(heading(OptionGroup::rate))
-        ->needs(command.get_option("--bitrate"));
+        ->group(heading::quality);
 }
 
 // What a player may want to know, and what people want to keep with a capture.
 void add_scene_options(CLI::App& command, EncodingOptions& options) {
-    constexpr const char* scene = "What the stream says of the capture";
     command
         .add_option("--floor", options.floor,
                     "Height of the floor on the axis of --up, metres, or lowest: of the first frame's vertices "
                     "(default: not known)")
         ->type_name("NUMBER")
-        ->needs(command.get_option("--up"))
-        ->group(scene);
+        ->group(heading::scene);
     const auto add_text = [&](const std::string& flag, const std::string& key, const std::string& help) {
         command
             .add_option_function<std::string>(
@@ -196,7 +176,7 @@ void add_scene_options(CLI::App& command, EncodingOptions& options) {
                 },
                 help)
             ->type_name("TEXT")
-            ->group(scene);
+            ->group(heading::scene);
     };
     add_text("--title", "title", "What it is, for people");
     add_text("--rights", "rights", "Whose it is, and what may be done with it");
@@ -216,101 +196,32 @@ void add_scene_options(CLI::App& command, EncodingOptions& options) {
         ->type_name("KEY=VALUE")
         ->expected(1)
         ->take_all()
-        ->group(scene);
+        ->group(heading::scene);
 }
 
-// All options except those that depend on the capture.
-EncoderOptions without_capture(const EncodingOptions& options) {
-    auto out = default_options(profile_by(options.profile));
-    out.quality = options.quality;
-    for (const auto& [option, value] : options.given) option->set(out, value);
-    return out;
-}
-
-// The library's sentence, with flags instead of its names.
-std::string in_flags(std::string_view sentence) {
-    std::string out;
-    while (!sentence.empty()) {
-        const auto end = std::min(sentence.find_first_of(" ,;"), sentence.size());
-        const auto* option = find_option(sentence.substr(0, end));
-        out += option && *option->flag ? option->flag : sentence.substr(0, end);
-        if (end < sentence.size()) out += sentence[end];
-        sentence.remove_prefix(std::min(sentence.size(), end + 1));
-    }
-    return out;
+// The title of each group in docs/options.md.
+const char* title_of(OptionGroup group) {
+    constexpr std::array<const char*, 4> titles = {"Every profile", "Rate control, instead of a quality",
+                                                   "Profile tracked (the default)", "Profiles topology and paper"};
+    return titles[static_cast<std::size_t>(group)];
 }
 
 }  // namespace
 
-std::uint64_t random_session() {
-    std::random_device random;
-    constexpr std::uint64_t largest = (std::uint64_t{1} << 53) - 1;
-    return std::max<std::uint64_t>((std::uint64_t{random()} << 32 | random()) & largest, 1);
-}
-
 void add_encoding_options(CLI::App& command, EncodingOptions& options) {
     add_quality(command, options);
     for (const auto& option : option_list())
-        if (*option.flag && &option != find_option("quality")) add_option(command, options, option);
+        if (*option.flag && !is(option, "quality")) add_option(command, options, option);
     add_what_is_beside_the_list(command, options);
     add_scene_options(command, options);
-    command.get_option("--buffer")->needs(command.get_option("--bitrate"));
-    // With a bitrate or a target error, quality follows from it, so options that set the steps directly contradict it.
-    command.get_option("--bitrate")->excludes(command.get_option("--target-error"));
-    for (const char* control : {"--bitrate", "--target-error"})
-        for (const char* by_hand : {"--quality", "--geometry-step", "--colour-step"})
-            command.get_option(control)->excludes(command.get_option(by_hand));
 }
 
-void check_together(const EncodingOptions& options) {
-    for (const auto& [option, value] : options.given)
-        if (!serves(option->group, profile_by(options.profile)))
-            throw CLI::ValidationError(fmt::format("{} does nothing with --profile {}: add --profile {}", option->flag,
-                                                   options.profile, group_name(option->group)));
-    if (const auto encoder = Encoder::create(without_capture(options)); !encoder)
-        throw CLI::ValidationError(in_flags(encoder.error().message));
-}
-
-Result<EncoderOptions> encoder_options(const EncodingOptions& options, const Capture& capture) {
-    auto out = without_capture(options);
-    // In its lowest terms, so that 30 frames a second are the library's default, 30 / 1, however they were given.
-    const auto rate = capture.frame_rate();
-    const auto divisor = std::max(std::gcd(rate.numerator, rate.denominator), 1u);
-    out.fps_numerator = rate.numerator / divisor;
-    out.fps_denominator = rate.denominator / divisor;
-    out.unit_micrometres =
-        static_cast<std::uint32_t>(std::clamp(std::round(capture.millimetres_per_unit() * 1000), 1.0, 4294967295.0));
-    out.up = capture.up();
-    if (options.floor == "lowest") {
-        out.floor = capture.lowest();
-    } else if (!options.floor.empty()) {
-        const auto metres = parse_number(options.floor);
-        if (!metres || !std::isfinite(*metres))
-            return fail(ErrorKind::bad_input,
-                        "--floor must be a number of metres or lowest, not '" + options.floor + "'");
-        out.floor = 1000 * *metres;
-    }
-    out.metadata = options.metadata;
-    out.skeleton = capture.skeleton();
-    out.radii = capture.radii();
-    if (!options.radii_file.empty()) {
-        if (capture.skeleton().bones.empty())
-            return fail(ErrorKind::bad_input, "--radii needs a skeleton (see --skeleton)");
-        auto radii = read_radii(options.radii_file, capture.skeleton().bones.size());
-        if (!radii) return tl::unexpected(radii.error());
-        out.radii = std::move(*radii);
-    }
-    if (options.intra == "draco") out.intra_coder = draco_intra_coder();
+EncoderOptions encoder_options(const EncodingOptions& options) {
+    auto out = default_options(options.profile);
+    out.quality = options.quality;
+    for (const auto& [option, value] : options.given) option->set(out, value);
     return out;
 }
-
-std::optional<double> given_value(const EncodingOptions& options, std::string_view name) {
-    const auto last = std::find_if(options.given.rbegin(), options.given.rend(),
-                                   [&](const auto& given) { return given.first->name == name; });
-    return last == options.given.rend() ? std::nullopt : std::optional(last->second);
-}
-
-bool is_given(const EncodingOptions& options, std::string_view name) { return given_value(options, name).has_value(); }
 
 std::string options_in_markdown() {
     std::string out =
@@ -323,7 +234,7 @@ std::string options_in_markdown() {
         "frames](tracked_frames.md).\n";
     for (const auto group : {OptionGroup::common, OptionGroup::rate, OptionGroup::tracked, OptionGroup::topology}) {
         out += fmt::format("\n## {}\n\n| option | `htvm encode` | range | default | meaning |\n|---|---|---|---|---|\n",
-                           group == OptionGroup::common ? "Every profile" : heading(group));
+                           title_of(group));
         for (const auto& option : option_list()) {
             if (option.group != group) continue;
             std::string flag = *option.flag ? fmt::format("`{}`", option.flag) : "";

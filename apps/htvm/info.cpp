@@ -3,12 +3,13 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "codec/format/frame_kinds.h"
+#include "command_line/capture.h"
 #include "command_line/layer_table.h"
 #include "command_line/terminal.h"
 #include "commands.h"
@@ -85,10 +86,7 @@ void print_frame(const FrameInfo& f, bool start) {
         bpv(b[Layer::tracked] + b[Layer::removed] + b[Layer::border]), bpv(b.total()));
 }
 
-const char* axis_name(UpAxis up) {
-    constexpr std::array names = {"unknown", "x", "-x", "y", "-y", "z", "-z"};
-    return names[static_cast<std::size_t>(up)];
-}
+const char* axis_name(UpAxis up) { return up == UpAxis::unknown ? "unknown" : word_of(up, up_axes); }
 
 void print_sequence(const SequenceInfo& s, const std::string& input) {
     fmt::print(
@@ -272,136 +270,205 @@ nlohmann::json audio_json(const AudioTotals& totals) {
     return {{"coder", "opus"}, {"channels", totals.channels}, {"seconds", totals.seconds()}, {"bytes", totals.bytes}};
 }
 
-Result<void> info(const Options& options) {
-    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes, options.trust);
-    if (!input) return tl::unexpected(input.error());
-    Decoder headers(options.limits);  // takes the sequence headers, and frames where the inspector asks for it
-    FrameInspector inspector(headers);
+// What is known of a stream so far.
+struct Findings {
     TotalsByType totals;
-    std::size_t count = 0;
-    LayerBytes codebooks;
-    nlohmann::json frames = nlohmann::json::array();
+    std::size_t frames = 0;
     std::uint64_t bytes = 0;
-    bool index = false;
-    FrameNumbers numbers;
-    RunningTime time;
+    bool has_index = false, has_groups = false;
     std::optional<StreamIndex> front;
-    bool grouped = false;
     AudioTotals audio;
     StreamPictures pictures;
     PatchedArea patched;
-    nlohmann::json sequences = nlohmann::json::array();
     std::optional<SequenceInfo> first_sequence;
-    std::optional<BufferModel> buffer;
-    if (options.megabits > 0) buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
+    nlohmann::json sequence_list = nlohmann::json::array(), frame_list = nlohmann::json::array();
+};
+
+// The stream, packet by packet.
+struct Inspection {
+    const Options& options;
+    Decoder headers =
+        Decoder(options.limits);  // takes the sequence headers, and frames where the inspector asks for it
+    FrameInspector inspector = FrameInspector(headers);
+    FrameNumbers numbers = {};
+    RunningTime time = {};
+    LayerBytes codebooks = {};               // that came since the last frame
+    std::optional<BufferModel> buffer = {};  // that --bitrate checks
+    Findings found = {};
+    bool lists_frames() const { return !options.json && !options.summary; }
+};
+
+void print_heading() {
+    fmt::print("{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>15} {:>8} {:>8} {:>17} {:>8} {:>8} {:>14} {:>22} {:>8}\n",
+               "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "pose/transforms", "geometry",
+               "colour", "normals/texcoords", "mapping", "fans", "distance order", "tracked/removed/border", "bpv");
+}
+
+Result<void> take_header(Inspection& in, const Packet& packet) {
+    const bool first = !in.headers.sequence();
+    if (auto ok = in.headers.decode(packet); !ok) return tl::unexpected(ok.error());
+    if (!first || in.options.json) return {};
+    print_sequence(*in.headers.sequence(), in.options.input);
+    if (in.found.front) print_index(*in.found.front);
+    if (in.lists_frames()) print_heading();
+    return {};
+}
+
+Result<void> take_front_index(Inspection& in, const Packet& packet) {
+    auto read = read_index(packet);
+    if (!read) return tl::unexpected(read.error());
+    in.found.front = std::move(*read);
+    // Else it stands behind the line that names the file.
+    if (!in.options.json && in.headers.sequence()) print_index(*in.found.front);
+    return {};
+}
+
+// What is no frame. Errors do not name the stream.
+Result<void> take_beside_frames(Inspection& in, const Packet& packet) {
+    switch (packet.kind) {
+        case PacketKind::codebook:
+            add_codebook(in.codebooks, packet);
+            return {};
+        case PacketKind::audio:
+            return add(in.found.audio, packet);
+        case PacketKind::texture:
+            return add(in.found.pictures, packet);
+        case PacketKind::index:
+            in.found.has_index = true;
+            return {};
+        case PacketKind::front_index:
+            in.found.has_index = true;
+            return in.found.front ? Result<void>() : take_front_index(in, packet);
+        default:
+            return {};
+    }
+}
+
+// The first frame behind another sequence header.
+void begin_sequence(Inspection& in, std::uint32_t first_frame) {
+    const auto& sequence = *in.headers.sequence();
+    if (!in.options.json && in.found.frames > 0)
+        print_sequence(sequence, fmt::format("from frame {} on, another sequence", first_frame));
+    if (!in.found.first_sequence) in.found.first_sequence = sequence;
+    in.found.sequence_list.push_back(sequence_json(sequence));
+    in.found.sequence_list.back()["first_frame"] = first_frame;
+}
+
+Result<void> take_frame(Inspection& in, const Packet& packet) {
+    auto inspected = in.inspector.inspect(packet);
+    if (!inspected) return tl::unexpected(inspected.error());
+    auto& [frame, recoded] = *inspected;
+    auto& found = in.found;
+    frame.bytes += std::exchange(in.codebooks, {});
+    frame.frame = in.numbers.of(frame.frame);
+    frame.reference = in.numbers.of(frame.reference);
+    if (in.numbers.begins_sequence() && in.headers.sequence()) begin_sequence(in, frame.frame);
+    ++found.frames;
+    found.has_groups = found.has_groups || frame.group > 1;
+    add(found.totals, frame);
+    add(found.patched, frame.type, recoded);
+    if (in.options.json) {
+        found.frame_list.push_back(frame_json(frame));
+        found.frame_list.back()["recoded_share"] = recoded ? nlohmann::json(*recoded) : nlohmann::json();
+    }
+    if (in.lists_frames()) print_frame(frame, found.front && is_start(*found.front, frame.frame));
+    return {};
+}
+
+Result<void> take(Inspection& in, const Packet& packet) {
+    if (in.buffer) in.buffer->add(packet);
+    in.numbers.take(packet);
+    in.time.take(packet, in.numbers.begins_sequence());
+    in.found.bytes += packet.payload.size() + packet_overhead;
+    if (packet.kind == PacketKind::sequence) return take_header(in, packet);
+    if (frame_type(packet.kind)) return take_frame(in, packet);
+    const auto taken = take_beside_frames(in, packet);
+    return taken ? taken : fail(taken.error().kind, in.options.input + ": " + taken.error().message);
+}
+
+// What the whole stream takes.
+struct Size {
+    double seconds = 0, megabits_per_second = 0;
+    std::uint64_t bytes_outside_frames = 0;  // sequence headers, the index
+};
+
+Size size_of(const Inspection& in) {
+    const auto& found = in.found;
+    Size out;
+    out.seconds = static_cast<double>(found.frames > 0 ? in.time.total_us() : in.time.one_frame_us()) / 1e6;
+    out.megabits_per_second = 8e-6 * static_cast<double>(found.bytes) / out.seconds;
+    out.bytes_outside_frames =
+        found.bytes - found.totals.all().bytes.total() - found.audio.bytes - found.pictures.bytes;
+    return out;
+}
+
+void print_json(const Inspection& in, const StreamInput& input) {
+    const auto& found = in.found;
+    const auto size = size_of(in);
+    const auto& sequence = found.first_sequence ? *found.first_sequence : *in.headers.sequence();
+    nlohmann::json out{{"sequence", sequence_json(sequence)},
+                       {"sequences", found.sequence_list},
+                       {"frames", found.frame_list},
+                       {"bytes", found.bytes},
+                       {"bytes_outside_frames", size.bytes_outside_frames},
+                       {"audio", audio_json(found.audio)},
+                       {"pictures", pictures_json(found.pictures, size.seconds)},
+                       {"patched_area", patched_area_json(found.patched)},
+                       {"index", found.has_index},
+                       {"front_index", found.front ? index_json(*found.front) : nlohmann::json()},
+                       {"damaged_bytes", input.damaged_bytes()},
+                       {"megabits_per_second", size.megabits_per_second}};
+    if (in.buffer) out["buffer"] = buffer_json(in.options, *in.buffer);
+    fmt::print("{}\n", out.dump(2));
+}
+
+void print_totals(const Inspection& in) {
+    const auto& found = in.found;
+    const AudioTotals& audio = found.audio;
+    const StreamPictures& pictures = found.pictures;
+    const PatchedArea& patched = found.patched;
+    const auto size = size_of(in);
+    if (!in.options.summary)
+        fmt::print(
+            "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
+            "mesh\n"
+            "*: a place to start, as every I- and TP-frame is\n{}\n",
+            found.has_groups
+                ? "T1/8: the first of a group of eight T-frames; its packet, and others, bring frames that follow\n"
+                : "");
+    if (audio.packets > 0)
+        fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo", audio.seconds(),
+                   audio.bytes);
+    if (pictures.pictures > 0)
+        fmt::print("pictures: {}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n", kinds_text(pictures),
+                   pictures.keys, pictures.bytes, 8e-6 * static_cast<double>(pictures.bytes) / size.seconds);
+    if (patched.patched > 0)
+        fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
+                   counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);
+    fmt::print("{}{} in {:.2f} s, {} bytes ({} outside frames), {:.2f} Mbit/s{}\n", layer_table(found.totals),
+               counted(found.frames, "frame"), size.seconds, found.bytes, size.bytes_outside_frames,
+               size.megabits_per_second, found.has_index ? ", with an index for seeking" : "");
+}
+
+Result<void> info(const Options& options) {
+    auto input = StreamInput::open(options.input, options.limits.max_packet_bytes, options.trust);
+    if (!input) return tl::unexpected(input.error());
+    Inspection in{options};
+    if (options.megabits > 0) in.buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
     while (auto packet = input->next()) {
-        if (buffer) buffer->add(*packet);
-        numbers.push(*packet);
-        time.push(*packet, numbers.begins_sequence());
-        bytes += packet->payload.size() + packet_overhead;
-        if (packet->kind == PacketKind::sequence) {
-            const bool first = !headers.sequence();
-            if (auto ok = headers.decode(*packet); !ok) return tl::unexpected(ok.error());
-            if (!options.json && first) print_sequence(*headers.sequence(), options.input);
-            if (!options.json && first && front) print_index(*front);
-            if (!options.json && first && !options.summary)
-                fmt::print(
-                    "{:>6} {:>4} {:>6} {:>10} {:>8} {:>9} {:>9} {:>15} {:>8} {:>8} {:>17} {:>8} {:>8} {:>14} {:>22} "
-                    "{:>8}\n",
-                    "frame", "type", "ref", "time s", "vertices", "triangles", "bytes", "pose/transforms", "geometry",
-                    "colour", "normals/texcoords", "mapping", "fans", "distance order", "tracked/removed/border",
-                    "bpv");
-        }
-        if (packet->kind == PacketKind::codebook) add_codebook(codebooks, *packet);
-        if (packet->kind == PacketKind::audio)
-            if (auto ok = add(audio, *packet); !ok)
-                return fail(ok.error().kind, options.input + ": " + ok.error().message);
-        if (packet->kind == PacketKind::texture)
-            if (auto ok = add(pictures, *packet); !ok)
-                return fail(ok.error().kind, options.input + ": " + ok.error().message);
-        if (packet->kind == PacketKind::front_index && !front) {
-            auto read = read_index(*packet);
-            if (!read) return fail(read.error().kind, options.input + ": " + read.error().message);
-            front = std::move(*read);
-            if (!options.json && headers.sequence()) print_index(*front);  // else behind the line that names the file
-        }
-        if (packet->kind == PacketKind::index || packet->kind == PacketKind::front_index) index = true;
-        if (!frame_type(packet->kind)) continue;
-        auto inspected = inspector.inspect(*packet);
-        if (!inspected) return tl::unexpected(inspected.error());
-        const auto& recoded = inspected->recoded;
-        auto* frame = &inspected->info;
-        frame->bytes += codebooks;
-        codebooks = {};
-        frame->frame = numbers.of(frame->frame);
-        frame->reference = numbers.of(frame->reference);
-        if (numbers.begins_sequence() && headers.sequence()) {
-            if (!options.json && count > 0)
-                print_sequence(*headers.sequence(), fmt::format("from frame {} on, another sequence", frame->frame));
-            if (!first_sequence) first_sequence = headers.sequence();
-            sequences.push_back(sequence_json(*headers.sequence()));
-            sequences.back()["first_frame"] = frame->frame;
-        }
-        ++count;
-        grouped = grouped || frame->group > 1;
-        add(totals, *frame);
-        add(patched, frame->type, recoded);
-        if (options.json) {
-            frames.push_back(frame_json(*frame));
-            frames.back()["recoded_share"] = recoded ? nlohmann::json(*recoded) : nlohmann::json();
-        }
-        if (!options.json && !options.summary) print_frame(*frame, front && is_start(*front, frame->frame));
+        if (auto taken = take(in, *packet); !taken) return taken;
         if (input->is_live()) std::fflush(stdout);
     }
     if (input->refusal()) return tl::unexpected(*input->refusal());
-    if (!headers.sequence() && input->oversized_packets() > 0) return check_whole(*input, options.input);
-    if (!headers.sequence())
+    if (!in.headers.sequence() && input->oversized_packets() > 0) return check_whole(*input, options.input);
+    if (!in.headers.sequence())
         return fail(ErrorKind::corrupt_stream, options.input + " is not an htvm stream: no sequence header was found");
-    const auto& s = *headers.sequence();
-    const double seconds = static_cast<double>(count > 0 ? time.total_us() : time.one_frame_us()) / 1e6;
-    const double megabits = 8e-6 * static_cast<double>(bytes) / seconds;
-    const auto outside_frames =
-        bytes - totals.all().bytes.total() - audio.bytes - pictures.bytes;  // sequence headers, the index
-    if (options.json) {
-        nlohmann::json out{{"sequence", sequence_json(first_sequence ? *first_sequence : s)},
-                           {"sequences", sequences},
-                           {"frames", frames},
-                           {"bytes", bytes},
-                           {"bytes_outside_frames", outside_frames},
-                           {"audio", audio_json(audio)},
-                           {"pictures", pictures_json(pictures, seconds)},
-                           {"patched_area", patched_area_json(patched)},
-                           {"index", index},
-                           {"front_index", front ? index_json(*front) : nlohmann::json()},
-                           {"damaged_bytes", input->damaged_bytes()},
-                           {"megabits_per_second", megabits}};
-        if (buffer) out["buffer"] = buffer_json(options, *buffer);
-        fmt::print("{}\n", out.dump(2));
-    } else {
-        if (!options.summary)
-            fmt::print(
-                "bpv: bits per captured vertex, as from pose/transforms on; vertices and triangles: of the decoded "
-                "mesh\n"
-                "*: a place to start, as every I- and TP-frame is\n{}\n",
-                grouped
-                    ? "T1/8: the first of a group of eight T-frames; its packet, and others, bring frames that follow\n"
-                    : "");
-        if (audio.packets > 0)
-            fmt::print("audio: Opus, {}, {:.2f} s, {} bytes\n", audio.channels == 1 ? "mono" : "stereo",
-                       audio.seconds(), audio.bytes);
-        if (pictures.pictures > 0)
-            fmt::print("pictures: {}, {} of them key pictures, {} bytes, {:.2f} Mbit/s\n", kinds_text(pictures),
-                       pictures.keys, pictures.bytes, 8e-6 * static_cast<double>(pictures.bytes) / seconds);
-        if (patched.patched > 0)
-            fmt::print("patches in {} replace {:.2f} % of the surface a T- or TP-frame on average, at most {:.1f} %\n",
-                       counted(patched.patched, "TP-frame"), 100 * patched.mean(), 100 * patched.largest);
-        fmt::print("{}{} in {:.2f} s, {} bytes ({} outside frames), {:.2f} Mbit/s{}\n", layer_table(totals),
-                   counted(count, "frame"), seconds, bytes, outside_frames, megabits,
-                   index ? ", with an index for seeking" : "");
-    }
+    if (options.json)
+        print_json(in, *input);
+    else
+        print_totals(in);
     if (auto whole = check_whole(*input, options.input); !whole) return whole;
-    if (buffer) return check_buffer(options, *buffer);
-    return {};
+    return in.buffer ? check_buffer(options, *in.buffer) : Result<void>();
 }
 
 }  // namespace
@@ -417,7 +484,7 @@ void add_info(CLI::App& app, Run& run) {
         ->required();
     command->add_flag("--summary", options->summary, "The totals only, no line per frame");
     command->add_flag("--json", options->json, "Everything as JSON");
-    add_hub_trust(*command, options->trust, "Hubs");
+    add_hub_trust(*command, options->trust);
     add_packet_limits(*command, options->limits);
     auto* bitrate = command->add_option("--bitrate", options->megabits,
                                         "Check that the stream plays without a pause over a line of this many Mbit/s,\n"

@@ -4,19 +4,19 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include "command_line/capture.h"
+#include "command_line/choice.h"
 #include "command_line/terminal.h"
 #include "stream_file.h"
 
 namespace htvm::app {
 namespace {
 
-const std::map<std::string, Shading> shadings{
-    {"flat", Shading::flat}, {"smooth", Shading::smooth}, {"unlit", Shading::unlit}};
-const std::map<std::string, UpAxis> axes{{"x", UpAxis::plus_x},   {"-x", UpAxis::minus_x}, {"y", UpAxis::plus_y},
-                                         {"-y", UpAxis::minus_y}, {"z", UpAxis::plus_z},   {"-z", UpAxis::minus_z}};
+constexpr std::array shadings = {Choice<Shading>{"flat", Shading::flat}, Choice<Shading>{"smooth", Shading::smooth},
+                                 Choice<Shading>{"unlit", Shading::unlit}};
 const std::map<std::string, Colour> named_colours{
     {"white", {255, 255, 255}}, {"black", {0, 0, 0}}, {"grey", {128, 128, 128}}};
 
@@ -40,9 +40,8 @@ std::optional<Colour> parse_background(const std::string& text) {
 void add_camera_options(CLI::App& command, ViewOptions& views, const std::string& up_default) {
     command.add_option("--width", views.width, "Width of the pictures, pixels")->capture_default_str();
     command.add_option("--height", views.height, "Height of the pictures, pixels")->capture_default_str();
-    command.add_option("--up", views.up, "Where the head is" + up_default)
-        ->transform(CLI::CheckedTransformer(axes))
-        ->option_text(views.up == UpAxis::unknown ? "x|-x|y|-y|z|-z" : "x|-x|y|-y|z|-z=y");
+    add_choice(command, "--up", views.up, up_axes, "Where the head is" + up_default)
+        ->default_str(word_of(views.up, up_axes));
     command.add_option("--azimuth", views.first_azimuth, "Direction of the first view, degrees around the body")
         ->capture_default_str();
     command.add_option("--elevation", views.elevation, "Degrees by which the views look down")->capture_default_str();
@@ -50,11 +49,9 @@ void add_camera_options(CLI::App& command, ViewOptions& views, const std::string
 }
 
 void add_shading_options(CLI::App& command, ShadingOptions& options, const std::string& shading_default) {
-    command
-        .add_option("--shading", options.shading,
-                    "Shading of the body; unlit draws the colours alone" + shading_default)
-        ->transform(CLI::CheckedTransformer(shadings))
-        ->option_text(shading_default.empty() ? "flat|smooth|unlit=smooth" : "flat|smooth|unlit");
+    add_choice(command, "--shading", options.shading, shadings,
+               "Shading of the body; unlit draws the colours alone" + shading_default)
+        ->default_str(shading_default.empty() ? "smooth" : "");
     command.add_flag("--grey", options.grey, "Draw without the colours");
 }
 

@@ -8,12 +8,12 @@
 #include <cmath>
 #include <string_view>
 
+#include "command_line/headings.h"
 #include "htvm/decoder.hpp"
 
 namespace htvm::app {
 namespace {
 
-constexpr const char* group = "Pictures of textures";
 constexpr std::array<std::uint16_t, 3> no_gains = {picture_gain_one, picture_gain_one, picture_gain_one};
 
 // Where who watches may start without the frames before: there pictures start too. Not where such frames are many, as
@@ -46,18 +46,16 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
             "more if meshes show much of these)")
         ->check(CLI::Range(16, static_cast<int>(most_picture_side)))
         ->type_name("NUMBER")
-        ->group(group);
-    command
-        .add_option("--texture-codec", options.codec,
-                    "av1 (default) or vp9, which takes a fifth more bits, for players whose platform has no AV1")
-        ->check(CLI::IsMember({"av1", "vp9"}))
-        ->group(group);
+        ->group(heading::textures);
+    add_choice(command, "--texture-codec", options.codec, video_codecs,
+               "av1 (default) or vp9, which takes a fifth more bits, for players whose platform has no AV1")
+        ->group(heading::textures);
     command
         .add_option("--texture-quality", options.quality,
                     "Of the pictures, 0 to 100 (default: -q, which balances them with the meshes)")
         ->check(CLI::Range(0.0, 100.0))
         ->type_name("NUMBER")
-        ->group(group);
+        ->group(heading::textures);
 }
 
 int quantiser_of(PictureCoder coder, double quality) {
@@ -68,7 +66,7 @@ int quantiser_of(PictureCoder coder, double quality) {
 Result<PictureTrack> PictureTrack::create(const Settings& settings) {
     PictureTrack out;
     if (settings.keep) return out;
-    out.coder_ = settings.options.codec == "vp9" ? PictureCoder::vp9 : PictureCoder::av1;
+    out.coder_ = settings.options.codec.value_or(PictureCoder::av1);
     out.width_ = static_cast<std::uint32_t>(settings.width);
     out.height_ = static_cast<std::uint32_t>(settings.height);
     if (settings.bake) {

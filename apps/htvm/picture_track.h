@@ -8,9 +8,9 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
+#include "command_line/choice.h"
 #include "core/image.h"
 #include "htvm/packet.hpp"
 #include "htvm/picture_encoder.hpp"
@@ -25,9 +25,14 @@ class App;
 namespace htvm::app {
 
 struct TexturePictureOptions {
-    int size = 0;                   // pixels of the longer side; 0: as captured
-    std::string codec = "av1";      // or vp9
-    std::optional<double> quality;  // 0..100; not given: that of the meshes
+    int size = 0;                       // pixels of the longer side; 0: as captured
+    std::optional<PictureCoder> codec;  // av1 or vp9; not given: av1
+    std::optional<double> quality;      // 0..100; not given: that of the meshes
+};
+
+inline constexpr std::array video_codecs = {
+    Choice<PictureCoder>{"av1", PictureCoder::av1},
+    Choice<PictureCoder>{"vp9", PictureCoder::vp9},
 };
 
 // Adds --texture-size, --texture-codec and --texture-quality to a command.

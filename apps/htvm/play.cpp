@@ -54,7 +54,7 @@ struct TemporaryFolder {
     }
 };
 
-Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeOptions options,
+Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeRequest request,
                                 TemporaryFolder& folder) {
     if (const auto files = find_sequence(inputs); !files) return tl::unexpected(files.error());
     if (!folder.make()) return fail(ErrorKind::bad_input, "there is no place for a temporary file (TMPDIR)");
@@ -62,15 +62,17 @@ Result<fs::path> encode_capture(const std::vector<std::string>& inputs, EncodeOp
     if (capture.filename().empty()) capture = capture.parent_path();
     auto stream = folder.path / capture.filename().replace_extension(".htvm");
     note(fmt::format("{} is not a stream: encoding it first, into a temporary file", inputs[0]));
-    options.capture.inputs = inputs;
-    options.output = stream.string();
-    options.keep_partial = false;
-    if (auto encoded = encode(options); !encoded) return tl::unexpected(encoded.error());
+    request.capture.inputs = inputs;
+    request.output = stream.string();
+    request.keep_partial = false;
+    const auto plan = plan_of(request);
+    if (!plan) return tl::unexpected(plan.error());
+    if (auto encoded = encode(*plan); !encoded) return tl::unexpected(encoded.error());
     return stream;
 }
 
 // A stream that can be served; a capture is encoded first. The server follows no symbolic link, but this may be one.
-Result<fs::path> stream_of(const std::vector<std::string>& inputs, const EncodeOptions& encoding,
+Result<fs::path> stream_of(const std::vector<std::string>& inputs, const EncodeRequest& encoding,
                            TemporaryFolder& folder) {
     fs::path stream = inputs[0];
     if (inputs.size() > 1 && stream.extension() == ".htvm")
@@ -100,9 +102,9 @@ void open_browser(const std::string& url) {
 }
 
 // For captures that streams are compared with: every vertex and triangle, each frame by itself.
-EncodeOptions nearly_lossless() {
-    EncodeOptions out;
-    out.encoding.profile = "topology";
+EncodeRequest nearly_lossless() {
+    EncodeRequest out;
+    out.encoding.profile = Profile::topology;
     out.encoding.quality = 100;
     out.encoding.given = {{find_option("key_interval"), 1}, {find_option("topology.merge_duplicates"), 0}};
     return out;
@@ -147,7 +149,7 @@ Result<void> play(const PlayOptions& options) {
         holds_streams(inputs[0])) {
         server.folder = inputs[0];
     } else {
-        auto encoding = options.beside.empty() ? EncodeOptions() : nearly_lossless();
+        auto encoding = options.beside.empty() ? EncodeRequest() : nearly_lossless();
         if (options.beside.empty()) encoding.encoding.quality = options.quality;
         encoding.capture.frames = options.frames;
         const auto stream = stream_of(inputs, encoding, temporary);

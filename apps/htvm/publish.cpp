@@ -10,12 +10,11 @@
 #include <utility>
 #include <vector>
 
+#include "command_line/headings.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "commands.h"
-#include "encoder_options.h"
 #include "htvm/decoder.hpp"
-#include "live/client/hub_address.h"
 #include "live_rounds.h"
 #include "pacing.h"
 #include "publishing.h"
@@ -28,7 +27,7 @@ using Clock = Pacing::Clock;
 
 struct Options {
     std::string input;
-    std::vector<std::string> hubs;
+    std::vector<std::string> hubs;  // the first is where the stream goes, the others where to go on
     PublishingOptions publishing;
     bool loop = false, json = false;
     double speed = 1;
@@ -105,9 +104,7 @@ Result<void> publish_round(Publication& p) {
 
 Result<void> publish(const Options& options) {
     watch_for_interruption();
-    auto publishing = options.publishing;
-    publishing.other_hubs.assign(options.hubs.begin() + 1, options.hubs.end());
-    auto hub = Publishing::open(options.hubs[0], publishing);
+    auto hub = Publishing::open(options.hubs[0], options.publishing);
     if (!hub) return tl::unexpected(hub.error());
     Result<void> done;
     std::uint64_t frames = 0;
@@ -124,6 +121,13 @@ Result<void> publish(const Options& options) {
     const auto state = hub->state();
     note(fmt::format("{} to {}, {} dropped", counted(frames, "frame"), state.hub, state.dropped_frames));
     if (interruption() != 0 && !options.loop) return fail(ErrorKind::bad_input, "interrupted");
+    return {};
+}
+
+std::string contradiction_in(const Options& options) {
+    if (options.loop && options.input == "-")
+        return "--loop: begins again, which standard input does not allow; give a file";
+    if (destination_of(options.input).is_hub()) return "input: is a file or standard input; hubs come behind it";
     return {};
 }
 
@@ -146,8 +150,9 @@ void add_publish(CLI::App& app, Run& run) {
                       "Begin again at the end, until Ctrl-C: each round is a session of its own, and time goes on");
     command->add_option("--speed", options->speed, "So many times as fast as it was captured (default 1)")
         ->check(CLI::Range(0.01, 100.0));
-    command->add_flag("--json", options->json, "Print a line of JSON on standard output each second, and at the end");
-    add_publishing_options(*command, options->publishing, "Hubs");
+    command->add_flag("--json", options->json, "Print a line of JSON on standard output each second, and at the end")
+        ->group(heading::scripts);
+    add_publishing_options(*command, options->publishing);
     add_packet_limits(*command, options->limits);
     command->footer(
         "Frames are sent when they are due by their timestamps. What the line does not take in time is dropped so "
@@ -159,11 +164,16 @@ void add_publish(CLI::App& app, Run& run) {
         "  htvm publish person.htvm ws://localhost:8080/publish/person --loop\n"
         "  HTVM_TOKEN=... htvm publish person.htvm wss://hub.example/publish/person\n"
         "  ssh rig htvm encode ... -o - | htvm publish - ws://localhost:8080/publish/person");
+    add_front_page(*command, {{{"--loop"},
+                               {"--speed"},
+                               {"--token-file",
+                                "A file whose first line is the token by which the hub knows who may "
+                                "publish\n(or the environment variable HTVM_TOKEN)"},
+                               {"--ca", "wss: PEM file of the certificates that may vouch for the hub's"},
+                               {"--json", "Print how it goes, a line of JSON each second"}}});
     command->callback([options, &run] {
-        if (options->loop && options->input == "-")
-            throw CLI::ValidationError("--loop", "begins again, which standard input does not allow; give a file");
-        if (live::looks_like_hub_address(options->input))
-            throw CLI::ValidationError("input", "is a file or standard input; hubs come behind it");
+        if (const auto why = contradiction_in(*options); !why.empty()) throw CLI::ValidationError(why);
+        options->publishing.other_hubs.assign(options->hubs.begin() + 1, options->hubs.end());
         run = [options] { return publish(*options); };
     });
 }

@@ -5,9 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
+#include <random>
 #include <utility>
 
+#include "command_line/headings.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "live/client/hub_address.h"
@@ -43,35 +46,50 @@ Result<std::string> token_of(const PublishingOptions& options) {
 
 }  // namespace
 
-void add_hub_trust(CLI::App& command, HubTrust& trust, const std::string& group) {
+void add_hub_trust(CLI::App& command, HubTrust& trust) {
     command
         .add_option("--ca", trust.certificates,
                     "wss: PEM file of the certificates that may vouch for the hub's (default: the system's)")
         ->type_name("FILE")
         ->check(CLI::ExistingFile)
-        ->group(group);
+        ->group(heading::live);
     command
         .add_flag("--insecure", trust.insecure, "wss: take any certificate, whoever may be behind it: for tests alone")
-        ->group(group);
+        ->group(heading::live);
 }
 
-void add_publishing_options(CLI::App& command, PublishingOptions& options, const std::string& group) {
+void add_publishing_options(CLI::App& command, PublishingOptions& options) {
     auto* token =
         command
             .add_option("--token", options.token,
                         "The token by which the hub knows who may publish. Others on this machine can see it\n"
                         "here: the environment variable HTVM_TOKEN, or a file, keeps it")
             ->type_name("TOKEN")
-            ->group(group);
+            ->group(heading::live);
     command.add_option("--token-file", options.token_file, "A file whose first line is the token")
         ->type_name("FILE")
         ->excludes(token)
-        ->group(group);
-    add_hub_trust(command, options.trust, group);
+        ->group(heading::live);
+    add_hub_trust(command, options.trust);
     command
         .add_flag("--stamps", options.stamps,
                   "Tell when each frame was sent, for measurements by viewers who ask for it (?stamps)")
-        ->group(group);
+        ->group(heading::live);
+}
+
+Destination destination_of(const std::string& path_or_address) {
+    using enum DestinationKind;
+    if (path_or_address == "-") return {path_or_address, standard_output};
+    if (live::looks_like_hub_address(path_or_address)) return {path_or_address, hub};
+    std::error_code error;
+    const bool is_there = std::filesystem::exists(path_or_address, error);
+    return {path_or_address, is_there && !std::filesystem::is_regular_file(path_or_address, error) ? pipe : file};
+}
+
+std::uint64_t random_session() {
+    std::random_device random;
+    constexpr std::uint64_t largest = (std::uint64_t{1} << 53) - 1;
+    return std::max<std::uint64_t>((std::uint64_t{random()} << 32 | random()) & largest, 1);
 }
 
 std::string shown_place(const std::string& path_or_address) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -22,8 +23,8 @@ struct HubTrust {
     std::string certificates;  // PEM file; empty: the system's
     bool insecure = false;     // anybody's
 };
-// Adds --ca and --insecure, in a group of the help.
-void add_hub_trust(CLI::App& command, HubTrust& trust, const std::string& group);
+// Adds --ca and --insecure.
+void add_hub_trust(CLI::App& command, HubTrust& trust);
 
 struct PublishingOptions {
     std::string token, token_file;  // neither: what the environment variable HTVM_TOKEN has, if anything
@@ -33,7 +34,26 @@ struct PublishingOptions {
     bool fixed_bitrate = false;  // while encoding: a full line does not lower the rate
 };
 // Adds --token, --token-file, --stamps and those of the trust.
-void add_publishing_options(CLI::App& command, PublishingOptions& options, const std::string& group);
+void add_publishing_options(CLI::App& command, PublishingOptions& options);
+
+// Where a stream goes.
+enum class DestinationKind : std::uint8_t {
+    file,             // that is there once it is whole
+    standard_output,  // "-"
+    hub,              // ws:// or wss://
+    pipe,             // or a device: there already, and no file
+};
+struct Destination {
+    std::string place;
+    DestinationKind kind = DestinationKind::file;
+    bool is_hub() const { return kind == DestinationKind::hub; }
+    // Whether somebody may look on while it is written: a session number keeps it apart from a run before.
+    bool may_be_live() const { return kind != DestinationKind::file; }
+};
+Destination destination_of(const std::string& path_or_address);
+
+// A session number, another each time.
+std::uint64_t random_session();
 
 // Where a stream goes or comes from, for people: of an address what is not secret.
 std::string shown_place(const std::string& path_or_address);

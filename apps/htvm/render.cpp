@@ -33,7 +33,7 @@ struct Options {
 constexpr double seconds_of_one_mesh = 6;
 
 Result<MeshSource> open_source(const Options& options) {
-    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits, options.picture.texture});
+    auto source = open_meshes(options.picture.inputs, {{}, "", options.picture.limits, options.picture.texture});
     if (!source) return source;
     if (options.frames > 0) source->frames = std::min(source->frames, options.frames);
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");

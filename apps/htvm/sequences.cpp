@@ -158,17 +158,14 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
                 name + " is a stream, whose texture is inside; --texture and --texture-origin are for mesh files");
         return open_stream(name, options.limits);
     }
-    const bool guess = options.unit == "auto";
-    const auto chosen = guess ? LengthUnit::millimetre : length_unit(options.unit);
-    if (!chosen) return tl::unexpected(chosen.error());
     const auto files = find_sequence(names);
     if (!files) return tl::unexpected(files.error());
     MeshSource source;
     source.name = names.size() == 1 ? name : "the files";
     source.frames = files->paths.size();
     source.numbers = files->numbers;
-    source.millimetres_per_unit = millimetres_per(*chosen);
-    source.guesses_unit = guess;
+    source.millimetres_per_unit = millimetres_per(options.unit.value_or(LengthUnit::millimetre));
+    source.guesses_unit = !options.unit;
     if (auto found = find_times(source, *files, options.timestamps); !found) return tl::unexpected(found.error());
     auto textures = TextureFiles::open(options.texture, *files);
     if (!textures) return tl::unexpected(textures.error());

@@ -17,6 +17,7 @@
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
 #include "htvm/scene.hpp"
+#include "io/mesh_file.h"
 #include "io/texture_file.h"
 #include "io/timestamps.h"
 
@@ -40,10 +41,10 @@ struct MeshSource {
 };
 
 struct MeshSourceOptions {
-    std::string unit = "auto";  // of files: one of length_units, or auto, which guesses from the first one
-    std::string timestamps;     // of files: a file of times (io/timestamps.h); empty: as PLY files say
-    DecoderOptions limits;      // of streams
-    TextureOptions texture;     // of files
+    std::optional<LengthUnit> unit;  // of files; not given: guessed from the first one
+    std::string timestamps;          // of files: a file of times (io/timestamps.h); empty: as PLY files say
+    DecoderOptions limits;           // of streams
+    TextureOptions texture;          // of files
 };
 
 // An .htvm stream, or the files that the names refer to (io/sequence.h).

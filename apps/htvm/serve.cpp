@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "command_line/headings.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "live/server/credentials.h"
@@ -289,14 +290,32 @@ void add_serve(CLI::App& app, Run& run) {
                      "How TCP finds out how fast it may send: bbr (default; where packets are lost, live streams come "
                      "late with others: docs/live.md), another that the kernel has, or system: the kernel's choice")
         ->type_name("NAME");
+    const auto under = [command](const char* heading) { command->option_defaults()->group(heading); };
+    under("Hubs of other machines");
     add_nats_options(*command, server.nats);
+    under("Who may publish and watch");
     add_access_options(*command, *options);
+    under("Recording and watching over it");
     add_recording(*command, *options);
-    add_limits(*command, *options);
     command->add_flag("--json", options->json,
                       "Log as JSON, an object a line, on standard output (default: for people, on standard error)");
-    show_first(*command, {"--config", "--files", "--address", "--port", "--cert", "--key", "--publishers",
-                          "--add-publisher", "--link-keys", "--add-link-key", "--origin", "--record", "--json"});
+    under(heading::limits);
+    add_limits(*command, *options);
+    under("Options");
+    add_front_page(*command,
+                   {{{"--files"},
+                     {"--address", "Address to listen on (default 127.0.0.1, this machine; ::, all networks)"},
+                     {"--port", "Port to listen on (default 8080)"},
+                     {"--cert", "With TLS: the certificate (PEM)"},
+                     {"--key", "The certificate's private key (PEM)"},
+                     {"--publishers"},
+                     {"--add-publisher"},
+                     {"--link-keys", "Watching needs a link that htvm link signs with a key of this file"},
+                     {"--add-link-key"},
+                     {"--origin", "Pages of this site alone may read and watch (default: of all)"},
+                     {"--record", "Keep each session of a live stream in this folder"},
+                     {"--config", "Read options from a file, a line each: port = 8443"},
+                     {"--json", "Log as JSON, an object a line"}}});
     command->footer(
         "Runs until Ctrl-C or SIGTERM, which give viewers and publishers 5 seconds to be told and to leave; a second "
         "one\n"

@@ -57,7 +57,7 @@ Result<std::size_t> position_of(const Options& options, const MeshSource& source
 Result<void> still(const Options& options) {
     if (options.output != "-" && !options.output.ends_with(".png"))
         return fail(ErrorKind::unsupported, "pictures are written as .png, not as " + options.output);
-    auto source = open_meshes(options.picture.inputs, {"auto", "", options.picture.limits, options.picture.texture});
+    auto source = open_meshes(options.picture.inputs, {{}, "", options.picture.limits, options.picture.texture});
     if (!source) return tl::unexpected(source.error());
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
     const auto position = position_of(options, *source);

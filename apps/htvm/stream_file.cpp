@@ -15,6 +15,7 @@
 #include <limits>
 #include <utility>
 
+#include "command_line/headings.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "htvm/decoder.hpp"
@@ -205,8 +206,6 @@ namespace {
 // Numbers with a sign, or beyond 64 bits, are parsed as values far above this.
 constexpr std::uint64_t most_bytes = std::uint64_t{1} << 60;
 
-const char* const group = "Limits, for untrusted streams";
-
 }  // namespace
 
 void add_decoder_limits(CLI::App& command, DecoderOptions& limits) {
@@ -215,24 +214,24 @@ void add_decoder_limits(CLI::App& command, DecoderOptions& limits) {
                     "Most memory that decoding may use: bytes, or a number with K, M or G (default 4G)")
         ->transform(CLI::AsSizeValue(false))
         ->check(CLI::Range(std::uint64_t{1}, most_bytes, "from 1 to 2^60 bytes"))
-        ->group(group);
+        ->group(heading::limits);
     command.add_option("--max-vertices", limits.max_vertices, "Most vertices of a frame (default 4194304)")
-        ->group(group);
+        ->group(heading::limits);
     command.add_option("--max-triangles", limits.max_triangles, "Most triangles of a frame (default 8388608)")
-        ->group(group);
+        ->group(heading::limits);
     add_packet_limits(command, limits);
 }
 
 void add_packet_limits(CLI::App& command, DecoderOptions& limits) {
     command
         .add_option("--max-bones", limits.max_bones, "Most bones of the skeleton (default 1024, the format's maximum)")
-        ->group(group);
+        ->group(heading::limits);
     command
         .add_option("--max-packet", limits.max_packet_bytes,
                     "Most bytes of a packet, likewise with K, M or G (default 256M); larger ones are skipped")
         ->transform(CLI::AsSizeValue(false))
         ->check(CLI::Range(std::uint64_t{1}, most_bytes, "from 1 to 2^60 bytes"))
-        ->group(group);
+        ->group(heading::limits);
 }
 
 }  // namespace htvm::app

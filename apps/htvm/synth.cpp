@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -16,6 +17,8 @@
 #include <string>
 #include <vector>
 
+#include "command_line/choice.h"
+#include "command_line/headings.h"
 #include "command_line/interruption.h"
 #include "command_line/terminal.h"
 #include "commands.h"
@@ -29,6 +32,7 @@
 #include "pacing.h"
 #include "synth/texture.h"
 #include "synth_truth.h"
+#include "texture_output.h"
 
 namespace htvm::app {
 
@@ -43,7 +47,7 @@ struct Options {
     SynthOptions synth;
     SynthTextureOptions texture;
     bool is_textured = false;
-    std::string texture_format = "jpg";
+    ImageFormat texture_format = ImageFormat::jpeg;
     unsigned threads = 0;
     bool json = false, live = false, counted = false;  // counted: the number of frames was given
 };
@@ -58,10 +62,12 @@ std::filesystem::path frame_path(const Options& options, int frame) {
     return std::filesystem::path(options.folder) / fmt::format("frame_{:05}.ply", frame);
 }
 
+const char* extension_of(ImageFormat format) { return format == ImageFormat::png ? ".png" : ".jpg"; }
+
 // The image beside a mesh.
 Result<void> write_image(const Options& options, std::filesystem::path path, const Image& image) {
-    path.replace_extension("." + options.texture_format);
-    const auto bytes = options.texture_format == "png" ? write_png_image(image) : write_jpeg_image(image);
+    path.replace_extension(extension_of(options.texture_format));
+    const auto bytes = options.texture_format == ImageFormat::png ? write_png_image(image) : write_jpeg_image(image);
     if (!bytes) return tl::unexpected(bytes.error());
     return write_file(path, *bytes);
 }
@@ -71,7 +77,7 @@ Result<void> write_frame(const Options& options, const std::filesystem::path& pa
                          const std::optional<SynthTexture>& texture) {
     if (!texture) return write_mesh(path, frame.mesh);
     MeshFileOptions named;
-    named.texture = path.stem().string() + "." + options.texture_format;
+    named.texture = path.stem().string() + extension_of(options.texture_format);
     if (auto ok = write_image(options, path, texture->image); !ok) return ok;
     return write_mesh(path, texture->mesh, named);
 }
@@ -225,13 +231,111 @@ Result<void> synthesise_live(const Options& options) {
     return {};
 }
 
+// ---- Options --------------------------------------------------------------------------------------------------------
+
+void add_places(CLI::App& command, Options& o) {
+    command
+        .add_option("OUT_DIR,-o,--output", o.folder,
+                    "Folder to write frame_00000.ply ..., skeleton.json, skeleton_true.json to")
+        ->type_name("FOLDER");
+    command
+        .add_flag("--live", o.live,
+                  "Instead, PLY after PLY on standard output, each when it is due, without end, as a\n"
+                  "camera would send them: for htvm encode -")
+        ->group(heading::output);
+    command
+        .add_option("--truth", o.truth,
+                    "Folder for what no real capture knows: the surface without noise, points fixed on it in every\n"
+                    "frame, and when limbs are fast, touch or come off ('htvm compare --truth' reads it)")
+        ->type_name("FOLDER")
+        ->group(heading::output);
+    command.add_option("--truth-marks", o.marks, "How many points of the surface are followed there")
+        ->check(CLI::Range(1, 20000))
+        ->capture_default_str()
+        ->group(heading::output);
+}
+
+void add_motion(CLI::App& command, Options& o) {
+    command.option_defaults()->group("The motion");
+    command.add_option("--frames", o.frames, "How many frames")
+        ->check(CLI::Range(1, most_frames))
+        ->capture_default_str();
+    command.add_option("--first-frame", o.first_frame, "The first frame's number; the motion starts at frame 0")
+        ->check(CLI::Range(0, most_frames))
+        ->capture_default_str();
+    std::map<std::string, SynthMotion> motions;
+    for (const auto& [motion, name] : synth_motions) motions[name] = motion;
+    command
+        .add_option("--motion", o.synth.motion,
+                    "What the person does: a tour (default), calm, everyday (walks, sits down, hands in pockets, a\n"
+                    "ball; somebody comes in), or fast (dances, kicks, jumps)")
+        ->transform(CLI::CheckedTransformer(motions, CLI::ignore_case))
+        ->option_text("tour|calm|everyday|fast");
+    command.add_option("--people", o.synth.people, "2: a second person moves beside; not in the tour")
+        ->check(CLI::Range(1, 2))
+        ->capture_default_str();
+    command.add_option("--fps", o.synth.fps, "Frames per second")->capture_default_str();
+}
+
+void add_capturing(CLI::App& command, Options& o) {
+    command.option_defaults()->group("How it is captured");
+    command.add_option("--vertices", o.synth.vertices, "Vertices per frame, within 3 %")->capture_default_str();
+    command
+        .add_option("--seed", o.synth.seed,
+                    "Seed of the noise and the sampling, and of the order of moves (the tour stays the same)")
+        ->capture_default_str();
+    command
+        .add_option("--surface-noise", o.synth.surface_noise_power,
+                    "Power of the noise on the surface, mm^2; new in every frame (2.25 is 1.5 mm RMS)")
+        ->capture_default_str();
+    command
+        .add_option("--joint-noise", o.synth.joint_noise_power,
+                    "Power of the noise on each joint coordinate in skeleton.json, mm^2 (25 is 5 mm RMS);\n"
+                    "skeleton_true.json has none")
+        ->capture_default_str();
+    command.add_flag("--lattice", o.synth.lattice,
+                     "Keep the vertices on the edges of one regular grid (by default there is no grid)");
+    command.add_flag("--normals", o.synth.normals, "Write vertex normals too");
+}
+
+void add_texture(CLI::App& command, Options& o) {
+    command.option_defaults()->group(heading::textures);
+    auto* texture = command
+                        .add_option("--texture", o.texture.size,
+                                    "Write a texture of that many pixels along a side beside every mesh, in place of "
+                                    "vertex\ncolours: an atlas whose layout changes every second, with noise and a "
+                                    "drifting exposure;\nwith --truth also without these")
+                        ->option_text("PIXELS");
+    constexpr std::array formats = {Choice<ImageFormat>{"jpg", ImageFormat::jpeg},
+                                    Choice<ImageFormat>{"png", ImageFormat::png}};
+    add_choice(command, "--texture-format", o.texture_format, formats, "The format of these images")
+        ->default_str("jpg")
+        ->needs(texture);
+    command.add_option("--texture-noise", o.texture.noise, "Their noise, levels RMS; new in every texel and frame")
+        ->capture_default_str()
+        ->needs(texture);
+    command
+        .add_option("--texture-exposure", o.texture.exposure,
+                    "By how many percent their exposure goes up and down, over seconds")
+        ->capture_default_str()
+        ->needs(texture);
+}
+
+std::string contradiction_in(const Options& options) {
+    if (options.live == !options.folder.empty())
+        return "OUT_DIR: or --live: give one of them, a folder to write to or standard output";
+    if (options.folder == "-") return "OUT_DIR: is a folder; for meshes on standard output give --live";
+    if (options.live && !options.truth.empty()) return "--truth: goes with a folder of frames, not with --live";
+    if (options.live && options.is_textured)
+        return "--texture: writes images beside meshes in a folder, so not with --live";
+    return {};
+}
+
 }  // namespace
 
 void add_synth(CLI::App& app, Run& run) {
     auto options = std::make_shared<Options>();
     auto& o = *options;
-    std::map<std::string, SynthMotion> motions;
-    for (const auto& [motion, name] : synth_motions) motions[name] = motion;
     CLI::App* command = app.add_subcommand("synth", "Make a synthetic capture of a person: meshes and skeleton");
     command->description(
         "Make a synthetic capture of a person, to try the codec on: a dressed, coloured body, 1.75 m tall, that\n"
@@ -240,74 +344,16 @@ void add_synth(CLI::App& app, Run& run) {
         "and positions of the vertices and the triangles\n"
         "all change.\n"
         "The same options give the same bytes, and every frame can be made on its own (--first-frame).");
-    command
-        ->add_option("OUT_DIR,-o,--output", o.folder,
-                     "Folder to write frame_00000.ply ..., skeleton.json, skeleton_true.json to")
-        ->type_name("FOLDER");
-    auto* live = command->add_flag("--live", o.live,
-                                   "Instead, PLY after PLY on standard output, each when it is due, without end, as a\n"
-                                   "camera would send them: for htvm encode -");
-    auto* frames = command->add_option("--frames", o.frames, "How many frames")
-                       ->check(CLI::Range(1, most_frames))
-                       ->capture_default_str();
-    command->add_option("--first-frame", o.first_frame, "The first frame's number; the motion starts at frame 0")
-        ->check(CLI::Range(0, most_frames))
-        ->capture_default_str();
-    command
-        ->add_option("--motion", o.synth.motion,
-                     "What the person does: a tour (default), calm, everyday (walks, sits down, hands in pockets, a\n"
-                     "ball; somebody comes in), or fast (dances, kicks, jumps)")
-        ->transform(CLI::CheckedTransformer(motions, CLI::ignore_case))
-        ->option_text("tour|calm|everyday|fast");
-    command->add_option("--people", o.synth.people, "2: a second person moves beside; not in the tour")
-        ->check(CLI::Range(1, 2))
-        ->capture_default_str();
-    command->add_option("--fps", o.synth.fps, "Frames per second")->capture_default_str();
-    command->add_option("--vertices", o.synth.vertices, "Vertices per frame, within 3 %")->capture_default_str();
-    command
-        ->add_option("--seed", o.synth.seed,
-                     "Seed of the noise and the sampling, and of the order of moves (the tour stays the same)")
-        ->capture_default_str();
-    command
-        ->add_option("--surface-noise", o.synth.surface_noise_power,
-                     "Power of the noise on the surface, mm^2; new in every frame (2.25 is 1.5 mm RMS)")
-        ->capture_default_str();
-    command
-        ->add_option("--joint-noise", o.synth.joint_noise_power,
-                     "Power of the noise on each joint coordinate in skeleton.json, mm^2 (25 is 5 mm RMS);\n"
-                     "skeleton_true.json has none")
-        ->capture_default_str();
-    command
-        ->add_option("--truth", o.truth,
-                     "Folder for what no real capture knows: the surface without noise, points fixed on it in every\n"
-                     "frame, and when limbs are fast, touch or come off ('htvm compare --truth' reads it)")
-        ->type_name("FOLDER");
-    command->add_option("--truth-marks", o.marks, "How many points of the surface are followed there")
-        ->check(CLI::Range(1, 20000))
-        ->capture_default_str();
-    command->add_flag("--lattice", o.synth.lattice,
-                      "Keep the vertices on the edges of one regular grid (by default there is no grid)");
-    auto* texture = command
-                        ->add_option("--texture", o.texture.size,
-                                     "Write a texture of that many pixels along a side beside every mesh, in place of "
-                                     "vertex\ncolours: an atlas whose layout changes every second, with noise and a "
-                                     "drifting exposure;\nwith --truth also without these")
-                        ->option_text("PIXELS");
-    command->add_option("--texture-format", o.texture_format, "The format of these images")
-        ->check(CLI::IsMember({"jpg", "png"}))
-        ->option_text("jpg|png=jpg")
-        ->needs(texture);
-    command->add_option("--texture-noise", o.texture.noise, "Their noise, levels RMS; new in every texel and frame")
-        ->capture_default_str()
-        ->needs(texture);
-    command
-        ->add_option("--texture-exposure", o.texture.exposure,
-                     "By how many percent their exposure goes up and down, over seconds")
-        ->capture_default_str()
-        ->needs(texture);
-    command->add_flag("--normals", o.synth.normals, "Write vertex normals too");
-    command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same");
-    command->add_flag("--json", o.json, "Print what was written as JSON on standard output")->excludes(live);
+    add_places(*command, o);
+    add_motion(*command, o);
+    add_capturing(*command, o);
+    add_texture(*command, o);
+    command->option_defaults()->group("Options");
+    command->add_option("--threads", o.threads, "Threads to use (default: one per core); the result is the same")
+        ->group(heading::parallel);
+    command->add_flag("--json", o.json, "Print what was written as JSON on standard output")
+        ->excludes(command->get_option("--live"))
+        ->group(heading::scripts);
     command->footer(
         "Example: a capture of 2 seconds, then its stream and what is in it\n"
         "  htvm synth capture --frames 60\n"
@@ -319,18 +365,20 @@ void add_synth(CLI::App& app, Run& run) {
         "  htvm compare dance dance.htvm --only m2 --truth truth\n"
         "Example: a live stream without a camera, beside a hub (htvm serve)\n"
         "  htvm synth --live --vertices 10000 --fps 10 | htvm encode - -o ws://localhost:8080/publish/me");
-    command->callback([options, frames, texture, &run] {
-        if (options->live == !options->folder.empty())
-            throw CLI::ValidationError("OUT_DIR",
-                                       "or --live: give one of them, a folder to write to or standard output");
-        if (options->folder == "-")
-            throw CLI::ValidationError("OUT_DIR", "is a folder; for meshes on standard output give --live");
-        if (options->live && !options->truth.empty())
-            throw CLI::ValidationError("--truth", "goes with a folder of frames, not with --live");
-        options->is_textured = texture->count() > 0;
-        if (options->live && options->is_textured)
-            throw CLI::ValidationError("--texture", "writes images beside meshes in a folder, so not with --live");
-        options->counted = frames->count() > 0;
+    add_front_page(*command, {{{"--frames"},
+                               {"--fps"},
+                               {"--vertices"},
+                               {"--motion"},
+                               {"--people"},
+                               {"--texture", "Write images of so many pixels along a side, in place of vertex colours"},
+                               {"--seed", "Another number makes other noise, and other moves"},
+                               {"--truth", "Folder for what no real capture knows: htvm compare --truth reads it"},
+                               {"--live", "PLY after PLY on standard output instead, as a camera would send them"},
+                               {"--json"}}});
+    command->callback([options, command, &run] {
+        options->is_textured = command->count("--texture") > 0;
+        options->counted = command->count("--frames") > 0;
+        if (const auto why = contradiction_in(*options); !why.empty()) throw CLI::ValidationError(why);
         run = [options] { return options->live ? synthesise_live(*options) : synthesise(*options); };
     });
 }

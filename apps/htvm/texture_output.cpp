@@ -45,10 +45,10 @@ void TextureOutput::take(const Packet& packet) {
 Result<ImageFile> TextureOutput::image() {
     if (!std::exchange(stale_, false)) return file_;
     const auto image = decoder_.image();
-    auto bytes = format_ == "jpeg" ? write_jpeg_image(*image) : write_png_image(*image);
+    auto bytes = format_ == ImageFormat::jpeg ? write_jpeg_image(*image) : write_png_image(*image);
     if (!bytes) return tl::unexpected(bytes.error());
     file_.bytes = std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
-    file_.extension = format_ == "jpeg" ? ".jpg" : ".png";
+    file_.extension = format_ == ImageFormat::jpeg ? ".jpg" : ".png";
     return file_;
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "htvm/packet.hpp"
@@ -21,10 +20,12 @@ struct ImageFile {
     const char* extension = ".png";
 };
 
+enum class ImageFormat : std::uint8_t { png, jpeg };
+
 class TextureOutput {
 public:
-    // format: png or jpeg, for pictures that are no image files already.
-    explicit TextureOutput(std::string format = "png") : format_(std::move(format)), decoder_(picture_decoder()) {}
+    // format: of pictures that are no image files already.
+    explicit TextureOutput(ImageFormat format = ImageFormat::png) : format_(format), decoder_(picture_decoder()) {}
     // A packet of a picture, or the sequence header of another sequence. What cannot be decoded is told as a warning,
     // once in a row; the last picture stays.
     void take(const Packet& packet);
@@ -33,7 +34,7 @@ public:
     Result<ImageFile> image();
 
 private:
-    std::string format_;
+    ImageFormat format_;
     PictureDecoder decoder_;
     ImageFile file_;
     bool stale_ = false;  // there is a newer picture than file_ has

@@ -13,6 +13,7 @@
 #include "charts.h"
 #include "coders.h"
 #include "command_line/capture.h"
+#include "command_line/choice.h"
 #include "command_line/terminal.h"
 #include "commands.h"
 #include "core/parallel.h"
@@ -40,7 +41,7 @@ struct Options {
     std::uint64_t samples = 200000;
     std::size_t measure_every = 1;
     int key_interval = 0;
-    std::string denoise = "off";
+    Denoising denoise = Denoising::off;
     int views = 10;
     std::size_t memory_megabytes = 1024;
     unsigned threads = 0, coder_threads = 1;
@@ -49,8 +50,7 @@ struct Options {
 };
 
 Result<std::vector<CoderUnderTest>> chosen_coders(const Options& options) {
-    const auto built_in =
-        built_in_coders(options.key_interval, options.denoise == "off" ? Denoising::off : Denoising::automatic);
+    const auto built_in = built_in_coders(options.key_interval, options.denoise);
     std::vector<CoderUnderTest> out;
     std::set<std::string> names;
     auto add = [&](const CoderUnderTest& coder) -> Result<void> {
@@ -326,13 +326,11 @@ void add_sweep_options(CLI::App& command, Options& o) {
         .add_option("--keyint", o.key_interval,
                     "Frames from one I-frame to the next (default: 300 for htvm-t, 30 for others)")
         ->check(CLI::Range(1, 1000000));
-    command
-        .add_option(
-            "--denoise", o.denoise,
-            "Whether htvm-t leaves the capture's noise out: off (default), since errors are measured against the "
-            "capture, noise and all; or auto, as htvm encode does")
-        ->check(CLI::IsMember({"auto", "off"}))
-        ->option_text("auto|off");
+    constexpr std::array denoising = {Choice<Denoising>{"auto", Denoising::automatic},
+                                      Choice<Denoising>{"off", Denoising::off}};
+    add_choice(command, "--denoise", o.denoise, denoising,
+               "Whether htvm-t leaves the capture's noise out: off (default), since errors are measured against the "
+               "capture, noise and all; or auto, as htvm encode does");
     command.add_flag("--geometry-only", o.geometry_only, "Leave the colours out");
 }
 

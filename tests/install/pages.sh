@@ -31,10 +31,11 @@ for page in man1/*.1; do
     checks=$((checks + 1))
 done
 command -v groff >/dev/null || echo "groff is not installed: the pages are not formatted"
-# has_options PROGRAM COMMAND: every option of the help is on the page.
+# has_options PROGRAM COMMAND NAME: every option of the whole help is on the page.
 has_options() {
-    local option
-    for option in $(COLUMNS=1000 "$1" "$2" --help | grep -oE '^ +(-[a-zA-Z],)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
+    local option all=--help
+    if "$1" "$2" --help | grep '^--help-all shows' >/dev/null; then all=--help-all; fi
+    for option in $(COLUMNS=1000 "$1" "$2" $all | grep -oE '^ +(-[a-zA-Z],)?--[a-z-]+' | grep -oE '\-\-[a-z-]+'); do
         grep -qF -- "\\fB${option//-/\\-}\\fR" "man1/$3-$2.1" || fail "the page of $3 $2 lacks $option"
         checks=$((checks + 1))
     done

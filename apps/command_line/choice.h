@@ -1,0 +1,43 @@
+// Options whose values are words: the parser turns a word into its value, and nothing behind it compares texts.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iterator>
+#include <string>
+#include <vector>
+
+namespace htvm::app {
+
+template <typename Value>
+struct Choice {
+    const char* word;
+    Value value;
+};
+
+// Adds an option that takes one of the words and stores its value. choices: a range of Choice, which is copied.
+template <typename Target, typename Choices>
+CLI::Option* add_choice(CLI::App& command, const std::string& flags, Target& target, const Choices& choices,
+                        const std::string& meaning) {
+    std::vector<std::string> words;
+    for (const auto& choice : choices) words.emplace_back(choice.word);
+    return command
+        .add_option_function<std::string>(
+            flags,
+            [&target, choices](const std::string& word) {
+                for (const auto& choice : choices)
+                    if (word == choice.word) target = choice.value;
+            },
+            meaning)
+        ->check(CLI::IsMember(words));
+}
+
+// The word of a value; empty if it has none.
+template <typename Value, typename Choices>
+const char* word_of(const Value& value, const Choices& choices) {
+    const auto found =
+        std::find_if(std::begin(choices), std::end(choices), [&](const auto& choice) { return choice.value == value; });
+    return found == std::end(choices) ? "" : found->word;
+}
+
+}  // namespace htvm::app
