@@ -62,7 +62,6 @@ FLOORS = [
     ("src/live/client", [*LIVE, "htvm/decoder.hpp", "htvm/publisher.hpp"]),
     ("src/live/hub", [*LIVE, "live/client"]),
     ("src/live/server", [*LIVE, "io", "live/client", "live/hub"]),
-    ("src/live", [*LIVE, "io", "htvm/decoder.hpp", "htvm/publisher.hpp"]),
 ]
 # The programs stand above everything.
 LIBRARIES = [folder.removeprefix("src/") for folder, _ in FLOORS if folder.startswith("src/")]

@@ -118,6 +118,11 @@ class Table(unittest.TestCase):
             self.assertLessEqual(set(allowed), above, folder)
             above.add(folder.removeprefix("src/"))
 
+    def test_each_row_is_of_something_that_is_there(self):
+        tree = os.path.join(HERE, "..", "..")
+        for path in [*(row for row, _ in check.FLOORS), *("include/" + header for header in check.INTERFACES)]:
+            self.assertTrue(os.path.exists(os.path.join(tree, path)), path)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -37,8 +37,12 @@ TESTED_BY = [
     ("tests/data/", ["codec"]),
 ]
 
-# Tests that take more than their share of three minutes; suites, or single tests.
-NOT_QUICK = {}
+# Tests that take more than their share of three minutes: suites, or single tests, of choices and numbers on long
+# sequences. Without them, those of the codec take a minute of one core, with them more than three.
+NOT_QUICK = {
+    "codec": ["ClosedLoop.EveryChoiceOfFrames", "EncoderError.*", "EncoderRate.*", "EncoderThreads.*", "Latency.*",
+              "SkeletonFaults.*", "TrackedError.*", "TrackedRate.*", "TrackingEffort.*"],
+}
 
 TREE = os.path.abspath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", ".."))
 
