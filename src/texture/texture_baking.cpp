@@ -114,38 +114,38 @@ bool TextureBaker::is_new(const Mesh& shown) const {
     return layout_.triangles != shown.triangles || layout_.texcoords != shown.texcoords;
 }
 
-void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> repeated) {
-    const int width = options_.width, height = options_.height;
-    const std::size_t own = shown.positions.size() - repeated.size();
-    // A triangle whose corners lie where they lay before shows what it showed.
-    const auto key_of = [&](const Triangle& t, std::span<const Vector2f> texcoords) {
-        std::uint64_t key = 0;
-        for (const auto v : t)
-            for (const float c : texcoords[v])
-                key = (key ^ static_cast<std::uint64_t>(std::lround(65536 * c))) * 0x9e3779b97f4a7c15u;
-        return key;
-    };
-    std::vector<std::uint64_t> before;
-    for (const auto& t : layout_.triangles) before.push_back(key_of(t, layout_.texcoords));
-    std::sort(before.begin(), before.end());
+namespace {
 
-    Layout next;
-    next.triangles = shown.triangles;
-    next.texcoords = shown.texcoords;
-    next.welded = shown.triangles;
-    for (auto& t : next.welded)
-        for (auto& v : t)
-            if (v >= own) v = repeated[v - own];
-    next.beside = triangles_beside(next.welded);
+// By which a triangle is known again whose corners lie where they lay: it shows what it showed.
+std::uint64_t key_of(const Triangle& t, std::span<const Vector2f> texcoords) {
+    std::uint64_t key = 0;
+    for (const auto v : t)
+        for (const float c : texcoords[v])
+            key = (key ^ static_cast<std::uint64_t>(std::lround(65536 * c))) * 0x9e3779b97f4a7c15u;
+    return key;
+}
 
+// Of each triangle, its chart: triangles that share a vertex as shown are of one, from 1 on.
+std::vector<std::uint32_t> charts_of(const Mesh& shown) {
     DisjointSets sets(shown.positions.size());
     for (const auto& [a, b, c] : shown.triangles) sets.join(a, b), sets.join(b, c);
     std::unordered_map<std::uint32_t, std::uint32_t> charts;
+    std::vector<std::uint32_t> out;
     for (const auto& t : shown.triangles)
-        next.chart_of_triangle.push_back(
+        out.push_back(
             charts.emplace(static_cast<std::uint32_t>(sets.of(t[0])), static_cast<std::uint32_t>(charts.size() + 1))
                 .first->second);
+    return out;
+}
 
+}  // namespace
+
+// Draws the triangles' charts into the picture. What a triangle that stays showed remains known.
+std::vector<std::uint8_t> TextureBaker::place_charts(const Mesh& shown, Layout& next) const {
+    const int width = options_.width, height = options_.height;
+    std::vector<std::uint64_t> before;
+    for (const auto& t : layout_.triangles) before.push_back(key_of(t, layout_.texcoords));
+    std::sort(before.begin(), before.end());
     const auto texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     next.chart_of_texel.assign(texels, 0);
     std::vector<std::uint8_t> is_known(texels, 0);
@@ -171,8 +171,17 @@ void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> rep
                       });
     }
     if (in_space > 0) next.texels_per_millimetre = std::sqrt(in_picture / in_space);
+    add_gutters(next);
+    // What lies between charts is nobody's, and stays as it is unless all is new.
+    if (any_stays)
+        for (std::size_t texel = 0; texel < texels; ++texel)
+            if (next.chart_of_texel[texel] == 0) is_known[texel] = is_known_[texel];
+    return is_known;
+}
 
-    // The gutters grow ring by ring from the charts, so that each of their texels is of the nearest.
+// The gutters grow ring by ring from the charts, so that each of their texels is of the nearest.
+void TextureBaker::add_gutters(Layout& next) const {
+    const int width = options_.width, height = options_.height;
     const auto for_each_around = [&](Texel texel, int reach, const auto& at) {
         const int x = static_cast<int>(texel) % width, y = static_cast<int>(texel) / width;
         for (int v = std::max(y - reach, 0); v <= std::min(y + reach, height - 1); ++v)
@@ -191,7 +200,7 @@ void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> rep
         gutter.insert(gutter.end(), further.begin(), further.end());
         ring.swap(further);
     }
-    std::vector<std::uint8_t> is_inside(texels, 0);
+    std::vector<std::uint8_t> is_inside(next.chart_of_texel.size(), 0);
     for (const auto texel : next.inside) is_inside[texel] = 1;
     for (const auto texel : gutter) {
         Texel source = texel;
@@ -203,11 +212,20 @@ void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> rep
         });
         next.gutter.push_back({texel, source});
     }
-    // What lies between charts is nobody's, and stays as it is unless all is new.
-    if (any_stays)
-        for (std::size_t texel = 0; texel < texels; ++texel)
-            if (next.chart_of_texel[texel] == 0) is_known[texel] = is_known_[texel];
-    is_known_ = std::move(is_known);
+}
+
+void TextureBaker::lay_out(const Mesh& shown, std::span<const std::uint32_t> repeated) {
+    const std::size_t own = shown.positions.size() - repeated.size();
+    Layout next;
+    next.triangles = shown.triangles;
+    next.texcoords = shown.texcoords;
+    next.welded = shown.triangles;
+    for (auto& t : next.welded)
+        for (auto& v : t)
+            if (v >= own) v = repeated[v - own];
+    next.beside = triangles_beside(next.welded);
+    next.chart_of_triangle = charts_of(shown);
+    is_known_ = place_charts(shown, next);
     layout_ = std::move(next);
 }
 
@@ -263,6 +281,53 @@ std::vector<TextureBaker::Match> TextureBaker::matches(const Mesh& captured, con
 
 // ---- Drawing -------------------------------------------------------------------------------------------------------
 
+// Where a captured triangle's corners lie in the picture, in texels from the lower left, as far as its k-th corner's
+// chart goes: a corner's match if that is in the chart, else by the plane of the triangle in which the k-th corner's
+// is, a little beyond the chart's border. Nothing where that fails, or where a corner was matched elsewhere.
+std::optional<TextureBaker::Corners> TextureBaker::corners_in_picture(const Mesh& captured, const Mesh& shown,
+                                                                      const Triangle& t,
+                                                                      const std::array<const Match*, 3>& match,
+                                                                      std::size_t k) const {
+    const auto place = [&](const std::array<double, 3>& shares, std::uint32_t triangle) {
+        std::array<double, 2> out{};
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto& at = layout_.texcoords[layout_.triangles[triangle][i]];
+            out[0] += shares[i] * static_cast<double>(at[0]) * options_.width;
+            out[1] += shares[i] * static_cast<double>(at[1]) * options_.height;
+        }
+        return out;
+    };
+    const auto place_by_plane = [&](std::uint32_t v, std::uint32_t triangle) -> std::optional<std::array<double, 2>> {
+        const auto& [a, b, c] = layout_.triangles[triangle];
+        const auto shares = shares_in_plane(to_vector(captured.positions[v]), to_vector(shown.positions[a]),
+                                            to_vector(shown.positions[b]), to_vector(shown.positions[c]));
+        return shares ? std::optional(place(*shares, triangle)) : std::nullopt;
+    };
+    const auto chart_at = [&](std::size_t i) { return layout_.chart_of_triangle[match[i]->triangle]; };
+    Corners at;
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (chart_at(i) == chart_at(k)) {
+            const auto& s = match[i]->shares;
+            at[i] = place({static_cast<double>(s[0]), static_cast<double>(s[1]), static_cast<double>(s[2])},
+                          match[i]->triangle);
+        } else {
+            const auto beyond = place_by_plane(t[i], match[k]->triangle);
+            if (!beyond) return std::nullopt;
+            at[i] = *beyond;
+        }
+    }
+    // A triangle that comes out much larger than it is has a corner that was matched elsewhere.
+    constexpr double stretch = 3, besides = 4;  // texels
+    for (std::size_t i = 0; i < 3; ++i) {
+        const std::size_t j = (i + 1) % 3;
+        const double apart = length(to_vector(captured.positions[t[i]]) - to_vector(captured.positions[t[j]]));
+        if (!(std::hypot(at[i][0] - at[j][0], at[i][1] - at[j][1]) <=
+              stretch * apart * layout_.texels_per_millimetre + besides))
+            return std::nullopt;
+    }
+    return at;
+}
+
 void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::span<const Match> matches) {
     const Mesh& mesh = captured.mesh;
     const int width = options_.width, height = options_.height;
@@ -271,89 +336,52 @@ void TextureBaker::draw(const TexturedMesh& captured, const Mesh& shown, std::sp
     std::vector<Sampler> samplers;
     for (std::size_t level = 0; level < pyramid.levels(); ++level) samplers.emplace_back(pyramid.at_level(level));
 
-    // A corner's place in the picture of a chart: its match's if that is in the chart, else by the plane of the
-    // triangle in which another corner's is, a little beyond the chart's border.
-    const auto place = [&](const std::array<double, 3>& shares, std::uint32_t t) {
-        std::array<double, 2> out{};
+    // Draws a captured triangle into a chart. at: where its corners lie in the picture.
+    const auto draw_triangle = [&](const Triangle& t, const Corners& at, std::uint32_t chart, float distance) {
+        // From places in the picture to places in the captured image.
+        const double area = 2 * area_of(at);
+        if (std::abs(area) < 1e-9) return;
+        const auto& image = *captured.texture;
+        Texcoords from;
         for (std::size_t i = 0; i < 3; ++i) {
-            const auto& at = layout_.texcoords[layout_.triangles[t][i]];
-            out[0] += shares[i] * static_cast<double>(at[0]) * width;
-            out[1] += shares[i] * static_cast<double>(at[1]) * height;
+            const auto& c = mesh.texcoords[t[i]];
+            from[i] = {static_cast<double>(c[0]) * image.width, (1 - static_cast<double>(c[1])) * image.height};
         }
-        return out;
-    };
-    const auto place_by_plane = [&](std::uint32_t v, std::uint32_t t) -> std::optional<std::array<double, 2>> {
-        const auto& [a, b, c] = layout_.triangles[t];
-        const auto shares = shares_in_plane(to_vector(mesh.positions[v]), to_vector(shown.positions[a]),
-                                            to_vector(shown.positions[b]), to_vector(shown.positions[c]));
-        return shares ? std::optional(place(*shares, t)) : std::nullopt;
+        const double ratio = std::sqrt(std::abs(2 * area_of(from) / area));
+        const auto level = pyramid.level_for(ratio);
+        const double smaller = 1.0 / static_cast<double>(std::size_t{1} << level);
+        std::array<std::array<double, 3>, 2> affine;  // per axis: by x, by y, constant
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+            const double first = from[1][axis] - from[0][axis], second = from[2][axis] - from[0][axis];
+            const double by_x = (first * (at[2][1] - at[0][1]) - second * (at[1][1] - at[0][1])) / area;
+            const double by_y = (second * (at[1][0] - at[0][0]) - first * (at[2][0] - at[0][0])) / area;
+            // From texel to texel; the first texel's centre is half a texel from the corner on both sides.
+            affine[axis] = {by_x * smaller, by_y * smaller,
+                            (from[0][axis] + by_x * (0.5 - at[0][0]) + by_y * (0.5 - at[0][1])) * smaller - 0.5};
+        }
+        constexpr double unit = 65536;
+        const auto& sampler = samplers[level];
+        for_each_cell({raster_point(at[0]), raster_point(at[1]), raster_point(at[2])}, {0, 0, width, height},
+                      [&](std::int32_t x, std::int32_t y) {
+                          const auto texel = static_cast<std::size_t>((height - 1 - y) * width + x);
+                          if (layout_.chart_of_texel[texel] != chart || nearness_[texel] <= distance) return;
+                          nearness_[texel] = distance;
+                          const auto& [u, v] = affine;
+                          sampler.at(static_cast<std::int64_t>((u[0] * x + u[1] * y + u[2]) * unit),
+                                     static_cast<std::int64_t>((v[0] * x + v[1] * y + v[2]) * unit),
+                                     &drawn_.rgb[3 * texel]);
+                      });
     };
 
     for (const auto& t : mesh.triangles) {
         const std::array<const Match*, 3> match = {&matches[t[0]], &matches[t[1]], &matches[t[2]]};
         if (match[0]->triangle == none || match[1]->triangle == none || match[2]->triangle == none) continue;
+        const float distance = (match[0]->distance + match[1]->distance + match[2]->distance) / 3;
         std::array<std::uint32_t, 3> chart;
         for (std::size_t i = 0; i < 3; ++i) chart[i] = layout_.chart_of_triangle[match[i]->triangle];
         for (std::size_t k = 0; k < 3; ++k) {
             if ((k > 0 && chart[k] == chart[0]) || (k > 1 && chart[k] == chart[1])) continue;
-            Texcoords at;
-            bool fits = true;
-            for (std::size_t i = 0; i < 3 && fits; ++i) {
-                if (chart[i] == chart[k]) {
-                    const auto& s = match[i]->shares;
-                    at[i] = place({static_cast<double>(s[0]), static_cast<double>(s[1]), static_cast<double>(s[2])},
-                                  match[i]->triangle);
-                } else {
-                    const auto beyond = place_by_plane(t[i], match[k]->triangle);
-                    fits = beyond.has_value();
-                    if (fits) at[i] = *beyond;
-                }
-            }
-            if (!fits) continue;
-            // A triangle that comes out much larger than it is has a corner that was matched elsewhere.
-            constexpr double stretch = 3, besides = 4;  // texels
-            for (std::size_t i = 0; i < 3; ++i) {
-                const std::size_t j = (i + 1) % 3;
-                const double apart = length(to_vector(mesh.positions[t[i]]) - to_vector(mesh.positions[t[j]]));
-                fits = fits && std::hypot(at[i][0] - at[j][0], at[i][1] - at[j][1]) <=
-                                   stretch * apart * layout_.texels_per_millimetre + besides;
-            }
-            if (!fits) continue;
-
-            // From places in the picture to places in the captured image.
-            const double area = 2 * area_of(at);
-            if (std::abs(area) < 1e-9) continue;
-            const auto& image = *captured.texture;
-            Texcoords from;
-            for (std::size_t i = 0; i < 3; ++i) {
-                const auto& c = mesh.texcoords[t[i]];
-                from[i] = {static_cast<double>(c[0]) * image.width, (1 - static_cast<double>(c[1])) * image.height};
-            }
-            const double ratio = std::sqrt(std::abs(2 * area_of(from) / area));
-            const auto level = pyramid.level_for(ratio);
-            const double smaller = 1.0 / static_cast<double>(std::size_t{1} << level);
-            std::array<std::array<double, 3>, 2> affine;  // per axis: by x, by y, constant
-            for (std::size_t axis = 0; axis < 2; ++axis) {
-                const double first = from[1][axis] - from[0][axis], second = from[2][axis] - from[0][axis];
-                const double by_x = (first * (at[2][1] - at[0][1]) - second * (at[1][1] - at[0][1])) / area;
-                const double by_y = (second * (at[1][0] - at[0][0]) - first * (at[2][0] - at[0][0])) / area;
-                // From texel to texel; the first texel's centre is half a texel from the corner on both sides.
-                affine[axis] = {by_x * smaller, by_y * smaller,
-                                (from[0][axis] + by_x * (0.5 - at[0][0]) + by_y * (0.5 - at[0][1])) * smaller - 0.5};
-            }
-            const float distance = (match[0]->distance + match[1]->distance + match[2]->distance) / 3;
-            constexpr double unit = 65536;
-            const auto& sampler = samplers[level];
-            for_each_cell({raster_point(at[0]), raster_point(at[1]), raster_point(at[2])}, {0, 0, width, height},
-                          [&](std::int32_t x, std::int32_t y) {
-                              const auto texel = static_cast<std::size_t>((height - 1 - y) * width + x);
-                              if (layout_.chart_of_texel[texel] != chart[k] || nearness_[texel] <= distance) return;
-                              nearness_[texel] = distance;
-                              const auto& [u, v] = affine;
-                              sampler.at(static_cast<std::int64_t>((u[0] * x + u[1] * y + u[2]) * unit),
-                                         static_cast<std::int64_t>((v[0] * x + v[1] * y + v[2]) * unit),
-                                         &drawn_.rgb[3 * texel]);
-                          });
+            if (const auto at = corners_in_picture(mesh, shown, t, match, k)) draw_triangle(t, *at, chart[k], distance);
         }
     }
 }

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -65,9 +66,15 @@ private:
         float distance = 0;  // mm
     };
 
+    using Corners = std::array<std::array<double, 2>, 3>;  // of a triangle, in texels
+
     bool is_new(const Mesh& shown) const;
     void lay_out(const Mesh& shown, std::span<const std::uint32_t> repeated);
+    std::vector<std::uint8_t> place_charts(const Mesh& shown, Layout& next) const;
+    void add_gutters(Layout& next) const;
     std::vector<Match> matches(const Mesh& captured, const Mesh& shown, std::size_t own_vertices) const;
+    std::optional<Corners> corners_in_picture(const Mesh& captured, const Mesh& shown, const Triangle& t,
+                                              const std::array<const Match*, 3>& match, std::size_t k) const;
     void draw(const TexturedMesh& captured, const Mesh& shown, std::span<const Match> matches);
     std::array<double, 3> exposure() const;
     void fill_holes();
