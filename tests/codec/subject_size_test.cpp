@@ -2,6 +2,7 @@
 // adult's is.
 #include <gtest/gtest.h>
 
+#include "codec/enhanced_options.h"
 #include "codec/patched_sequences.h"
 #include "codec/test_sequences.h"
 
@@ -57,7 +58,7 @@ void expect_the_same_for_any_size(const TestSequence& sequence, const EncoderOpt
 }
 
 TEST(SubjectSize, MotionIsCodedInTheSameFrameKindsAndAsManyBytes) {
-    expect_the_same_for_any_size(arms_down(8), default_options(Profile::tracked), 0.03);
+    expect_the_same_for_any_size(arms_down(8), options_at_2_mm(Profile::tracked), 0.03);
 }
 
 TEST(SubjectSize, WhatIsLostIsPatchedForAnySize) {
@@ -68,7 +69,7 @@ TEST(SubjectSize, WhatIsLostIsPatchedForAnySize) {
 }
 
 TEST(SubjectSize, ABitrateBuysTheSameErrorInProportion) {
-    auto options = default_options(Profile::tracked);
+    auto options = options_at_2_mm(Profile::tracked);
     options.rate.bits_per_second = 600'000;
     expect_the_same_for_any_size(arms_down(8), options, 0.05);
 }

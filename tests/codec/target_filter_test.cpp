@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "codec/enhanced_options.h"
 #include "codec/height_field.h"
 #include "codec/test_sequences.h"
 #include "surface/surface_distance.h"
@@ -179,7 +180,7 @@ NoisyCapture noisy_capture(int frames) {
 }
 
 EncoderOptions with(Denoising denoise) {
-    auto out = default_options(Profile::tracked);
+    auto out = options_at_2_mm(Profile::tracked);
     out.tracked.denoise = denoise;
     return out;
 }
