@@ -263,7 +263,7 @@ Result<void> Capture::find_listed_times() {
     return {};
 }
 
-// Of the comments in PLY files, where they serve.
+// Takes the times from the comments in PLY files, where they serve.
 void Capture::find_times_in_files() {
     if (timestamp_in_file(files_.paths[0]).empty()) return;
     const auto unused = [&](const std::filesystem::path& path, const std::string& why) {
@@ -530,7 +530,7 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
         if (place < options_.first) continue;
         at_ = place;
         came_ = came;
-        // Of the first mesh, as sequence headers say it from then on.
+        // The first mesh alone says the rate, as sequence headers tell it from then on.
         if (!std::exchange(rate_is_told_, true))
             if (const auto rate = parse_frame_rate(per_second)) rate_ = *rate;
         auto timed = find_piped_time(place, timestamp);

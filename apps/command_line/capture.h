@@ -76,7 +76,7 @@ bool keeps_pictures(TextureAs use);
 // Adds the options above to a command.
 void add_capture_options(CLI::App& command, CaptureOptions& options);
 
-// Of these, --texture and --texture-origin, for commands that read meshes otherwise.
+// Adds --texture and --texture-origin alone, for commands that read meshes otherwise.
 void add_texture_options(CLI::App& command, TextureOptions& options);
 
 // Whether the meshes come from standard input.
@@ -107,7 +107,7 @@ public:
     Mesh take_first();
     const Pose* first_pose() const { return pose_at(peeked_at_); }
 
-    // Of the frame that next() gave, or failed at, last:
+    // The frame that next() gave, or failed at, last:
     const Pose* pose() const { return pose_at(*at_); }  // null where there is no skeleton
     std::int64_t timestamp_us() const { return timestamp_us_; }
     // When it was there: of standard input, when its last byte came; of files, when the caller asked for it.
@@ -128,7 +128,7 @@ public:
     const FrameRate& frame_rate() const { return rate_; }
     double fps() const { return rate_.per_second(); }
     UpAxis up() const { return up_; }
-    // Of the first frame's vertices, mm: how far down along the axis that is up one lies. 0 if none is known to be.
+    // Where the first frame's lowest vertex lies along the axis that is up, mm; 0 if none is known to be.
     double lowest() const { return lowest_; }
     double millimetres_per_unit() const { return millimetres_per_unit_; }  // scaling included
 

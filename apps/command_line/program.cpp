@@ -41,7 +41,7 @@ int exit_code(ErrorKind kind) {
     return 1;
 }
 
-// Of these the word most like it, where it can have been meant; else empty.
+// The known word most like this one, where it can have been meant; else empty.
 std::string meant_by(const std::string& word, const std::vector<std::string>& known) {
     const auto distance = [&](const std::string& other) { return internal::edit_distance(word.substr(0, 100), other); };
     const auto nearest = std::min_element(known.begin(), known.end(),

@@ -257,8 +257,8 @@ std::string csv_line(std::size_t frame, const FrameComparison& comparison, const
 
 // ---- Flicker --------------------------------------------------------------------------------------------------------
 
-// Of a frame: how the pictures changed since the frame before, which a frame of files or behind a gap may not have; and
-// its kind, if it is known.
+// A frame's change of the pictures since the frame before, which a frame of files or behind a gap may not have; and its
+// kind, if it is known.
 struct FlickerFrame {
     std::optional<FrameFlicker> change;
     std::optional<FrameType> kind;

@@ -25,8 +25,8 @@ struct EffortLog {
     std::vector<LoggedFrame> frames;
 };
 
-// Of logs without the last column, frames were repaired; of those that do not say what was asked for, it was the usual
-// effort, or the highest in them. Lines may end as on Windows.
+// Frames of a log that does not say whether they may be repaired may be; what was asked for, if a log does not say it,
+// is the usual effort, or the highest in it if that is higher. Lines may end as on Windows.
 Result<EffortLog> read_effort_log(const std::filesystem::path& path);
 // Why such a log does not do for so many frames, a number or "more".
 std::string too_few_efforts(const std::string& path, std::size_t efforts, const std::string& frames);

@@ -283,7 +283,7 @@ Result<std::optional<EffortLog>> efforts_to_repeat(const EncodePlan& plan, const
     if (plan.repeat_efforts.empty()) return std::nullopt;
     auto log = read_effort_log(plan.repeat_efforts);
     if (!log) return tl::unexpected(log.error());
-    // Of a pipe nobody knows how many come, nor of files which of them can be read.
+    // Nobody knows how many frames come from a pipe, nor which files can be read where bad ones are skipped.
     const bool all = !plan.is_piped && plan.bad_frames != BadFrames::skip;
     if (all && log->frames.size() < capture.frames())
         return fail(ErrorKind::bad_input,

@@ -102,7 +102,7 @@ Result<void> set_repair(Pass& pass, std::function<bool()> may_repair) {
     return pass.deadline ? pass.encoder.set_repair(std::move(may_repair)) : Result<void>();
 }
 
-// Of a frame that is coded or dropped: the next ones' efforts follow from it, and the log tells of it.
+// Counts a frame that is coded or dropped: the next ones' efforts follow from it, and the log tells of it.
 Result<void> count(Pass& pass, const TimedFrame& timed) {
     if (pass.deadline) pass.deadline->took(timed);
     if (!pass.effort_log) return {};

@@ -30,7 +30,7 @@ struct Summary {
     TotalsByType totals;
     double encode_seconds = 0;
     std::size_t without_triangles = 0;
-    // Of the capture's frames, coded or not.
+    // The capture's frames, coded or not: how many, and the times of the first and the last.
     std::size_t frames = 0;
     std::int64_t first_us = 0, last_us = 0;
     // Frames that are not as captured.
@@ -40,7 +40,7 @@ struct Summary {
     PictureTotals pictures;
     std::vector<ListedFrame> list;  // with --json
 };
-// Of frames behind those summed up so far, whose own numbers begin with 0.
+// Adds the frames behind those summed up so far; their own numbers begin with 0.
 void add(Summary& summary, Summary behind);
 
 // Warnings of single frames, from any thread: of hundreds of a kind the first few tell enough.

@@ -21,7 +21,7 @@ struct Options {
     DecoderOptions limits;
 };
 
-// Of parts of one stream, what hints at their order or at one that is missing.
+// Tells what hints at a wrong order of the parts of one stream, or at one that is missing.
 void tell_of_pause(const StreamJoin& join, const std::string& path) {
     if (!join.pause_seconds()) return;
     if (*join.pause_seconds() < 0)

@@ -41,7 +41,7 @@ void add_texture_picture_options(CLI::App& command, TexturePictureOptions& optio
 // The coder's quantiser for a quality at which neither meshes nor pictures spend bits that the others' errors hide.
 int quantiser_of(PictureCoder coder, double quality);
 
-// Of a rate for both, what the meshes are given: so their errors and those of the pictures are worth the same bits.
+// What the meshes are given of a rate for both: so their errors and those of the pictures are worth the same bits.
 inline constexpr double share_of_meshes = 0.5;
 
 struct PictureTotals {
@@ -54,8 +54,8 @@ struct PictureTotals {
 // Takes the picture of each frame that goes into the encoder of meshes, and gives it out behind that frame's packet.
 class PictureTrack {
 public:
-    // Of images of this size, which others are brought to. With keep, files go as they are. bits_per_second: of meshes
-    // and pictures together; 0: by the quality.
+    // Pictures have one size, which images of others are brought to. With keep, files go as they are. bits_per_second:
+    // of meshes and pictures together; 0: by the quality.
     struct Settings {
         TexturePictureOptions options;
         bool keep = false;

@@ -121,7 +121,7 @@ Result<MeshSource> open_stream(const std::string& path, DecoderOptions options) 
     return source;
 }
 
-// Of files: as listed, or as the PLY files say.
+// The times of files: as listed, or as the PLY files say.
 Result<void> find_times(MeshSource& source, const SequenceFiles& files, const std::string& listed) {
     if (!listed.empty()) {
         auto times = read_frame_times(listed, {});

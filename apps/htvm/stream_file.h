@@ -33,7 +33,7 @@ public:
                                     const HubTrust& trust = {});
     // The next packet; nothing at the end.
     std::optional<Packet> next();
-    // Of a live stream that a hub does not show: why.
+    // Why a hub does not show a live stream.
     const std::optional<Error>& refusal() const { return refusal_; }
     bool is_live() const { return watcher_.has_value(); }
     std::uint64_t damaged_bytes() const {
@@ -73,7 +73,7 @@ public:
     // Lays sound between the frames of the stream, in the place of its own. Before anything is written.
     void lay(AudioTrack audio) { audio_.emplace(std::move(audio)); }
     Result<void> write(const Packet& packet);
-    // Of the last frame, for the index.
+    // The bounds of the last frame, or of several, for the index.
     void add_bounds(const SpaceBounds& bounds) { indexer_.add(bounds); }
     // Those of all frames of a stream that goes into this one, if this packet of it is an index that tells them.
     void add_bounds_of(const Packet& packet);

@@ -43,7 +43,7 @@ struct Verification {
     std::vector<Problem> problems = {};
     std::optional<ErrorKind> refused = {};  // by a limit, or this version
     std::uint64_t frames = 0;
-    // Of the sequence in force.
+    // The last frame of the sequence in force: its number and its time.
     std::optional<std::uint32_t> last_number = {};
     std::int64_t last_us = 0;
     std::set<std::uint32_t> droppable = {};         // own numbers of frames since the I-frame

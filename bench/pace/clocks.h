@@ -7,7 +7,7 @@
 
 namespace htvm::pace {
 
-// Of all threads of this process, since it began.
+// The processor time of all threads of this process, since it began.
 inline double processor_milliseconds() {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);

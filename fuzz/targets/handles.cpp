@@ -32,7 +32,7 @@ void check_nodes(const fuzz::SmallMesh& mesh, fuzz::FuzzInput& input) {
     check_weights(nodes.weights, mesh.positions.size(), nodes.vertex.size());
     for (const auto& pair : nodes.neighbours)
         require(pair.first < pair.second && pair.second < nodes.vertex.size(), "neighbours are nodes");
-    // Of a patch that leaves the first so many vertices, and makes what it likes of the others.
+    // A patch leaves the first so many vertices, and makes what it likes of the others.
     std::vector<std::uint32_t> stays(input.below(static_cast<std::uint32_t>(mesh.positions.size() + 1)));
     std::iota(stays.begin(), stays.end(), 0u);
     const auto other = fuzz::small_mesh(input);

@@ -200,7 +200,7 @@ class htvm_pose(Structure):
 
 htvm_status = c_int32
 
-# Of each function its result and its parameters.
+# Each function's result and parameters.
 functions: dict[str, tuple[Any, list[Any]]] = {
     "htvm_version_string": (c_char_p, []),
     "htvm_stream_version": (c_uint32, []),

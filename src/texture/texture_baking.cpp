@@ -125,7 +125,7 @@ std::uint64_t key_of(const Triangle& t, std::span<const Vector2f> texcoords) {
     return key;
 }
 
-// Of each triangle, its chart: triangles that share a vertex as shown are of one, from 1 on.
+// Each triangle's chart, from 1 on: triangles that share a vertex as shown are of one.
 std::vector<std::uint32_t> charts_of(const Mesh& shown) {
     DisjointSets sets(shown.positions.size());
     for (const auto& [a, b, c] : shown.triangles) sets.join(a, b), sets.join(b, c);

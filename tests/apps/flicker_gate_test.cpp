@@ -71,7 +71,7 @@ Coded code(const SynthOptions& capture, int frames) {
     return out;
 }
 
-// Of each frame of a kind: its measure over that of the T-frames beside it; ascending.
+// The measure of each frame of a kind over that of the T-frames beside it; ascending.
 std::vector<double> over_tracked_beside(const Coded& coded, FrameType kind, ChangeSums FrameFlicker::*shading,
                                         double (*measure)(const ChangeSums&)) {
     std::vector<double> values, out;

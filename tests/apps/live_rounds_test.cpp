@@ -55,7 +55,7 @@ TEST(LiveRounds, EachSequenceOfEachRoundHasASessionOfItsOwn) {
     for (std::size_t k = 0; k < sessions.size(); ++k) EXPECT_EQ(sessions[k], 100 + k);
 }
 
-// Of the frames' positions.
+// A digest of each decoded frame's positions.
 std::vector<std::uint64_t> digests_of(const std::vector<Packet>& packets) {
     Decoder decoder;
     std::vector<std::uint64_t> out;

@@ -355,7 +355,7 @@ TEST(GroupedStream, AFrameWhosePacketIsLostIsShownIfAnotherBroughtIt) {
     ASSERT_TRUE(hidden.has_value());
     EXPECT_TRUE(hidden->concealed);
     expect_same_mesh(hidden->mesh, grouped().reconstructions[4]);
-    // Of one that is not there, what was shown last.
+    // What was shown last stands in for a frame that is not there.
     expect_same_mesh(decoder.conceal_copy(3, 0)->mesh, grouped().reconstructions[4]);
 }
 

@@ -481,7 +481,7 @@ TEST(NodeMotion, IsPredictedByTheMeanStepOfAllLowerNeighbours) {
               encode_node_motion(as_one, graph, before, options).decisions.bits());
 }
 
-// Of nodes that the data hold across a floor only, and hardly against turning.
+// The form of nodes that the data hold across a floor only, and hardly against turning.
 DeformationForm held_across(std::size_t nodes) {
     DeformationForm out;
     Matrix6 form = Matrix6::Zero();

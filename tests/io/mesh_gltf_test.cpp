@@ -468,7 +468,7 @@ protected:
         while (reader.remaining() > 0) out.push_back(std::bit_cast<float>(reader.u32()));
         return out;
     }
-    // Of the node's scale: its keys.
+    // The keys of the node's scale: times and values.
     std::pair<std::vector<float>, std::vector<float>> keys_of(const json& root_of, std::size_t node) const {
         for (const auto& channel : root_of["animations"][0]["channels"]) {
             if (channel["target"]["node"] != node) continue;

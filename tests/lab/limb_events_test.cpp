@@ -101,7 +101,7 @@ std::vector<FrameOfLimbs> stream(const std::string& word) {
     return out;
 }
 
-// Of an event in frames 12 and 13, with two frames behind it.
+// The outcome of an event in frames 12 and 13, with two frames behind it.
 LimbOutcome outcome(const std::string& word) {
     LimbRule rule;
     rule.frames_after = 2;

@@ -37,7 +37,7 @@ TEST(StructuralSimilarity, OfEvenGreysFollowsFromTheirLevelsAlone) {
 }
 
 TEST(StructuralSimilarity, IsOfTheLuma) {
-    // Of pure red the luma is 76.245, of this grey 76: the pictures are as good as equal.
+    // The luma of pure red is 76.245, that of this grey 76: the pictures are as good as equal.
     const Picture red = picture_of(11, 11, [](int, int, int c) { return c == 0 ? 255 : 0; });
     const Picture grey = picture_of(11, 11, [](int, int, int) { return 76; });
     EXPECT_NEAR(mean_similarity(structural_similarity(red, grey)), 1, 1e-5);

@@ -66,6 +66,7 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
     }
     const double units = 1.0 / header.lattice.step();
     configuration.scale = {units, adult * units};
+    configuration.steps = steps_of(configuration, {options.geometry_step, options.colour_step});
     const auto on_lattice = [](double length) {
         return static_cast<std::int32_t>(std::lround(std::min(length, 1.0 * lattice_limit)));
     };
@@ -95,10 +96,6 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
         header.node_spacing = std::max(on_lattice(spacing * units), 1);
     }
     return tracker;
-}
-
-FrameSteps steps_asked_for(const Configuration& configuration) {
-    return steps_of(configuration, {configuration.options.geometry_step, configuration.options.colour_step});
 }
 
 FrameSteps steps_of_quality(const Configuration& configuration, double quality) {

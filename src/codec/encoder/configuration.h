@@ -11,11 +11,19 @@
 
 namespace htvm::internal {
 
+// How coarsely a frame is quantised, as asked for.
+struct FrameSteps {
+    std::int32_t geometry = 32;  // lattice units
+    std::int32_t colour = 6;     // levels
+    bool operator==(const FrameSteps&) const = default;
+};
+
 struct Configuration {
     EncoderOptions options;
     SequenceHeader header;
     Threads threads = {};
     Scale scale;
+    FrameSteps steps;  // of the options, where neither a rate nor an error decides
     bool intra_only() const { return options.key_interval == 1; }  // no frame refers to another
 };
 
@@ -24,15 +32,6 @@ struct Configuration {
 // then on. Errors: bad_input, as of Encoder::push().
 Result<PoseTracker> configure(Configuration& configuration, const Mesh& first, const Pose* pose);
 
-// How coarsely a frame is quantised, as asked for.
-struct FrameSteps {
-    std::int32_t geometry = 32;  // lattice units
-    std::int32_t colour = 6;     // levels
-    bool operator==(const FrameSteps&) const = default;
-};
-
-// The steps of the options, where neither a rate nor an error decides.
-FrameSteps steps_asked_for(const Configuration& configuration);
 // For quality that is derived, 0..100, which means the same for every subject, whatever its size.
 FrameSteps steps_of_quality(const Configuration& configuration, double quality);
 

@@ -120,10 +120,10 @@ bool brings_header(const State& state, FrameType type) {
 }
 
 HeaderBits header_bits(const State& state) {
+    if (!brings_header(state, FrameType::intra)) return {};  // then no other kind brings it
     const double bits =
         8.0 * static_cast<double>(write_sequence_header(state.configuration.header).size() + packet_overhead);
-    const auto of = [&](FrameType type) { return brings_header(state, type) ? bits : 0; };
-    return {.if_alone = of(FrameType::intra), .otherwise = of(FrameType::predicted)};
+    return {.if_alone = bits, .otherwise = brings_header(state, FrameType::predicted) ? bits : 0};
 }
 
 // Beside it, other threads go on with the frames that wait.

@@ -93,7 +93,7 @@ std::vector<LatticePoint> smoothed_within_cells(std::span<const LatticePoint> po
     const std::int64_t reach = cells.step / 2;
     if (reach == 0) return out;
     const auto leader = cells.at_seams ? first_at_same_place(positions) : std::vector<std::uint32_t>{};
-    // Of a patched mesh little moves: only the triangles there, and those around what bends there, are looked at.
+    // Little of a patched mesh moves: only the triangles there, and those around what bends there, are looked at.
     const bool in_part = cells.settled > 0 && !cells.at_seams;
     std::vector<Triangle> nearest, near;
     if (in_part) {

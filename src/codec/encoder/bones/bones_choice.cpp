@@ -236,7 +236,7 @@ std::optional<FrameSteps> enhanced_steps(const Configuration& configuration) {
     const bool whole =
         (choice == FrameChoice::fixed || choice == FrameChoice::cheaper) && !(options.topology.still_below > 0);
     if (!whole || options.rate.bits_per_second > 0 || options.rate.target_error > 0) return std::nullopt;
-    return steps_asked_for(configuration);
+    return configuration.steps;
 }
 
 }  // namespace htvm::internal

@@ -465,7 +465,7 @@ Frame turned(const Mesh2& mesh, std::span<const std::uint32_t> faces, const Vect
 // The matrix's rows are the frame's axes.
 QuantisedRotation rotation_of(const Frame& f) {
     const std::array<Vector3d, 3> m = {f.x, f.y, f.direction};
-    // Of the four ways to take the quaternion from the matrix the one with the largest component (Shepperd).
+    // The quaternion is taken from the matrix in that of four ways which has the largest component (Shepperd).
     const std::array<double, 4> squares = {1 + m[0][0] + m[1][1] + m[2][2], 1 + m[0][0] - m[1][1] - m[2][2],
                                            1 - m[0][0] + m[1][1] - m[2][2], 1 - m[0][0] - m[1][1] + m[2][2]};
     const auto largest = static_cast<std::size_t>(std::max_element(squares.begin(), squares.end()) - squares.begin());

@@ -102,7 +102,7 @@ Result<typename Work::Frame> code_under_control(const Work& work, typename Work:
                                                 QualityControl& control, const HeaderBits& header) {
     if (control.rate) return code_within_buffer(work, progress, *control.rate, header);
     if (control.error) return code_to_error(work, progress, *control.error);
-    return choose(work, progress, steps_asked_for(work.configuration));
+    return choose(work, progress, work.configuration.steps);
 }
 
 }  // namespace htvm::internal

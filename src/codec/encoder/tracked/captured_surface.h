@@ -92,8 +92,8 @@ TrackedFit measure_tracked_fit(const SurfaceIndex& captured, const LatticeMesh& 
                                std::span<const std::uint32_t> near, std::span<const double> intra_squared,
                                const TrackedFitOptions& options);
 
-// Of the fits of a reference and of the one that it follows, what frames may not exceed: what tracking leaves must not
-// become the measure of what may be left.
+// The least of a reference's fit and that of the one it follows, which frames may not exceed: what tracking leaves must
+// not become the measure of what may be left.
 TrackedFit least_of(TrackedFit fit, const TrackedFit& before);
 
 struct SimplifiedReferenceOptions {

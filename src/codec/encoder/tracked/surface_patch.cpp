@@ -342,7 +342,7 @@ std::vector<double> errors_around(std::span<const Point3f> points, std::span<con
     return out;
 }
 
-// Of each vertex of the tracked mesh.
+// What tells that surface is lost, by vertex of the tracked mesh.
 struct LossSigns {
     std::span<const double> error, error_around;
     const std::vector<bool>&rims, &bad_shape;

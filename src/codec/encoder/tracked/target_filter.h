@@ -23,7 +23,7 @@
 
 namespace htvm::internal {
 
-// Of a vertex: displacement in lattice units, then red, green and blue in levels.
+// A vertex's displacement in lattice units, then red, green and blue in levels.
 using TargetDetail = std::array<float, 4>;
 // Variances: of the displacement, and of the colours, the mean of the three components.
 using TargetVariance = std::array<float, 2>;

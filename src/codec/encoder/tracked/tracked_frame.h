@@ -28,7 +28,7 @@ struct RemovedNoise {
 
 struct TrackedFrameOptions {
     Scale scale;  // of the lattice
-    // Of the displacement along the normal, and of colours (levels).
+    // The quantiser steps of the displacement along the normal, and of colours (levels).
     LatticeUnits geometry_step = tracking_numbers.finer * usual_request.geometry_step;
     double colour_step = tracking_numbers.coarser_tracked_colours * usual_request.colour_step;
     double lambda = 0.12;  // squared steps that one bit is worth

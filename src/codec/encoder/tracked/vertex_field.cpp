@@ -74,7 +74,7 @@ void fill_means(const VertexHierarchy& hierarchy, Means& means) {
     }
 }
 
-// Of component c.
+// The means of component c.
 Means means_of(const VertexHierarchy& hierarchy, std::span<const std::int32_t> values, std::size_t components,
                std::size_t c, bool turned) {
     Means means(1);
