@@ -6,10 +6,6 @@
 
 namespace htvm::internal {
 
-double bits_of(const CodedFrame& frame, const HeaderBits& header) {
-    return 8.0 * static_cast<double>(frame.bytes()) + (stands_alone(frame.type) ? header.if_alone : header.otherwise);
-}
-
 tl::unexpected<Error> does_not_fit(const RateController& rate, double bits) {
     const auto& options = rate.options();
     const double room = rate.room(), capacity = options.bits_per_second * options.buffer_seconds;

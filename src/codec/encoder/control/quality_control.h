@@ -25,7 +25,9 @@ struct QualityControl {
 struct HeaderBits {
     double if_alone = 0, otherwise = 0;
 };
-double bits_of(const CodedFrame& frame, const HeaderBits& header);
+inline double bits_of(const CodedFrame& frame, const HeaderBits& header) {
+    return 8.0 * static_cast<double>(frame.bytes()) + (stands_alone(frame.type) ? header.if_alone : header.otherwise);
+}
 
 // The error for a frame that takes this many bits even at the lowest quality.
 tl::unexpected<Error> does_not_fit(const RateController& rate, double bits);

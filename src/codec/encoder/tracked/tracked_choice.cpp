@@ -17,7 +17,7 @@ constexpr auto& numbers = tracking_numbers;
 
 // How far off a region of 10 cm may be. best: RMS of the best T-frame.
 LatticeUnits allowed_in_region(const TrackedWork& work, LatticeUnits best) {
-    const auto& origin = work.reference().origin;
+    const auto& origin = work.reference->origin;
     return std::max({numbers.region_to_best * best, numbers.region_to_intra * LatticeUnits(origin.fit.worst_region),
                      work.configuration.scale.on_lattice(numbers.visible),
                      numbers.remeshed_in_edges * LatticeUnits(origin.edge)});
@@ -26,7 +26,7 @@ LatticeUnits allowed_in_region(const TrackedWork& work, LatticeUnits best) {
 // The same of the whole surface. On a clean, smooth capture the best T-frame may be far better than quantisation lets
 // an I-frame or a patch be.
 LatticeUnits allowed_over_all(const TrackedWork& work, LatticeUnits best) {
-    const LatticeUnits step = work.reference().origin.steps.geometry;
+    const LatticeUnits step = work.reference->origin.steps.geometry;
     return std::max(numbers.worst_to_best * best, numbers.quantised * step);
 }
 
@@ -35,7 +35,7 @@ LatticeUnits allowed_over_all(const TrackedWork& work, LatticeUnits best) {
 bool falls_apart(const TrackedWork& work, const TrackedFit& fit) {
     const auto& scale = work.configuration.scale;
     const auto best = work.sequence.history.best_fit;
-    const auto allowed = std::max(allowed_over_all(work, best), LatticeUnits(work.reference().origin.fit.rms));
+    const auto allowed = std::max(allowed_over_all(work, best), LatticeUnits(work.reference->origin.fit.rms));
     return fit.rms > std::max(scale.on_lattice(numbers.most_of_all), numbers.apart_to_lost * allowed) ||
            fit.worst_region > std::max(scale.on_lattice(numbers.most_in_region),
                                        numbers.apart_to_lost * allowed_in_region(work, best));
@@ -46,12 +46,12 @@ bool falls_apart(const TrackedWork& work, const TrackedFit& fit) {
 bool is_lost(const TrackedWork& work, const TrackedFit& fit) {
     const auto best_fit = work.sequence.history.best_fit;
     const auto best = best_fit > 0 ? best_fit : fit.rms;
-    return fit.stray_share > work.reference().origin.fit.stray_share + numbers.more_strays ||
+    return fit.stray_share > work.reference->origin.fit.stray_share + numbers.more_strays ||
            fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best);
 }
 
 TrackedFit fit_of(const TrackedWork& work, const EncodedTrackedFrame& encoded) {
-    const auto& origin = work.reference().origin;
+    const auto& origin = work.reference->origin;
     return fit_of(work, encoded.mesh, origin.edge, encoded.near, origin.fit.squared);
 }
 
@@ -59,18 +59,18 @@ TrackedFit fit_of(const TrackedWork& work, const EncodedTrackedFrame& encoded) {
 
 // Whether the capture's texture atlas is laid out anew since the I-frame, whose texture coordinates a T-frame shows.
 bool texture_is_laid_out_anew(const TrackedWork& work, const LatticeMesh& tracked) {
-    if (work.mesh().texcoords.empty()) return false;
+    if (work.captured.mesh.texcoords.empty()) return false;
     // Measured on a studio's capture: without a new layout no vertex has other coordinates, with one 92 % have.
     StageClock clock(work.stages);
     const double others =
-        share_with_other_texcoords(tracked, work.mesh(), work.configuration.scale.on_lattice(numbers.slip));
+        share_with_other_texcoords(tracked, work.captured.mesh, work.configuration.scale.on_lattice(numbers.slip));
     clock.done("layout of the texture");
     return others > numbers.most_others;
 }
 
 // Whoever joins late needs all patches since the I-frame.
 bool patches_have_grown(const TrackedWork& work) {
-    const auto& reference = work.reference();
+    const auto& reference = *work.reference;
     return reference.patches >= numbers.most_patches ||
            reference.patch_bytes > numbers.most_patches_bytes * reference.intra_bytes;
 }
@@ -78,7 +78,7 @@ bool patches_have_grown(const TrackedWork& work) {
 // Whether an I-frame of the tracked mesh is as good as one of the capture: it does not have many more vertices, nor was
 // it made for much coarser or finer steps. (Where an error is asked for, the steps of I- and T-frames are far apart.)
 bool may_be_renewed(const TrackedWork& work, const FrameSteps& steps, const LatticeMesh& tracked) {
-    const auto& origin = work.reference().origin;
+    const auto& origin = work.reference->origin;
     const double ratio = static_cast<double>(steps.geometry) / origin.steps.geometry;
     return work.configuration.options.rate.target_error <= 0 &&
            static_cast<double>(tracked.positions.size()) <=
@@ -92,8 +92,8 @@ SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& ste
     const auto& configuration = work.configuration;
     const auto& scale = configuration.scale;
     SurfacePatchOptions out;
-    out.lost = std::max(scale.on_lattice(numbers.lost),
-                        numbers.remeshed_in_edges * LatticeUnits(work.reference().origin.edge));
+    out.lost =
+        std::max(scale.on_lattice(numbers.lost), numbers.remeshed_in_edges * LatticeUnits(work.reference->origin.edge));
     out.region = region_side(configuration);
     out.reach = scale.on_lattice(numbers.reach);
     out.speck = scale.on_lattice(numbers.speck);
@@ -108,12 +108,12 @@ SurfacePatchOptions patch_options(const TrackedWork& work, const FrameSteps& ste
 Result<std::optional<TrackedPatch>> patch(const TrackedWork& work, const NodeRegistration& registered,
                                           const FrameSteps& steps, const EncodedTrackedFrame& tracked) {
     using Patched = std::optional<TrackedPatch>;
-    const auto& reference = work.reference();
+    const auto& reference = *work.reference;
     const auto lost = std::min(allowed_in_region(work, work.sequence.history.best_fit),
                                numbers.lost_in_steps * LatticeUnits(steps.geometry));
     StageClock measuring(work.stages);
     const SurfacePatchSearch search({tracked.mesh, reference.decoded.by_nodes->mesh.positions, tracked.near},
-                                    work.mesh(), work.surface, patch_options(work, steps));
+                                    work.captured.mesh, work.surface, patch_options(work, steps));
     measuring.done("patch");
     for (const auto region_lost : {lost, LatticeUnits(0)}) {
         StageClock clock(work.stages);
@@ -158,7 +158,7 @@ Result<JudgedMotion> code_and_judge(const TrackedWork& work, const NodeRegistrat
 
 bool may_be_patched(const TrackedWork& work, bool due) {
     return !due && work.configuration.options.tracked.patch_share > 0 &&
-           work.reference().decoded.mesh().texcoords.empty();
+           work.reference->decoded.mesh().texcoords.empty();
 }
 
 // Looks for limbs that another start finds, and beside it codes what patches are planned on. Limbs are rarely found;
@@ -251,7 +251,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     // 4. Where it still is: a patch.
     const auto& tracked = motion->coded.encoded;
     const bool expensive =
-        may_be_intra(work) && static_cast<double>(motion->coded.bytes()) > work.reference().intra_bytes;
+        may_be_intra(work) && static_cast<double>(motion->coded.bytes()) > work.reference->intra_bytes;
     const bool anew = expensive || texture_is_laid_out_anew(work, tracked.mesh);
     if (!anew && motion->lost && was_lost && patches) {
         auto patched = patch(work, *tracking.registered, steps, motion->to_patch());
@@ -274,7 +274,7 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
 FrameType expected_type(const TrackedWork& work) { return intra_is_due(work) ? FrameType::intra : FrameType::tracked; }
 
 Result<Frame> choose(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
-    if (!carries_surface(work.mesh())) return as_frame(code_unreferred_intra(work, steps));
+    if (!carries_surface(work.captured.mesh)) return as_frame(code_unreferred_intra(work, steps));
     if (can_refer(work)) return choose_by_fit(work, tracking, steps);
     return as_frame(work.configuration.intra_only() ? code_unreferred_intra(work, steps) : code_intra(work, steps));
 }
@@ -286,7 +286,7 @@ Result<Frame> code_stand_in(const TrackedWork& work, Tracking& tracking, const F
 }
 
 SurfaceErrors errors_of(const TrackedWork& work, const LatticeMesh& decoded) {
-    return errors_between(work.mesh(), work.surface, decoded, work.configuration.threads);
+    return errors_between(work.captured.mesh, work.surface, decoded, work.configuration.threads);
 }
 
 }  // namespace htvm::internal

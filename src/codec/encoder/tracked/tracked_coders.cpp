@@ -24,7 +24,8 @@ FrameSteps tracked_steps(const FrameSteps& steps) {
 
 LatticeMesh simplified(const TrackedWork& work, const FrameSteps& steps) {
     StageClock clock(work.stages);
-    auto out = simplified_reference(work.mesh(), work.surface, simplification_options(work.configuration, steps));
+    auto out =
+        simplified_reference(work.captured.mesh, work.surface, simplification_options(work.configuration, steps));
     clock.done("simplification");
     return out;
 }
@@ -67,7 +68,7 @@ std::optional<TexturedSurface> add_charts_of_piece(const PatchedSurface& patched
 Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& made_of, const FrameSteps& steps,
                                    FrameSteps quantised, IntraUse use, bool renewal) {
     const auto& configuration = work.configuration;
-    const auto captured = counts_of(work.mesh());
+    const auto captured = counts_of(work.captured.mesh);
     const bool referred_to = use == IntraUse::reference;
     StageClock clock(work.stages);
     if (referred_to)
@@ -87,11 +88,11 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& m
     frame.captured = captured;
     frame.of_tracked_mesh = renewal;
     // Under rate control also what stands in for a frame that does not fit may refer to it.
-    frame.referred = carries_surface(work.mesh()) && !frame.decoded.triangles.empty() &&
+    frame.referred = carries_surface(work.captured.mesh) && !frame.decoded.triangles.empty() &&
                      (!configuration.intra_only() || configuration.options.rate.bits_per_second > 0);
     frame.packets.push_back(frame_packet(PacketKind::intra, coded->payload));
     auto& origin = out.origin;
-    origin.edge = mean_edge(work.mesh().positions, work.mesh().triangles);
+    origin.edge = mean_edge(work.captured.mesh.positions, work.captured.mesh.triangles);
     origin.steps = steps;
     origin.chart_scale = charts->scale;
     origin.vertices = frame.decoded.positions.size();
@@ -102,9 +103,9 @@ Result<TrackedIntra> code_intra_of(const TrackedWork& work, const LatticeMesh& m
 }
 
 Result<TrackedIntra> code_intra_of_capture(const TrackedWork& work, const FrameSteps& steps, IntraUse use) {
-    const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.mesh());
+    const bool simplify = work.configuration.options.tracked.simplify > 0 && carries_surface(work.captured.mesh);
     const auto simple = simplify ? simplified(work, steps) : LatticeMesh{};
-    return code_intra_of(work, simplify ? simple : work.mesh(), steps, tracked_steps(steps), use, false);
+    return code_intra_of(work, simplify ? simple : work.captured.mesh, steps, tracked_steps(steps), use, false);
 }
 
 // Not where frames are to have an error that is measured against the capture, noise and all.
@@ -114,7 +115,7 @@ bool denoises(const Configuration& configuration) {
 }
 
 TargetFilterOptions filter_options(const TrackedWork& work) {
-    const auto& origin = work.reference().origin;
+    const auto& origin = work.reference->origin;
     const auto steps = tracked_steps(origin.steps);
     return {1.0 * steps.geometry, 1.0 * steps.colour, origin.edge};
 }
@@ -130,7 +131,7 @@ Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistrati
     options.motion_alone = parts == MotionParts::motion_alone;
     options.target_samples = work.effort.target_samples;
     options.near = near;
-    return encode_tracked_frame(work.mesh(), work.surface, *work.reference().decoded.by_nodes, registered, before,
+    return encode_tracked_frame(work.captured.mesh, work.surface, *work.reference->decoded.by_nodes, registered, before,
                                 work.sequence.history.targets, options, work.stages);
 }
 
@@ -171,7 +172,7 @@ Result<TrackedIntra> code_renewal(const TrackedWork& work, const FrameSteps& ste
         std::max(1, static_cast<std::int32_t>(std::lround(tracking_numbers.finer_renewed * quantised.geometry)));
     auto out = code_intra_of(work, tracked, steps, quantised, IntraUse::reference, true);
     if (!out) return out;
-    const auto& before = work.reference().origin;
+    const auto& before = work.reference->origin;
     out->origin.fit = least_of(std::move(out->origin.fit), before.fit);
     out->origin.vertices = before.vertices;
     return out;
@@ -182,7 +183,7 @@ Result<CodedMotion> code_motion(const TrackedWork& work, const NodeRegistration&
     const auto& options = work.configuration.options.tracked;
     const auto& history = work.sequence.history;
     // Now and then a place to start from, for whoever has the reference.
-    const auto since = work.sequence.next_frame - std::max(work.reference().decoded.number, history.access.value_or(0));
+    const auto since = work.sequence.next_frame - std::max(work.reference->decoded.number, history.access.value_or(0));
     const bool from_last = history.frame && options.references == TrackedReferences::previous &&
                            std::int64_t{since} < options.access_interval;
     auto encoded = encode(work, registered, steps, parts, from_last ? &history.state : nullptr);
@@ -200,12 +201,12 @@ TrackedMotion chosen_motion(const TrackedWork& work, const NodeRegistration& reg
     TrackedMotion out;
     auto& frame = out.frame;
     frame.type = FrameType::tracked;
-    frame.reference = coded.of_reference ? work.reference().decoded.number : *before.frame;
+    frame.reference = coded.of_reference ? work.reference->decoded.number : *before.frame;
     frame.referred = work.configuration.options.tracked.references == TrackedReferences::previous;
     frame.access = coded.of_reference;
     frame.packets.push_back(std::move(coded.packet));
     frame.decoded = std::move(coded.encoded.mesh);
-    frame.captured = counts_of(work.mesh());
+    frame.captured = counts_of(work.captured.mesh);
     frame.shares = coded.encoded.runs.shares;
     out.steps = coded.steps;
     out.noise = std::move(coded.encoded.noise);
@@ -228,7 +229,7 @@ Result<EncodedTrackedFrame> code_for_patches(const TrackedWork& work, const Node
 Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const NodeRegistration& registered,
                                                const FrameSteps& steps, const EncodedTrackedFrame& tracked,
                                                const SurfacePatch& patch) {
-    const auto& reference = work.reference();
+    const auto& reference = *work.reference;
     const auto& by_nodes = *reference.decoded.by_nodes;
     StageClock clock(work.stages);
     const auto quantised = tracked_steps(steps);
@@ -237,7 +238,7 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     auto patched = encode_patch({mesh.positions, mesh.triangles, mesh.colours}, by_nodes.hierarchy, patch,
                                 {quantised.geometry, quantised.colour}, payload);
     if (!patched) return tl::unexpected(patched.error());
-    const auto captured = counts_of(work.mesh());
+    const auto captured = counts_of(work.captured.mesh);
     const auto vertices = patched->mesh.positions.size();
     payload.header.source_vertices = captured.vertices;
     payload.header.source_triangles = captured.triangles;
@@ -267,7 +268,7 @@ Result<std::optional<TrackedPatch>> code_patch(const TrackedWork& work, const No
     out.last = registered.motion;
     auto& origin = out.origin = reference.origin;
     origin.steps = steps;
-    origin.edge = mean_edge(work.mesh().positions, work.mesh().triangles);
+    origin.edge = mean_edge(work.captured.mesh.positions, work.captured.mesh.triangles);
     origin.colours = colours_at(work, frame.decoded);
     clock.done("patch coding");
     std::vector<std::uint32_t> near(vertices, OrientedPoints::no_point);

@@ -13,7 +13,9 @@ TrackedWork begin_work(const Configuration& configuration, const TrackedStrategy
     if (!ahead.surface) ahead.surface = surface_of(configuration, captured, stages);
     tracking.registered = std::move(ahead.registered);
     const auto effort = tracking_effort(captured.effort);
-    TrackedWork work{configuration, strategy.sequence, stages, std::move(captured), effort, std::move(*ahead.surface)};
+    TrackedWork work{
+        configuration, strategy.sequence,        strategy.sequence.reference.get(), stages, std::move(captured),
+        effort,        std::move(*ahead.surface)};
     if (can_refer(work)) register_once(work, tracking);
     return work;
 }
@@ -37,7 +39,7 @@ void register_next(const TrackedWork& work, const Tracking& tracking, const Trac
     find_surface(work.configuration, next, stages);
     if (assumed.nodes && !tracking.lost && can_be_moved(work.sequence, next.captured.mesh))
         next.ahead.registered =
-            register_frame(work.configuration, work.reference(), *next.ahead.surface, next.captured,
+            register_frame(work.configuration, *work.reference, *next.ahead.surface, next.captured,
                            {assumed.nodes->motion, work.sequence.history.last, {}, {}}, stages, &tracking.lost);
 }
 
@@ -109,7 +111,7 @@ Result<TrackedSequence> after(const TrackedWork& work, TrackedIntra& intra) {
 }
 
 Result<TrackedSequence> after(const TrackedWork& work, TrackedPatch& patch) {
-    const auto& before = work.reference();
+    const auto& before = *work.reference;
     auto reference =
         reference_of(work, patch.frame, std::move(patch.origin), std::move(patch.pose), 1, std::move(patch.kept));
     if (!reference) return tl::unexpected(reference.error());

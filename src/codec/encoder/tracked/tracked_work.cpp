@@ -18,7 +18,7 @@ std::vector<RigidMotion> skeletal_node_motion(const Configuration& configuration
 }
 
 std::int64_t frames_since_intra(const TrackedWork& work) {
-    return std::int64_t{work.sequence.next_frame} - work.reference().intra_frame;
+    return std::int64_t{work.sequence.next_frame} - work.reference->intra_frame;
 }
 
 }  // namespace
@@ -68,7 +68,7 @@ NodeRegistration register_frame(const Configuration& configuration, const Tracke
 const NodeRegistration& register_once(const TrackedWork& work, Tracking& tracking) {
     if (!tracking.registered) {
         const auto& history = work.sequence.history;
-        tracking.registered = register_frame(work.configuration, work.reference(), work.surface, work.captured,
+        tracking.registered = register_frame(work.configuration, *work.reference, work.surface, work.captured,
                                              {history.last, history.before_last, history.gone_on, {}}, work.stages);
     }
     return *tracking.registered;
@@ -77,9 +77,9 @@ const NodeRegistration& register_once(const TrackedWork& work, Tracking& trackin
 FoundLimbs find_lost_limbs(const TrackedWork& work, NodeRegistration registered, std::vector<StageTime>& stages) {
     StageClock clock(stages);
     const auto& history = work.sequence.history;
-    const auto skeletal = skeletal_node_motion(work.configuration, work.reference().decoded, work.captured.pose);
+    const auto skeletal = skeletal_node_motion(work.configuration, work.reference->decoded, work.captured.pose);
     FoundLimbs out{std::move(registered)};
-    out.any = follow_lost_limbs(work.reference().deformable, work.surface,
+    out.any = follow_lost_limbs(work.reference->deformable, work.surface,
                                 {history.last, history.before_last, history.gone_on, skeletal},
                                 deformation_options(work.configuration, work.effort), out.registered);
     clock.done("registration");
@@ -114,7 +114,7 @@ std::vector<Colour> colours_at(const TrackedWork& work, const LatticeMesh& decod
         for (std::size_t c = 0; c < 3 && at.found(); ++c) {
             float level = 0;
             for (std::size_t i = 0; i < 3; ++i)
-                level += at.shares[i] * static_cast<float>(colours[work.mesh().triangles[at.triangle][i]][c]);
+                level += at.shares[i] * static_cast<float>(colours[work.captured.mesh.triangles[at.triangle][i]][c]);
             colour[c] = static_cast<std::uint8_t>(std::clamp(level + 0.5F, 0.0F, 255.0F));
         }
         out.push_back(colour);

@@ -106,20 +106,18 @@ struct TrackedWork {
 
     const Configuration& configuration;
     const TrackedSequence& sequence;
-    std::vector<StageTime>& stages;  // where times are added
+    const TrackedReference* reference;  // the sequence's; null before the first I-frame
+    std::vector<StageTime>& stages;     // where times are added
     CapturedFrame captured;
     TrackingEffort effort;
     SurfaceIndex surface;  // the captured surface, indexed by direction too; empty where there are no triangles
-
-    const LatticeMesh& mesh() const { return captured.mesh; }
-    const TrackedReference& reference() const { return *sequence.reference; }  // there must be one
 };
 
 // A frame without triangles is an I-frame that nothing refers to, and leaves the reference as it was.
 bool carries_surface(const LatticeMesh& captured);
 // Whether the nodes of the reference can move it to this captured frame, by what both have.
 bool can_be_moved(const TrackedSequence& sequence, const LatticeMesh& captured);
-inline bool can_be_moved(const TrackedWork& work) { return can_be_moved(work.sequence, work.mesh()); }
+inline bool can_be_moved(const TrackedWork& work) { return can_be_moved(work.sequence, work.captured.mesh); }
 // Whether the frame may also refer to it.
 bool can_refer(const TrackedWork& work);
 // Whether an I-frame is wanted: it is asked for, there is nothing to refer to, or the longest key interval has passed.
