@@ -361,7 +361,7 @@ Result<bool> decode_next(Decoding& d) {
         if (auto ok = d.sound->take(*packet); !ok) return tl::unexpected(ok.error());
     const bool is_frame = frame_type(packet->kind).has_value();
     const auto sequences = d.numbers.dependencies().sequences();
-    d.numbers.take(*packet);
+    d.numbers.push(*packet);
     if (d.numbers.dependencies().sequences() != sequences) d.textures.begin_sequence();
     if (d.numbers.begins_sequence()) d.summary.timestamp_us.reset();  // frames before its first one never existed
     if (is_frame || packet->kind == PacketKind::index) {              // the index gives the number of frames

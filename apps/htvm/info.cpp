@@ -378,7 +378,7 @@ Result<void> take_frame(Inspection& in, const Packet& packet) {
 Result<void> take(Inspection& in, const Packet& packet) {
     if (in.buffer) in.buffer->add(packet);
     in.numbers.take(packet);
-    in.time.take(packet, in.numbers.begins_sequence());
+    in.time.push(packet, in.numbers.begins_sequence());
     in.found.bytes += packet.payload.size() + packet_overhead;
     if (packet.kind == PacketKind::sequence) return take_header(in, packet);
     if (frame_type(packet.kind)) return take_frame(in, packet);
