@@ -375,9 +375,9 @@ Result<void> take_frame(Inspection& in, const Packet& packet) {
     return {};
 }
 
-Result<void> take(Inspection& in, const Packet& packet) {
+Result<void> count(Inspection& in, const Packet& packet) {
     if (in.buffer) in.buffer->add(packet);
-    in.numbers.take(packet);
+    in.numbers.push(packet);
     in.time.push(packet, in.numbers.begins_sequence());
     in.found.bytes += packet.payload.size() + packet_overhead;
     if (packet.kind == PacketKind::sequence) return take_header(in, packet);
@@ -456,7 +456,7 @@ Result<void> info(const Options& options) {
     Inspection in{options};
     if (options.megabits > 0) in.buffer.emplace(1e6 * options.megabits, options.buffer_seconds);
     while (auto packet = input->next()) {
-        if (auto taken = take(in, *packet); !taken) return taken;
+        if (auto counted = count(in, *packet); !counted) return counted;
         if (input->is_live()) std::fflush(stdout);
     }
     if (input->refusal()) return tl::unexpected(*input->refusal());
