@@ -79,6 +79,8 @@ class Quick:
             raise TimeIsOver from None
 
     def ninja(self, *targets):
+        if time.monotonic() >= self.end:
+            raise TimeIsOver
         process = subprocess.Popen(["ninja", "-C", self.build, "--quiet", *targets], stdout=subprocess.PIPE, text=True)
         printed = self.wait(process)
         if process.returncode != 0:
@@ -91,11 +93,12 @@ class Quick:
         sources = sorted(known.intersection(os.path.join(TREE, source) for source in sources))
         if not sources:
             return
+        count = "one source" if len(sources) == 1 else f"{len(sources)} sources"
         try:
             self.ninja(*(source + "^" for source in sources))
-            self.ran.append(f"{len(sources)} sources compiled")
+            self.ran.append(f"{count} compiled")
         except TimeIsOver:
-            self.left.append(f"compiling {len(sources)} sources, which was not done in time")
+            self.left.append(f"compiling {count}, which was not done in time")
 
     def test(self, program):
         name = f"test_{program}"
