@@ -181,7 +181,7 @@ private:
     }
     std::string make_option_desc(const CLI::Option* option) const override {
         for (const auto& entry : page_.options)
-            if (*entry.meaning && option->check_name(entry.option)) return in_column(entry.meaning);
+            if (!entry.meaning.empty() && option->check_name(entry.option)) return in_column(entry.meaning);
         return Help::make_option_desc(option);
     }
     std::string make_footer(const CLI::App* app) const override {

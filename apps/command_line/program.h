@@ -51,7 +51,7 @@ int run_program(const Program& program, int argc, char** argv);
 struct FrontPage {
     struct Entry {
         const char* option;        // a flag, or the name of a positional argument
-        const char* meaning = "";  // "": as --help-all has it
+        std::string meaning = "";  // "": as --help-all has it
     };
     std::vector<Entry> options;  // flags in the order of the page; positional arguments are there in any case
     std::string footer = "";     // "": as --help-all has it

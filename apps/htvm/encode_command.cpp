@@ -167,13 +167,15 @@ FrontPage front_page() {
                  "The meshes, one file per frame (PLY, OBJ, Draco, glTF): a folder, a pattern such as\n"
                  "scan_%05d.ply, files in their order, or - for PLY after PLY on standard input"},
                 {"--output", "The stream: a file, - for standard output, or a hub, ws://HOST:PORT/publish/NAME"},
-                {"--quality", "0 to 100 (default 42): more looks better, and takes more bits"},
+                {"--quality",
+                 fmt::format("0 to 100 (default {}): more looks better, and takes more bits", default_quality)},
                 {"--bitrate", "Mbit/s to keep to; the quality follows"},
                 {"--target-error", "How far each frame's surface may be off, mm (RMS); the quality follows"},
                 {"--profile",
                  "tracked (default): the fewest bits, on triangles that move along. topology: every\n"
                  "frame's own triangles. paper: the same, as published"},
-                {"--effort", "1 to 9 (default 5): more takes longer, and fewer bits"},
+                {"--effort", fmt::format("1 to 9 (default {}): more takes longer, and fewer bits",
+                                         EncoderOptions().tracked.effort)},
                 {"--threads", "Threads to use (default: one per core); the stream does not depend on it"},
                 {"--fps", "Frames per second of the meshes (default: as files or skeleton say, else 30)"},
                 {"--frames", "Use at most so many frames (default: all)"},

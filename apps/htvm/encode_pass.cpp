@@ -323,7 +323,7 @@ Result<std::optional<PictureTrack>> picture_track(const EncodePlan& plan, const 
     out.bake = use == TextureAs::picture;
     out.width = settings.texture.width;
     out.height = settings.texture.height;
-    out.quality = plan.quality;
+    out.quality = plan.encoder.quality;
     out.frames_per_second = capture.fps();
     if (settings.rate.bits_per_second > 0) out.bits_per_second = settings.rate.bits_per_second / share_of_meshes;
     out.buffer_seconds = settings.rate.buffer_seconds;

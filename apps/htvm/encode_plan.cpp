@@ -267,7 +267,6 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     plan.audio = request.audio;
     plan.pictures = request.pictures;
     plan.encoder = encoder_of(request, plan.output);
-    plan.quality = request.encoding.quality;
     plan.floor = *floor;
     plan.radii_file = request.encoding.radii_file;
     choose_passes(plan, request);

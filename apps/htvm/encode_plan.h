@@ -81,8 +81,7 @@ struct EncodePlan {
     AudioOptions audio;
     TexturePictureOptions pictures;  // where the capture's images go into the stream
 
-    EncoderOptions encoder;            // all but what the capture says: its rate, unit, axes, skeleton, radii, texture
-    double quality = default_quality;  // for pictures that are not told another
+    EncoderOptions encoder;  // all but what the capture says: its rate, unit, axes, skeleton, radii, texture
     Floor floor;
     std::string radii_file;  // empty: none
 

@@ -1,4 +1,4 @@
-// The encoder's options on the command line: those of the library's list (htvm/option_list.hpp), and a quality.
+// The encoder's options on the command line: those of the library's list (htvm/option_list.hpp), and some beside it.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ struct EncodingOptions {
 
 void add_encoding_options(CLI::App& command, EncodingOptions& options);
 
-// The library's options: the profile's defaults, the quality's steps, and what was given.
+// The library's options: the profile's defaults, the quality, and what was given.
 EncoderOptions encoder_options(const EncodingOptions& options);
 
 // All options of the library, as in docs/options.md.

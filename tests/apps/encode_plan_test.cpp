@@ -414,7 +414,8 @@ TEST(EncodePlan, WhatWasGivenIsInTheEncodersOptions) {
     const auto made = plan(request);
     EXPECT_EQ(made.encoder.profile, Profile::topology);
     EXPECT_EQ(made.encoder.key_interval, 7);
-    EXPECT_EQ(made.encoder.geometry_step, quality_steps(50).geometry_step);
+    EXPECT_EQ(made.encoder.quality, 50);
+    EXPECT_EQ(made.encoder.geometry_step, 0);  // by the quality
     EXPECT_EQ(made.encoder.colour_step, 3);
     EXPECT_EQ(made.encoder.metadata, request.encoding.metadata);
     ASSERT_TRUE(made.encoder.intra_coder);

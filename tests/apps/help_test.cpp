@@ -86,8 +86,11 @@ TEST(FrontPage, EncodeShowsTheDozenOptionsThatPeopleNeed) {
 
 TEST(FrontPage, ExperimentsAndLogsAreNotOnIt) {
     const auto page = help("encode");
-    for (const auto& option : option_list())
-        if (option.group == OptionGroup::topology) EXPECT_THAT(page, Not(HasSubstr(option.flag)));
+    for (const auto& option : option_list()) {
+        if (option.group == OptionGroup::topology) {
+            EXPECT_THAT(page, Not(HasSubstr(option.flag)));
+        }
+    }
     EXPECT_THAT(page, AllOf(Not(HasSubstr("--effort-log")), Not(HasSubstr("--repeat-efforts"))));
 }
 
@@ -118,8 +121,11 @@ TEST(HelpAll, HasWhatTheFrontPageHas) {
 
 TEST(HelpAll, HasEveryOptionOfTheLibrarysList) {
     const auto all = flags_of(help("encode", "--help-all"));
-    for (const auto& option : option_list())
-        if (*option.flag) EXPECT_THAT(all, testing::Contains(option.flag));
+    for (const auto& option : option_list()) {
+        if (*option.flag) {
+            EXPECT_THAT(all, testing::Contains(option.flag));
+        }
+    }
 }
 
 TEST(HelpAll, SortsOptionsByWhatTheyAreFor) {
