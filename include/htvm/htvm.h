@@ -287,13 +287,13 @@ const char* htvm_layer_name(uint32_t layer);
 
 /* flags of a packet: bits */
 enum {
-    HTVM_PACKET_REFERRED = 1,  /* of a frame or picture: later ones may refer to it */
-    HTVM_PACKET_ACCESS = 2,    /* of a frame: it needs no frame but the one it refers to, which needs none; of a
-                                * picture: it needs no other */
-    HTVM_PACKET_DROPPABLE = 4, /* of a frame or picture: it may be left out without affecting any other */
-    HTVM_PACKET_COLOUR = 8,    /* of a codebook: of the colours, not of the geometry */
-    HTVM_PACKET_SESSION = 16,  /* of a sequence header: its session is not 0 */
-    HTVM_PACKET_FLAGS_VALID = 128     /* the other bits are valid */
+    HTVM_PACKET_REFERRED = 1,     /* of a frame or picture: later ones may refer to it */
+    HTVM_PACKET_ACCESS = 2,       /* of a frame: it needs no frame but the one it refers to, which needs none; of a
+                                   * picture: it needs no other */
+    HTVM_PACKET_DROPPABLE = 4,    /* of a frame or picture: it may be left out without affecting any other */
+    HTVM_PACKET_COLOUR = 8,       /* of a codebook: of the colours, not of the geometry */
+    HTVM_PACKET_SESSION = 16,     /* of a sequence header: its session is not 0 */
+    HTVM_PACKET_FLAGS_VALID = 128 /* the other bits are valid */
 };
 
 typedef struct htvm_packet_info {
@@ -312,8 +312,8 @@ htvm_status htvm_packet_read(const uint8_t* packet, size_t size, htvm_packet_inf
 
 /* The same from the first HTVM_PACKET_HEADER bytes of a packet alone, for programs that go from packet to packet in a
  * file. HTVM_AGAIN: there are fewer bytes. HTVM_CORRUPT_STREAM: no undamaged header begins here. Whether what follows
- * is undamaged is not known. In streams of version 1, flags lack HTVM_PACKET_FLAGS_VALID: only htvm_packet_read() derives
- * them. */
+ * is undamaged is not known. In streams of version 1, flags lack HTVM_PACKET_FLAGS_VALID: only htvm_packet_read()
+ * derives them. */
 enum { HTVM_PACKET_HEADER = 32 };
 htvm_status htvm_packet_header_read(const uint8_t* bytes, size_t size, htvm_packet_info* info, size_t info_size);
 

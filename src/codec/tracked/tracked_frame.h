@@ -1,10 +1,10 @@
 // Tracked frames: the reference mesh with its connectivity, moved by the nodes of a deformation graph and displaced
 // along its normals. Neither connectivity, nor mapping, nor positions along the surface are sent.
 //
-// Everything is relative to the reference, an I- or TP-frame: its mesh is moved by the nodes' transforms, then each vertex is
-// displaced along the moved mesh's normal, and its colour is changed. Transforms and fields may be predicted from those
-// of the previous frame; each frame says whether they are. A frame that refers to the reference alone does not need
-// those before it.
+// Everything is relative to the reference, an I- or TP-frame: its mesh is moved by the nodes' transforms, then each
+// vertex is displaced along the moved mesh's normal, and its colour is changed. Transforms and fields may be predicted
+// from those of the previous frame; each frame says whether they are. A frame that refers to the reference alone does
+// not need those before it.
 #pragma once
 
 #include <optional>
