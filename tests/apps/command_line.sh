@@ -12,7 +12,7 @@ expect 2 "add --profile topology" "$htvm" encode capture --keep-duplicates -o b.
 expect 2 "add --profile tracked" "$htvm" encode capture --profile paper --simplify 0 -o b.htvm
 expect 2 "choose one" "$htvm" encode capture --json -o -
 expect 2 "choose one" "$htvm" decode a.htvm --json -o -
-expect 2 "--geometry-step must be 2^-16 to 1000 mm, not 'nan'" "$htvm" encode capture --geometry-step nan -o b.htvm
+expect 2 "--geometry-step must be 0, or 2^-16 to 1000 mm, not 'nan'" "$htvm" encode capture --geometry-step nan -o b.htvm
 expect 2 "--bitrate must be 0, or 0.001 to 1000000 Mbit/s, not 0.0001" "$htvm" encode capture --bitrate 0.0001 -o b.htvm
 expect 2 "--reference must be bone or any, not 'every'" "$htvm" encode capture --profile paper --reference every -o b.htvm
 expect 2 "--predicted-below does nothing unless --decide is motion" "$htvm" encode capture --profile paper --predicted-below 5 -o b.htvm
