@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "codec/enhanced_options.h"
 #include "htvm/decoder.hpp"
 #include "htvm/encoder.hpp"
 #include "htvm/picture_decoder.hpp"
@@ -49,7 +50,7 @@ void add_ball(Mesh& mesh, int frame) {
 
 // The synthetic capture as the default codes it, but for an I-frame every twelve frames.
 Coded code(const SynthOptions& capture, int frames) {
-    auto options = default_options(Profile::tracked);
+    auto options = test::options_at_2_mm(Profile::tracked);
     options.key_interval = 12;
     auto encoder = Encoder::create(options);
     EXPECT_TRUE(encoder.has_value());
@@ -131,7 +132,7 @@ INSTANTIATE_TEST_SUITE_P(Captures, FlickerGate,
 constexpr int first_of_layout = 30, beside = 8;
 Coded code_textured(const SynthOptions& capture) {
     constexpr SynthTextureOptions images{.size = 512};
-    auto options = default_options(Profile::tracked);
+    auto options = test::options_at_2_mm(Profile::tracked);
     options.texture = {TextureLayout::charts, 384, 384};
     auto encoder = Encoder::create(options);
     app::PictureTrack::Settings settings;
