@@ -62,7 +62,8 @@ struct TrackingNumbers {
 
 inline constexpr TrackingNumbers tracking_numbers;
 
-// What an encoder is asked for by default, at the default Scale: what options stand for that follow from it.
+// A request at 2 mm and 6 levels, quality 50, at the default Scale: what the options of single algorithms stand for by
+// default follows from it.
 struct UsualRequest {
     LatticeUnits geometry_step{32};
     double colour_step = 6;           // levels

@@ -1,4 +1,4 @@
-// How much is searched for a T-frame, from live to archive: what an effort of 1 to 9 stands for. The numbers are those
+// How much is searched for a T-frame, from live to archive: what an effort of 0 to 9 stands for. The numbers are those
 // that paid at their place: docs/experiments/efforts.md has what each level takes and gives.
 #pragma once
 
