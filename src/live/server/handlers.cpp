@@ -129,8 +129,8 @@ Response answer_health(const Site& site, ResponseHeader header) {
 
 // Answers with a sentence and ends the connection.
 net::awaitable<void> refuse(const Site& site, Line line, ResponseHeader header, Refusal refusal) {
+    header.keep_alive(false);
     auto response = refusing_response(refusal, std::move(header));
-    response.header.keep_alive(false);
     co_await send(line, response, true, site.stall_time);
     co_await line.close();
 }
