@@ -18,7 +18,7 @@ struct Length {
     double value = 0;
 
     constexpr Length() = default;
-    constexpr explicit(!Unit::made_of_numbers) Length(double count) : value(count) {}
+    constexpr explicit Length(double count) : value(count) {}
 
     constexpr Length operator-() const { return Length(-value); }
     constexpr Length& operator+=(Length other) { return value += other.value, *this; }
@@ -34,16 +34,9 @@ struct Length {
     friend constexpr auto operator<=>(Length a, Length b) = default;
 };
 
-// made_of_numbers: whether a number may stand for such a length.
-struct OnLattice {
-    static constexpr bool made_of_numbers = true;
-};
-struct InSpace {
-    static constexpr bool made_of_numbers = false;
-};
-struct OnAdult {
-    static constexpr bool made_of_numbers = false;
-};
+struct OnLattice;
+struct InSpace;
+struct OnAdult;
 using LatticeUnits = Length<OnLattice>;    // distances of LatticePoints
 using Millimetres = Length<InSpace>;       // of the subject as it was captured
 using AdultMillimetres = Length<OnAdult>;  // of the same part of an adult

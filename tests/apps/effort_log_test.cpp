@@ -15,7 +15,9 @@ namespace fs = std::filesystem;
 class EffortLogs : public testing::Test {
 protected:
     void SetUp() override { fs::remove(path), fs::remove(partial); }
-    fs::path path = fs::path(testing::TempDir()) / "efforts.csv", partial = path.string() + ".partial";
+    fs::path path = fs::path(testing::TempDir()) /
+                    (std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + ".csv"),
+             partial = path.string() + ".partial";
     void write(const std::string& text) { std::ofstream(path, std::ios::binary) << text; }
     static std::string text(const fs::path& file) {
         std::ifstream in(file, std::ios::binary);

@@ -58,7 +58,7 @@ TEST(TrackedTargets, lay_the_triangles_of_a_coarse_mesh_on_a_bent_surface_not_on
     TrackedFitOptions options;
     const auto before = measure_tracked_fit(surface_of(captured), reference, {}, {}, options);
     const auto after = measure_tracked_fit(surface_of(captured), fitted, {}, {}, options);
-    EXPECT_LT(after.rms, 0.75 * before.rms);
+    EXPECT_LT(after.rms.value, 0.75 * before.rms.value);
 }
 
 TEST(TrackedTargets, beyond_what_a_field_can_code_are_clamped_to_it) {
@@ -117,7 +117,7 @@ TEST(SimplifiedReference, has_fewer_vertices_within_the_error) {
     options.surface_error = LatticeUnits(8);
     const auto out = simplified_reference(captured, surface_of(captured), options);
     EXPECT_LT(out.positions.size(), captured.positions.size() / 5);
-    EXPECT_LT(measure_tracked_fit(surface_of(captured), out, {}, {}, {}).rms, 8);
+    EXPECT_LT(measure_tracked_fit(surface_of(captured), out, {}, {}, {}).rms.value, 8);
     ASSERT_EQ(out.colours.size(), out.positions.size());
     EXPECT_EQ(out.colours[0], (Colour{9, 8, 7}));
     EXPECT_EQ(out.normals.size(), out.positions.size());
@@ -161,7 +161,7 @@ TEST(SimplifiedReference, with_texture_coordinates_or_without_triangles_is_the_c
 TEST(TrackedFit, of_the_same_surface_is_nothing) {
     const auto captured = height_field(64, 25, bowl);
     const auto fit = measure_tracked_fit(surface_of(captured), captured, {}, {}, {});
-    EXPECT_LT(fit.rms, 0.5);
+    EXPECT_LT(fit.rms.value, 0.5);
     EXPECT_EQ(fit.stray_share, 0);
 }
 
@@ -171,8 +171,8 @@ TEST(TrackedFit, tells_of_one_region_that_does_not_fit_where_the_whole_hardly_sh
     TrackedFitOptions options;
     options.region = LatticeUnits(500);
     const auto fit = measure_tracked_fit(surface_of(captured), bumped, {}, {}, options);
-    EXPECT_LT(fit.rms, 20);
-    EXPECT_GT(fit.worst_region, 2 * fit.rms);
+    EXPECT_LT(fit.rms.value, 20);
+    EXPECT_GT(fit.worst_region.value, 2 * fit.rms.value);
 }
 
 TEST(TrackedFit, counts_what_one_surface_lacks_as_strays_both_ways) {
@@ -197,12 +197,12 @@ TEST(TrackedFit, does_not_hold_against_a_frame_what_its_intra_frame_was_off_alre
     const auto intra = measure_tracked_fit(ending_at(600), decoded, {}, {}, {});
     EXPECT_GT(*std::max_element(intra.squared.begin(), intra.squared.end()), 100 * 100);
     const auto same = measure_tracked_fit(ending_at(600), decoded, {}, intra.squared, {});
-    EXPECT_EQ(same.rms, 0);
-    EXPECT_EQ(same.worst_region, 0);
+    EXPECT_EQ(same.rms.value, 0);
+    EXPECT_EQ(same.worst_region.value, 0);
     EXPECT_EQ(same.squared, intra.squared);  // what is reported is what was measured
     const std::vector<double> perfect(intra.squared.size(), 0);
-    EXPECT_GT(measure_tracked_fit(ending_at(600), decoded, {}, perfect, {}).rms, 10);
-    EXPECT_GT(measure_tracked_fit(ending_at(300), decoded, {}, intra.squared, {}).rms, 10);
+    EXPECT_GT(measure_tracked_fit(ending_at(600), decoded, {}, perfect, {}).rms.value, 10);
+    EXPECT_GT(measure_tracked_fit(ending_at(300), decoded, {}, intra.squared, {}).rms.value, 10);
 }
 
 }  // namespace

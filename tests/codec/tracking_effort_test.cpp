@@ -3,10 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "codec/encoder/tracking_numbers.h"
 #include "codec/moving_sequences.h"
 #include "codec/test_sequences.h"
 #include "htvm/decoder.hpp"
@@ -75,6 +77,25 @@ TEST(TrackingEffort, OfArchivesTakesFewerBitsThanThatOfLiveStreams) {
 
 TEST(TrackingEffort, FiveIsTheUsualOne) {
     EXPECT_TRUE(same(code(with_effort_of(5)).packets, code(default_options(Profile::tracked)).packets));
+}
+
+TEST(TrackingEffort, FiveIsWhatTheOptionsOfRegistrationAreByDefault) {
+    const DeformationOptions options;
+    const auto usual = with_effort(options, tracking_effort(usual_effort));
+    EXPECT_EQ(usual.coarse_rounds, options.coarse_rounds);
+    EXPECT_EQ(usual.fine_rounds, options.fine_rounds);
+    EXPECT_EQ(usual.surface_rounds, options.surface_rounds);
+    EXPECT_EQ(usual.solver_iterations, options.solver_iterations);
+    EXPECT_EQ(usual.samples, options.samples);
+    EXPECT_EQ(usual.back_samples, options.back_samples);
+}
+
+TEST(UsualRequest, IsWhatAnEncoderIsAskedForByDefault) {
+    const EncoderOptions options;
+    const auto steps = quality_steps(options);
+    EXPECT_EQ(usual_request.geometry_step.value, std::round(steps.geometry_step * Scale{}.units));
+    EXPECT_EQ(usual_request.colour_step, std::round(steps.colour_step));
+    EXPECT_EQ(usual_request.simplify, options.tracked.simplify);
 }
 
 TEST(TrackingEffort, SetForAllFramesIsTheOptionButForTheReferencesSamples) {

@@ -65,7 +65,7 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
         radii = std::move(*calibrated);
     }
     const double units = 1.0 / header.lattice.step();
-    configuration.scale = {units, adult * units};
+    configuration.scale = {units, LatticeUnits(adult * units)};
     configuration.steps = steps_of(configuration, {options.geometry_step, options.colour_step});
     const auto on_lattice = [](double length) {
         return static_cast<std::int32_t>(std::lround(std::min(length, 1.0 * lattice_limit)));

@@ -62,11 +62,10 @@ struct TrackingNumbers {
 
 inline constexpr TrackingNumbers tracking_numbers;
 
-// A request at 2 mm and 6 levels, quality 50, at the default Scale: what the options of single algorithms stand for by
-// default follows from it.
+// What an encoder is asked for by default, on the default Scale: options that depend on it have these defaults.
 struct UsualRequest {
-    LatticeUnits geometry_step{32};
-    double colour_step = 6;           // levels
+    LatticeUnits geometry_step{45};   // this and the colours' are of default_quality
+    double colour_step = 7;           // levels
     double simplify = 0.4;            // see TrackedOptions
     LatticeUnits captured_edge{128};  // mean edge of a captured mesh
 };

@@ -56,8 +56,8 @@ BonesMoved code_what_moves(const BonesWork& work, BonesProgress& progress, const
     const auto shifts = shifts_of_bones(work);
     if (std::all_of(shifts.begin(), shifts.end(), [&](double shift) { return shift >= still_below; }))
         return code_whole(work, progress, steps);
-    const auto coded =
-        choose_coded_bones(shifts, *work.animation, still_below, largest_animation_error(work.configuration));
+    const auto coded = choose_coded_bones(shifts, *work.animation, LatticeUnits(still_below),
+                                          LatticeUnits(largest_animation_error(work.configuration)));
     return code_coded_bones(work, steps, coded, std::exchange(progress.quantised, std::nullopt));
 }
 
@@ -65,7 +65,8 @@ BonesMoved code_what_moves(const BonesWork& work, BonesProgress& progress, const
 
 Result<Frame> choose_by_motion(const BonesWork& work, BonesProgress& progress, const FrameSteps& steps) {
     const auto shifts = shifts_of_bones(work);
-    const double motion = work.configuration.scale.in_space(std::accumulate(shifts.begin(), shifts.end(), 0.0)).value;
+    const double motion =
+        work.configuration.scale.in_space(LatticeUnits(std::accumulate(shifts.begin(), shifts.end(), 0.0))).value;
     const auto& options = work.configuration.options.topology;
     if (options.intra_above > 0 && motion > options.intra_above && may_be_intra(work))
         return as_frame(code_intra(work, steps));

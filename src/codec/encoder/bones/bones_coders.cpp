@@ -115,7 +115,7 @@ BonesMoved code_moving_part(const BonesWork& work, const FrameSteps& steps, cons
     StageClock clock(work.stages);
     constexpr double stray_in_edges = 4;
     const auto part = cut_moving_part(work.mesh(), work.motion->bone_of_vertex, work.reference().decoded.skinned, fit,
-                                      coded_bones, stray_in_edges * work.reference().edge);
+                                      coded_bones, LatticeUnits(stray_in_edges * work.reference().edge));
     clock.done("cutting");
     auto source = whole_frame(work);
     source.mesh = &part.mesh;

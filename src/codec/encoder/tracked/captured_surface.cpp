@@ -418,9 +418,9 @@ TrackedFit summed_up(const std::vector<Point3f>& points, const std::vector<doubl
         if (distance > stray) ++strays;
     }
     const auto count = static_cast<double>(points.size());
-    return {std::sqrt(squares / count),
+    return {LatticeUnits(std::sqrt(squares / count)),
             static_cast<double>(strays) / count,
-            cube_errors(points, squared, options.region, fewest, left_out).worst(),
+            LatticeUnits(cube_errors(points, squared, options.region, fewest, left_out).worst()),
             {}};
 }
 

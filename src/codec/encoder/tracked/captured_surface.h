@@ -67,11 +67,11 @@ struct CubeErrors {
 CubeErrors cube_errors(std::span<const Point3f> samples, std::span<const double> squared, LatticeUnits side,
                        std::ptrdiff_t fewest, std::ptrdiff_t left_out = 0);
 
-// Measured with a few thousand samples in each direction; the worse of the two directions. Lattice units.
+// Measured with a few thousand samples in each direction; the worse of the two directions.
 struct TrackedFit {
-    double rms = 0;               // RMS distance from surface to surface; no distance counts as more than `reach`
+    LatticeUnits rms;             // RMS distance from surface to surface; no distance counts as more than `reach`
     double stray_share = 0;       // share of the samples that are farther than `stray`
-    double worst_region = 0;      // the RMS distance in the worst cube of space
+    LatticeUnits worst_region;    // the RMS distance in the worst cube of space
     std::vector<double> squared;  // squared distances of the decoded mesh's samples from the captured surface
 };
 

@@ -38,7 +38,7 @@ public:
                 reference_, {state_of(frame.earlier), state_of(frame.later), &state_of(frame.above)->head}, frame);
             const auto& head = between->head;
             constexpr double one = 256;
-            options.geometry_step = head.displacement.step[0] / one;
+            options.geometry_step = LatticeUnits(head.displacement.step[0] / one);
             options.colour_step = head.colour.step[0] / one;
             options.motion = head.motion;
         } else {

@@ -18,7 +18,7 @@ constexpr auto& numbers = tracking_numbers;
 // How far off a region of 10 cm may be. best: RMS of the best T-frame.
 LatticeUnits allowed_in_region(const TrackedWork& work, LatticeUnits best) {
     const auto& origin = work.reference->origin;
-    return std::max({numbers.region_to_best * best, numbers.region_to_intra * LatticeUnits(origin.fit.worst_region),
+    return std::max({numbers.region_to_best * best, numbers.region_to_intra * origin.fit.worst_region,
                      work.configuration.scale.on_lattice(numbers.visible),
                      numbers.remeshed_in_edges * LatticeUnits(origin.edge)});
 }
@@ -26,7 +26,7 @@ LatticeUnits allowed_in_region(const TrackedWork& work, LatticeUnits best) {
 // The same of the whole surface. On a clean, smooth capture the best T-frame may be far better than quantisation lets
 // an I-frame or a patch be.
 LatticeUnits allowed_over_all(const TrackedWork& work, LatticeUnits best) {
-    const LatticeUnits step = work.reference->origin.steps.geometry;
+    const LatticeUnits step(work.reference->origin.steps.geometry);
     return std::max(numbers.worst_to_best * best, numbers.quantised * step);
 }
 
@@ -35,7 +35,7 @@ LatticeUnits allowed_over_all(const TrackedWork& work, LatticeUnits best) {
 bool falls_apart(const TrackedWork& work, const TrackedFit& fit) {
     const auto& scale = work.configuration.scale;
     const auto best = work.sequence.history.best_fit;
-    const auto allowed = std::max(allowed_over_all(work, best), LatticeUnits(work.reference->origin.fit.rms));
+    const auto allowed = std::max(allowed_over_all(work, best), work.reference->origin.fit.rms);
     return fit.rms > std::max(scale.on_lattice(numbers.most_of_all), numbers.apart_to_lost * allowed) ||
            fit.worst_region > std::max(scale.on_lattice(numbers.most_in_region),
                                        numbers.apart_to_lost * allowed_in_region(work, best));
@@ -45,7 +45,7 @@ bool falls_apart(const TrackedWork& work, const TrackedFit& fit) {
 // such as a hand.
 bool is_lost(const TrackedWork& work, const TrackedFit& fit) {
     const auto best_fit = work.sequence.history.best_fit;
-    const auto best = best_fit > 0 ? best_fit : fit.rms;
+    const auto best = best_fit.value > 0 ? best_fit : fit.rms;
     return fit.stray_share > work.reference->origin.fit.stray_share + numbers.more_strays ||
            fit.rms > allowed_over_all(work, best) || fit.worst_region > allowed_in_region(work, best);
 }
@@ -218,8 +218,8 @@ Result<Frame> as_frame(Result<TrackedIntra> intra) {
 // so is one whose motion alone is wanted, unless it falls apart.
 Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const FrameSteps& steps) {
     const bool due = intra_is_due(work);
-    const double best_before = work.sequence.history.best_fit;
-    const auto send = [&](CodedMotion coded, double best) {
+    const auto best_before = work.sequence.history.best_fit;
+    const auto send = [&](CodedMotion coded, LatticeUnits best) {
         return Frame(chosen_motion(work, *tracking.registered, std::move(coded), best));
     };
     // 1. Its motion alone, where no more is wanted.
@@ -260,8 +260,8 @@ Result<Frame> choose_by_fit(const TrackedWork& work, Tracking& tracking, const F
     }
 
     // 5. The T-frame, or an I-frame: of the tracked mesh, where that is as good.
-    const bool best = !motion->lost && (best_before == 0 || motion->fit.rms < best_before);
-    const double best_fit = best ? motion->fit.rms : best_before;
+    const bool best = !motion->lost && (best_before.value == 0 || motion->fit.rms < best_before);
+    const auto best_fit = best ? motion->fit.rms : best_before;
     if (!anew && !motion->lost && !due && !patches_have_grown(work)) return send(std::move(motion->coded), best_fit);
     const bool renewed = !anew && !motion->lost && may_be_renewed(work, steps, tracked.mesh);
     auto intra = renewed ? code_renewal(work, steps, tracked.mesh) : code_intra(work, steps);

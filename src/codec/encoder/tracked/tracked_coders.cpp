@@ -117,7 +117,7 @@ bool denoises(const Configuration& configuration) {
 TargetFilterOptions filter_options(const TrackedWork& work) {
     const auto& origin = work.reference->origin;
     const auto steps = tracked_steps(origin.steps);
-    return {1.0 * steps.geometry, 1.0 * steps.colour, origin.edge};
+    return {LatticeUnits(steps.geometry), 1.0 * steps.colour, LatticeUnits(origin.edge)};
 }
 
 // before: state of the frame that it refers to; null if that is the reference.
@@ -140,7 +140,7 @@ Result<EncodedTrackedFrame> encode(const TrackedWork& work, const NodeRegistrati
 TrackedFrameOptions tracked_frame_options(const Configuration& configuration, const FrameSteps& steps) {
     TrackedFrameOptions out;
     out.scale = configuration.scale;
-    out.geometry_step = tracked_steps(steps).geometry;
+    out.geometry_step = LatticeUnits(tracked_steps(steps).geometry);
     out.colour_step = tracking_numbers.coarser_tracked_colours * steps.colour;
     out.lambda = configuration.options.lambda;
     out.reach = configuration.scale.on_lattice(tracking_numbers.reach);
@@ -150,7 +150,7 @@ TrackedFrameOptions tracked_frame_options(const Configuration& configuration, co
 
 SimplifiedReferenceOptions simplification_options(const Configuration& configuration, const FrameSteps& steps) {
     SimplifiedReferenceOptions out;
-    out.surface_error = configuration.options.tracked.simplify * steps.geometry;
+    out.surface_error = configuration.options.tracked.simplify * LatticeUnits(steps.geometry);
     out.colour_error = tracking_numbers.simplified_colours * steps.colour;
     out.longest_edge = configuration.scale.on_lattice(tracking_numbers.longest_edge);
     out.reach = configuration.scale.on_lattice(tracking_numbers.reach);
@@ -196,7 +196,7 @@ Result<CodedMotion> code_motion(const TrackedWork& work, const NodeRegistration&
 }
 
 TrackedMotion chosen_motion(const TrackedWork& work, const NodeRegistration& registered, CodedMotion coded,
-                            double best_fit) {
+                            LatticeUnits best_fit) {
     const auto& before = work.sequence.history;
     TrackedMotion out;
     auto& frame = out.frame;

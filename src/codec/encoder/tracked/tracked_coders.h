@@ -37,7 +37,7 @@ Result<CodedMotion> code_motion(const TrackedWork& work, const NodeRegistration&
                                 MotionParts parts);
 // The T-frame as it is sent. best_fit: what it leaves as such.
 TrackedMotion chosen_motion(const TrackedWork& work, const NodeRegistration& registered, CodedMotion coded,
-                            double best_fit);
+                            LatticeUnits best_fit);
 
 // A T-frame of the reference alone, on which patches are planned: whoever joins later needs the references alone.
 // near: of a T-frame that was tried.

@@ -90,7 +90,7 @@ TrackedFit fit_of(const TrackedWork& work, const LatticeMesh& decoded, double re
                   std::span<const std::uint32_t> near, std::span<const double> intra_squared) {
     StageClock clock(work.stages);
     TrackedFitOptions options;
-    options.stray = std::max(tracking_numbers.stray_in_edges * reference_edge, 1.0);
+    options.stray = std::max(tracking_numbers.stray_in_edges * LatticeUnits(reference_edge), LatticeUnits(1));
     options.reach = std::max(work.configuration.scale.on_lattice(tracking_numbers.fit_reach), options.stray);
     options.region = region_side(work.configuration);
     options.threads = work.configuration.threads;

@@ -49,7 +49,7 @@ struct MotionHistory {
     TargetHistory targets;                       // what filtering left of the last one
     std::vector<RigidMotion> gone_on;  // behind a TP-frame: a start for each node of the new reference, from how the
                                        // surface there moved on the old one; else empty
-    double best_fit = 0;               // RMS of the best so far; 0: none yet
+    LatticeUnits best_fit;             // RMS of the best so far; 0: none yet
 };
 
 // The strategy's state between two frames.
@@ -86,7 +86,7 @@ struct TrackedIntra {
     ReferenceOrigin origin;
     std::int32_t step = 1;  // Reference::step
     CodedPose pose;
-    double best_fit = 0;  // MotionHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
+    LatticeUnits best_fit;  // MotionHistory::best_fit, which lasts as long as tracking does; 0: it begins anew
 };
 // A TP-frame, which becomes the reference.
 struct TrackedPatch {
@@ -96,7 +96,7 @@ struct TrackedPatch {
     KeptNodes kept;                              // what it takes over of the reference before
     TargetHistory targets;                       // on the reference that it becomes
     std::vector<RigidMotion> before_last, last;  // of each node of the reference before, up to this frame
-    double best_fit = 0;                         // as of an I-frame
+    LatticeUnits best_fit;                       // as of an I-frame
 };
 
 // The frame that is coded, and what is found of it before that. Attempts share it and leave it as it is.
