@@ -185,10 +185,8 @@ private:
         return Help::make_option_desc(option);
     }
     std::string make_footer(const CLI::App* app) const override {
-        const auto more =
-            static_cast<std::size_t>(std::ranges::count_if(app->get_options(), [&](const CLI::Option* option) {
-                return option->nonpositional() && !shows(*option);
-            }));
+        const auto more = static_cast<std::size_t>(std::ranges::count_if(
+            app->get_options(), [&](const CLI::Option* option) { return option->nonpositional() && !shows(*option); }));
         const auto& footer = page_.footer.empty() ? app->get_footer() : page_.footer;
         return filled(fmt::format("{}{}--help-all shows {} more options, by what they are for.", footer,
                                   footer.empty() ? "" : "\n", more)) +
