@@ -77,6 +77,7 @@ export class FileSession implements Session {
                 if (++this.#reopenings > mostReopenings)
                     return this.#page.fail(new SourceError('changed', `${this.#url} changes all the time.`), this.#at);
                 this.#reopen();
+                continue;
             }
             while (this.#page.serial === serial) await this.#page.woken();
         }
