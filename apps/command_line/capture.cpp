@@ -526,7 +526,7 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
         is_lost_ = !piped;
         if (!piped) return tl::unexpected(piped.error());
         if (!*piped) return std::optional<TexturedMesh>{};
-        auto& [mesh, place, timestamp, image, per_second, came] = **piped;
+        auto& [mesh, place, timestamp, per_second, findings, came] = **piped;
         if (place < options_.first) continue;
         at_ = place;
         came_ = came;
@@ -537,9 +537,7 @@ Result<std::optional<TexturedMesh>> Capture::read_pipe() {
         is_lost_ = !timed;
         if (!timed) return tl::unexpected(timed.error());
         if (auto ok = scale_positions(mesh, millimetres_per_unit_); !ok) return tl::unexpected(ok.error());
-        TextureReference said;
-        if (!image.empty()) add_image(said, image);
-        auto textured = textures_.with_image(std::move(mesh), place, said, texture_use());
+        auto textured = textures_.with_image(std::move(mesh), place, std::move(findings), texture_use());
         if (!textured) return fail(textured.error().kind, fmt::format("{}: {}", name(), textured.error().message));
         return std::optional<TexturedMesh>{std::move(*textured)};
     }

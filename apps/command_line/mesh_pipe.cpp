@@ -68,7 +68,7 @@ struct MeshPipe::State {
         if (interruption() != 0) return std::optional<PipedMesh>();  // in the middle of a mesh, perhaps
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) return std::optional<PipedMesh>();
-        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.texture(), reader.fps(),
+        return std::optional(PipedMesh{std::move(**mesh), came++, reader.timestamp(), reader.fps(), reader.findings(),
                                        std::chrono::steady_clock::now()});
     } catch (const std::bad_alloc&) {  // else it would end the process, as this is not the caller's thread
         return fail(ErrorKind::limit, "out of memory");

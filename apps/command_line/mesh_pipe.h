@@ -10,6 +10,7 @@
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "io/mesh_reading.h"
 
 namespace htvm::app {
 
@@ -17,8 +18,8 @@ struct PipedMesh {
     Mesh mesh;
     std::size_t place = 0;  // among all that came, dropped ones too
     std::string timestamp;  // as its header says; empty: it does not
-    std::string texture;    // likewise: the image's name
     std::string fps;        // likewise: how many a second are to come
+    MeshFindings findings;  // what was found besides
     // When it was there in whole; where the sender waits, not before it was asked for.
     std::chrono::steady_clock::time_point came{};
 };

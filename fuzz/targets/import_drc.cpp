@@ -4,7 +4,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
-    const auto mesh = read_drc({data, size}, {1u << 20, 1u << 20});
+    const auto mesh = read_drc({data, size}, {{1u << 20, 1u << 20}});
     if (mesh) fuzz::require_importable(*mesh);
     return 0;
 }

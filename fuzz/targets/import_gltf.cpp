@@ -5,7 +5,7 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     using namespace htvm;
     // Nodes may show a mesh many times: a small file can be a large mesh.
-    const MeshLimits limits{100000, 100000};
+    const MeshReadOptions limits{{100000, 100000}};
     const auto mesh = read_gltf({data, size}, {}, limits);
     if (!mesh) return 0;
     fuzz::require_importable(*mesh);

@@ -208,7 +208,8 @@ Result<Mesh> decode(std::span<const std::uint8_t> bytes, const MeshLimits& limit
 
 }  // namespace
 
-Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
+Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshReadOptions& options, MeshFindings*) {
+    const auto& limits = options.limits;
     try {
         const auto counts = claimed_counts(bytes);
         if (!counts) return tl::unexpected(counts.error());

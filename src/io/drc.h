@@ -18,12 +18,13 @@
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
-#include "io/mesh_check.h"
+#include "io/mesh_reading.h"
 
 namespace htvm {
 
 // Errors: bad_input if the bytes are not a Draco file, are truncated or damaged, have no positions, or a position is
 // not finite; unsupported for bitstreams before 2.2 (Draco 1.2, 2017) and for other attribute layouts; limit.
-Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
+Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshReadOptions& options = {},
+                      MeshFindings* findings = nullptr);
 
 }  // namespace htvm

@@ -27,8 +27,7 @@
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
-#include "io/mesh_check.h"
-#include "io/texture_reference.h"
+#include "io/mesh_reading.h"
 
 namespace htvm {
 
@@ -36,7 +35,7 @@ namespace htvm {
 // those in it, not through links that lead out of it, and nothing is fetched; with an empty folder, they are errors.
 // Errors: bad_input, unsupported, limit.
 Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesystem::path& folder,
-                       const MeshLimits& limits = {}, TextureReference* texture = nullptr);
+                       const MeshReadOptions& options = {}, MeshFindings* findings = nullptr);
 
 // A .glb file. Positions, normals, colours and triangles are read back exactly, texture coordinates to within 1e-7 if
 // they are 0..1. Coloured meshes are unlit (KHR_materials_unlit): captured colours contain the light. Fails (bad_input)

@@ -448,7 +448,8 @@ Result<void> add_scene(Reading& reading) {
 }  // namespace
 
 Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesystem::path& folder,
-                       const MeshLimits& limits, TextureReference* texture) {
+                       const MeshReadOptions& options, MeshFindings* findings) {
+    const auto& limits = options.limits;
     auto file = open_gltf(bytes, folder);
     if (!file) return tl::unexpected(file.error());
     Reading reading{std::move(*file), limits};
@@ -457,8 +458,9 @@ Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesyste
     if (!reading.any_colours) mesh.colours.clear();
     if (!reading.any_normals) mesh.normals.clear();
     if (!reading.any_texcoords) mesh.texcoords.clear();
-    reading.texture.is_partial = reading.any_without_image && !reading.texture.images.empty();
-    if (texture) *texture = std::move(reading.texture);
+    for (std::size_t i = 0; i < reading.texture.images.size(); ++i) reading.texture.parts.push_back({{}, i, {}});
+    if (reading.any_without_image) reading.texture.parts.emplace_back();
+    if (findings) findings->texture = std::move(reading.texture);
     return std::move(mesh);
 }
 

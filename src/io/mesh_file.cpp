@@ -41,20 +41,20 @@ tl::unexpected<Error> fail_at(const std::filesystem::path& path, const Error& er
 }
 
 Result<Mesh> parse(MeshFormat format, const std::vector<std::uint8_t>& bytes, const std::filesystem::path& path,
-                   const MeshLimits& limits, TextureReference* texture) {
+                   const MeshReadOptions& options, MeshFindings* findings) {
     switch (format) {
         case MeshFormat::ply:
-            return read_ply(bytes, limits, texture);
+            return read_ply(bytes, options, findings);
         case MeshFormat::obj:
-            return read_obj(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), limits,
-                            texture);
+            return read_obj(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()), options,
+                            findings);
         case MeshFormat::glb:
         case MeshFormat::gltf:
-            return read_gltf(bytes, path.has_parent_path() ? path.parent_path() : ".", limits, texture);
+            return read_gltf(bytes, path.has_parent_path() ? path.parent_path() : ".", options, findings);
         case MeshFormat::drc:
             break;
     }
-    return read_drc(bytes, limits);
+    return read_drc(bytes, options, findings);
 }
 
 }  // namespace
@@ -115,7 +115,7 @@ std::string timestamp_in_file(const std::filesystem::path& path) {
     return read_ply_timestamp(file).value_or(std::string());
 }
 
-Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options, TextureReference* texture) {
+Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options, MeshFindings* findings) {
     const auto format = format_of(path);
     if (!format) {
         return fail_at(path, ErrorKind::unsupported,
@@ -123,7 +123,7 @@ Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions&
     }
     const auto bytes = read_file(path);
     if (!bytes) return tl::unexpected(bytes.error());
-    auto mesh = parse(*format, *bytes, path, options.limits, texture);
+    auto mesh = parse(*format, *bytes, path, options.reading, findings);
     if (!mesh) return fail_at(path, mesh.error());
     if (auto ok = scale_positions(*mesh, options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
     return mesh;

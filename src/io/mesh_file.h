@@ -12,14 +12,13 @@
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
-#include "io/mesh_check.h"
-#include "io/texture_reference.h"
+#include "io/mesh_reading.h"
 
 namespace htvm {
 
 struct MeshFileOptions {
     double millimetres_per_unit = 1;  // for the file's coordinates: 1000 for a file in metres; finite, above 0
-    MeshLimits limits;                // the largest mesh to accept
+    MeshReadOptions reading;          // of a file that is read
     std::string timestamp;            // for the comment of a PLY file that is written (ply.h); empty: none
     std::string texture;  // of a PLY or OBJ file that is written, the name of its image; an OBJ's material then
                           // goes to a file of the same name that ends in .mtl
@@ -29,10 +28,10 @@ struct MeshFileOptions {
 // When a PLY file says that its frame was captured (ply.h); empty if it does not say, is no PLY or cannot be read.
 std::string timestamp_in_file(const std::filesystem::path& path);
 
-// Reads a mesh and scales its positions to millimetres. Every error message begins with the file's name. texture: takes
-// what the file says of its texture; the image is read by texture_file.h.
+// Reads a mesh and scales its positions to millimetres. Every error message begins with the file's name. findings:
+// takes what else was found; the image is read by texture_file.h.
 Result<Mesh> read_mesh(const std::filesystem::path& path, const MeshFileOptions& options = {},
-                       TextureReference* texture = nullptr);
+                       MeshFindings* findings = nullptr);
 
 // Writes a mesh, with positions scaled from millimetres to the file's unit, replacing any file of that name. The folder
 // must exist. Writing .drc and .gltf is unsupported. Every error message begins with the file's name.

@@ -153,8 +153,9 @@ Result<void> read_face(ObjText& obj, std::string_view line, std::size_t line_num
     if (auto ok = check_count(obj.corners.size(), 3 * limits.most_triangles, "corners or more"); !ok) return ok;
     obj.polygons.push_back(polygon);
     if (!std::exchange(obj.is_material_used, true)) {
-        auto& used = obj.texture.materials;
-        if (std::find(used.begin(), used.end(), obj.material_name) == used.end()) used.push_back(obj.material_name);
+        auto& parts = obj.texture.parts;
+        if (std::ranges::find(parts, obj.material_name, &TextureReference::Part::material) == parts.end())
+            parts.push_back({obj.material_name, {}, {}});
     }
     return {};
 }
@@ -356,7 +357,8 @@ void append_statement(std::string& text, const char* keyword, const std::array<f
 
 }  // namespace
 
-Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits, TextureReference* texture) {
+Result<Mesh> read_obj(std::string_view text, const MeshReadOptions& options, MeshFindings* findings) {
+    const auto& limits = options.limits;
     ObjText obj;
     std::string joined;
     std::size_t line_number = 0;
@@ -369,7 +371,7 @@ Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits, TextureRe
         return bad_line(obj.foreign_line,
                         "it is not an OBJ statement, and there is no vertex: this is another kind of file");
     if (auto ok = check_corners(obj); !ok) return tl::unexpected(ok.error());
-    if (texture) *texture = std::move(obj.texture);
+    if (findings) findings->texture = std::move(obj.texture);
     return mesh_of(obj);
 }
 

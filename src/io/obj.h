@@ -25,14 +25,13 @@
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
-#include "io/mesh_check.h"
-#include "io/texture_reference.h"
+#include "io/mesh_reading.h"
 
 namespace htvm {
 
 // Errors: bad_input, naming the line, if a number cannot be read, a position is not finite or an index refers to
 // nothing; limit.
-Result<Mesh> read_obj(std::string_view text, const MeshLimits& limits = {}, TextureReference* texture = nullptr);
+Result<Mesh> read_obj(std::string_view text, const MeshReadOptions& options = {}, MeshFindings* findings = nullptr);
 
 // The image of a material in a file that mtllib names: what map_Kd says, without its options. Names are as in the file
 // but for backslashes, which become slashes. Nothing is an error: what is not understood is passed over.

@@ -474,9 +474,10 @@ Result<PlyHeader> read_header(PlySource& source) {
     return header;
 }
 
-Result<PlyAtStart> read_one(PlySource& source, const MeshLimits& limits) {
+Result<PlyAtStart> read_one(PlySource& source, const MeshReadOptions& options) {
     const auto header = read_header(source);
     if (!header) return tl::unexpected(header.error());
+    const MeshLimits& limits = options.limits;
     Body body{source, header->format, limits};
     bool has_vertices = false;
     for (const PlyElement& element : header->elements) {
@@ -512,20 +513,23 @@ Result<PlyAtStart> read_one(PlySource& source, const MeshLimits& limits) {
             if (c == '\n') break;
         }
     }
-    return PlyAtStart{std::move(mesh), header->timestamp, header->texture, header->fps,
+    MeshFindings findings;
+    if (!header->texture.empty())
+        findings.texture.parts.push_back({{}, add_image(findings.texture, header->texture), {}});
+    return PlyAtStart{std::move(mesh), std::move(findings), header->timestamp, header->fps,
                       static_cast<std::size_t>(source.consumed())};
 }
 
 }  // namespace
 
-Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
+Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshReadOptions& options) {
     PlySource source(bytes);
     skip_white_space(source);
-    return read_one(source, limits);
+    return read_one(source, options);
 }
 
-Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits, TextureReference* texture) {
-    auto read = read_ply_at_start(bytes, limits);
+Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshReadOptions& options, MeshFindings* findings) {
+    auto read = read_ply_at_start(bytes, options);
     if (!read) return tl::unexpected(read.error());
     PlySource rest(bytes.subspan(read->bytes_consumed));
     skip_white_space(rest);
@@ -533,7 +537,7 @@ Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& lim
     if (const auto next = read_line(rest, line, 16); next && *next == "ply") {
         return fail(ErrorKind::bad_input, "the file holds more than one PLY; give such a file on standard input");
     }
-    if (texture && !read->texture.empty()) add_image(*texture, read->texture);
+    if (findings) *findings = std::move(read->findings);
     return std::move(read->mesh);
 }
 
@@ -544,20 +548,23 @@ Result<std::string> read_ply_timestamp(std::istream& stream) {
     return header->timestamp;
 }
 
-PlyStreamReader::PlyStreamReader(std::istream& stream, const MeshLimits& limits) : stream_(stream), limits_(limits) {}
+PlyStreamReader::PlyStreamReader(std::istream& stream, const MeshReadOptions& options)
+    : stream_(stream), options_(options) {}
 
 Result<std::optional<Mesh>> PlyStreamReader::next() {
     if (error_) return tl::unexpected(*error_);
     PlySource source(*stream_.rdbuf());
     if (!skip_white_space(source)) return std::optional<Mesh>();
-    auto read = read_one(source, limits_);
+    auto read = read_one(source, options_);
     if (!read) {
         error_ = Error{read.error().kind,
                        "mesh " + std::to_string(meshes_read_) + " of the stream: " + read.error().message};
         return tl::unexpected(*error_);
     }
     ++meshes_read_;
-    header_ = {std::move(read->timestamp), std::move(read->texture), std::move(read->fps)};
+    timestamp_ = std::move(read->timestamp);
+    fps_ = std::move(read->fps);
+    findings_ = std::move(read->findings);
     return std::optional<Mesh>(std::move(read->mesh));
 }
 

@@ -27,24 +27,24 @@
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
-#include "io/mesh_check.h"
-#include "io/texture_reference.h"
+#include "io/mesh_reading.h"
 
 namespace htvm {
 
 struct PlyAtStart {
     Mesh mesh;
-    std::string timestamp, texture, fps;  // what the header's comments say; empty: nothing
-    std::size_t bytes_consumed = 0;       // the position at which the next PLY may begin
+    MeshFindings findings;
+    std::string timestamp, fps;      // what the header's comments say; empty: nothing
+    std::size_t bytes_consumed = 0;  // the position at which the next PLY may begin
 };
 
 // Reads the one PLY at the beginning of the bytes (leading white space is skipped); others may follow.
-Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {});
+Result<PlyAtStart> read_ply_at_start(std::span<const std::uint8_t> bytes, const MeshReadOptions& options = {});
 
 // Reads the bytes of a file. Trailing bytes are ignored, but a second PLY is an error, so that no mesh is dropped
 // silently.
-Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshLimits& limits = {},
-                      TextureReference* texture = nullptr);
+Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshReadOptions& options = {},
+                      MeshFindings* findings = nullptr);
 
 // The text after "comment timestamp" in the header of the PLY at the start of the stream; empty if there is none.
 Result<std::string> read_ply_timestamp(std::istream& stream);
@@ -60,22 +60,21 @@ Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view t
 class PlyStreamReader {
 public:
     // The stream must outlive the reader.
-    explicit PlyStreamReader(std::istream& stream, const MeshLimits& limits = {});
+    explicit PlyStreamReader(std::istream& stream, const MeshReadOptions& options = {});
     // The next mesh; nothing at the end of the stream. After an error it is unknown where the next mesh begins, so the
     // same error (which names the mesh, counted from 0) is returned again.
     Result<std::optional<Mesh>> next();
     // For the mesh that next() returned, as from read_ply_timestamp().
-    const std::string& timestamp() const { return header_.timestamp; }
-    // Likewise, what its header says of the texture; empty: nothing.
-    const std::string& texture() const { return header_.texture; }
-    const std::string& fps() const { return header_.fps; }
+    const std::string& timestamp() const { return timestamp_; }
+    const std::string& fps() const { return fps_; }
+    // Likewise, what was found besides the mesh.
+    const MeshFindings& findings() const { return findings_; }
 
 private:
     std::istream& stream_;
-    MeshLimits limits_;
-    struct {
-        std::string timestamp, texture, fps;
-    } header_;
+    MeshReadOptions options_;
+    std::string timestamp_, fps_;
+    MeshFindings findings_;
     std::size_t meshes_read_ = 0;
     std::optional<Error> error_;
 };

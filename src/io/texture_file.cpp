@@ -47,7 +47,7 @@ std::optional<fs::path> file_within(const fs::path& folder, const std::string& n
 // never sent along.
 Result<TextureReference> with_materials(const fs::path& mesh, const TextureReference& said) {
     TextureReference out = said;
-    if (said.material_files.empty() || said.materials.empty()) return out;
+    if (said.material_files.empty() || said.parts.empty()) return out;
     std::vector<ObjMaterial> known;
     for (const auto& name : said.material_files) {
         const auto path = file_within(folder_of(mesh), name);
@@ -58,15 +58,10 @@ Result<TextureReference> with_materials(const fs::path& mesh, const TextureRefer
         const auto more = read_obj_materials({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
         known.insert(known.end(), more.begin(), more.end());
     }
-    bool any_without = false;
-    for (const auto& name : said.materials) {
-        const auto material =
-            std::find_if(known.begin(), known.end(), [&](const auto& candidate) { return candidate.name == name; });
-        const bool has_image = material != known.end() && !material->image.empty();
-        if (has_image) add_image(out, material->image);
-        any_without = any_without || !has_image;
+    for (auto& part : out.parts) {
+        const auto material = std::ranges::find(known, part.material, &ObjMaterial::name);
+        if (material != known.end() && !material->image.empty()) part.image = add_image(out, material->image);
     }
-    out.is_partial = any_without && !out.images.empty();
     return out;
 }
 
@@ -229,9 +224,11 @@ Result<TextureFiles::Found> TextureFiles::find(const fs::path& mesh, std::size_t
     }
     const auto texture = with_materials(mesh, said);
     if (!texture) return tl::unexpected(texture.error());
-    if (texture->images.size() > 1 || texture->is_partial)
+    const bool is_partial =
+        !texture->images.empty() && std::ranges::any_of(texture->parts, [](const auto& part) { return !part.image; });
+    if (texture->images.size() > 1 || is_partial)
         return fail_at(mesh, ErrorKind::unsupported,
-                       texture->is_partial
+                       is_partial
                            ? "a part of the mesh has an image and another has none; one image for all of it is read" +
                                  std::string(other_ways)
                            : "its parts have " + std::to_string(texture->images.size()) +
@@ -257,8 +254,7 @@ Result<TextureFiles::Found> TextureFiles::find(const fs::path& mesh, std::size_t
     return out;
 }
 
-Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, std::size_t place,
-                                             const TextureReference& said, TextureUse use) {
+Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, std::size_t place, TextureUse use) {
     image_name_.clear();
     const bool from_top = !path.empty() && counts_texture_from_top(path);
     if ((options_.origin == TextureOrigin::top && !from_top) || (options_.origin == TextureOrigin::bottom && from_top))
@@ -274,7 +270,7 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
     }
     const bool is_wanted =
         use == TextureUse::always || (use == TextureUse::where_colourless && (is_named || mesh.colours.empty()));
-    const auto found = find(path, place, said);
+    const auto found = find(path, place, findings_.texture);
     if (!found) {
         if (!is_wanted) return TexturedMesh(std::move(mesh));
         return tl::unexpected(found.error());
@@ -343,15 +339,15 @@ Result<TextureFiles::ReadImage> TextureFiles::picture_of_video(std::size_t numbe
 
 Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const MeshFileOptions& options) {
     const auto& path = meshes_.paths[place];
-    TextureReference said;
-    auto mesh = read_mesh(path, options, &said);
+    findings_ = {};
+    auto mesh = read_mesh(path, options, &findings_);
     if (!mesh) return tl::unexpected(mesh.error());
-    return completed(std::move(*mesh), path, place, said, use);
+    return completed(std::move(*mesh), path, place, use);
 }
 
-Result<TexturedMesh> TextureFiles::with_image(Mesh mesh, std::size_t place, const TextureReference& said,
-                                              TextureUse use) {
-    return completed(std::move(mesh), {}, place, said, use);
+Result<TexturedMesh> TextureFiles::with_image(Mesh mesh, std::size_t place, MeshFindings findings, TextureUse use) {
+    findings_ = std::move(findings);
+    return completed(std::move(mesh), {}, place, use);
 }
 
 }  // namespace htvm

@@ -14,8 +14,8 @@
 #include "core/image.h"
 #include "htvm/result.hpp"
 #include "io/mesh_file.h"
+#include "io/mesh_reading.h"
 #include "io/sequence.h"
-#include "io/texture_reference.h"
 #include "io/texture_video.h"
 
 namespace htvm {
@@ -53,7 +53,10 @@ public:
     Result<TexturedMesh> read(std::size_t place, TextureUse use, const MeshFileOptions& options = {});
 
     // The same for a mesh that was read already, from standard input, at that place among all that came.
-    Result<TexturedMesh> with_image(Mesh mesh, std::size_t place, const TextureReference& said, TextureUse use);
+    Result<TexturedMesh> with_image(Mesh mesh, std::size_t place, MeshFindings findings, TextureUse use);
+
+    // What was found in the mesh that was read last.
+    const MeshFindings& findings() const { return findings_; }
 
     // The name of the image for the mesh that was read last, whether the image was read or not; empty: there is none.
     const std::string& image_name() const { return image_name_; }
@@ -71,8 +74,7 @@ private:
         const std::vector<std::uint8_t>* bytes = nullptr;
         std::optional<std::size_t> picture = {};  // of the video
     };
-    Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place,
-                                   const TextureReference& said, TextureUse use);
+    Result<TexturedMesh> completed(Mesh mesh, const std::filesystem::path& path, std::size_t place, TextureUse use);
     struct ReadImage {
         std::shared_ptr<const Image> image;
         std::shared_ptr<const std::vector<std::uint8_t>> file;  // where it is to be kept
@@ -87,6 +89,7 @@ private:
     std::optional<TextureVideo> video_;          // or this
     std::vector<std::uint64_t> times_;           // of the meshes in the video, in pictures
     std::string image_name_;
+    MeshFindings findings_;
     std::optional<bool> from_top_by_seams_;    // decided by the first mesh that has seams
     std::filesystem::path kept_path_;          // of the image that was read last, which frames may share
     std::optional<std::size_t> kept_picture_;  // or its number in the video

@@ -69,7 +69,7 @@ struct Sample {
         primitive()["attributes"][name] = root["accessors"].size() - 1;
         return root["accessors"].back();
     }
-    Result<Mesh> read(const MeshLimits& limits = {}) const { return read_gltf(glb(root, binary), {}, limits); }
+    Result<Mesh> read(const MeshLimits& limits = {}) const { return read_gltf(glb(root, binary), {}, {limits}); }
     Mesh mesh() const {
         const auto read_back = read();
         EXPECT_TRUE(read_back) << read_back.error().message;

@@ -83,7 +83,7 @@ TEST(ObjReading, ErrorsNameTheLine) {
 }
 
 TEST(ObjReading, LimitsAreErrorsOfTheirOwnKind) {
-    const auto mesh = read_obj(square, {3, 100});
+    const auto mesh = read_obj(square, {{3, 100}});
     ASSERT_FALSE(mesh);
     EXPECT_EQ(mesh.error().kind, ErrorKind::limit);
 }

@@ -167,7 +167,7 @@ TEST(PlyReading, TrianglesAmongOtherFacesKeepTheirOrder) {
         const auto next = PlyStreamReader(stream).next();
         ASSERT_TRUE(next) << next.error().message;
         EXPECT_EQ((*next)->triangles, expected);
-        const MeshLimits limits{.most_triangles = expected.size() - 1};
+        const MeshReadOptions limits{.limits = {.most_triangles = expected.size() - 1}};
         EXPECT_FALSE(read_ply(bytes_of(bytes), limits));
         const auto damaged = read(bytes.substr(0, bytes.size() - 1) + "\x01");  // the last corner's highest byte
         EXPECT_FALSE(damaged);
@@ -210,7 +210,7 @@ TEST(PlyReading, ErrorsNameTheVertexOrTheFace) {
 }
 
 TEST(PlyReading, HeadersThatLieAboutCountsAreRefusedBeforeAllocation) {
-    const MeshLimits no_limits{~std::uint64_t{0}, ~std::uint64_t{0}};
+    const MeshReadOptions no_limits{{~std::uint64_t{0}, ~std::uint64_t{0}}};
     for (const std::string format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
         for (const std::string count : {"2147483648", "4294967295", "18446744073709551615"}) {
             const std::string vertices =
@@ -242,8 +242,8 @@ TEST(PlyReading, HeadersThatLieAboutCountsAreRefusedBeforeAllocation) {
 TEST(PlyReading, LimitsAreErrorsOfTheirOwnKind) {
     const auto bytes = write_ply(random_mesh(1, 10, 20));
     ASSERT_TRUE(bytes);
-    EXPECT_TRUE(read_ply(*bytes, {10, 20}));
-    for (const MeshLimits limits : {MeshLimits{9, 20}, MeshLimits{10, 19}}) {
+    EXPECT_TRUE(read_ply(*bytes, {{10, 20}}));
+    for (const MeshReadOptions limits : {MeshReadOptions{{9, 20}}, MeshReadOptions{{10, 19}}}) {
         const auto mesh = read_ply(*bytes, limits);
         ASSERT_FALSE(mesh);
         EXPECT_EQ(mesh.error().kind, ErrorKind::limit);
