@@ -145,9 +145,13 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         if (auto ok = scale_positions(scaled, 1 / options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
         written = &scaled;
     }
+    std::array<double, 3> origin{};
+    for (std::size_t c = 0; c < 3; ++c)
+        origin[c] = static_cast<double>(options.global_shift[c]) / options.millimetres_per_unit;
     if (*format != MeshFormat::obj) {
-        const auto bytes = *format == MeshFormat::ply ? write_ply(*written, options.timestamp, options.texture)
-                                                      : write_gltf(*written, options.image);
+        const auto bytes = *format == MeshFormat::ply
+                               ? write_ply(*written, options.timestamp, options.texture, {}, origin)
+                               : write_gltf(*written, options.image, origin);
         if (!bytes) return fail_at(path, bytes.error());
         return write_file(path, *bytes);
     }
@@ -156,7 +160,8 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         material.replace_extension(".mtl");
         if (auto ok = write_file(material, write_obj_material(options.texture)); !ok) return ok;
     }
-    const auto text = write_obj(*written, options.texture.empty() ? std::string() : material.filename().string());
+    const auto text = write_obj(*written, options.texture.empty() ? std::string() : material.filename().string(),
+                                origin);
     if (!text) return fail_at(path, text.error());
     return write_file(path, *text);
 }

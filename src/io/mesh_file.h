@@ -12,6 +12,7 @@
 
 #include "htvm/mesh.hpp"
 #include "htvm/result.hpp"
+#include "htvm/scene.hpp"
 #include "io/mesh_reading.h"
 
 namespace htvm {
@@ -22,6 +23,7 @@ struct MeshFileOptions {
     std::string timestamp;            // for the comment of a PLY file that is written (ply.h); empty: none
     std::string texture;  // of a PLY or OBJ file that is written, the name of its image; an OBJ's material then
                           // goes to a file of the same name that ends in .mtl
+    GlobalShift global_shift{};  // of a file that is written, mm: added to the positions, as doubles
     std::span<const std::uint8_t> image;  // of a .glb that is written, the file of its image: PNG or JPEG
 };
 

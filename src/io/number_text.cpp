@@ -21,10 +21,18 @@ std::optional<double> parse_number(std::string_view text) {
     return value;
 }
 
-void append_number(std::string& text, float value) {
+namespace {
+
+template <class Number>
+void append_shortest(std::string& text, Number value) {
     char digits[32];
     const auto result = std::to_chars(digits, digits + sizeof digits, value);
     text.append(digits, result.ptr);
 }
+
+}  // namespace
+
+void append_number(std::string& text, float value) { append_shortest(text, value); }
+void append_number(std::string& text, double value) { append_shortest(text, value); }
 
 }  // namespace htvm

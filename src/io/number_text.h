@@ -13,5 +13,7 @@ std::optional<double> parse_number(std::string_view text);
 
 // Appends the shortest text that parse_number and a conversion to float turn back into exactly this value.
 void append_number(std::string& text, float value);
+// The same for a double.
+void append_number(std::string& text, double value);
 
 }  // namespace htvm

@@ -17,6 +17,7 @@
 // Positions keep the file's own unit: see mesh_file.h for the scale to millimetres.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -43,8 +44,10 @@ std::vector<ObjMaterial> read_obj_materials(std::string_view text);
 
 // Writes lines v x y z or v x y z r g b, vt, vn, f. Positions, normals and texture coordinates are read back exactly,
 // colours to the same 8 bits. Fails (bad_input) if check_mesh does.
-// material_file: of the material that faces use, written by write_obj_material(); empty: none.
-Result<std::string> write_obj(const Mesh& mesh, std::string_view material_file = {});
+// material_file: of the material that faces use, written by write_obj_material(); empty: none. origin: added to the
+// positions, as doubles.
+Result<std::string> write_obj(const Mesh& mesh, std::string_view material_file = {},
+                              const std::array<double, 3>& origin = {});
 // The text of such a file, for an image of that name.
 std::string write_obj_material(std::string_view image);
 

@@ -16,6 +16,7 @@
 // index is out of range; limit; unsupported. Nothing is allocated for a count that the available bytes cannot hold.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <iosfwd>
@@ -50,10 +51,11 @@ Result<Mesh> read_ply(std::span<const std::uint8_t> bytes, const MeshReadOptions
 Result<std::string> read_ply_timestamp(std::istream& stream);
 
 // Binary little-endian: float x y z, then, if the mesh has them, float nx ny nz, float s t, uchar red green blue; faces
-// as uchar, uint vertex_indices. timestamp, texture and fps: for the comments; empty: none. Fails (bad_input) if
-// check_mesh does.
+// as uchar, uint vertex_indices. timestamp, texture and fps: for the comments; empty: none. origin: added to the
+// positions, which are then doubles; zeros: they stay floats. Fails (bad_input) if check_mesh does.
 Result<std::vector<std::uint8_t>> write_ply(const Mesh& mesh, std::string_view timestamp = {},
-                                            std::string_view texture = {}, std::string_view fps = {});
+                                            std::string_view texture = {}, std::string_view fps = {},
+                                            const std::array<double, 3>& origin = {});
 
 // Reads PLYs that follow one another in a stream. One mesh is held at a time, and the stream is not read past the end
 // of the mesh returned, so the meshes of a live stream are available as soon as they are complete.
