@@ -22,10 +22,9 @@ bool is_downwards(UpAxis up) { return static_cast<std::size_t>(up) % 2 == 0; }
 
 // From the lowest to the highest vertex, in the mesh's unit; up: as in CaptureOptions.
 double height_of(const Mesh& mesh, UpAxis up) {
+    const auto bounds = surface_bounds(mesh);
     const auto along = [&](std::size_t axis) {
-        const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
-                                                     [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
-        return mesh.positions.empty() ? 0.0 : static_cast<double>((*high)[axis]) - static_cast<double>((*low)[axis]);
+        return bounds ? static_cast<double>(bounds->high[axis]) - static_cast<double>(bounds->low[axis]) : 0.0;
     };
     return up == UpAxis::unknown ? std::max(along(1), along(2)) : along(number_of(up));
 }
@@ -461,12 +460,8 @@ void Capture::find_floor() {
     up_ = options_.up;
     if (up_ == UpAxis::unknown) return;
     const auto axis = number_of(up_);
-    const bool down = is_downwards(up_);
-    bool any = false;
-    for (const auto& p : peeked_->mesh.positions) {
-        const double c = static_cast<double>(p[axis]);
-        if (!std::exchange(any, true) || (down ? c > lowest_ : c < lowest_)) lowest_ = c;
-    }
+    if (const auto bounds = surface_bounds(peeked_->mesh))
+        lowest_ = static_cast<double>(is_downwards(up_) ? bounds->high[axis] : bounds->low[axis]);
 }
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------

@@ -7,17 +7,18 @@
 #include <cmath>
 #include <vector>
 
+#include "io/mesh_file.h"
+
 namespace htvm::app {
 
 GlobalShift shift_of(const Mesh& mesh, double millimetres_per_unit) {
     constexpr double far = 64;  // sizes: floats then still have a 250,000th of the size
-    if (mesh.positions.empty()) return {};
+    const auto bounds = surface_bounds(mesh);
+    if (!bounds) return {};
     std::array<double, 3> low{}, high{};
     for (std::size_t c = 0; c < 3; ++c) {
-        const auto [least, most] = std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
-                                                       [c](const auto& a, const auto& b) { return a[c] < b[c]; });
-        low[c] = static_cast<double>((*least)[c]);
-        high[c] = static_cast<double>((*most)[c]);
+        low[c] = static_cast<double>(bounds->low[c]);
+        high[c] = static_cast<double>(bounds->high[c]);
     }
     const double size = std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
     GlobalShift out{};

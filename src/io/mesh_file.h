@@ -76,7 +76,10 @@ constexpr double millimetres_per(LengthUnit unit) { return names_of(unit).millim
 // bad_input names the symbols that there are.
 Result<LengthUnit> length_unit(std::string_view symbol);
 
-// The unit that a mesh of a person is probably in, by the diagonal of its bounding box: metres below 10, centimetres
+// Of the vertices that triangles use; of all where there are no triangles. Scanners leave unused ones at the origin.
+std::optional<SpaceBounds> surface_bounds(const Mesh& mesh);
+
+// The unit that a mesh of a person is probably in, by the diagonal of its surface's bounding box: metres below 10, centimetres
 // below 600, otherwise millimetres. A person's diagonal is 0.5 m (an infant) to 3 m (arms and legs spread), so the
 // bounds are safe except for scenes above 6 m in cm. For a mesh without extent: mm.
 LengthUnit guess_unit(const Mesh& mesh);
