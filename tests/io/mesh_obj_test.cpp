@@ -72,9 +72,9 @@ TEST(ObjReading, SplitVerticesKeepTheirColourAndCornersMayLackAttributes) {
 }
 
 TEST(ObjReading, ErrorsNameTheLine) {
-    for (const std::string bad : {"f 1 2 5", "f 1 2 0", "f 1 2 -5", "f 1 2 x", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1",
-                                  "f 1/2/3/4 1 1", "f 1 2 99999999999999999999", "v 1 2", "v 1 2 nan", "v 1 inf 2",
-                                  "v 1 2 1e39", "v a b c", "vn 1 2", "vt", "vt x", "f 1 2 4294967297"}) {
+    for (const std::string bad : {"f 1 2 5", "f 1 2 0", "f 1 2 -5", "f 1 2 x", "f 1/x 2/1 3/1", "f 1/2/3/4 1 1",
+                                  "f 1 2 99999999999999999999", "v 1 2", "v a b c", "v 1 2 1,2,3", "vn 1 2", "vt",
+                                  "vt x", "f 1 2 4294967297", "f 1 2 4294967296", "f 1 2 4294967295"}) {
         const auto mesh = read_obj(square + bad + "\nf 1 2 3\n");
         ASSERT_FALSE(mesh) << bad;
         EXPECT_EQ(mesh.error().kind, ErrorKind::bad_input);
