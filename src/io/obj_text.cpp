@@ -24,7 +24,7 @@ struct Reading {
     std::size_t line = 0;          // the number of the statement's first line
     std::size_t foreign_line = 0;  // the first line that is not an OBJ statement; 0: none
     std::uint64_t triangles = 0;
-    std::string material = {};        // of the faces that follow
+    std::string material = {};   // of the faces that follow
     bool is_part_known = false;  // `part` is that of the material
     std::uint16_t part = 0;
     std::unordered_map<std::string, std::uint16_t> part_of_material = {};
