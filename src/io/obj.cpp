@@ -154,39 +154,4 @@ Result<Mesh> read_obj(std::string_view text, const MeshReadOptions& options, Mes
     return mesh;
 }
 
-std::vector<ObjMaterial> read_obj_materials(std::string_view text) {
-    // How many words follow an option of a map, of which numbers may be left out.
-    const auto words_of_option = [](std::string_view option) {
-        if (option == "-s" || option == "-o" || option == "-t") return 3;
-        return option == "-mm" ? 2 : 1;
-    };
-    std::vector<ObjMaterial> out;
-    std::string joined;
-    std::size_t line_number = 0;
-    while (!text.empty()) {
-        std::string_view line = read_line(text, line_number, joined);
-        const std::string_view keyword = read_word(line);
-        if (keyword == "newmtl") out.push_back({std::string(trimmed(line)), {}});
-        if (keyword != "map_Kd" || out.empty()) continue;
-        for (;;) {
-            std::string_view rest = line;
-            const std::string_view option = read_word(rest);
-            if (!option.starts_with('-')) break;
-            for (int left = words_of_option(option); left > 0; --left) {
-                std::string_view behind = rest;
-                const std::string_view word = read_word(behind);
-                const bool is_text = option.starts_with("-blend") || option == "-clamp" || option == "-cc" ||
-                                     option == "-imfchan" || option == "-type";
-                if (!is_text && !parse_number(word)) break;
-                rest = behind;
-            }
-            line = rest;
-        }
-        auto& image = out.back().image;
-        image = trimmed(line);
-        std::replace(image.begin(), image.end(), '\\', '/');
-    }
-    return out;
-}
-
 }  // namespace htvm

@@ -39,14 +39,6 @@ namespace htvm {
 // if too many positions are not finite; limit.
 Result<Mesh> read_obj(std::string_view text, const MeshReadOptions& options = {}, MeshFindings* findings = nullptr);
 
-// The image of a material in a file that mtllib names: what map_Kd says, without its options. Names are as in the file
-// but for backslashes, which become slashes. Nothing is an error: what is not understood is passed over.
-struct ObjMaterial {
-    std::string name;
-    std::string image;  // empty: it has none
-};
-std::vector<ObjMaterial> read_obj_materials(std::string_view text);
-
 // Writes lines v x y z or v x y z r g b, vt, vn, f. Positions, normals and texture coordinates are read back exactly,
 // colours to the same 8 bits. Fails (bad_input) if check_mesh does.
 // material_file: of the material that faces use, written by write_obj_material(); empty: none. origin: added to the
