@@ -125,7 +125,8 @@ TEST(DrcReading, WhatIsNoDracoFileIsAnError) {
     EXPECT_FALSE(read_drc(samples::bytes_of("DRACO")));
     EXPECT_FALSE(read_drc(samples::bytes_of("ply\nformat ascii 1.0\n")));
     auto old = encoded_points(5, draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
-    old[6] = 1;
+    old[5] = 0;
+    old[6] = 9;
     const auto mesh = read_drc(old);
     ASSERT_FALSE(mesh);
     EXPECT_EQ(mesh.error().kind, ErrorKind::unsupported);

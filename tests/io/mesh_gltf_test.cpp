@@ -69,7 +69,15 @@ struct Sample {
         primitive()["attributes"][name] = root["accessors"].size() - 1;
         return root["accessors"].back();
     }
-    Result<Mesh> read(const MeshLimits& limits = {}) const { return read_gltf(glb(root, binary), {}, {limits}); }
+    Result<Mesh> read(const MeshLimits& limits = {}, MeshFindings* findings = nullptr) const {
+        return read_gltf(glb(root, binary), {}, {limits}, findings);
+    }
+    MeshFindings findings() const {
+        MeshFindings out;
+        const auto read_back = read({}, &out);
+        EXPECT_TRUE(read_back) << read_back.error().message;
+        return out;
+    }
     Mesh mesh() const {
         const auto read_back = read();
         EXPECT_TRUE(read_back) << read_back.error().message;
@@ -281,17 +289,13 @@ TEST(GltfReading, OnlyTheShownSceneIsRead) {
 // ---- Files that are wrong or hostile --------------------------------------------------------------------------------
 
 TEST(GltfReading, WhatIsNotReadSaysSo) {
-    Sample sparse, skinned, morphed, compressed, old;
-    sparse.root["accessors"][0]["sparse"] = json::object();
-    EXPECT_EQ(sparse.error().kind, ErrorKind::unsupported);
-    skinned.root["nodes"][0]["skin"] = 0;
-    EXPECT_THAT(skinned.error().message, HasSubstr("pose applied"));
+    Sample morphed, compressed, old;
     morphed.root["meshes"][0]["weights"] = {0, 0.5};
     EXPECT_THAT(morphed.error().message, HasSubstr("shape applied"));
     morphed.root["meshes"][0]["weights"] = {0, 0};
     EXPECT_TRUE(morphed.read());
-    compressed.root["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-    EXPECT_THAT(compressed.error().message, HasSubstr("KHR_draco_mesh_compression"));
+    compressed.root["extensionsRequired"] = {"EXT_something_else"};
+    EXPECT_THAT(compressed.error().message, HasSubstr("EXT_something_else"));
     old.root["asset"]["version"] = "1.0";
     EXPECT_EQ(old.error().kind, ErrorKind::unsupported);
 }
@@ -327,7 +331,6 @@ TEST(GltfReading, SizesAndPlacesThatAreNotTrueAreErrors) {
     refused("negative", [&](json& root) { root["accessors"][0]["count"] = -1; });
     refused("fraction", [&](json& root) { root["accessors"][0]["count"] = 3.5; });
     refused("a matrix", [&](json& root) { root["accessors"][0]["type"] = "MAT2"; });
-    refused("no view", [&](json& root) { root["accessors"][0].erase("bufferView"); });
     refused("short matrix", [&](json& root) { root["nodes"][0]["matrix"] = {1, 0}; });
     refused("not a list", [&](json& root) { root["nodes"][0]["children"] = 1; });
     refused("circle", [&](json& root) { root["nodes"][0]["children"] = {0}; });
@@ -366,11 +369,8 @@ TEST(GltfReading, CutOffAndDamagedFilesAreErrors) {
     ASSERT_TRUE(read_gltf(whole, {}));
     for (std::size_t size = 0; size < whole.size(); ++size)
         EXPECT_FALSE(read_gltf(std::span(whole).first(size), {})) << size;
-    // The binary chunk says that it is eight bytes longer than the file.
-    auto longer = whole;
-    longer[longer.size() - sample.binary.size() - 8] += 8;
-    EXPECT_THAT(read_gltf(longer, {}).error().message, HasSubstr("cut off"));
-    for (const char* text : {"", "{", "[]", "{}", "null", R"({"asset": {}})", R"({"asset": {"version": 2}})"})
+    for (const char* text : {"", "{", "[]", "{}", "null", R"({"asset": {}})", R"({"asset": {"version": 2}})",
+          R"({"asset": {"version": "3.0"}})", R"({"asset": {"version": "2.1", "minVersion": "2.1"}})"})
         EXPECT_FALSE(read_gltf(bytes_of(text), {})) << text;
     // Brackets in brackets.
     std::string deep = R"({"asset": {"version": "2.0", "extras": )" + std::string(300000, '[');
