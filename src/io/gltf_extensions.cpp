@@ -29,7 +29,6 @@ constexpr std::string_view harmless_beginnings[] = {
     "KHR_animation_",
     "KHR_interactivity",
     "KHR_physics_",
-    "KHR_audio",
     "KHR_node_",
     "KHR_texture_",
     "EXT_texture_",
@@ -40,17 +39,11 @@ constexpr std::string_view harmless_beginnings[] = {
     "FB_",
     "MSFT_packing_",
     "MSFT_lod",
-    "MSFT_audio",
     "EXT_mesh_manifold",
     "EXT_mesh_features",
-    "EXT_mesh_polygon",
     "EXT_structural_metadata",
     "EXT_instance_features",
     "CESIUM_primitive_outline",
-    "UNITY_",
-    "SKETCHFAB_",
-    "NEEDLE_",
-    "MOZ_",
 };
 
 bool is_known(std::string_view name) {
