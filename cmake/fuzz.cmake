@@ -3,7 +3,7 @@
 file(GLOB fuzz_sources CONFIGURE_DEPENDS fuzz/targets/*.cpp)
 set(fuzz_libraries htvm_c htvm_encoder htvm_decoder htvm_io htvm_images htvm_sound htvm_live htvm_texture)
 # libdraco keeps a byte of the file in a bool and reads it back in its headers: harmless, and not our code.
-set_source_files_properties(src/io/drc.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=bool)
+set_source_files_properties(src/io/draco_geometry.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=bool)
 if(HTVM_FUZZ)
   add_custom_target(fuzz)
   foreach(source ${fuzz_sources})

@@ -152,6 +152,15 @@ if command -v draco_encoder >/dev/null; then
     draco_encoder -i "$work/square.obj" -o "$out/import_drc/sequential" -cl 0 >/dev/null
     draco_encoder -i "$work/normals/frame_00060.ply" -o "$out/import_drc/person" -qp 8 >/dev/null
     draco_encoder -point_cloud -i "$work/normals/frame_00060.ply" -o "$out/import_drc/cloud" -qp 8 >/dev/null
+    size=$(stat -c %s "$out/import_drc/square")
+    cat >"$out/import_gltf/draco" <<GLTF
+{"asset": {"version": "2.0"}, "extensionsRequired": ["KHR_draco_mesh_compression"], "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "extensions": {"KHR_draco_mesh_compression":
+   {"bufferView": 0, "attributes": {"POSITION": 0, "TEXCOORD_0": 1}}}}]}],
+ "accessors": [{"componentType": 5126, "count": 4, "type": "VEC3"}, {"componentType": 5126, "count": 4, "type": "VEC2"},
+               {"componentType": 5123, "count": 6, "type": "SCALAR"}],
+ "bufferViews": [{"buffer": 0, "byteLength": $size}], "buffers": [{"byteLength": $size, "uri": "data:;base64,$(base64 -w0 "$out/import_drc/square")"}]}
+GLTF
 fi
 
 "$htvm" decode "$work/tiny_tracked.htvm" -o "$work/gltf/%d.glb" --quiet
@@ -171,6 +180,29 @@ cat >"$out/import_gltf/nodes" <<'GLTF'
                {"bufferView": 1, "componentType": 5121, "count": 4, "type": "SCALAR"}],
  "bufferViews": [{"buffer": 0, "byteLength": 16, "byteStride": 4}, {"buffer": 0, "byteOffset": 16, "byteLength": 4}],
  "buffers": [{"byteLength": 20, "uri": "data:;base64,AQIDBH8GBwgJgAsMDQ4P/wABAgM="}]}
+GLTF
+# Images and emission, sparse accessors, instances, a skeleton, nodes and scenes that are not shown.
+cat >"$out/import_gltf/looks" <<'GLTF'
+{"asset": {"version": "2.1", "minVersion": "2.0"}, "extensionsUsed": ["KHR_node_visibility", "EXT_unknown"],
+ "scenes": [{"nodes": [0, 1, 2]}, {}], "animations": [{}], "skins": [{"joints": [2]}],
+ "nodes": [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 2, "SCALE": 0}}}},
+           {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": false}}}, {"mesh": 0, "skin": 0, "translation": [0, 1, 0]}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1, "TEXCOORD_1": 1, "COLOR_0": 0}, "indices": 3, "material": 0},
+                            {"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 3, "mode": 5, "material": 1},
+                            {"attributes": {"POSITION": 0}, "mode": 1}]}],
+ "materials": [{"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [1, 0, 1, 1], "diffuseTexture": {"index": 0, "texCoord": 1,
+                  "extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": 1, "scale": [2, 2]}}}}}, "alphaMode": "MASK"},
+               {"emissiveFactor": [1, 1, 0], "emissiveTexture": {"index": 1}, "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]},
+                "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 2}}}],
+ "textures": [{"source": 0}, {"source": 0, "extensions": {"KHR_texture_basisu": {"source": 1}, "EXT_texture_webp": {"source": 0}}}],
+ "images": [{"bufferView": 0}, {"uri": "a%20b.ktx2"}],
+ "accessors": [{"componentType": 5126, "count": 4, "type": "VEC3",
+                "sparse": {"count": 2, "indices": {"bufferView": 1, "componentType": 5121}, "values": {"bufferView": 2}}},
+               {"bufferView": 0, "componentType": 5121, "count": 4, "type": "VEC2", "normalized": true},
+               {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"},
+               {"bufferView": 1, "componentType": 5121, "count": 6, "type": "SCALAR"}],
+ "bufferViews": [{"buffer": 0, "byteLength": 8, "byteOffset": 8}, {"buffer": 0, "byteLength": 6}, {"buffer": 0, "byteLength": 24, "byteOffset": 8}],
+ "buffers": [{"byteLength": 32, "uri": "data:application/gltf-buffer;base64,AQIDAAECAAAAAIA/AAAAQAAAQEAAAIC/AAAAPwAAAAA="}]}
 GLTF
 
 cat >"$out/import_bvh/person" <<'BVH'

@@ -1,18 +1,14 @@
 #include "io/drc.h"
 
-#include <draco/compression/decode.h>
-#include <draco/metadata/geometry_metadata.h>
-#include <draco/metadata/metadata_decoder.h>
-
 #include <algorithm>
-#include <cmath>
-#include <exception>
-#include <memory>
-#include <new>
-#include <optional>
+#include <array>
+#include <limits>
 #include <string>
+#include <utility>
+#include <vector>
 
-#include "core/bytes.h"
+#include "io/draco_geometry.h"
+#include "io/mesh_finite.h"
 
 namespace htvm {
 
@@ -24,202 +20,127 @@ tl::unexpected<Error> not_readable(const std::string& why) {
     return fail(ErrorKind::bad_input, "the Draco file cannot be read: " + why);
 }
 
-struct DracoCounts {
-    std::uint64_t faces = 0;
-    std::uint64_t points = 0;  // at least, for a mesh; attribute seams add more
+struct Names {
+    const char *about, *many;
 };
 
-// The counts that libdraco is going to allocate for, read from the beginning of the file: "DRACO", version, type and
-// method, flags; metadata if the flags say so; counts.
-Result<DracoCounts> claimed_counts(std::span<const std::uint8_t> bytes) {
-    constexpr std::size_t header_bytes = 11;
-    if (bytes.size() < header_bytes || !std::equal(bytes.begin(), bytes.begin() + 5, "DRACO")) {
-        return not_readable("it does not begin with \"DRACO\"");
+// An attribute of one kind, the first of several, with its numbers.
+struct Rows {
+    const DracoAttribute* attribute = nullptr;  // nullptr: there is none
+    std::vector<double> numbers;
+    // Integers that stand for shares are those.
+    double number(std::uint32_t point, std::size_t column) const {
+        const double value = numbers[std::size_t{point} * attribute->components + column];
+        return attribute->normalised && attribute->most ? std::max(value / *attribute->most, -1.0) : value;
     }
-    const int version = bytes[5] * 256 + bytes[6];
-    if (version < 2 * 256 + 2) {
-        return fail(ErrorKind::unsupported, "the Draco file is of bitstream version " + std::to_string(bytes[5]) + "." +
-                                                std::to_string(bytes[6]) + "; encode it again with Draco 1.2 or later");
+};
+
+// The first attribute of the kind, if its components are at least that many.
+Result<Rows> rows_of(const DracoGeometry& geometry, DracoKind kind, std::size_t least, const Names& names,
+                     MeshFindings* findings) {
+    Rows out;
+    std::size_t count = 0;
+    for (const auto& attribute : geometry.attributes)
+        if (attribute.kind == kind && count++ == 0) out.attribute = &attribute;
+    if (count > 1)
+        remark(findings, names.about,
+               "of its " + std::to_string(count) + " sets of " + names.many + " the first is taken");
+    if (!out.attribute) return out;
+    const auto components = out.attribute->components;
+    if (components < least || components > 4) {
+        remark(findings, names.about,
+               std::string("its ") + names.many + " have " + std::to_string(components) + " numbers each, not " +
+                   std::to_string(least) + ": they are passed over",
+               true);
+        return Rows();
     }
-    const bool is_mesh = bytes[7] == 1;
-    const bool edgebreaker = bytes[8] == 1;
-    const bool metadata = (bytes[10] & 0x80) != 0;
-    std::span<const std::uint8_t> rest = bytes.subspan(header_bytes);
-    if (metadata) {
-        draco::DecoderBuffer buffer;
-        buffer.Init(reinterpret_cast<const char*>(rest.data()), rest.size());
-        buffer.set_bitstream_version(static_cast<std::uint16_t>(version));
-        draco::GeometryMetadata skipped;
-        if (!draco::MetadataDecoder().DecodeGeometryMetadata(&buffer, &skipped)) return not_readable("bad metadata");
-        rest = rest.subspan(static_cast<std::size_t>(buffer.decoded_size()));
-    }
-    ByteReader in(rest);
-    DracoCounts counts;
-    if (!is_mesh) {
-        counts.points = in.u32();
-    } else if (edgebreaker) {
-        in.u8();  // the method of traversal
-        counts.points = in.varint();
-        counts.faces = in.varint();
-    } else {
-        counts.faces = in.varint();
-        counts.points = in.varint();
-    }
-    if (!in.ok()) return not_readable("it ends within its header");
-    return counts;
+    auto numbers = draco_rows(geometry, *out.attribute);
+    if (!numbers) return tl::unexpected(numbers.error());
+    out.numbers = std::move(*numbers);
+    return out;
 }
 
-Result<void> check_counts(const DracoCounts& counts, std::size_t file_bytes, const MeshLimits& limits) {
-    if (auto ok = check_count(counts.points, limits.most_vertices, "vertices"); !ok) return ok;
-    if (auto ok = check_count(counts.faces, limits.most_triangles, "triangles"); !ok) return ok;
-    // Draco never gets below a hundredth of a bit per vertex, except in small meshes, which may be one repeated value.
-    const std::uint64_t believable = 65536 + std::uint64_t{1000} * file_bytes;
-    if (counts.points > believable || counts.faces > believable) {
-        return not_readable("it claims " + std::to_string(counts.points) + " vertices and " +
-                            std::to_string(counts.faces) + " triangles in " + std::to_string(file_bytes) + " bytes");
-    }
-    return {};
-}
-
-// Calls take(point, components) for each point; false if the attribute does not have data for all points.
-template <std::size_t N, class Take>
-bool for_each_point(const draco::PointCloud& cloud, const draco::PointAttribute& attribute, Take take) {
-    const std::uint32_t points = cloud.num_points();
-    if (!attribute.IsValid()) return false;
-    if (!attribute.is_mapping_identity() && attribute.indices_map_size() < points) return false;
-    const std::int64_t value_bytes = std::int64_t{draco::DataTypeLength(attribute.data_type())} * N;
-    const auto data_bytes = static_cast<std::int64_t>(attribute.buffer()->data_size());
-    for (std::uint32_t p = 0; p < points; ++p) {
-        const draco::AttributeValueIndex index = attribute.mapped_index(draco::PointIndex(p));
-        if (index.value() >= attribute.size() || attribute.GetBytePos(index) + value_bytes > data_bytes) return false;
-        std::array<double, N> value{};
-        if (!attribute.ConvertValue<double, static_cast<int>(N)>(index, value.data())) return false;
-        take(p, value);
-    }
-    return true;
-}
-
-Result<void> copy_positions(const draco::PointCloud& cloud, Mesh& mesh) {
-    const draco::PointAttribute* attribute = cloud.GetNamedAttribute(draco::GeometryAttribute::POSITION);
-    if (!attribute) {
-        return cloud.num_points() == 0 ? Result<void>() : not_readable("it holds no positions");
-    }
-    if (attribute->num_components() != 3) {
+// A position that no float can hold becomes one that is not finite, as it may be that of a vertex that nothing uses.
+Result<void> copy_positions(const DracoGeometry& geometry, const std::array<double, 3>& origin, Mesh& mesh,
+                            MeshFindings* findings) {
+    const bool any = std::ranges::any_of(geometry.attributes,
+                                         [](const auto& attribute) { return attribute.kind == DracoKind::position; });
+    if (!any) return geometry.points == 0 ? Result<void>() : not_readable("it holds no positions");
+    const auto rows = rows_of(geometry, DracoKind::position, 2, {"positions", "positions"}, findings);
+    if (!rows) return tl::unexpected(rows.error());
+    if (!rows->attribute)
         return fail(ErrorKind::unsupported, "the Draco file's positions do not have three components");
-    }
-    std::optional<std::uint32_t> broken;
-    const bool complete =
-        for_each_point<3>(cloud, *attribute, [&](std::uint32_t p, const std::array<double, 3>& value) {
-            for (const double c : value) {
-                if (!fits_float(c) && !broken) broken = p;
-            }
-            mesh.positions.push_back({finite_or_zero(value[0]), finite_or_zero(value[1]), finite_or_zero(value[2])});
-        });
-    if (!complete) return not_readable("its positions are incomplete");
-    if (broken) {
-        return fail(ErrorKind::bad_input, "the position of vertex " + std::to_string(*broken) + " is not finite");
+    for (std::uint32_t p = 0; p < geometry.points; ++p) {
+        auto& position = mesh.positions.emplace_back();
+        for (std::size_t i = 0; i < 3; ++i) {
+            const double c = (i < rows->attribute->components ? rows->number(p, i) : 0) - origin[i];
+            position[i] = fits_float(c) ? static_cast<float>(c) : std::numeric_limits<float>::quiet_NaN();
+        }
     }
     return {};
 }
 
-Result<void> copy_colours(const draco::PointCloud& cloud, Mesh& mesh) {
-    const draco::PointAttribute* attribute = cloud.GetNamedAttribute(draco::GeometryAttribute::COLOR);
-    if (!attribute) return {};
-    double scale = 1;
-    switch (attribute->data_type()) {
-        case draco::DT_UINT8:
-            break;
-        case draco::DT_UINT16:
-            scale = 1.0 / 257;
-            break;
-        case draco::DT_FLOAT32:
-        case draco::DT_FLOAT64:
-            scale = 255;
-            break;
-        default:
-            return fail(ErrorKind::unsupported, "the Draco file's colours are neither 8 nor 16 bits nor floats");
+// Colours of one or two components are grey, with or without alpha. Of all but bytes, the type does not say the range.
+Result<void> copy_colours(const DracoGeometry& geometry, const std::optional<ColourRange>& given, Mesh& mesh,
+                          MeshFindings* findings) {
+    const auto rows = rows_of(geometry, DracoKind::colour, 1, {"colours", "colours"}, findings);
+    if (!rows) return tl::unexpected(rows.error());
+    if (!rows->attribute) return {};
+    const auto components = rows->attribute->components;
+    const bool is_grey = components < 3;
+    if (is_grey) remark(findings, "grey-colours", "its colours have one number each, and are taken for grey");
+    const auto of = [&](std::uint32_t p, std::size_t i) { return rows->number(p, is_grey ? 0 : i); };
+    const bool is_share = rows->attribute->normalised && rows->attribute->most;
+    const bool is_byte = !is_share && rows->attribute->most && *rows->attribute->most <= 255;
+    ColourRange range = is_share ? ColourRange::unit : ColourRange::bytes;
+    if (!is_share && !is_byte) {
+        ColourLevels levels;
+        for (std::uint32_t p = 0; p < geometry.points; ++p)
+            for (std::size_t i = 0; i < 3; ++i) levels.count(of(p, i));
+        range = given.value_or(colour_range_of(levels));
+        // Whole numbers up to 1 are dark levels.
+        if (rows->attribute->most && range == ColourRange::unit) range = ColourRange::bytes;
+        if (findings) findings->colour_levels += levels;
     }
-    if (attribute->num_components() < 3 || attribute->num_components() > 4) {
-        return fail(ErrorKind::unsupported, "the Draco file's colours do not have three or four components");
-    }
-    // libdraco scales normalised integers to 0..1.
-    if (attribute->normalized()) scale = 255;
-    const bool complete = for_each_point<3>(cloud, *attribute, [&](std::uint32_t, const std::array<double, 3>& value) {
-        Colour colour{};
-        for (std::size_t i = 0; i < 3; ++i) {
-            const double c = value[i] * scale;
-            colour[i] = c > 0 ? static_cast<std::uint8_t>(std::lround(std::min(c, 255.0))) : std::uint8_t{0};
-        }
-        mesh.colours.push_back(colour);
-    });
-    return complete ? Result<void>() : not_readable("its colours are incomplete");
+    for (std::uint32_t p = 0; p < geometry.points; ++p)
+        mesh.colours.push_back(
+            {colour_level(of(p, 0), range), colour_level(of(p, 1), range), colour_level(of(p, 2), range)});
+    return {};
 }
 
 template <std::size_t N>
-Result<void> copy_floats(const draco::PointCloud& cloud, draco::GeometryAttribute::Type type, const char* name,
-                         std::vector<std::array<float, N>>& out) {
-    const draco::PointAttribute* attribute = cloud.GetNamedAttribute(type);
-    if (!attribute) return {};
-    if (attribute->num_components() != N) {
-        return fail(ErrorKind::unsupported,
-                    std::string("the Draco file's ") + name + " do not have " + std::to_string(N) + " components");
+Result<void> copy_floats(const DracoGeometry& geometry, DracoKind kind, const Names& names,
+                         std::vector<std::array<float, N>>& out, MeshFindings* findings) {
+    const auto rows = rows_of(geometry, kind, N, names, findings);
+    if (!rows) return tl::unexpected(rows.error());
+    if (!rows->attribute) return {};
+    // Integers of either can only be shares.
+    const double scale = rows->attribute->most && !rows->attribute->normalised ? 1 / *rows->attribute->most : 1;
+    for (std::uint32_t p = 0; p < geometry.points; ++p) {
+        auto& row = out.emplace_back();
+        for (std::size_t i = 0; i < N; ++i) row[i] = finite_or_zero(rows->number(p, i) * scale);
     }
-    const bool complete = for_each_point<N>(cloud, *attribute, [&](std::uint32_t, const std::array<double, N>& value) {
-        std::transform(value.begin(), value.end(), out.emplace_back().begin(), finite_or_zero);
-    });
-    return complete ? Result<void>() : not_readable(std::string("its ") + name + " are incomplete");
-}
-
-Result<Mesh> mesh_of(const draco::PointCloud& cloud, const draco::Mesh* faces, const MeshLimits& limits) {
-    if (auto ok = check_count(cloud.num_points(), limits.most_vertices, "vertices"); !ok) {
-        return tl::unexpected(ok.error());
-    }
-    Mesh mesh;
-    Result<void> taken = copy_positions(cloud, mesh);
-    if (taken) taken = copy_colours(cloud, mesh);
-    if (taken) taken = copy_floats(cloud, draco::GeometryAttribute::NORMAL, "normals", mesh.normals);
-    if (taken) taken = copy_floats(cloud, draco::GeometryAttribute::TEX_COORD, "texture coordinates", mesh.texcoords);
-    if (!taken) return tl::unexpected(taken.error());
-    const std::uint32_t face_count = faces ? faces->num_faces() : 0;
-    for (std::uint32_t f = 0; f < face_count; ++f) {
-        const draco::Mesh::Face& face = faces->face(draco::FaceIndex(f));
-        mesh.triangles.push_back({face[0].value(), face[1].value(), face[2].value()});
-    }
-    if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
-    return mesh;
-}
-
-Result<Mesh> decode(std::span<const std::uint8_t> bytes, const MeshLimits& limits) {
-    draco::DecoderBuffer buffer;
-    buffer.Init(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    const auto type = draco::Decoder::GetEncodedGeometryType(&buffer);
-    if (!type.ok()) return not_readable(type.status().error_msg_string());
-    draco::Decoder decoder;
-    if (type.value() == draco::TRIANGULAR_MESH) {
-        auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-        if (!decoded.ok()) return not_readable(decoded.status().error_msg_string());
-        return mesh_of(*decoded.value(), decoded.value().get(), limits);
-    }
-    if (type.value() != draco::POINT_CLOUD) return not_readable("it is neither a mesh nor a point cloud");
-    auto decoded = decoder.DecodePointCloudFromBuffer(&buffer);
-    if (!decoded.ok()) return not_readable(decoded.status().error_msg_string());
-    return mesh_of(*decoded.value(), nullptr, limits);
+    return {};
 }
 
 }  // namespace
 
-Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshReadOptions& options, MeshFindings*) {
-    const auto& limits = options.limits;
-    try {
-        const auto counts = claimed_counts(bytes);
-        if (!counts) return tl::unexpected(counts.error());
-        if (auto ok = check_counts(*counts, bytes.size(), limits); !ok) return tl::unexpected(ok.error());
-        return decode(bytes, limits);
-    } catch (const std::bad_alloc&) {
-        return fail(ErrorKind::limit, "the Draco file asks for more memory than there is");
-    } catch (const std::exception& e) {
-        return not_readable(e.what());
-    }
+Result<Mesh> read_drc(std::span<const std::uint8_t> bytes, const MeshReadOptions& options, MeshFindings* findings) {
+    auto geometry = read_draco_geometry(bytes, options.limits);
+    if (!geometry) return tl::unexpected(geometry.error());
+    Mesh mesh;
+    auto taken = copy_positions(*geometry, options.origin, mesh, findings);
+    if (taken) taken = copy_colours(*geometry, options.colour_range, mesh, findings);
+    if (taken) taken = copy_floats(*geometry, DracoKind::normal, {"normals", "normals"}, mesh.normals, findings);
+    if (taken)
+        taken = copy_floats(*geometry, DracoKind::texcoord, {"texture-coordinates", "texture coordinates"},
+                            mesh.texcoords, findings);
+    if (!taken) return tl::unexpected(taken.error());
+    mesh.triangles = std::move(geometry->triangles);
+    std::vector<std::uint16_t> no_parts;
+    if (auto ok = leave_out_not_finite(mesh, no_parts, findings); !ok) return tl::unexpected(ok.error());
+    if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
+    return mesh;
 }
 
 }  // namespace htvm

@@ -4,20 +4,32 @@
 // nested brackets, copies the binary chunk for every buffer that names it, and leaves the bounds of accessors to its
 // caller.
 //
-// Read: every mesh that the file's scene shows, joined to one, with the transforms of the nodes applied. POSITION,
-// NORMAL, COLOR_0 (times the material's base colour) and TEXCOORD_0, of floats or integers; triangles, strips, fans and
-// points, with indices or without. A material's base colour and its texture's image, with the coordinates that it
-// uses (KHR_texture_transform applied; the base colour does not multiply the image). Lines, materials otherwise,
-// cameras, lights and animations are passed over, and so are nodes that are scaled to nothing, which glTF uses to hide.
-// A vertex that lacks what others have is white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh
-// that share their vertices go on sharing them.
+// Read: every mesh that the file's scene shows, joined to one, with the transforms of the nodes applied, instances too
+// (EXT_mesh_gpu_instancing), less those that are hidden by KHR_node_visibility or by a scale of nothing. POSITION,
+// NORMAL, COLOR_0 and the texture coordinates that the image uses, of floats or integers, sparse or not, or compressed
+// by Draco; triangles, strips, fans, or points alone, with indices or without. A vertex that lacks what others have is
+// white, has a zero normal, texture coordinate 0, 0. Primitives of one mesh that share their vertices go on sharing
+// them. Vertices whose positions are no numbers are left out (mesh_finite.h).
 //
-// Not read, with an error that says so: sparse accessors, skins and weighted morph targets (the vertices of a frame are
-// what counts), and required extensions about geometry other than KHR_mesh_quantization, such as Draco.
+// What it looks like is by gltf_material.h. TextureReference gets each image once, and a part for each look in the
+// order of the materials; colours of parts and of vertices multiply the image. Where nothing has an image, the
+// materials' colours are those of the vertices, and multiply theirs; a grey that is everywhere, as programs write it by
+// default, is none.
+//
+// Passed over, with a remark: lines, points beside triangles, emission besides a colour, what alpha lets through,
+// animations (everything is as at rest), scenes but the shown one, extensions that are not known. Without one: cameras,
+// lights and how surfaces answer light.
+//
+// Not read, with an error that says so: skins whose pose changes the shape and weighted morph targets (the vertices of
+// a frame are what counts), views that are compressed by meshopt and have no plain ones beside them, and required
+// extensions that are not known. Images as KTX2 or AVIF alone are told apart by their name, which says so.
 //
 // glTF's colours are linear light, ours sRGB levels: 16 bits keep each of the 256 levels. Its texture coordinates begin
 // at the top of the picture, ours at the bottom, as in OBJ: v becomes 1 - v. Positions keep the file's own unit, which
-// is to be the metre: see mesh_file.h for the scale to millimetres.
+// is to be the metre: see mesh_file.h for the scale to millimetres. The transforms are applied, and the origin is taken
+// off, in doubles.
+//
+// Draco goes through libdraco: read untrusted files in a process of their own (drc.h).
 #pragma once
 
 #include <array>

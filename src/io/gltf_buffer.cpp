@@ -7,7 +7,7 @@
 
 #include "core/bytes.h"
 #include "core/srgb.h"
-#include "io/gltf_file.h"
+#include "io/gltf_accessor.h"
 
 namespace htvm::internal {
 namespace {

@@ -1,11 +1,10 @@
 #include "io/gltf_file.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <string_view>
 
 #include "core/bytes.h"
+#include "io/gltf_uri.h"
 #include "io/mesh_check.h"
 #include "io/mesh_file.h"
 #include "io/skeleton_json_value.h"
@@ -19,9 +18,7 @@ using nlohmann::json;
 constexpr std::uint64_t most_json_bytes = std::uint64_t{1} << 27;
 constexpr std::uint64_t most_buffer_bytes = std::uint64_t{1} << 32;  // of all buffers of a file
 
-tl::unexpected<Error> not_readable(const std::string& why) {
-    return fail(ErrorKind::bad_input, "the glTF cannot be read: " + why);
-}
+tl::unexpected<Error> not_readable(const std::string& why) { return gltf_not_readable(why); }
 
 // ---- The container --------------------------------------------------------------------------------------------------
 
@@ -30,115 +27,59 @@ struct Parts {
     std::span<const std::uint8_t> binary;
 };
 
+// The text of a JSON chunk, which some programs fill up with zeros.
+std::string_view text_of(std::span<const std::uint8_t> chunk) {
+    std::string_view text(reinterpret_cast<const char*>(chunk.data()), chunk.size());
+    while (text.ends_with('\0')) text.remove_suffix(1);
+    return text;
+}
+
+// The chunks say how long they are, and are believed as far as the file goes: what is missing of the binary one is
+// found out where it is needed.
 Result<Parts> parts_of_glb(std::span<const std::uint8_t> bytes) {
-    ByteReader header(bytes);
-    header.u32();
-    const auto version = header.u32();
-    const std::uint64_t length = header.u32();
-    if (header.ok() && version != 2)
+    ByteReader chunks(bytes);
+    chunks.u32();
+    const auto version = chunks.u32();
+    chunks.u32();  // the length of all
+    if (!chunks.ok()) return not_readable("it is cut off");
+    if (version != 2)
         return fail(ErrorKind::unsupported, "the .glb is of version " + std::to_string(version) + ", not 2");
-    if (!header.ok() || length > bytes.size() || length < header.position()) return not_readable("it is cut off");
-    ByteReader chunks(bytes.first(static_cast<std::size_t>(length)).subspan(header.position()));
     Parts parts;
-    for (bool first = true; chunks.remaining() >= 8; first = false) {
+    while (chunks.remaining() >= 8 && (parts.json.empty() || parts.binary.empty())) {
         const auto size = chunks.u32();
         const auto type = chunks.u32();
-        const auto content = chunks.bytes(size);
-        if (!chunks.ok()) return not_readable("a chunk of the .glb is cut off");
-        if (first != (type == glb_json_chunk)) return not_readable("the .glb does not begin with its only JSON chunk");
-        if (first) parts.json = {reinterpret_cast<const char*>(content.data()), content.size()};
+        const auto content = chunks.bytes(std::min<std::size_t>(size, chunks.remaining()));
+        if (type == glb_json_chunk && content.size() < size) return not_readable("its JSON is cut off");
+        if (type == glb_json_chunk && parts.json.empty()) parts.json = text_of(content);
         if (type == glb_binary_chunk && parts.binary.empty()) parts.binary = content;
     }
+    if (parts.json.empty()) return not_readable("the .glb has no JSON in it");
     return parts;
 }
 
-// Extensions that may be required: they change nothing that is read here, or are understood.
-bool is_harmless(const std::string& extension) {
-    for (const std::string_view begin : {"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"})
-        if (extension.starts_with(begin)) return true;
-    return extension == "KHR_mesh_quantization" || extension == "KHR_node_visibility";
-}
-
+// "2.1" may be read by those who know 2.0, unless the file says otherwise.
 Result<void> check_version(const json& root) {
     const auto* asset = find_member(root, "asset");
     const auto* version = asset ? find_member(*asset, "version") : nullptr;
     if (!version || !version->is_string()) return not_readable("it does not say its version");
-    const auto& text = version->get_ref<const std::string&>();
-    if (!text.starts_with("2."))
-        return fail(ErrorKind::unsupported, "the glTF is of version " + text.substr(0, 20) + ", not 2");
-    const auto* required = find_member(root, "extensionsRequired");
-    if (!required || !required->is_array()) return {};
-    for (const auto& extension : *required) {
-        const auto name = extension.is_string() ? extension.get<std::string>() : std::string();
-        if (!is_harmless(name))
-            return fail(ErrorKind::unsupported, "the glTF needs the extension \"" + name.substr(0, 60) +
-                                                    "\", which is not read; export it without (for Draco: without "
-                                                    "compression)");
-    }
-    return {};
+    const auto* least = find_member(*asset, "minVersion");
+    const auto& text = (least && least->is_string() ? least : version)->get_ref<const std::string&>();
+    const bool is_read =
+        least && least->is_string() ? text == "2.0" || text == "2" : text.starts_with("2.") || text == "2";
+    if (is_read) return {};
+    return fail(ErrorKind::unsupported, "the glTF is of version " + text.substr(0, 20) + ", not 2");
 }
 
 // ---- Buffers --------------------------------------------------------------------------------------------------------
-
-std::optional<std::vector<std::uint8_t>> decoded_base64(std::string_view text) {
-    while (text.ends_with('=')) text.remove_suffix(1);
-    std::vector<std::uint8_t> out;
-    out.reserve(text.size() / 4 * 3 + 2);
-    std::uint32_t bits = 0;
-    int count = 0;
-    for (const char c : text) {
-        std::uint32_t six = 0;
-        if (c >= 'A' && c <= 'Z')
-            six = static_cast<std::uint32_t>(c - 'A');
-        else if (c >= 'a' && c <= 'z')
-            six = static_cast<std::uint32_t>(c - 'a') + 26;
-        else if (c >= '0' && c <= '9')
-            six = static_cast<std::uint32_t>(c - '0') + 52;
-        else if (c == '+' || c == '/')
-            six = c == '+' ? 62 : 63;
-        else
-            return std::nullopt;
-        bits = bits << 6 | six;
-        count += 6;
-        if (count < 8) continue;
-        count -= 8;
-        out.push_back(static_cast<std::uint8_t>(bits >> count));
-    }
-    return out;
-}
-
-std::optional<std::string> decoded_percents(std::string_view text) {
-    std::string out;
-    const auto digit = [](char c) {
-        return c >= '0' && c <= '9'   ? c - '0'
-               : c >= 'a' && c <= 'f' ? c - 'a' + 10
-               : c >= 'A' && c <= 'F' ? c - 'A' + 10
-                                      : -1;
-    };
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        if (text[i] != '%') {
-            out += text[i];
-            continue;
-        }
-        const int high = i + 2 < text.size() ? digit(text[i + 1]) : -1;
-        const int low = high >= 0 ? digit(text[i + 2]) : -1;
-        if (low < 0) return std::nullopt;
-        out += static_cast<char>(high * 16 + low);
-        i += 2;
-    }
-    return out;
-}
 
 // The file that a URI names, if it lies in the folder or below it.
 Result<fs::path> file_in(const fs::path& folder, const std::string& uri) {
     const auto refused = [&](const std::string& why) {
         return not_readable("its buffer \"" + uri.substr(0, 100) + "\" " + why);
     };
-    const auto name = decoded_percents(uri);
-    if (!name || name->empty() || name->find('\0') != name->npos) return refused("has no name that can be read");
-    if (name->find(':') != name->npos || name->starts_with('/') || name->find('\\') != name->npos)
-        return refused("is not in its folder; only buffers there are read");
     if (folder.empty()) return refused("is a file of its own, which is not read here");
+    const auto name = name_in_uri(uri, folder);
+    if (!name || name->starts_with('/')) return refused("is not in its folder; only buffers there are read");
     std::error_code error;
     const auto inside = fs::canonical(folder, error);
     const auto path = error ? fs::path() : fs::canonical(folder / *name, error);
@@ -148,23 +89,20 @@ Result<fs::path> file_in(const fs::path& folder, const std::string& uri) {
     return path;
 }
 
-// What a data: URI holds.
-Result<std::vector<std::uint8_t>> content_of(const std::string& uri, const char* what) {
-    const auto comma = uri.find(";base64,");
-    auto content = comma == uri.npos ? std::nullopt : decoded_base64(std::string_view(uri).substr(comma + 8));
-    if (!content) return not_readable(std::string(what) + " inside of it is not Base64");
-    return std::move(*content);
-}
-
 Result<std::vector<std::uint8_t>> read_buffer(const GltfFile& file, const std::string& uri) {
     std::uint64_t taken = 0;
     for (const auto& [name, content] : file.buffers) taken += content.size();
-    if (uri.starts_with("data:")) return content_of(uri, "a buffer");
+    if (is_data_uri(uri)) {
+        auto content = content_of_data_uri(uri);
+        if (!content) return not_readable("a buffer inside of it is not Base64");
+        return std::move(*content);
+    }
     const auto path = file_in(file.folder, uri);
     if (!path) return tl::unexpected(path.error());
     return read_file(*path, most_buffer_bytes - std::min(taken, most_buffer_bytes));
 }
 
+// All that there is of a buffer, which is no less than its length.
 Result<std::span<const std::uint8_t>> open_buffer(GltfFile& file, std::uint64_t index) {
     const auto buffer = gltf_item(file, "buffers", index);
     if (!buffer) return tl::unexpected(buffer.error());
@@ -188,69 +126,45 @@ Result<std::span<const std::uint8_t>> open_buffer(GltfFile& file, std::uint64_t 
     if (*length > content.size())
         return not_readable("buffer " + std::to_string(index) + " has " + std::to_string(content.size()) +
                             " bytes of " + std::to_string(*length));
-    return content.first(static_cast<std::size_t>(*length));
+    return content;
 }
 
-// ---- Accessors ------------------------------------------------------------------------------------------------------
+// Whether an extension that compresses a view has left the plain bytes out.
+bool is_plain_left_out(const json& buffer, bool is_binary_chunk) {
+    for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"})
+        if (const auto* extension = gltf_extension(buffer, name)) {
+            const auto* fallback = find_member(*extension, "fallback");
+            if (fallback && fallback->is_boolean() && fallback->get<bool>()) return true;
+        }
+    return !find_member(buffer, "uri") && !is_binary_chunk;
+}
 
-// 0: no component type of glTF.
-std::size_t bytes_of(std::uint64_t component) {
-    switch (component) {
-        case static_cast<std::uint64_t>(GltfComponent::i8):
-        case static_cast<std::uint64_t>(GltfComponent::u8):
-            return 1;
-        case static_cast<std::uint64_t>(GltfComponent::i16):
-        case static_cast<std::uint64_t>(GltfComponent::u16):
-            return 2;
-        case static_cast<std::uint64_t>(GltfComponent::u32):
-        case static_cast<std::uint64_t>(GltfComponent::f32):
-            return 4;
-        default:
-            return 0;
+Result<void> check_compression(const GltfFile& file, const json& view, std::uint64_t buffer_index) {
+    for (const char* name : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
+        if (!gltf_extension(view, name)) continue;
+        const auto buffer = gltf_item(file, "buffers", buffer_index);
+        if (!buffer) return tl::unexpected(buffer.error());
+        if (is_plain_left_out(**buffer, buffer_index == 0 && !file.binary.empty()))
+            return fail(ErrorKind::unsupported, std::string("the glTF is compressed by ") + name +
+                                                    ", which is not read; write it without (gltfpack without -c, "
+                                                    "gltf-transform copy)");
     }
+    return {};
 }
 
-// 0: a type that is not read here.
-std::size_t components_of(const json& accessor) {
-    const auto* type = find_member(accessor, "type");
-    if (!type || !type->is_string()) return 0;
-    const auto& name = type->get_ref<const std::string&>();
-    if (name == "SCALAR") return 1;
-    const bool vector = name.size() == 4 && name.starts_with("VEC") && name[3] >= '2' && name[3] <= '4';
-    return vector ? static_cast<std::size_t>(name[3] - '0') : 0;
-}
-
-template <class T>
-T loaded(const std::uint8_t* at) {
-    T out;
-    std::memcpy(&out, at, sizeof out);
-    return out;
-}
-
-struct View {
-    std::span<const std::uint8_t> bytes;
-    std::optional<std::uint64_t> stride = {};
-};
-
-// Opens a view of numbers or of an image; nothing if it goes beyond its buffer.
-Result<std::optional<View>> open_view(GltfFile& file, std::uint64_t index) {
-    const auto view = gltf_item(file, "bufferViews", index);
-    if (!view) return tl::unexpected(view.error());
-    const auto buffer_index = gltf_number(**view, "buffer", 0);
-    const auto offset = gltf_number(**view, "byteOffset", 0);
-    const auto length = gltf_number(**view, "byteLength", 0);
-    const auto stride = gltf_index(**view, "byteStride");
-    for (const auto* number : {&buffer_index, &offset, &length})
-        if (!*number) return tl::unexpected(number->error());
-    if (!stride) return tl::unexpected(stride.error());
-    const auto buffer = open_buffer(file, *buffer_index);
-    if (!buffer) return tl::unexpected(buffer.error());
-    if (*offset > buffer->size() || *length > buffer->size() - *offset) return std::optional<View>();
-    return std::optional(
-        View{buffer->subspan(static_cast<std::size_t>(*offset), static_cast<std::size_t>(*length)), *stride});
+// What an image inside of the file is, if it is of a kind that no reader here takes; else nothing.
+std::string_view unread_kind(std::span<const std::uint8_t> bytes) {
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    if (text.starts_with("\xABKTX")) return "KTX2 with Basis (KHR_texture_basisu)";
+    if (text.size() > 12 && text.substr(4, 7) == "ftypavi") return "AVIF (EXT_texture_avif)";
+    return {};
 }
 
 }  // namespace
+
+tl::unexpected<Error> gltf_not_readable(const std::string& why) {
+    return fail(ErrorKind::bad_input, "the glTF cannot be read: " + why);
+}
 
 Result<GltfFile> open_gltf(std::span<const std::uint8_t> bytes, const fs::path& folder) {
     Parts parts{{reinterpret_cast<const char*>(bytes.data()), bytes.size()}, {}};
@@ -307,36 +221,35 @@ Result<std::array<double, N>> gltf_numbers(const json& object, const char* name,
         return not_readable(std::string("a \"") + name + "\" is not a list of " + std::to_string(N) + " numbers");
     return out;
 }
-template Result<std::array<double, 1>> gltf_numbers(const json&, const char*, const std::array<double, 1>&);
 template Result<std::array<double, 2>> gltf_numbers(const json&, const char*, const std::array<double, 2>&);
 template Result<std::array<double, 3>> gltf_numbers(const json&, const char*, const std::array<double, 3>&);
 template Result<std::array<double, 4>> gltf_numbers(const json&, const char*, const std::array<double, 4>&);
 template Result<std::array<double, 16>> gltf_numbers(const json&, const char*, const std::array<double, 16>&);
 
-double GltfAccessor::number(std::uint64_t row, std::size_t column) const {
-    const auto share = [this](double value, double most) { return normalised ? std::max(value / most, -1.0) : value; };
-    const auto* at = bytes.data() + row * stride;
-    switch (component) {
-        case GltfComponent::i8:
-            return share(loaded<std::int8_t>(at + column), 127);
-        case GltfComponent::u8:
-            return share(at[column], 255);
-        case GltfComponent::i16:
-            return share(loaded<std::int16_t>(at + 2 * column), 32767);
-        case GltfComponent::u16:
-            return share(loaded<std::uint16_t>(at + 2 * column), 65535);
-        case GltfComponent::u32:
-            return share(loaded<std::uint32_t>(at + 4 * column), 4294967295.0);
-        case GltfComponent::f32:
-            break;
-    }
-    return static_cast<double>(loaded<float>(at + 4 * column));
+Result<double> gltf_real(const json& object, const char* name, double otherwise) {
+    const auto* member = find_member(object, name);
+    if (!member) return otherwise;
+    const auto number = finite_number(*member);
+    if (!number) return not_readable(std::string("a \"") + name + "\" is no number");
+    return *number;
 }
 
-std::uint32_t GltfAccessor::whole(std::uint64_t row) const {
-    const auto* at = bytes.data() + row * stride;
-    if (component == GltfComponent::u8) return *at;
-    return component == GltfComponent::u16 ? loaded<std::uint16_t>(at) : loaded<std::uint32_t>(at);
+Result<GltfView> open_gltf_view(GltfFile& file, std::uint64_t index) {
+    const auto view = gltf_item(file, "bufferViews", index);
+    if (!view) return tl::unexpected(view.error());
+    const auto buffer_index = gltf_number(**view, "buffer", 0);
+    const auto offset = gltf_number(**view, "byteOffset", 0);
+    const auto length = gltf_number(**view, "byteLength", 0);
+    const auto stride = gltf_index(**view, "byteStride");
+    for (const auto* number : {&buffer_index, &offset, &length})
+        if (!*number) return tl::unexpected(number->error());
+    if (!stride) return tl::unexpected(stride.error());
+    if (auto ok = check_compression(file, **view, *buffer_index); !ok) return tl::unexpected(ok.error());
+    const auto buffer = open_buffer(file, *buffer_index);
+    if (!buffer) return tl::unexpected(buffer.error());
+    if (*offset > buffer->size() || *length > buffer->size() - *offset)
+        return not_readable("view " + std::to_string(index) + " goes beyond its buffer");
+    return GltfView{buffer->subspan(static_cast<std::size_t>(*offset), static_cast<std::size_t>(*length)), *stride};
 }
 
 Result<TextureReference::Image> gltf_image_at(GltfFile& file, std::uint64_t index) {
@@ -347,65 +260,28 @@ Result<TextureReference::Image> gltf_image_at(GltfFile& file, std::uint64_t inde
     if (const auto* uri = find_member(**image, "uri")) {
         if (!uri->is_string()) return not_readable("the URI of an image is no text");
         const auto& text = uri->get_ref<const std::string&>();
-        if (text.starts_with("data:")) {
-            auto content = content_of(text, "an image");
-            if (!content) return tl::unexpected(content.error());
-            out.bytes = std::move(*content);
+        if (!is_data_uri(text)) {
+            // Of one that leads elsewhere, the last part is looked for.
+            auto name = name_in_uri(text, file.folder);
+            if (!name) name = name_in_uri(text.substr(text.find_last_of("/\\:") + 1), file.folder);
+            if (!name) return not_readable("its image \"" + text.substr(0, 100) + "\" has no name that can be read");
+            out.name = *name;
             return out;
         }
-        const auto name = decoded_percents(text);
-        if (!name || name->empty() || name->find('\0') != name->npos)
-            return not_readable("its image \"" + text.substr(0, 100) + "\" has no name that can be read");
-        out.name = *name;
-        return out;
+        auto content = content_of_data_uri(text);
+        if (!content) return not_readable("an image inside of it is not Base64");
+        out.bytes = std::move(*content);
+    } else {
+        const auto view_index = gltf_index(**image, "bufferView");
+        if (!view_index) return tl::unexpected(view_index.error());
+        if (!*view_index) return not_readable(out.name + " has neither a URI nor a place in a buffer");
+        const auto view = open_gltf_view(file, **view_index);
+        if (!view) return tl::unexpected(view.error());
+        out.bytes.assign(view->bytes.begin(), view->bytes.end());
     }
-    const auto view_index = gltf_index(**image, "bufferView");
-    if (!view_index) return tl::unexpected(view_index.error());
-    if (!*view_index) return not_readable(out.name + " has neither a URI nor a place in a buffer");
-    const auto view = open_view(file, **view_index);
-    if (!view) return tl::unexpected(view.error());
-    if (!*view || (*view)->bytes.empty()) return not_readable(out.name + " is empty or goes beyond its buffer");
-    out.bytes.assign((*view)->bytes.begin(), (*view)->bytes.end());
-    return out;
-}
-
-Result<GltfAccessor> open_accessor(GltfFile& file, std::uint64_t index) {
-    const auto item = gltf_item(file, "accessors", index);
-    if (!item) return tl::unexpected(item.error());
-    const json& json_of = **item;
-    const auto wrong = [&](const std::string& why) {
-        return not_readable("accessor " + std::to_string(index) + " " + why);
-    };
-    if (find_member(json_of, "sparse"))
-        return fail(ErrorKind::unsupported,
-                    "accessor " + std::to_string(index) + " of the glTF is sparse, which is not read");
-    const auto view_index = gltf_index(json_of, "bufferView");
-    const auto offset = gltf_number(json_of, "byteOffset", 0);
-    const auto component = gltf_number(json_of, "componentType", 0);
-    const auto count = gltf_number(json_of, "count", 0);
-    if (!view_index) return tl::unexpected(view_index.error());
-    for (const auto* number : {&offset, &component, &count})
-        if (!*number) return tl::unexpected(number->error());
-    GltfAccessor out;
-    out.components = components_of(json_of);
-    const auto row = bytes_of(*component) * out.components;
-    if (row == 0) return wrong("is of a type that is not read here");
-    if (!*view_index) return wrong("has no values");
-    out.component = static_cast<GltfComponent>(*component);
-    out.count = *count;
-    const auto* normalised = find_member(json_of, "normalized");
-    out.normalised = normalised && normalised->is_boolean() && normalised->get<bool>();
-
-    const auto view = open_view(file, **view_index);
-    if (!view) return tl::unexpected(view.error());
-    if (!*view) return wrong("lies in a view that goes beyond its buffer");
-    const auto& [bytes, given_stride] = **view;
-    const std::uint64_t stride = given_stride.value_or(row);
-    if (stride < row || stride > 252) return wrong("has rows that overlap or lie too far apart");
-    out.stride = static_cast<std::size_t>(stride);
-    const auto room = *offset > bytes.size() ? 0 : bytes.size() - *offset;
-    if (out.count > 0 && (room < row || (out.count - 1) > (room - row) / stride)) return wrong("goes beyond its view");
-    out.bytes = bytes.subspan(static_cast<std::size_t>(room > 0 ? *offset : 0));
+    if (out.bytes.empty()) return not_readable(out.name + " is empty");
+    if (const auto kind = unread_kind(out.bytes); !kind.empty())
+        out.name += ", which is " + std::string(kind) + " and not read: write the file with PNG, JPEG or WebP images";
     return out;
 }
 

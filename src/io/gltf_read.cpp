@@ -1,15 +1,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/geometry.h"
 #include "core/srgb.h"
+#include "io/draco_geometry.h"
 #include "io/gltf.h"
+#include "io/gltf_accessor.h"
 #include "io/gltf_file.h"
+#include "io/gltf_material.h"
+#include "io/gltf_scene.h"
+#include "io/mesh_finite.h"
 #include "io/skeleton_json_value.h"
 
 namespace htvm {
@@ -20,63 +27,36 @@ namespace {
 
 using nlohmann::json;
 
-tl::unexpected<Error> not_readable(const std::string& why) {
-    return fail(ErrorKind::bad_input, "the glTF cannot be read: " + why);
-}
+constexpr std::uint64_t most_drawn = std::uint64_t{1} << 20;  // primitives, of all nodes and instances
 
-// ---- Transforms of nodes --------------------------------------------------------------------------------------------
+tl::unexpected<Error> not_readable(const std::string& why) { return gltf_not_readable(why); }
 
-struct Transform {
-    std::array<Vector3d, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};  // where the unit vectors go
-    Vector3d origin{};
-    bool is_identity = true;
+enum class Mode : std::uint64_t { points = 0, lines = 1, line_strip = 3, triangles = 4, strip = 5, fan = 6 };
 
-    Vector3d turned(const Vector3d& v) const { return axes[0] * v[0] + axes[1] * v[1] + axes[2] * v[2]; }
-    Vector3d moved(const Vector3d& p) const { return turned(p) + origin; }
+// A primitive that is shown.
+struct Drawn {
+    const json* primitive;
+    const GltfTransform* transform;
+    std::size_t node;  // which of the shown meshes it is of
+    Mode mode;
+    GltfLook look;
 };
 
-// First b, then a.
-Transform composed(const Transform& a, const Transform& b) {
-    if (a.is_identity) return b;
-    if (b.is_identity) return a;
-    return {{a.turned(b.axes[0]), a.turned(b.axes[1]), a.turned(b.axes[2])}, a.moved(b.origin), false};
-}
+// Where the numbers of an attribute are: in an accessor, or in a Draco bitstream, in whose place the accessor says how
+// they are meant.
+struct AttributeSource {
+    std::optional<std::uint64_t> accessor;
+    std::optional<std::uint64_t> draco_id;
+    auto operator<=>(const AttributeSource&) const = default;
+};
 
-// The node's own, relative to its parent.
-Result<Transform> transform_of(const json& node) {
-    const bool has_matrix = find_member(node, "matrix") != nullptr;
-    const auto m = gltf_numbers<16>(node, "matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
-    const auto move = gltf_numbers<3>(node, "translation", {0, 0, 0});
-    const auto turn = gltf_numbers<4>(node, "rotation", {0, 0, 0, 1});
-    const auto scale = gltf_numbers<3>(node, "scale", {1, 1, 1});
-    if (!m) return tl::unexpected(m.error());
-    if (!move) return tl::unexpected(move.error());
-    if (!turn) return tl::unexpected(turn.error());
-    if (!scale) return tl::unexpected(scale.error());
-    Transform out;
-    if (has_matrix) {
-        for (std::size_t i = 0; i < 3; ++i) out.axes[i] = {(*m)[4 * i], (*m)[4 * i + 1], (*m)[4 * i + 2]};
-        out.origin = {(*m)[12], (*m)[13], (*m)[14]};
-    } else {
-        const auto& [x, y, z, w] = *turn;
-        const auto& s = *scale;
-        out.axes[0] = Vector3d{1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)} * s[0];
-        out.axes[1] = Vector3d{2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)} * s[1];
-        out.axes[2] = Vector3d{2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)} * s[2];
-        out.origin = *move;
-    }
-    const Transform identity;
-    out.is_identity = out.axes == identity.axes && out.origin == identity.origin;
-    return out;
-}
-
-// ---- Vertices -------------------------------------------------------------------------------------------------------
-
-// The accessors that vertices come from, and the colour that multiplies theirs.
+// Where vertices come from, and what becomes of them. Primitives of a node that have the same source share them.
 struct VertexSource {
-    std::optional<std::uint64_t> positions, normals, colours, texcoords;
-    std::array<double, 4> factor{1, 1, 1, 1};
-    std::array<double, 6> placed{1, 0, 0, 0, 1, 0};  // texture coordinates: two rows of x, y and 1
+    std::size_t node = 0;
+    std::optional<std::uint64_t> draco_view;
+    AttributeSource positions, normals, colours, texcoords;
+    std::array<double, 3> factor{1, 1, 1};
+    std::array<double, 6> placed{1, 0, 0, 0, 1, 0};
     auto operator<=>(const VertexSource&) const = default;
 };
 
@@ -84,32 +64,89 @@ struct Vertices {
     std::size_t first = 0, count = 0;
 };
 
-struct Reading {
-    GltfFile file;
-    const MeshLimits& limits;
-    Mesh mesh = {};  // every attribute as long as the positions until the end
-    bool any_colours = false, any_normals = false, any_texcoords = false;
-    bool any_without_image = false;
-    TextureReference texture = {};
-    std::map<VertexSource, Vertices> of_node = {};  // vertices of the node at work that primitives may share
+// A part of the mesh, by which material and image it has; parts are in this order.
+using PartKey = std::pair<std::uint64_t, std::optional<std::uint64_t>>;
+struct Part {
+    std::array<double, 3> factor{1, 1, 1};
+    bool is_see_through = false;
+    std::size_t place = 0;  // among all, at the end
 };
 
-// An attribute's accessor, which has as many rows as there are positions.
-Result<GltfAccessor> open_attribute(Reading& reading, std::uint64_t index, const char* name, std::size_t least,
-                                    std::size_t most, std::uint64_t count) {
-    auto accessor = open_accessor(reading.file, index);
+struct Reading {
+    GltfFile file;
+    const MeshReadOptions& options;
+    MeshFindings* findings;
+    Mesh mesh = {};  // every attribute as long as the positions until the end
+    bool any_image = false;
+    bool any_colours = false, any_normals = false, any_texcoords = false;
+    std::map<VertexSource, Vertices> vertices = {};     // of the node at work
+    std::map<std::uint64_t, DracoGeometry> draco = {};  // by view
+    std::map<PartKey, Part> parts = {};
+    std::vector<const Part*> part_of_triangle = {};
+};
+
+// ---- Attributes -----------------------------------------------------------------------------------------------------
+
+Result<const DracoGeometry*> draco_geometry(Reading& reading, std::uint64_t view_index) {
+    if (const auto known = reading.draco.find(view_index); known != reading.draco.end()) return &known->second;
+    const auto view = open_gltf_view(reading.file, view_index);
+    if (!view) return tl::unexpected(view.error());
+    auto geometry = read_draco_geometry(view->bytes, reading.options.limits);
+    if (!geometry) return tl::unexpected(geometry.error());
+    return &reading.draco.emplace(view_index, std::move(*geometry)).first->second;
+}
+
+Result<GltfAccessor> decoded_attribute(Reading& reading, std::uint64_t view, const AttributeSource& source) {
+    const auto geometry = draco_geometry(reading, view);
+    if (!geometry) return tl::unexpected(geometry.error());
+    const auto& attributes = (*geometry)->attributes;
+    const auto attribute = std::ranges::find(attributes, *source.draco_id, &DracoAttribute::id);
+    if (attribute == attributes.end())
+        return not_readable("its Draco data has no attribute " + std::to_string(*source.draco_id));
+    auto rows = draco_rows(**geometry, *attribute);
+    if (!rows) return tl::unexpected(rows.error());
+    GltfAccessor out;
+    if (source.accessor) {
+        const auto accessor = gltf_item(reading.file, "accessors", *source.accessor);
+        if (!accessor) return tl::unexpected(accessor.error());
+        const auto* normalised = find_member(**accessor, "normalized");
+        out.normalised = normalised && normalised->is_boolean() && normalised->get<bool>();
+    }
+    const bool is_signed = attribute->most == 127 || attribute->most == 32767;
+    const bool is_byte = attribute->most && *attribute->most <= 255,
+               is_short = attribute->most && *attribute->most <= 65535;
+    out.component = !attribute->most ? GltfComponent::f32
+                    : is_byte        ? (is_signed ? GltfComponent::i8 : GltfComponent::u8)
+                    : is_short       ? (is_signed ? GltfComponent::i16 : GltfComponent::u16)
+                                     : GltfComponent::u32;
+    out.count = (*geometry)->points;
+    out.components = attribute->components;
+    out.decoded = std::make_shared<const std::vector<double>>(std::move(*rows));
+    return out;
+}
+
+Result<GltfAccessor> open_source(Reading& reading, const VertexSource& vertices, const AttributeSource& source) {
+    if (source.draco_id) return decoded_attribute(reading, *vertices.draco_view, source);
+    return open_accessor(reading.file, *source.accessor);
+}
+
+// An attribute of vertices: one row for each at least, of which those behind are passed over.
+Result<GltfAccessor> open_attribute(Reading& reading, const VertexSource& vertices, const AttributeSource& source,
+                                    const char* name, std::size_t least, std::size_t most, std::uint64_t count) {
+    auto accessor = open_source(reading, vertices, source);
     if (!accessor) return tl::unexpected(accessor.error());
     if (accessor->components < least || accessor->components > most)
         return not_readable(std::string(name) + " has " + std::to_string(accessor->components) + " numbers per vertex");
-    if (accessor->count != count)
+    if (accessor->count < count)
         return not_readable(std::string(name) + " is given for " + std::to_string(accessor->count) + " of " +
                             std::to_string(count) + " vertices");
+    accessor->count = count;
     return accessor;
 }
 
-Result<void> add_normals(Reading& reading, const GltfAccessor& accessor, const Transform& transform) {
+void add_normals(Reading& reading, const GltfAccessor& accessor, const GltfTransform& transform) {
     const auto& [x, y, z] = transform.axes;
-    const double side = dot(cross(x, y), z) < 0 ? -1 : 1;
+    const double side = transform.is_mirror() ? -1 : 1;
     for (std::uint64_t row = 0; row < accessor.count; ++row) {
         Vector3d n{};
         for (std::size_t i = 0; i < 3; ++i) n[i] = static_cast<double>(finite_or_zero(accessor.number(row, i)));
@@ -118,23 +155,22 @@ Result<void> add_normals(Reading& reading, const GltfAccessor& accessor, const T
         reading.mesh.normals.push_back({finite_or_zero(n[0]), finite_or_zero(n[1]), finite_or_zero(n[2])});
     }
     reading.any_normals = true;
-    return {};
 }
 
-Result<void> add_positions(Reading& reading, const GltfAccessor& accessor, const Transform& transform) {
+// Positions that no float can hold become such as are not finite, as nothing may use them.
+void add_positions(Reading& reading, const GltfAccessor& accessor, const GltfTransform& transform) {
+    constexpr auto nowhere = std::numeric_limits<float>::quiet_NaN();
     for (std::uint64_t row = 0; row < accessor.count; ++row) {
-        Vector3d p{accessor.number(row, 0), accessor.number(row, 1), accessor.number(row, 2)};
-        if (!transform.is_identity) p = transform.moved(p);
-        if (!fits_float(p[0]) || !fits_float(p[1]) || !fits_float(p[2]))
-            return not_readable("the position of vertex " + std::to_string(reading.mesh.positions.size()) +
-                                " is not finite");
-        reading.mesh.positions.push_back(to_floats(p));
+        const auto p = transform.moved({accessor.number(row, 0), accessor.number(row, 1), accessor.number(row, 2)}) -
+                       reading.options.origin;
+        const bool fits = fits_float(p[0]) && fits_float(p[1]) && fits_float(p[2]);
+        reading.mesh.positions.push_back(fits ? to_floats(p) : Vector3f{nowhere, nowhere, nowhere});
     }
-    return {};
 }
 
-void add_colours(Reading& reading, const GltfAccessor* accessor, std::uint64_t count,
-                 const std::array<double, 4>& factor) {
+// Integers that do not say so stand for shares all the same: no others are allowed.
+void add_colours(Reading& reading, GltfAccessor* accessor, std::uint64_t count, const std::array<double, 3>& factor) {
+    if (accessor) accessor->normalised = true;
     for (std::uint64_t row = 0; row < count; ++row) {
         Colour colour{};
         for (std::size_t i = 0; i < 3; ++i)
@@ -154,314 +190,319 @@ void add_texcoords(Reading& reading, const GltfAccessor& accessor, const std::ar
     reading.any_texcoords = true;
 }
 
-Result<Vertices> add_vertices(Reading& reading, const VertexSource& source, const Transform& transform) {
-    if (const auto known = reading.of_node.find(source); known != reading.of_node.end()) return known->second;
-    const auto positions = open_accessor(reading.file, *source.positions);
+bool is_given(const AttributeSource& source) { return source.accessor || source.draco_id; }
+
+Result<Vertices> add_vertices(Reading& reading, const VertexSource& source, const GltfTransform& transform) {
+    if (const auto known = reading.vertices.find(source); known != reading.vertices.end()) return known->second;
+    const auto positions = open_source(reading, source, source.positions);
     if (!positions) return tl::unexpected(positions.error());
     if (positions->components != 3) return not_readable("POSITION does not have three numbers per vertex");
     Mesh& mesh = reading.mesh;
-    const auto count = positions->count;
-    if (auto ok = check_count(count, reading.limits.most_vertices, "vertices"); !ok) return tl::unexpected(ok.error());
-    if (auto ok = check_count(mesh.positions.size() + count, reading.limits.most_vertices, "vertices"); !ok)
-        return tl::unexpected(ok.error());
-    if (auto ok = add_positions(reading, *positions, transform); !ok) return tl::unexpected(ok.error());
-    if (source.normals) {
-        const auto normals = open_attribute(reading, *source.normals, "NORMAL", 3, 3, count);
+    const auto count = positions->count, most = reading.options.limits.most_vertices;
+    if (auto ok = check_count(count, most, "vertices"); !ok) return tl::unexpected(ok.error());
+    if (auto ok = check_count(mesh.positions.size() + count, most, "vertices"); !ok) return tl::unexpected(ok.error());
+    add_positions(reading, *positions, transform);
+    if (is_given(source.normals)) {
+        const auto normals = open_attribute(reading, source, source.normals, "NORMAL", 3, 3, count);
         if (!normals) return tl::unexpected(normals.error());
-        if (auto ok = add_normals(reading, *normals, transform); !ok) return tl::unexpected(ok.error());
+        add_normals(reading, *normals, transform);
     }
     std::optional<GltfAccessor> colours;
-    if (source.colours) {
-        auto opened = open_attribute(reading, *source.colours, "COLOR_0", 3, 4, count);
+    if (is_given(source.colours)) {
+        auto opened = open_attribute(reading, source, source.colours, "COLOR_0", 3, 4, count);
         if (!opened) return tl::unexpected(opened.error());
-        colours = *opened;
+        colours = std::move(*opened);
     }
     add_colours(reading, colours ? &*colours : nullptr, count, source.factor);
-    if (source.texcoords) {
-        const auto texcoords = open_attribute(reading, *source.texcoords, "TEXCOORD_0", 2, 2, count);
+    if (is_given(source.texcoords)) {
+        const auto texcoords = open_attribute(reading, source, source.texcoords, "TEXCOORD", 2, 4, count);
         if (!texcoords) return tl::unexpected(texcoords.error());
         add_texcoords(reading, *texcoords, source.placed);
     }
     mesh.normals.resize(mesh.positions.size());
     mesh.texcoords.resize(mesh.positions.size());
     const Vertices added{mesh.positions.size() - static_cast<std::size_t>(count), static_cast<std::size_t>(count)};
-    reading.of_node.emplace(source, added);
+    reading.vertices.emplace(source, added);
     return added;
+}
+
+// ---- Triangles ------------------------------------------------------------------------------------------------------
+
+// The corners of a primitive: its indices, or the vertices one after the other.
+struct Corners {
+    std::optional<GltfAccessor> indices;
+    std::uint64_t count = 0;
+    std::uint64_t vertices = 0;
+    std::uint64_t restart = std::numeric_limits<std::uint64_t>::max();  // an index at which triangles begin anew
+
+    std::uint64_t at(std::uint64_t place) const { return indices ? indices->whole(place) : place; }
+    bool is_restart(std::uint64_t place) const {
+        const auto index = at(place);
+        return indices && index == restart && index >= vertices;
+    }
+};
+
+Result<Corners> open_corners(Reading& reading, const json& primitive, const Vertices& vertices) {
+    Corners out;
+    out.vertices = out.count = vertices.count;
+    const auto index = gltf_index(primitive, "indices");
+    if (!index) return tl::unexpected(index.error());
+    if (!*index) return out;
+    auto opened = open_accessor(reading.file, **index);
+    if (!opened) return tl::unexpected(opened.error());
+    const auto type = opened->component;
+    const bool whole = type == GltfComponent::u8 || type == GltfComponent::u16 || type == GltfComponent::u32;
+    if (!whole || opened->components != 1) return not_readable("the indices of a primitive are no whole numbers");
+    out.restart = type == GltfComponent::u8 ? 0xFF : type == GltfComponent::u16 ? 0xFFFF : 0xFFFFFFFF;
+    out.count = opened->count;
+    out.indices = std::move(*opened);
+    return out;
+}
+
+// The corners of triangle `t` of those from `first` on.
+std::array<std::uint64_t, 3> corners_of(Mode mode, std::uint64_t first, std::uint64_t t) {
+    const auto at = first + t;
+    if (mode == Mode::strip) return t % 2 == 0 ? std::array{at, at + 1, at + 2} : std::array{at, at + 2, at + 1};
+    if (mode == Mode::fan) return {at + 1, at + 2, first};
+    return {first + 3 * t, first + 3 * t + 1, first + 3 * t + 2};
+}
+
+Result<void> add_triangle(Reading& reading, std::array<std::uint64_t, 3> corners, const Vertices& vertices,
+                          bool mirrored, const Part* part) {
+    Triangle triangle{};
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (corners[i] >= vertices.count)
+            return not_readable("a triangle uses vertex " + std::to_string(corners[i]) + " of a primitive that has " +
+                                std::to_string(vertices.count));
+        triangle[i] = static_cast<std::uint32_t>(vertices.first + corners[i]);
+    }
+    if (mirrored) std::swap(triangle[1], triangle[2]);
+    reading.mesh.triangles.push_back(triangle);
+    reading.part_of_triangle.push_back(part);
+    return {};
+}
+
+Result<void> add_triangles(Reading& reading, const Drawn& drawn, const Vertices& vertices, const Part* part) {
+    const auto corners = open_corners(reading, *drawn.primitive, vertices);
+    if (!corners) return tl::unexpected(corners.error());
+    const auto count_of = [&](std::uint64_t length) {
+        return drawn.mode == Mode::triangles ? length / 3 : std::max<std::uint64_t>(length, 2) - 2;
+    };
+    const auto most = reading.options.limits.most_triangles, all = count_of(corners->count);
+    if (auto ok = check_count(all, most, "triangles"); !ok) return ok;
+    if (auto ok = check_count(reading.mesh.triangles.size() + all, most, "triangles"); !ok) return ok;
+    const bool mirrored = drawn.transform->is_mirror();
+    for (std::uint64_t first = 0, end = 0; first < corners->count; first = end + 1) {
+        for (end = first; end < corners->count && !corners->is_restart(end);) ++end;
+        for (std::uint64_t t = 0; t < count_of(end - first); ++t) {
+            auto triangle = corners_of(drawn.mode, first, t);
+            for (auto& corner : triangle) corner = corners->at(corner);
+            if (auto ok = add_triangle(reading, triangle, vertices, mirrored, part); !ok) return ok;
+        }
+    }
+    return {};
+}
+
+Result<void> add_decoded_triangles(Reading& reading, const DracoGeometry& geometry, const Drawn& drawn,
+                                   const Vertices& vertices, const Part* part) {
+    const auto most = reading.options.limits.most_triangles;
+    if (auto ok = check_count(reading.mesh.triangles.size() + geometry.triangles.size(), most, "triangles"); !ok)
+        return ok;
+    const bool mirrored = drawn.transform->is_mirror();
+    for (const auto& [a, b, c] : geometry.triangles)
+        if (auto ok = add_triangle(reading, {a, b, c}, vertices, mirrored, part); !ok) return ok;
+    return {};
 }
 
 // ---- Primitives -----------------------------------------------------------------------------------------------------
 
-// glTF's numbers for what vertices are joined to.
-enum class Mode : std::uint64_t { points = 0, triangles = 4, strip = 5, fan = 6 };
-
-// The corners of triangle t.
-std::array<std::uint64_t, 3> corners_of(Mode mode, std::uint64_t t) {
-    if (mode == Mode::strip) return t % 2 == 0 ? std::array{t, t + 1, t + 2} : std::array{t, t + 2, t + 1};
-    if (mode == Mode::fan) return {t + 1, t + 2, 0};
-    return {3 * t, 3 * t + 1, 3 * t + 2};
-}
-
-Result<void> add_triangles(Reading& reading, Mode mode, const Vertices& vertices,
-                           const std::optional<std::uint64_t>& index_accessor, bool mirrored) {
-    std::optional<GltfAccessor> indices;
-    if (index_accessor) {
-        auto opened = open_accessor(reading.file, *index_accessor);
-        if (!opened) return tl::unexpected(opened.error());
-        const auto type = opened->component;
-        const bool whole = type == GltfComponent::u8 || type == GltfComponent::u16 || type == GltfComponent::u32;
-        if (!whole || opened->components != 1) return not_readable("the indices of a primitive are no whole numbers");
-        indices = *opened;
+Result<VertexSource> source_of(const Drawn& drawn, bool any_image) {
+    const auto& attributes = (*drawn.primitive)["attributes"];
+    VertexSource out;
+    out.node = drawn.node;
+    out.placed = drawn.look.placed;
+    // Where there are images, the factor is their part's.
+    if (!any_image) out.factor = drawn.look.factor;
+    const json* decoded = nullptr;
+    if (const auto* draco = gltf_extension(*drawn.primitive, "KHR_draco_mesh_compression")) {
+        const auto view = gltf_index(*draco, "bufferView");
+        if (!view) return tl::unexpected(view.error());
+        if (!*view) return not_readable("a primitive has no Draco data");
+        out.draco_view = *view;
+        decoded = find_member(*draco, "attributes");
     }
-    const std::uint64_t corners = indices ? indices->count : vertices.count;
-    const std::uint64_t count = mode == Mode::triangles ? corners / 3 : std::max<std::uint64_t>(corners, 2) - 2;
-    auto& triangles = reading.mesh.triangles;
-    if (auto ok = check_count(count, reading.limits.most_triangles, "triangles"); !ok) return ok;
-    if (auto ok = check_count(triangles.size() + count, reading.limits.most_triangles, "triangles"); !ok) return ok;
-    for (std::uint64_t t = 0; t < count; ++t) {
-        Triangle triangle{};
-        const auto at = corners_of(mode, t);
-        for (std::size_t i = 0; i < 3; ++i) {
-            const std::uint64_t index = indices ? indices->whole(at[i]) : at[i];
-            if (index >= vertices.count)
-                return not_readable("a triangle uses vertex " + std::to_string(index) + " of a primitive that has " +
-                                    std::to_string(vertices.count));
-            triangle[i] = static_cast<std::uint32_t>(vertices.first + index);
-        }
-        if (mirrored) std::swap(triangle[1], triangle[2]);
-        triangles.push_back(triangle);
+    const auto texcoord = "TEXCOORD_" + std::to_string(drawn.look.texcoord_set);
+    const auto named = {std::pair{"POSITION", &out.positions}, std::pair{"NORMAL", &out.normals},
+                        std::pair{"COLOR_0", &out.colours}, std::pair{texcoord.c_str(), &out.texcoords}};
+    for (const auto& [name, source] : named) {
+        const auto index = gltf_index(attributes, name);
+        const auto id = decoded ? gltf_index(*decoded, name) : std::optional<std::uint64_t>();
+        if (!index) return tl::unexpected(index.error());
+        if (!id) return tl::unexpected(id.error());
+        *source = {*index, *id};
     }
-    return {};
+    if (!drawn.look.takes_vertex_colours) out.colours = {};
+    return out;
 }
 
-// Which image a texture shows; nothing if it names none that is read here.
-Result<std::optional<std::uint64_t>> image_of_texture(const GltfFile& file, std::uint64_t index) {
-    const auto texture = gltf_item(file, "textures", index);
-    if (!texture) return tl::unexpected(texture.error());
-    if (const auto* extensions = find_member(**texture, "extensions"))
-        if (const auto* webp = find_member(*extensions, "EXT_texture_webp")) return gltf_index(*webp, "source");
-    return gltf_index(**texture, "source");
+Result<void> add_primitive(Reading& reading, const Drawn& drawn) {
+    const auto source = source_of(drawn, reading.any_image);
+    if (!source) return tl::unexpected(source.error());
+    const auto vertices = add_vertices(reading, *source, *drawn.transform);
+    if (!vertices) return tl::unexpected(vertices.error());
+    if (drawn.mode == Mode::points) return {};
+    const auto& look = drawn.look;
+    const PartKey key{look.material.value_or(std::numeric_limits<std::uint64_t>::max()), look.image};
+    const Part* part = &reading.parts.emplace(key, Part{look.factor, look.is_see_through}).first->second;
+    if (!source->draco_view) return add_triangles(reading, drawn, *vertices, part);
+    const auto geometry = draco_geometry(reading, *source->draco_view);
+    if (!geometry) return tl::unexpected(geometry.error());
+    return add_decoded_triangles(reading, **geometry, drawn, *vertices, part);
 }
 
-// KHR_texture_transform: scaled, turned, moved.
-Result<std::array<double, 6>> placed_by(const json& transform) {
-    const auto offset = gltf_numbers<2>(transform, "offset", {0, 0});
-    const auto scale = gltf_numbers<2>(transform, "scale", {1, 1});
-    const auto* turn = find_member(transform, "rotation");
-    const auto angle = turn ? finite_number(*turn) : Result<double>(0);
-    if (!offset) return tl::unexpected(offset.error());
-    if (!scale) return tl::unexpected(scale.error());
-    if (!angle) return not_readable("a \"rotation\" is no number");
-    const double c = std::cos(*angle), s = std::sin(*angle);
-    return std::array<double, 6>{c * (*scale)[0],  s * (*scale)[1], (*offset)[0],
-                                 -s * (*scale)[0], c * (*scale)[1], (*offset)[1]};
-}
-
-// The base colour's image, and which texture coordinates it takes.
-Result<void> add_texture(Reading& reading, const json& texture, const json& attributes, VertexSource& source) {
-    const auto index = gltf_index(texture, "index");
-    const auto set = gltf_number(texture, "texCoord", 0);
-    if (!index) return tl::unexpected(index.error());
-    if (!set) return tl::unexpected(set.error());
-    if (!*index) return {};
-    const auto image = image_of_texture(reading.file, **index);
-    if (!image) return tl::unexpected(image.error());
-    std::uint64_t of_set = *set;
-    if (const auto* extensions = find_member(texture, "extensions"))
-        if (const auto* transform = find_member(*extensions, "KHR_texture_transform")) {
-            const auto placed = placed_by(*transform);
-            if (!placed) return tl::unexpected(placed.error());
-            source.placed = *placed;
-            const auto other = gltf_number(*transform, "texCoord", of_set);
-            if (!other) return tl::unexpected(other.error());
-            of_set = *other;
-        }
-    if (of_set > 0) {
-        const auto name = "TEXCOORD_" + std::to_string(of_set);
-        const auto accessor = gltf_index(attributes, name.c_str());
-        if (!accessor) return tl::unexpected(accessor.error());
-        source.texcoords = *accessor;
-    }
-    if (!*image) return {};
-    auto found = gltf_image_at(reading.file, **image);
-    if (!found) return tl::unexpected(found.error());
-    auto& images = reading.texture.images;
-    const bool is_known =
-        std::any_of(images.begin(), images.end(), [&](const auto& other) { return other.name == found->name; });
-    if (!is_known) images.push_back(std::move(*found));
-    return {};
-}
-
-Result<void> add_material(Reading& reading, const json& primitive, const json& attributes, VertexSource& source) {
-    const auto index = gltf_index(primitive, "material");
-    if (!index) return tl::unexpected(index.error());
-    const json* surface = nullptr;
-    if (*index) {
-        const auto material = gltf_item(reading.file, "materials", **index);
-        if (!material) return tl::unexpected(material.error());
-        surface = find_member(**material, "pbrMetallicRoughness");
-    }
-    const auto* texture = surface ? find_member(*surface, "baseColorTexture") : nullptr;
-    if (!texture) reading.any_without_image = true;
-    if (!surface) return {};
-    const auto factor = gltf_numbers<4>(*surface, "baseColorFactor", source.factor);
-    if (!factor) return tl::unexpected(factor.error());
-    source.factor = *factor;
-    return texture ? add_texture(reading, *texture, attributes, source) : Result<void>();
-}
-
-Result<void> add_primitive(Reading& reading, const json& primitive, const Transform& transform) {
+// The primitive as it is to be drawn; nothing if it shows nothing that is read here.
+Result<std::optional<Drawn>> drawn_as(const GltfFile& file, const json& primitive, MeshFindings* findings) {
     const auto mode = gltf_number(primitive, "mode", static_cast<std::uint64_t>(Mode::triangles));
     if (!mode) return tl::unexpected(mode.error());
     if (*mode > static_cast<std::uint64_t>(Mode::fan))
         return not_readable("a primitive has the unknown mode " + std::to_string(*mode));
-    const bool lines =
-        *mode > static_cast<std::uint64_t>(Mode::points) && *mode < static_cast<std::uint64_t>(Mode::triangles);
     const auto* attributes = find_member(primitive, "attributes");
-    if (lines || !attributes || !find_member(*attributes, "POSITION")) return {};  // nothing to show
-    VertexSource source;
-    const auto named = {std::pair{"POSITION", &source.positions}, std::pair{"NORMAL", &source.normals},
-                        std::pair{"COLOR_0", &source.colours}, std::pair{"TEXCOORD_0", &source.texcoords}};
-    for (const auto& [name, accessor] : named) {
-        const auto index = gltf_index(*attributes, name);
-        if (!index) return tl::unexpected(index.error());
-        *accessor = *index;
+    if (!attributes || !find_member(*attributes, "POSITION")) return std::optional<Drawn>();
+    if (*mode >= static_cast<std::uint64_t>(Mode::lines) && *mode <= static_cast<std::uint64_t>(Mode::line_strip)) {
+        remark(findings, "lines", "it has lines, which are passed over", true);
+        return std::optional<Drawn>();
     }
-    const auto indices = gltf_index(primitive, "indices");
-    if (!indices) return tl::unexpected(indices.error());
-    if (auto ok = add_material(reading, primitive, *attributes, source); !ok) return ok;
-    const auto vertices = add_vertices(reading, source, transform);
-    if (!vertices) return tl::unexpected(vertices.error());
-    if (*mode == static_cast<std::uint64_t>(Mode::points)) return {};
-    const auto& [x, y, z] = transform.axes;
-    return add_triangles(reading, static_cast<Mode>(*mode), *vertices, *indices, dot(cross(x, y), z) < 0);
-}
-
-// ---- The scene ------------------------------------------------------------------------------------------------------
-
-bool any_weight(const json& object) {
-    const auto* weights = find_member(object, "weights");
-    if (!weights || !weights->is_array()) return false;
-    return std::any_of(weights->begin(), weights->end(),
-                       [](const json& weight) { return !weight.is_number() || weight.get<double>() != 0; });
-}
-
-Result<void> add_mesh(Reading& reading, const json& node, std::uint64_t index, const Transform& transform) {
-    const auto mesh = gltf_item(reading.file, "meshes", index);
-    if (!mesh) return tl::unexpected(mesh.error());
-    if (find_member(node, "skin"))
-        return fail(ErrorKind::unsupported,
-                    "the glTF has a mesh that a skeleton moves (skin), which is not read; export "
-                    "it with the pose applied");
-    if (find_member(node, "weights") ? any_weight(node) : any_weight(**mesh))
-        return fail(ErrorKind::unsupported,
-                    "the glTF has a mesh that morph targets change, which are not read; export "
-                    "it with the shape applied");
-    const auto* primitives = find_member(**mesh, "primitives");
-    if (!primitives || !primitives->is_array()) return {};
-    reading.of_node.clear();
-    for (const auto& primitive : *primitives)
-        if (auto ok = add_primitive(reading, primitive, transform); !ok) return ok;
-    return {};
-}
-
-// The numbers in a list of nodes, such as children.
-Result<std::vector<std::uint64_t>> nodes_in(const json& object, const char* name) {
-    std::vector<std::uint64_t> out;
-    const auto* list = find_member(object, name);
-    if (!list) return out;
-    if (!list->is_array()) return not_readable(std::string("\"") + name + "\" is no list");
-    for (const auto& node : *list) {
-        if (!node.is_number_unsigned())
-            return not_readable(std::string("\"") + name + "\" does not list numbers of nodes");
-        out.push_back(node.get<std::uint64_t>());
+    auto look = gltf_look(file, primitive, findings);
+    if (!look) return tl::unexpected(look.error());
+    if (!look->is_shown) return std::optional<Drawn>();
+    const auto texcoord = "TEXCOORD_" + std::to_string(look->texcoord_set);
+    if (look->image && !find_member(*attributes, texcoord.c_str())) {
+        remark(findings, "no-coordinates",
+               "a part of it has an image and no texture coordinates: the image is left out", true);
+        look->image.reset();
     }
-    return out;
+    return std::optional(Drawn{&primitive, nullptr, 0, static_cast<Mode>(*mode), *look});
 }
 
-// The nodes that are shown first: those of the scene; of all, without one, those that are nobody's child.
-Result<std::vector<std::uint64_t>> roots_of(const GltfFile& file) {
-    const auto* scenes = find_member(file.root, "scenes");
-    const auto scene = gltf_number(file.root, "scene", 0);
-    if (!scene) return tl::unexpected(scene.error());
-    if (scenes && scenes->is_array() && !scenes->empty()) {
-        const auto shown = gltf_item(file, "scenes", *scene);
-        if (!shown) return tl::unexpected(shown.error());
-        return nodes_in(**shown, "nodes");
-    }
-    const auto* nodes = find_member(file.root, "nodes");
-    const std::size_t count = nodes && nodes->is_array() ? nodes->size() : 0;
-    std::vector<bool> is_child(count);
-    for (std::size_t n = 0; n < count; ++n) {
-        const auto children = nodes_in((*nodes)[n], "children");
-        if (!children) return tl::unexpected(children.error());
-        for (const auto child : *children)
-            if (child < count) is_child[static_cast<std::size_t>(child)] = true;
-    }
-    std::vector<std::uint64_t> out;
-    for (std::size_t n = 0; n < count; ++n)
-        if (!is_child[n]) out.push_back(n);
-    return out;
-}
-
-Result<void> add_scene(Reading& reading) {
-    struct Shown {
-        const json* node;
-        Transform parent;
-    };
-    std::vector<Shown> next;
-    std::vector<bool> met;
-    const auto show = [&](const std::vector<std::uint64_t>& numbers, const Transform& parent) -> Result<void> {
-        for (auto number = numbers.rbegin(); number != numbers.rend(); ++number) {
-            const auto node = gltf_item(reading.file, "nodes", *number);
-            if (!node) return tl::unexpected(node.error());
-            const auto place = static_cast<std::size_t>(*number);
-            if (place >= met.size()) met.resize(place + 1);
-            if (met[place])
-                return not_readable("node " + std::to_string(place) + " has two parents, or is part of a circle");
-            met[place] = true;
-            next.push_back({*node, parent});
-        }
-        return {};
-    };
-    const auto roots = roots_of(reading.file);
-    if (!roots) return tl::unexpected(roots.error());
-    if (auto ok = show(*roots, {}); !ok) return ok;
-    while (!next.empty()) {
-        const auto [node, parent] = next.back();
-        next.pop_back();
-        const auto own = transform_of(*node);
-        if (!own) return tl::unexpected(own.error());
-        const Transform transform = composed(parent, *own);
-        const auto mesh = gltf_index(*node, "mesh");
+// Everything that is shown. Points beside triangles are not: they would be vertices that nothing uses.
+Result<std::vector<Drawn>> all_drawn(const GltfFile& file, const std::vector<GltfShownMesh>& meshes,
+                                     MeshFindings* findings) {
+    std::vector<Drawn> out;
+    for (std::size_t m = 0; m < meshes.size(); ++m) {
+        const auto mesh = gltf_item(file, "meshes", meshes[m].mesh);
         if (!mesh) return tl::unexpected(mesh.error());
-        // Scaled to nothing is glTF's way not to show something.
-        const bool shows = transform.axes != std::array<Vector3d, 3>{};
-        if (*mesh && shows)
-            if (auto ok = add_mesh(reading, *node, **mesh, transform); !ok) return ok;
-        const auto children = nodes_in(*node, "children");
-        if (!children) return tl::unexpected(children.error());
-        if (auto ok = show(*children, transform); !ok) return ok;
+        const auto* primitives = find_member(**mesh, "primitives");
+        if (!primitives || !primitives->is_array()) continue;
+        if (auto ok = check_count(out.size() + primitives->size(), most_drawn, "parts"); !ok)
+            return tl::unexpected(ok.error());
+        for (const auto& primitive : *primitives) {
+            auto drawn = drawn_as(file, primitive, findings);
+            if (!drawn) return tl::unexpected(drawn.error());
+            if (!*drawn) continue;
+            (*drawn)->transform = &meshes[m].transform;
+            (*drawn)->node = m;
+            out.push_back(**drawn);
+        }
     }
-    return {};
+    const auto is_point = [](const Drawn& drawn) { return drawn.mode == Mode::points; };
+    const auto points = std::ranges::count_if(out, is_point);
+    if (points > 0 && points < std::ssize(out)) {
+        std::erase_if(out, is_point);
+        remark(findings, "points", "it has points beside its triangles, which are passed over", true);
+    }
+    return out;
+}
+
+// ---- What it looks like ---------------------------------------------------------------------------------------------
+
+Colour levels_of(const std::array<double, 3>& light) {
+    return {level_of(finite_or_zero(light[0])), level_of(finite_or_zero(light[1])), level_of(finite_or_zero(light[2]))};
+}
+
+// Whether materials alone tell parts apart, or give all of it a colour. A grey for all of it says nothing.
+bool are_coloured_by_materials(const std::vector<Drawn>& drawn) {
+    return std::ranges::any_of(drawn, [&](const Drawn& part) {
+        const auto [r, g, b] = levels_of(part.look.factor);
+        return part.look.factor != drawn[0].look.factor || r != g || g != b;
+    });
+}
+
+Result<std::size_t> image_in(Reading& reading, TextureReference& texture, std::uint64_t index, bool is_see_through) {
+    auto image = gltf_image_at(reading.file, index);
+    if (!image) return tl::unexpected(image.error());
+    const auto& bytes = image->bytes;
+    const bool is_jpeg = bytes.size() > 1 ? bytes[0] == 0xFF && bytes[1] == 0xD8
+                                          : image->name.ends_with(".jpg") || image->name.ends_with(".jpeg");
+    if (is_see_through && !is_jpeg)
+        remark(reading.findings, "alpha",
+               "its materials may be see-through by the alpha of their image (alphaMode), which is passed over", true);
+    const auto known = std::ranges::find(texture.images, image->name, &TextureReference::Image::name);
+    const auto place = static_cast<std::size_t>(known - texture.images.begin());
+    if (known == texture.images.end()) texture.images.push_back(std::move(*image));
+    return place;
+}
+
+// The parts in the order of the materials; those that look alike are one.
+Result<TextureReference> texture_of(Reading& reading) {
+    TextureReference out;
+    out.colours_multiply = true;
+    for (auto& [key, part] : reading.parts) {
+        TextureReference::Part look;
+        if (key.second) {
+            const auto image = image_in(reading, out, *key.second, part.is_see_through);
+            if (!image) return tl::unexpected(image.error());
+            look.image = *image;
+        }
+        const auto colour = levels_of(part.factor);
+        if (reading.any_image && colour != Colour{255, 255, 255}) look.colour = colour;
+        const auto same = std::ranges::find_if(
+            out.parts, [&](const auto& other) { return other.image == look.image && other.colour == look.colour; });
+        part.place = static_cast<std::size_t>(same - out.parts.begin());
+        if (same == out.parts.end()) out.parts.push_back(look);
+    }
+    if (auto ok = check_count(out.parts.size(), std::numeric_limits<std::uint16_t>::max(), "materials"); !ok)
+        return tl::unexpected(ok.error());
+    if (out.parts.size() > 1)
+        for (const auto* part : reading.part_of_triangle)
+            out.part_of_triangle.push_back(static_cast<std::uint16_t>(part->place));
+    return out;
+}
+
+// Only attributes that some vertex has are kept.
+void drop_what_is_not_there(Reading& reading) {
+    auto& mesh = reading.mesh;
+    // White multiplies images by one.
+    const bool all_white = std::ranges::all_of(mesh.colours, [](const auto& c) { return c == Colour{255, 255, 255}; });
+    if (!reading.any_colours || (reading.any_image && all_white)) mesh.colours.clear();
+    if (!reading.any_normals) mesh.normals.clear();
+    if (!reading.any_texcoords) mesh.texcoords.clear();
 }
 
 }  // namespace
 
 Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesystem::path& folder,
                        const MeshReadOptions& options, MeshFindings* findings) {
-    const auto& limits = options.limits;
     auto file = open_gltf(bytes, folder);
     if (!file) return tl::unexpected(file.error());
-    Reading reading{std::move(*file), limits};
-    if (auto ok = add_scene(reading); !ok) return tl::unexpected(ok.error());
-    Mesh& mesh = reading.mesh;
-    if (!reading.any_colours) mesh.colours.clear();
-    if (!reading.any_normals) mesh.normals.clear();
-    if (!reading.any_texcoords) mesh.texcoords.clear();
-    for (std::size_t i = 0; i < reading.texture.images.size(); ++i) reading.texture.parts.push_back({{}, i, {}});
-    if (reading.any_without_image) reading.texture.parts.emplace_back();
-    if (findings) findings->texture = std::move(reading.texture);
-    return std::move(mesh);
+    if (auto ok = check_gltf_extensions(file->root, findings); !ok) return tl::unexpected(ok.error());
+    Reading reading{std::move(*file), options, findings};
+    const auto meshes = gltf_shown_meshes(reading.file, findings);
+    if (!meshes) return tl::unexpected(meshes.error());
+    const auto drawn = all_drawn(reading.file, *meshes, findings);
+    if (!drawn) return tl::unexpected(drawn.error());
+    reading.any_image = std::ranges::any_of(*drawn, [](const auto& part) { return part.look.image.has_value(); });
+    reading.any_colours = !reading.any_image && are_coloured_by_materials(*drawn);
+    for (std::size_t d = 0; d < drawn->size(); ++d) {
+        if (d > 0 && (*drawn)[d].node != (*drawn)[d - 1].node) reading.vertices.clear();
+        if (auto ok = add_primitive(reading, (*drawn)[d]); !ok) return tl::unexpected(ok.error());
+    }
+    drop_what_is_not_there(reading);
+    auto texture = texture_of(reading);
+    if (!texture) return tl::unexpected(texture.error());
+    if (auto ok = leave_out_not_finite(reading.mesh, texture->part_of_triangle, findings); !ok)
+        return tl::unexpected(ok.error());
+    if (findings) findings->texture = std::move(*texture);
+    return std::move(reading.mesh);
 }
 
 }  // namespace htvm

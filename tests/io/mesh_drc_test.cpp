@@ -125,7 +125,8 @@ TEST(DrcReading, WhatIsNoDracoFileIsAnError) {
     EXPECT_FALSE(read_drc(samples::bytes_of("DRACO")));
     EXPECT_FALSE(read_drc(samples::bytes_of("ply\nformat ascii 1.0\n")));
     auto old = encoded_points(5, draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
-    old[6] = 1;
+    old[5] = 0;
+    old[6] = 9;
     const auto mesh = read_drc(old);
     ASSERT_FALSE(mesh);
     EXPECT_EQ(mesh.error().kind, ErrorKind::unsupported);
@@ -149,6 +150,149 @@ TEST(DrcReading, EveryTruncationIsAnError) {
             const std::vector<std::uint8_t> cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n));
             EXPECT_FALSE(read_drc(cut)) << n << " of " << whole.size();
         }
+    }
+}
+
+// ---- Layouts of attributes ------------------------------------------------------------------------------------------
+
+// A point cloud, whose attributes tests choose.
+struct Cloud {
+    explicit Cloud(std::uint32_t n) : points(n) { builder.Start(n); }
+    template <class T>
+    void add(GeometryAttribute::Type kind, draco::DataType type, const std::vector<std::vector<T>>& rows,
+             bool normalised = false) {
+        const int attribute = builder.AddAttribute(kind, static_cast<std::int8_t>(rows[0].size()), type);
+        if (normalised) normalised_ones.push_back(attribute);
+        for (std::uint32_t p = 0; p < points; ++p)
+            builder.SetAttributeValueForPoint(attribute, draco::PointIndex(p), rows[p].data());
+    }
+    std::vector<std::uint8_t> bytes() {
+        const auto cloud = builder.Finalize(false);
+        for (const int attribute : normalised_ones) cloud->attribute(attribute)->set_normalized(true);
+        draco::Encoder encoder;
+        encoder.SetEncodingMethod(draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
+        draco::EncoderBuffer buffer;
+        EXPECT_TRUE(encoder.EncodePointCloudToBuffer(*cloud, &buffer).ok());
+        return {buffer.data(), buffer.data() + buffer.size()};
+    }
+    Mesh mesh(const MeshReadOptions& options = {}) {
+        findings = {};
+        const auto read = read_drc(bytes(), options, &findings);
+        EXPECT_TRUE(read) << read.error().message;
+        return read.value_or(Mesh());
+    }
+    std::uint32_t points;
+    draco::PointCloudBuilder builder;
+    std::vector<int> normalised_ones;
+    MeshFindings findings;
+};
+
+template <class T>
+std::vector<Colour> colours_of(draco::DataType type, const std::vector<std::vector<T>>& rows, bool normalised = false,
+                               const MeshReadOptions& options = {}) {
+    Cloud cloud(static_cast<std::uint32_t>(rows.size()));
+    cloud.add<float>(GeometryAttribute::POSITION, draco::DT_FLOAT32,
+                     std::vector<std::vector<float>>(rows.size(), {0, 0, 0}));
+    cloud.add<T>(GeometryAttribute::COLOR, type, rows, normalised);
+    return cloud.mesh(options).colours;
+}
+
+TEST(DrcReading, PositionsOfAnyTypeLoseTheOriginBeforeTheyBecomeFloats) {
+    Cloud doubles(2), shorts(1);
+    doubles.add<double>(GeometryAttribute::POSITION, draco::DT_FLOAT64, {{5400000.125, 1, 2}, {5400001, 1, 2}});
+    MeshReadOptions options;
+    options.origin = {5400000, 1, 0};
+    EXPECT_EQ(doubles.mesh(options).positions, (std::vector<Vector3f>{{.125f, 0, 2}, {1, 0, 2}}));
+    shorts.add<std::int16_t>(GeometryAttribute::POSITION, draco::DT_INT16, {{-300, 5, 7}});
+    EXPECT_EQ(shorts.mesh().positions, (std::vector<Vector3f>{{-300, 5, 7}}));
+}
+
+TEST(DrcReading, ColoursOfFloatsAndShortsAreInTheRangeOfTheirBulk) {
+    using Colours = std::vector<Colour>;
+    EXPECT_EQ(colours_of<float>(draco::DT_FLOAT32, {{0, .5f, 1}}), (Colours{{0, 128, 255}}));
+    EXPECT_EQ(colours_of<float>(draco::DT_FLOAT32, {{0, 128, 255}}), (Colours{{0, 128, 255}}));
+    EXPECT_EQ(colours_of<std::uint16_t>(draco::DT_UINT16, {{0, 32896, 65535}}), (Colours{{0, 128, 255}}));
+    EXPECT_EQ(colours_of<std::uint16_t>(draco::DT_UINT16, {{0, 128, 255}}), (Colours{{0, 128, 255}}));
+    EXPECT_EQ(colours_of<std::uint16_t>(draco::DT_UINT16, {{0, 1, 1}}), (Colours{{0, 1, 1}})) << "dark, not white";
+    EXPECT_EQ(colours_of<std::uint16_t>(draco::DT_UINT16, {{0, 257, 257}}, true), (Colours{{0, 1, 1}}));
+    MeshReadOptions bytes;
+    bytes.colour_range = ColourRange::bytes;
+    EXPECT_EQ(colours_of<float>(draco::DT_FLOAT32, {{0, 1, 1}}, false, bytes), (Colours{{0, 1, 1}}))
+        << "as the capture has it";
+    EXPECT_EQ(colours_of<std::uint8_t>(draco::DT_UINT8, {{0, 1, 2}}), (Colours{{0, 1, 2}}));
+    EXPECT_EQ(colours_of<std::uint8_t>(draco::DT_UINT8, {{0, 1, 2, 3}}, true), (Colours{{0, 1, 2}}));
+    EXPECT_EQ(colours_of<std::uint8_t>(draco::DT_UINT8, {{9}}), (Colours{{9, 9, 9}})) << "grey";
+    EXPECT_EQ(colours_of<std::uint8_t>(draco::DT_UINT8, {{9, 255}}), (Colours{{9, 9, 9}})) << "grey and alpha";
+}
+
+TEST(DrcReading, LevelsOfColoursAreToldForTheCapture) {
+    Cloud cloud(1);
+    cloud.add<float>(GeometryAttribute::POSITION, draco::DT_FLOAT32, {{0, 0, 0}});
+    cloud.add<float>(GeometryAttribute::COLOR, draco::DT_FLOAT32, {{0, 1, 200}});
+    (void)cloud.mesh();
+    EXPECT_EQ(cloud.findings.colour_levels.up_to_unit, 1u);
+    EXPECT_EQ(cloud.findings.colour_levels.up_to_bytes, 1u);
+}
+
+TEST(DrcReading, NormalsAndTextureCoordinatesMayBeIntegers) {
+    for (const bool normalised : {false, true}) {
+        Cloud cloud(1);
+        cloud.add<float>(GeometryAttribute::POSITION, draco::DT_FLOAT32, {{0, 0, 0}});
+        cloud.add<std::int8_t>(GeometryAttribute::NORMAL, draco::DT_INT8, {{127, 0, -127}}, normalised);
+        cloud.add<std::uint16_t>(GeometryAttribute::TEX_COORD, draco::DT_UINT16, {{65535, 0}}, normalised);
+        const auto mesh = cloud.mesh();
+        EXPECT_EQ(mesh.normals, (std::vector<Vector3f>{{1, 0, -1}}));
+        EXPECT_EQ(mesh.texcoords, (std::vector<Vector2f>{{1, 0}}));
+    }
+}
+
+TEST(DrcReading, OfSeveralSetsTheFirstIsTakenAndOthersAreNotLookedAt) {
+    Cloud cloud(1);
+    cloud.add<float>(GeometryAttribute::POSITION, draco::DT_FLOAT32, {{0, 0, 0}});
+    cloud.add<float>(GeometryAttribute::TEX_COORD, draco::DT_FLOAT32, {{.25f, .5f}});
+    cloud.add<float>(GeometryAttribute::TEX_COORD, draco::DT_FLOAT32, {{0, 0}});
+    cloud.add<std::uint8_t>(GeometryAttribute::GENERIC, draco::DT_UINT8, {{1, 2, 3, 4, 5, 6}});
+    cloud.add<float>(GeometryAttribute::NORMAL, draco::DT_FLOAT32, {{0, 0}});
+    const auto mesh = cloud.mesh();
+    EXPECT_EQ(mesh.texcoords, (std::vector<Vector2f>{{.25f, .5f}}));
+    EXPECT_TRUE(mesh.normals.empty());
+    ASSERT_EQ(cloud.findings.remarks.size(), 2u);
+    EXPECT_EQ(cloud.findings.remarks[0].about, "normals");
+    EXPECT_TRUE(cloud.findings.remarks[0].is_loss);
+    EXPECT_THAT(cloud.findings.remarks[1].text, testing::HasSubstr("2 sets of texture coordinates"));
+}
+
+TEST(DrcReading, PointsThatAreNoNumbersAreLeftOut) {
+    Cloud cloud(3);
+    const float none = std::nanf("");
+    cloud.add<float>(GeometryAttribute::POSITION, draco::DT_FLOAT32, {{0, 1, 2}, {none, 0, 0}, {3, 4, 5}});
+    cloud.add<std::uint8_t>(GeometryAttribute::COLOR, draco::DT_UINT8, {{1, 1, 1}, {2, 2, 2}, {3, 3, 3}});
+    const auto mesh = cloud.mesh();
+    EXPECT_EQ(mesh.positions, (std::vector<Vector3f>{{0, 1, 2}, {3, 4, 5}}));
+    EXPECT_EQ(mesh.colours, (std::vector<Colour>{{1, 1, 1}, {3, 3, 3}}));
+    ASSERT_EQ(cloud.findings.remarks.size(), 1u);
+    EXPECT_EQ(cloud.findings.remarks[0].about, "not-finite");
+}
+
+TEST(DrcReading, BytesBehindTheMeshAreNotLookedAt) {
+    auto bytes = encoded_grid(4, draco::MESH_EDGEBREAKER_ENCODING, 0);
+    bytes.insert(bytes.end(), 100, 0);
+    EXPECT_TRUE(read_drc(bytes));
+}
+
+// The version before has the same layout for such clouds; the counts of older meshes are numbers of four bytes.
+TEST(DrcReading, OlderBitstreamsAreReadWithTheirCountsChecked) {
+    auto points = encoded_points(5, draco::POINT_CLOUD_SEQUENTIAL_ENCODING);
+    points[6] = 1;
+    const auto mesh = read_drc(points);
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(mesh->positions.size(), 5u);
+    for (const std::uint8_t method : {std::uint8_t{0}, std::uint8_t{1}}) {
+        std::vector<std::uint8_t> old{'D', 'R', 'A', 'C', 'O', 1, 1, 1, method, 0, 0};
+        if (method == 1) old.insert(old.end(), {0, 9, 9, 9, 9});  // the traversal; vertices that are split
+        old.insert(old.end(), {0xff, 0xff, 0xff, 0, 1, 0, 0, 0, 0, 0, 0, 0});
+        ASSERT_FALSE(read_drc(old));
+        EXPECT_THAT(read_drc(old).error().message, testing::HasSubstr("16777215"));
     }
 }
 

@@ -1,3 +1,7 @@
+#include <draco/compression/encode.h>
+#include <draco/mesh/triangle_soup_mesh_builder.h>
+
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <fstream>
@@ -8,6 +12,7 @@
 #include "gmock/gmock.h"
 #include "io/gltf.h"
 #include "io/gltf_animation.h"
+#include "io/gltf_samples.h"
 #include "io/mesh_file.h"
 #include "io/mesh_samples.h"
 
@@ -16,73 +21,13 @@ namespace {
 
 using nlohmann::json;
 using samples::bytes_of;
+using samples::floats;
+using samples::glb;
 using samples::random_mesh;
+using samples::sample_positions;
 using testing::HasSubstr;
 
-std::vector<std::uint8_t> glb(const json& root, const std::vector<std::uint8_t>& binary = {}) {
-    auto text = root.dump();
-    text.resize((text.size() + 3) / 4 * 4, ' ');
-    internal::ByteWriter out;
-    out.bytes(bytes_of("glTF"));
-    out.u32(2);
-    out.u32(static_cast<std::uint32_t>(12 + 8 + text.size() + (binary.empty() ? 0 : 8 + binary.size())));
-    out.u32(static_cast<std::uint32_t>(text.size()));
-    out.bytes(bytes_of("JSON"));
-    out.bytes(bytes_of(text));
-    if (!binary.empty()) {
-        out.u32(static_cast<std::uint32_t>(binary.size()));
-        out.bytes(bytes_of(std::string_view("BIN\0", 4)));
-        out.bytes(binary);
-    }
-    return out.take();
-}
-
-std::vector<std::uint8_t> floats(std::initializer_list<float> values) {
-    internal::ByteWriter out;
-    for (const float value : values) out.u32(std::bit_cast<std::uint32_t>(value));
-    return out.take();
-}
-
-// A triangle of four vertices (one is left over), on the node 0; tests change what they are about.
-struct Sample {
-    std::vector<std::uint8_t> binary = floats({0, 0, 0, 1, 0, 0, 0, 1, 0, 5, 6, 7});
-    json root = json::parse(R"({
-        "asset": {"version": "2.0"},
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"},
-                      {"bufferView": 1, "componentType": 5121, "count": 3, "type": "SCALAR"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 3}],
-        "buffers": [{"byteLength": 52}]})");
-    Sample() { binary.insert(binary.end(), {0, 1, 2, 0}); }
-    json& primitive() { return root["meshes"][0]["primitives"][0]; }
-    // An attribute of the four vertices, and its accessor.
-    json& add(const char* name, const std::vector<std::uint8_t>& bytes, int component, const char* type) {
-        root["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", binary.size()}, {"byteLength", bytes.size()}});
-        binary.insert(binary.end(), bytes.begin(), bytes.end());
-        root["buffers"][0]["byteLength"] = binary.size();
-        root["accessors"].push_back({{"bufferView", root["bufferViews"].size() - 1},
-                                     {"componentType", component},
-                                     {"count", 4},
-                                     {"type", type}});
-        primitive()["attributes"][name] = root["accessors"].size() - 1;
-        return root["accessors"].back();
-    }
-    Result<Mesh> read(const MeshLimits& limits = {}) const { return read_gltf(glb(root, binary), {}, {limits}); }
-    Mesh mesh() const {
-        const auto read_back = read();
-        EXPECT_TRUE(read_back) << read_back.error().message;
-        return read_back.value_or(Mesh());
-    }
-    Error error() const {
-        const auto read_back = read();
-        EXPECT_FALSE(read_back);
-        return read_back ? Error{} : read_back.error();
-    }
-};
-
-const std::vector<Vector3f> sample_positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 6, 7}};
+using Sample = samples::GltfSample;
 
 // ---- Writing, and reading back --------------------------------------------------------------------------------------
 
@@ -281,17 +226,13 @@ TEST(GltfReading, OnlyTheShownSceneIsRead) {
 // ---- Files that are wrong or hostile --------------------------------------------------------------------------------
 
 TEST(GltfReading, WhatIsNotReadSaysSo) {
-    Sample sparse, skinned, morphed, compressed, old;
-    sparse.root["accessors"][0]["sparse"] = json::object();
-    EXPECT_EQ(sparse.error().kind, ErrorKind::unsupported);
-    skinned.root["nodes"][0]["skin"] = 0;
-    EXPECT_THAT(skinned.error().message, HasSubstr("pose applied"));
+    Sample morphed, compressed, old;
     morphed.root["meshes"][0]["weights"] = {0, 0.5};
     EXPECT_THAT(morphed.error().message, HasSubstr("shape applied"));
     morphed.root["meshes"][0]["weights"] = {0, 0};
     EXPECT_TRUE(morphed.read());
-    compressed.root["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-    EXPECT_THAT(compressed.error().message, HasSubstr("KHR_draco_mesh_compression"));
+    compressed.root["extensionsRequired"] = {"EXT_something_else"};
+    EXPECT_THAT(compressed.error().message, HasSubstr("EXT_something_else"));
     old.root["asset"]["version"] = "1.0";
     EXPECT_EQ(old.error().kind, ErrorKind::unsupported);
 }
@@ -327,7 +268,6 @@ TEST(GltfReading, SizesAndPlacesThatAreNotTrueAreErrors) {
     refused("negative", [&](json& root) { root["accessors"][0]["count"] = -1; });
     refused("fraction", [&](json& root) { root["accessors"][0]["count"] = 3.5; });
     refused("a matrix", [&](json& root) { root["accessors"][0]["type"] = "MAT2"; });
-    refused("no view", [&](json& root) { root["accessors"][0].erase("bufferView"); });
     refused("short matrix", [&](json& root) { root["nodes"][0]["matrix"] = {1, 0}; });
     refused("not a list", [&](json& root) { root["nodes"][0]["children"] = 1; });
     refused("circle", [&](json& root) { root["nodes"][0]["children"] = {0}; });
@@ -366,16 +306,184 @@ TEST(GltfReading, CutOffAndDamagedFilesAreErrors) {
     ASSERT_TRUE(read_gltf(whole, {}));
     for (std::size_t size = 0; size < whole.size(); ++size)
         EXPECT_FALSE(read_gltf(std::span(whole).first(size), {})) << size;
-    // The binary chunk says that it is eight bytes longer than the file.
-    auto longer = whole;
-    longer[longer.size() - sample.binary.size() - 8] += 8;
-    EXPECT_THAT(read_gltf(longer, {}).error().message, HasSubstr("cut off"));
-    for (const char* text : {"", "{", "[]", "{}", "null", R"({"asset": {}})", R"({"asset": {"version": 2}})"})
+    for (const char* text :
+         {"", "{", "[]", "{}", "null", R"({"asset": {}})", R"({"asset": {"version": 2}})",
+          R"({"asset": {"version": "3.0"}})", R"({"asset": {"version": "2.1", "minVersion": "2.1"}})"})
         EXPECT_FALSE(read_gltf(bytes_of(text), {})) << text;
     // Brackets in brackets.
     std::string deep = R"({"asset": {"version": "2.0", "extras": )" + std::string(300000, '[');
     deep += std::string(300000, ']') + "}}";
     EXPECT_TRUE(read_gltf(bytes_of(deep), {}));
+}
+
+// ---- How programs write them ----------------------------------------------------------------------------------------
+
+TEST(GltfReading, SparseAccessorsReplaceRowsOfTheirViewOrOfZeros) {
+    Sample sample;
+    const auto indices = sample.add_view(std::vector<std::uint8_t>{1, 0, 3, 0});
+    const auto values = sample.add_view(floats({7, 8, 9, 1, 2, 3}));
+    auto& accessor = sample.root["accessors"][0];
+    accessor["sparse"] = {{"count", 2},
+                          {"indices", {{"bufferView", indices}, {"componentType", 5123}}},
+                          {"values", {{"bufferView", values}}}};
+    EXPECT_EQ(sample.mesh().positions, (std::vector<Vector3f>{{0, 0, 0}, {7, 8, 9}, {0, 1, 0}, {1, 2, 3}}));
+    accessor.erase("bufferView");
+    EXPECT_EQ(sample.mesh().positions, (std::vector<Vector3f>{{0, 0, 0}, {7, 8, 9}, {0, 0, 0}, {1, 2, 3}}));
+    accessor["count"] = 3;
+    EXPECT_THAT(sample.error().message, HasSubstr("row that is not there"));
+    accessor["count"] = 4000000000u;
+    EXPECT_EQ(sample.error().kind, ErrorKind::limit) << "zeros are not believed";
+    accessor["count"] = 4;
+    for (const std::uint64_t count : {std::uint64_t{3}, std::uint64_t{0x100000000}, ~std::uint64_t{0}}) {
+        accessor["sparse"]["count"] = count;
+        EXPECT_THAT(sample.error().message, HasSubstr("goes beyond its view"));
+    }
+    accessor["sparse"]["count"] = 2;
+    accessor["sparse"]["indices"]["componentType"] = 5126;
+    EXPECT_EQ(sample.error().kind, ErrorKind::bad_input);
+    accessor["sparse"].erase("indices");
+    EXPECT_EQ(sample.error().kind, ErrorKind::bad_input);
+}
+
+TEST(GltfReading, AttributesMayHaveRowsThatNoVertexUses) {
+    Sample sample;
+    sample.add("TEXCOORD_0", floats({0, 0, 1, .25f, .5f, 1, 0, 2, 9, 9}), 5126, "VEC2")["count"] = 5;
+    EXPECT_EQ(sample.mesh().texcoords.size(), 4u);
+    sample.root["accessors"].back()["count"] = 3;
+    EXPECT_THAT(sample.error().message, HasSubstr("3 of 4 vertices"));
+}
+
+TEST(GltfReading, TheLargestIndexBeginsStripsAnew) {
+    Sample sample;
+    sample.primitive()["indices"] = sample.add_accessor({0, 1, 2, 255, 1, 2, 3, 0}, 5121, "SCALAR", 8);
+    sample.primitive()["mode"] = 5;
+    EXPECT_EQ(sample.mesh().triangles, (std::vector<Triangle>{{0, 1, 2}, {1, 2, 3}, {2, 0, 3}}));
+    sample.primitive()["mode"] = 6;
+    EXPECT_EQ(sample.mesh().triangles, (std::vector<Triangle>{{1, 2, 0}, {2, 3, 1}, {3, 0, 1}}));
+}
+
+TEST(GltfReading, VerticesThatAreNoNumbersAreLeftOutWhereTheyCanBe) {
+    Sample sample;
+    sample.binary[47] = 0x7f;  // of the vertex that nothing uses
+    sample.binary[46] = 0xc0;
+    EXPECT_EQ(sample.mesh().positions, (std::vector<Vector3f>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+    EXPECT_EQ(sample.mesh().triangles, (std::vector<Triangle>{{0, 1, 2}}));
+    ASSERT_EQ(sample.findings().remarks.size(), 1u);
+    EXPECT_EQ(sample.findings().remarks[0].about, "not-finite");
+    EXPECT_FALSE(sample.findings().remarks[0].is_loss);
+    // One triangle of eleven.
+    std::vector<std::uint8_t> indices{0, 1, 3};
+    for (int t = 0; t < 10; ++t) indices.insert(indices.end(), {0, 1, 2});
+    sample.primitive()["indices"] = sample.add_accessor(indices, 5121, "SCALAR", 33);
+    EXPECT_EQ(sample.mesh().triangles.size(), 10u);
+    EXPECT_TRUE(sample.findings().remarks[0].is_loss);
+    sample.root["accessors"].back()["count"] = 9;
+    EXPECT_THAT(sample.error().message, HasSubstr("position of vertex 3 is not finite"));
+}
+
+TEST(GltfReading, ContainersAreReadByTheirChunks) {
+    const Sample sample;
+    const auto whole = glb(sample.root, sample.binary);
+    const auto expect_read = [&](const std::vector<std::uint8_t>& bytes, const char* what) {
+        const auto mesh = read_gltf(bytes, {});
+        ASSERT_TRUE(mesh) << what << ": " << mesh.error().message;
+        EXPECT_EQ(mesh->positions, sample_positions) << what;
+    };
+    auto changed = whole;
+    changed[8] = 12, changed[9] = 0;
+    expect_read(changed, "a length that is too small");
+    changed[9] = 0xff;
+    expect_read(changed, "one that is too large");
+    changed = whole;
+    changed.insert(changed.end(), {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12});
+    expect_read(changed, "bytes behind it");
+    changed = whole;
+    changed[whole.size() - sample.binary.size() - 8] += 8;
+    expect_read(changed, "a chunk that says more than there is");
+    changed = whole;
+    changed.insert(changed.begin() + 12, {4, 0, 0, 0, 'X', 'T', 'R', 'A', 0, 0, 0, 0});
+    expect_read(changed, "an unknown chunk before");
+    changed = whole;
+    for (auto at = changed.size() - sample.binary.size() - 9; changed[at] == ' '; --at) changed[at] = 0;
+    expect_read(changed, "JSON filled up with zeros");
+}
+
+TEST(GltfReading, VersionsThatSayTheyMayBeReadAre) {
+    Sample sample;
+    sample.root["asset"] = {{"version", "2.1"}, {"minVersion", "2.0"}};
+    EXPECT_EQ(sample.mesh().positions, sample_positions);
+    sample.root["asset"] = {{"version", "2.1"}};
+    EXPECT_EQ(sample.mesh().positions, sample_positions);
+    const auto text = "\xEF\xBB\xBF" + json({{"asset", {{"version", "2.0"}}}}).dump();
+    EXPECT_TRUE(read_gltf(bytes_of(text), {})) << "a byte order mark";
+}
+
+TEST(GltfReading, CompressedViewsAreReadWhereAPlainOneIsBeside) {
+    Sample sample;
+    sample.root["bufferViews"][0]["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0}, {"count", 4}};
+    sample.root["extensionsUsed"] = {"EXT_meshopt_compression"};
+    EXPECT_EQ(sample.mesh().positions, sample_positions);
+    sample.root["extensionsRequired"] = {"EXT_meshopt_compression"};
+    sample.root["buffers"][0]["extensions"]["EXT_meshopt_compression"]["fallback"] = true;
+    EXPECT_THAT(sample.error().message, HasSubstr("EXT_meshopt_compression"));
+    EXPECT_EQ(sample.error().kind, ErrorKind::unsupported);
+}
+
+// ---- Draco inside ---------------------------------------------------------------------------------------------------
+
+// Four vertices with colours of 16 bits, one triangle, as KHR_draco_mesh_compression has them.
+struct DracoSample : Sample {
+    explicit DracoSample(bool is_damaged = false) {
+        draco::TriangleSoupMeshBuilder builder;
+        builder.Start(1);
+        using draco::GeometryAttribute;
+        const int position = builder.AddAttribute(GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
+        const int colour = builder.AddAttribute(GeometryAttribute::COLOR, 3, draco::DT_UINT16);
+        const std::array<Vector3f, 3> p{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
+        const std::array<std::array<std::uint16_t, 3>, 3> c{{{0, 0, 65535}, {0, 65535, 0}, {65535, 0, 0}}};
+        builder.SetAttributeValuesForFace(position, draco::FaceIndex(0), &p[0], &p[1], &p[2]);
+        builder.SetAttributeValuesForFace(colour, draco::FaceIndex(0), &c[0], &c[1], &c[2]);
+        auto mesh = builder.Finalize();
+        mesh->attribute(position)->set_unique_id(7);
+        mesh->attribute(colour)->set_unique_id(3);
+        draco::Encoder encoder;
+        draco::EncoderBuffer buffer;
+        EXPECT_TRUE(encoder.EncodeMeshToBuffer(*mesh, &buffer).ok());
+        std::vector<std::uint8_t> bytes(buffer.data(), buffer.data() + buffer.size());
+        if (is_damaged) bytes.resize(bytes.size() / 2);
+        root["accessors"] = json::parse(R"([{"componentType": 5126, "count": 3, "type": "VEC3"},
+            {"componentType": 5125, "count": 3, "type": "SCALAR"},
+            {"componentType": 5123, "normalized": true, "count": 3, "type": "VEC3"}])");
+        primitive()["attributes"]["COLOR_0"] = 2;
+        primitive()["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", add_view(bytes)},
+                                                                   {"attributes", {{"POSITION", 7}, {"COLOR_0", 3}}}};
+        root["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+    }
+};
+
+TEST(GltfReading, DracoInsideIsRead) {
+    DracoSample sample;
+    sample.root["nodes"][0]["translation"] = {0, 0, 5};
+    sample.root["nodes"].push_back({{"mesh", 0}});
+    sample.root["scenes"][0]["nodes"] = {0, 1};
+    const auto mesh = sample.mesh();
+    ASSERT_EQ(mesh.positions.size(), 6u);
+    ASSERT_EQ(mesh.triangles.size(), 2u);
+    const auto& [a, b, c] = mesh.triangles[0];
+    std::vector<std::pair<Vector3f, Colour>> corners;
+    for (const auto v : {a, b, c}) corners.emplace_back(mesh.positions[v], mesh.colours[v]);
+    std::sort(corners.begin(), corners.end());
+    EXPECT_EQ(corners, (std::vector<std::pair<Vector3f, Colour>>{
+                           {{0, 0, 5}, {0, 0, 255}}, {{0, 1, 5}, {255, 0, 0}}, {{1, 0, 5}, {0, 255, 0}}}));
+    sample.primitive()["extensions"]["KHR_draco_mesh_compression"]["attributes"]["POSITION"] = 9;
+    EXPECT_THAT(sample.error().message, HasSubstr("no attribute 9"));
+}
+
+TEST(GltfReading, DamagedDracoInsideIsAnError) {
+    EXPECT_EQ(DracoSample(true).error().kind, ErrorKind::bad_input);
+    DracoSample none;
+    none.primitive()["extensions"]["KHR_draco_mesh_compression"].erase("bufferView");
+    EXPECT_EQ(none.error().kind, ErrorKind::bad_input);
 }
 
 // ---- Buffers outside of the file ------------------------------------------------------------------------------------
@@ -388,7 +496,8 @@ protected:
         outside = name;
         folder = outside / "folder";
         std::filesystem::create_directories(folder / "more data");
-        for (const auto& path : {outside / "a.bin", folder / "a.bin", folder / "more data" / "a.bin"})
+        for (const auto& path : {outside / "a.bin", folder / "a.bin", folder / "more data" / "a.bin",
+                                 folder / "100%.bin", folder / "a%20b.bin"})
             std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(sample.binary.data()), 52);
         std::filesystem::create_symlink(outside / "a.bin", folder / "link.bin");
         std::filesystem::create_symlink(folder / "a.bin", folder / "inner.bin");
@@ -403,7 +512,8 @@ protected:
 };
 
 TEST_F(GltfBuffers, InTheFolderAreRead) {
-    for (const char* uri : {"a.bin", "./a.bin", "more%20data/a.bin", "inner.bin", "more data/../a.bin"}) {
+    for (const char* uri : {"a.bin", "./a.bin", "more%20data/a.bin", "inner.bin", "more data/../a.bin",
+                            "more data\\a.bin", ".\\a.bin", "100%.bin", "a%20b.bin", "a.bin?v=1"}) {
         const auto mesh = with(uri);
         ASSERT_TRUE(mesh) << uri << ": " << mesh.error().message;
         EXPECT_EQ(mesh->positions, sample_positions);
@@ -428,6 +538,8 @@ TEST_F(GltfBuffers, InTheTextAreDecoded) {
     sample.root["accessors"] = json::parse(R"([{"bufferView": 0, "componentType": 5121, "count": 1, "type": "VEC3"}])");
     sample.primitive().erase("indices");
     for (const char* uri : {"data:application/octet-stream;base64,AQL/", "data:;base64,AQL/"})
+        EXPECT_EQ(with(uri)->positions, (std::vector<Vector3f>{{1, 2, 255}})) << uri;
+    for (const char* uri : {"DATA:text/plain;charset=utf-8;BASE64,AQL%2F", "data:;base64,AQ L\n_", "data:,%01%02%FF"})
         EXPECT_EQ(with(uri)->positions, (std::vector<Vector3f>{{1, 2, 255}})) << uri;
     for (const char* uri : {"data:application/octet-stream;base64,AQI=", "data:;base64,A*L/", "data:;base64,"})
         EXPECT_FALSE(with(uri)) << uri;
