@@ -11,6 +11,7 @@
 #include "command_line/terminal.h"
 #include "io/skeleton_align.h"
 #include "io/skeleton_file.h"
+#include "io/skeleton_rate.h"
 #include "io/texture_colours.h"
 
 namespace htvm::app {
@@ -45,6 +46,14 @@ FrameRate rate_of(const std::vector<std::int64_t>& times) {
     return {static_cast<std::uint32_t>(std::lround(per_second * 1000)), 1000};
 }
 
+// Seconds from the first mesh to the end of the last one; 0 of one mesh or an unknown number.
+double duration_of(const std::vector<std::int64_t>& times, std::size_t frames, double fps) {
+    if (times.size() > 1)
+        return static_cast<double>(times.back() - times.front()) / 1e6 * static_cast<double>(times.size()) /
+               static_cast<double>(times.size() - 1);
+    return frames > 1 ? static_cast<double>(frames) / fps : 0;
+}
+
 std::string key_of_rate(const FrameRate& rate) {
     return rate.denominator == 1000 ? fmt::format("{}", rate.per_second())
                                     : fmt::format("{}/{}", rate.numerator, rate.denominator);
@@ -61,6 +70,13 @@ void add_meshes(CLI::App& command, CaptureOptions& options) {
         ->type_name("FILE")
         ->expected(1, -1)
         ->required();
+    command
+        .add_option("--ignore", options.ignored,
+                    "Files, and folders, that are no frames: those whose name matches this glob, such as 'template*',\n"
+                    "are left out; may be given several times")
+        ->type_name("GLOB")
+        ->allow_extra_args(false)
+        ->group(heading::input);
     command.add_option("--frames", options.frames, "Use at most this many frames; 0: all (default: all)")
         ->group(heading::input);
     command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)")
@@ -215,17 +231,11 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
 }
 
 Result<void> Capture::find_files() {
-    auto files = find_sequence(options_.inputs);
+    auto files = find_sequence(options_.inputs, {options_.ignored});
     if (!files) return tl::unexpected(files.error());
     files_ = std::move(*files);
-    const auto& paths = files_.paths;
-    const auto back = std::adjacent_find(
-        paths.begin(), paths.end(), [](const auto& a, const auto& b) { return natural_less(b.string(), a.string()); });
-    if (options_.inputs.size() > 1 && back != paths.end())
-        warn(
-            fmt::format("the files are taken in the order given, where {} comes before {}; a folder or a pattern in "
-                        "quotes is taken by number",
-                        back->string(), std::next(back)->string()));
+    for (const auto& remark : files_.remarks)
+        (remark.is_loss ? warn : note)(fmt::format("{}: {}", input_name(options_), remark.text));
     places_ = places_in_time(files_);
     const std::size_t found = files_.paths.size();
     if (options_.first >= found)
@@ -303,14 +313,22 @@ Result<void> Capture::find_poses() {
     }
     if (auto found = find_times(); !found) return found;
     const auto& times = pipe_ ? listed_.microseconds : file_times_;
-    if (options_.fps.numerator > 0) {
-        rate_ = options_.fps;
-    } else if (track && track->fps > 0) {
-        rate_ = {static_cast<std::uint32_t>(std::lround(track->fps * 1000)), 1000};
-    } else if (times.size() > 1) {
-        rate_ = rate_of(times);
+    const bool is_known = options_.fps.numerator > 0 || (times.size() > 1 && (!track || !track->rate_is_known));
+    const std::size_t frames = places_.empty() ? times.size() : static_cast<std::size_t>(places_.back() + 1);
+    if (is_known) {
+        rate_ = options_.fps.numerator > 0 ? options_.fps : rate_of(times);
+    } else if (track && track->rate_is_known) {
+        const auto beside = times.empty() ? mesh_rate_beside(*track, frames) : MeshRate{track->fps, {}, false};
+        rate_ = {static_cast<std::uint32_t>(std::lround(beside.fps * 1000)), 1000};
+        if (!beside.note.empty())
+            (beside.is_doubtful ? warn : note)(fmt::format("{}: {}", options_.skeleton, beside.note));
     } else if (!track) {
         rate_is_told_ = false;
+    }
+    if (track && !track->rate_is_known) take_rate_of_meshes(*track, fps(), frames);
+    if (track && (is_known || !times.empty())) {
+        const auto apart = unlike_durations(*track, duration_of(times, frames, fps()));
+        if (!apart.empty()) warn(fmt::format("{}: {}", options_.skeleton, apart));
     }
     if (!track) return {};
     MeshClock clock;

@@ -57,8 +57,9 @@ std::vector<Choice<std::optional<LengthUnit>>> units_or(const char* none);
 struct CaptureOptions {
     // A folder, pattern, glob or file of meshes; several files; or - for PLY after PLY on standard input.
     std::vector<std::string> inputs;
-    std::string skeleton;            // file; empty: none
-    FrameRate fps;                   // of the meshes; not given: the skeleton's, else of their timestamps, else 30
+    std::vector<std::string> ignored;  // globs of files and folders that are no frames, as in SequenceOptions
+    std::string skeleton;              // file; empty: none
+    FrameRate fps;                     // of the meshes; not given: the skeleton's, else of their timestamps, else 30
     std::string timestamps;          // file; empty: as the PLY files say, else by the files' numbers and the frame rate
     std::optional<LengthUnit> unit;  // of the mesh files; not given: by their format, else guessed from the first mesh
     double scale = 1;                // of the mesh files' positions besides
