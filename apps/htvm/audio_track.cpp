@@ -61,6 +61,7 @@ Result<std::optional<AudioTrack>> AudioTrack::open(const AudioOptions& options) 
     };
     auto track = read_opus_track(options.file, coding);
     if (!track) return tl::unexpected(track.error());
+    if (track->is_silent) warn(options.file + " is silent from its beginning to its end");
     return AudioTrack(std::move(*track), options.delay);
 }
 

@@ -111,6 +111,15 @@ std::string rate_warning(const RateReport& report) {
                        strain.moved_alone + strain.dropped > 0 ? " or a larger --buffer" : "");
 }
 
+std::string missed_rate(const RateReport& report, std::uint64_t bytes, double seconds) {
+    constexpr double most = 100.0 / 3;
+    if (!report.rate_controlled() || !report.dropped.empty() || seconds <= report.buffer_seconds) return {};
+    const double error = error_percent(report, bytes, seconds);
+    if (error <= most) return {};
+    return fmt::format("takes {:.2f} Mbit/s, {:.0f} % above its --bitrate: give at least that, or fewer vertices",
+                       rate_of(bytes, seconds) / 1e6, error);
+}
+
 std::string rate_summary(const RateReport& report, std::uint64_t bytes, double seconds) {
     const auto quality = quality_range(report);
     const std::string qualities =

@@ -120,6 +120,28 @@ Result<void> check_whole(const StreamInput& input, const std::string& path, cons
     return {};
 }
 
+namespace {
+
+// What else than a stream a file of that name is: "a mesh"; empty: nothing that is known. Who gives such a name expects
+// a file of that kind.
+std::string other_kind_of(const std::filesystem::path& path) {
+    if (is_mesh_file_name(path)) return "a mesh";
+    std::string ending = path.extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(),
+                   [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+    const auto is_of = [&](std::initializer_list<const char*> endings) {
+        return std::find(endings.begin(), endings.end(), ending) != endings.end();
+    };
+    if (is_of({".mp4", ".m4v", ".mov", ".mkv", ".webm", ".avi", ".y4m", ".mpg"})) return "a video";
+    if (is_of({".png", ".jpg", ".jpeg", ".webp", ".gif"})) return "a picture";
+    if (is_of({".wav", ".flac", ".opus", ".ogg", ".mp3", ".m4a", ".aac"})) return "a sound";
+    if (is_of({".bvh", ".json", ".csv", ".txt", ".html"})) return "a text";
+    if (is_of({".zip", ".gz", ".tar", ".7z", ".usd", ".usdz", ".fbx", ".abc"})) return "another format";
+    return {};
+}
+
+}  // namespace
+
 Result<StreamOutput> StreamOutput::open(const std::string& path, const PublishingOptions& publishing) {
     StreamOutput output;
     if (path == "-") return output;
@@ -129,9 +151,9 @@ Result<StreamOutput> StreamOutput::open(const std::string& path, const Publishin
         output.publishing_.emplace(std::move(*opened));
         return output;
     }
-    if (is_mesh_file_name(path))
-        return fail(ErrorKind::bad_input,
-                    path + " is the name of a mesh, but a stream would be written there; give one that ends in .htvm");
+    if (const auto what = other_kind_of(path); !what.empty())
+        return fail(ErrorKind::bad_input, path + " is the name of " + what +
+                                              ", but a stream would be written there; give one that ends in .htvm");
     auto file = OutputFile::create(path);
     if (!file) return tl::unexpected(file.error());
     output.file_.emplace(std::move(*file));

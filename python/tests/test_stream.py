@@ -140,12 +140,14 @@ def test_a_file_object_is_read_once_and_has_no_random_access(stream):
 
 def test_the_sequence_header_is_told():
     skeleton = htvm.Skeleton(["pelvis", "neck", "head"], [(0, 1), (1, 2)], [100, 50])
-    encoder = htvm.Encoder(fps="30000/1001", skeleton=skeleton, up="-z", floor=12.5, unit_micrometres=10000,
+    encoder = htvm.Encoder(fps="30000/1001", skeleton=skeleton, up="-z", floor=12.5, global_shift=(500000000, -1, 4649776000),
+                           unit_micrometres=10000,
                            metadata={"title": "Ein Gang", "rights": "©"}, subject_size=1000)
     packets = encoder.push(sheet(0), htvm.Pose([[50, 10, 0], [50, 60, 0], [50, 100, 0]]))
     sequence = htvm.open(b"".join(packets)).sequence
     assert sequence.fps == Fraction(30000, 1001)
     assert (sequence.up, sequence.floor, sequence.unit_micrometres) == ("-z", 12.5, 10000)
+    assert sequence.global_shift == (500000000, -1, 4649776000)
     assert sequence.metadata == {"title": "Ein Gang", "rights": "©"}
     assert sequence.skeleton.joint_names == ["pelvis", "neck", "head"]
     assert sequence.skeleton.bones == [(0, 1), (1, 2)]

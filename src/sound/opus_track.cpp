@@ -109,11 +109,13 @@ Result<OpusTrack> read_opus_track(const std::filesystem::path& path, const OpusF
         OpusTrackEncoder::create(file->channels(), options.bits_per_second.value_or(usual_opus_rate(file->channels())));
     if (!encoder) return in_file(encoder.error());
     double done = 0, told = 0;
+    bool is_silent = true;
     const double promised = static_cast<double>(file->promised_samples()) / second;
     for (;;) {
         const auto samples = file->next();
         if (!samples) return tl::unexpected(samples.error());
         if (samples->empty()) break;
+        is_silent = is_silent && std::all_of(samples->begin(), samples->end(), [](float s) { return s == 0; });
         if (auto ok = encoder->push(*samples); !ok) return in_file(ok.error());
         done += static_cast<double>(samples->size()) / file->channels() / second;
         if (done < told + 1) continue;
@@ -124,6 +126,7 @@ Result<OpusTrack> read_opus_track(const std::filesystem::path& path, const OpusF
     auto track = encoder->finish();
     if (!track) return in_file(track.error());
     if (track->samples == 0) return fail(ErrorKind::bad_input, path.string() + ": there is no sound in it");
+    track->is_silent = is_silent;
     return track;
 }
 

@@ -547,6 +547,9 @@ TEST(CInterface, CarriesSessionSceneAndMetadata) {
     EXPECT_EQ(htvm_encoder_options_set(options, "session", "4711"), HTVM_OK);
     EXPECT_EQ(htvm_encoder_options_set(options, "up", "-z"), HTVM_OK);
     EXPECT_EQ(htvm_encoder_options_set_floor(options, 12.5), HTVM_OK);
+    const int64_t shift[3] = {500000000, -1, 4649776000};
+    EXPECT_EQ(htvm_encoder_options_set_global_shift(options, shift), HTVM_OK);
+    EXPECT_EQ(htvm_encoder_options_set_global_shift(options, nullptr), HTVM_BAD_INPUT);
     EXPECT_EQ(htvm_encoder_options_add_metadata(options, "title", "a walk"), HTVM_OK);
     EXPECT_EQ(htvm_encoder_options_add_metadata(options, nullptr, "a walk"), HTVM_BAD_INPUT);
     htvm_encoder* encoder = nullptr;
@@ -574,6 +577,10 @@ TEST(CInterface, CarriesSessionSceneAndMetadata) {
     EXPECT_EQ(info.up, std::uint32_t{HTVM_UP_MINUS_Z});
     EXPECT_EQ(info.floor_known, 1u);
     EXPECT_EQ(info.floor, 12.5);
+    int64_t decoded_shift[3] = {};
+    EXPECT_EQ(htvm_decoder_global_shift(decoder.get(), decoded_shift), HTVM_OK);
+    EXPECT_TRUE(std::equal(shift, shift + 3, decoded_shift));
+    EXPECT_EQ(htvm_decoder_global_shift(decoder.get(), nullptr), HTVM_BAD_INPUT);
     ASSERT_EQ(info.metadata, 1u);
     char key[256], value[4096];
     ASSERT_EQ(htvm_decoder_metadata(decoder.get(), 0, key, sizeof key, value, sizeof value), HTVM_OK);

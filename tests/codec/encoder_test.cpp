@@ -122,6 +122,62 @@ std::vector<std::uint8_t> drained(Encoder& encoder) {
     return out;
 }
 
+// Which of the decoded frames have normals, of a capture that has them.
+std::vector<bool> frames_with_normals(EncoderOptions options) {
+    auto encoder = Encoder::create(std::move(options));
+    Decoder decoder;
+    std::vector<bool> out;
+    for (const auto& frame : synthetic(false, 3, 300).frames) {
+        EXPECT_FALSE(frame.mesh.normals.empty());
+        EXPECT_TRUE(encoder->push(frame.mesh));
+    }
+    EXPECT_TRUE(encoder->finish());
+    while (const auto packet = encoder->pull())
+        if (const auto decoded = decoder.decode(*packet); decoded && *decoded)
+            out.push_back(!(*decoded)->mesh.normals.empty());
+    return out;
+}
+
+TEST(Encoder, LeavesCapturedNormalsOutWhereFramesBetweenIFramesCouldNotKeepThem) {
+    EncoderOptions tracked;
+    tracked.threads = 1;
+    EXPECT_EQ(frames_with_normals(tracked), (std::vector<bool>{false, false, false}));
+    tracked.normals = CapturedNormals::keep;
+    EXPECT_TRUE(frames_with_normals(tracked)[0]);
+    EncoderOptions topology = test::enhanced_options();
+    topology.threads = 1;
+    EXPECT_EQ(frames_with_normals(topology), (std::vector<bool>{true, true, true}));
+    topology.normals = CapturedNormals::none;
+    EXPECT_EQ(frames_with_normals(topology), (std::vector<bool>{false, false, false}));
+}
+
+TEST(Encoder, OfATrackedSurfaceTakesDoubledAndMixedTrianglesForTheSurfaceThatTheyAre) {
+    const auto sequence = synthetic(false, 3, 800);
+    const auto stream_of = [&](const std::function<void(Mesh&)>& change) {
+        EncoderOptions options;
+        options.threads = 1;
+        auto encoder = Encoder::create(options);
+        for (auto frame : sequence.frames) {
+            change(frame.mesh);
+            EXPECT_TRUE(encoder->push(frame.mesh));
+        }
+        EXPECT_TRUE(encoder->finish());
+        return drained(*encoder);
+    };
+    const auto turn = [](Triangle t) { return Triangle{t[0], t[2], t[1]}; };
+    const auto clean = stream_of([](Mesh&) {});
+    EXPECT_EQ(stream_of([&](Mesh& mesh) {
+                  for (std::size_t t = 0; t < mesh.triangles.size(); t += 3) mesh.triangles[t] = turn(mesh.triangles[t]);
+              }).size(),
+              clean.size());
+    const auto doubled = stream_of([&](Mesh& mesh) {
+        const auto before = mesh.triangles;
+        for (const auto& t : before) mesh.triangles.push_back(turn(t));
+    });
+    // The counts of the captured mesh in its frames are those of what is left.
+    EXPECT_EQ(doubled.size(), clean.size());
+}
+
 TEST(Encoder, AFrameThatCannotBeCodedIsNamedAndTheStreamGoesOnAsIfItHadNotBeen) {
     const auto sequence = synthetic(true, 4, 300);
     std::vector<std::uint8_t> expected;

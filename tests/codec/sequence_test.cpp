@@ -29,6 +29,7 @@ SequenceHeader full_header() {
     header.floor = -lattice_limit;
     header.metadata = {
         {"title", "\xe4\xba\xba \xf0\x9f\x9a\xb6"}, {"rights", ""}, {std::string(255, 'k'), std::string(4095, 'v')}};
+    header.global_shift = {-most_global_shift, 0, most_global_shift};
     return header;
 }
 
@@ -48,6 +49,7 @@ void expect_equal(const SequenceHeader& a, const SequenceHeader& b) {
     EXPECT_EQ(a.up, b.up);
     EXPECT_EQ(a.floor, b.floor);
     EXPECT_EQ(a.metadata, b.metadata);
+    EXPECT_EQ(a.global_shift, b.global_shift);
     ASSERT_EQ(a.skeleton.bones.size(), b.skeleton.bones.size());
     for (std::size_t i = 0; i < a.skeleton.bones.size(); ++i) {
         EXPECT_EQ(a.skeleton.bones[i].first, b.skeleton.bones[i].first);
@@ -81,6 +83,18 @@ TEST(SequenceHeader, OfTheLargestSkeletonComesBack) {
 TEST(SequenceHeader, WrittenAgainIsTheSameBytes) {
     const auto bytes = write_sequence_header(full_header());
     EXPECT_EQ(write_sequence_header(*read_sequence_header(bytes)), bytes);
+}
+
+TEST(SequenceHeader, TheGlobalShiftStandsLastWhereDecodersThatDoNotKnowItStopReading) {
+    auto shifted = full_header(), plain = full_header();
+    plain.global_shift = {};
+    const auto bytes = write_sequence_header(shifted), without = write_sequence_header(plain);
+    ASSERT_EQ(bytes.size(), without.size() + 24);
+    std::size_t differing = 0;
+    for (std::size_t i = 0; i < without.size(); ++i) differing += bytes[i] != without[i];
+    EXPECT_EQ(differing, 1u) << "the bit that says that it follows";
+    const auto cut = read_sequence_header(std::span(bytes).first(bytes.size() - 1));
+    EXPECT_FALSE(cut) << "once said, it has to be there";
 }
 
 TEST(SequenceHeader, LongNamesAreCut) {
@@ -135,6 +149,9 @@ TEST(SequenceHeader, FieldsOutOfRangeAreRefused) {
     header = full_header();
     header.up = UpAxis::unknown;
     expect_refused(header, "a floor, and nothing that is up");
+    header = full_header();
+    header.global_shift[1] = most_global_shift + 1;
+    expect_refused(header, "global shift");
 }
 
 TEST(SequenceHeader, MetadataIsBoundedTextInUtf8) {

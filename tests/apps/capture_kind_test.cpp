@@ -1,0 +1,75 @@
+// What the frames of a capture have in common.
+#include "command_line/capture_kind.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace htvm::app {
+namespace {
+
+using testing::HasSubstr;
+
+Mesh person(float size = 1, float x = 0, bool coloured = true) {
+    Mesh out;
+    for (int i = 0; i < 60; ++i)
+        out.positions.push_back({x + size * 200 * static_cast<float>(i % 3), size * 30 * static_cast<float>(i), size * 10});
+    for (std::uint32_t i = 2; i < 60; ++i) out.triangles.push_back({i - 2, i - 1, i});
+    if (coloured) out.colours.assign(60, {90, 80, 70});
+    return out;
+}
+
+TEST(GlobalShift, IsTakenOfWhatIsFar) {
+    EXPECT_EQ(shift_of(person(), 1), GlobalShift{}) << "at the origin";
+    EXPECT_EQ(shift_of(person(1, 50000), 1), GlobalShift{}) << "50 m away floats are fine";
+    EXPECT_EQ(shift_of(person(1, 5e8f), 1), (GlobalShift{500000000, 1000, 0})) << "in whole metres";
+    EXPECT_EQ(shift_of(person(0.001f, 5e5f), 1000), (GlobalShift{500000000, 1000, 0})) << "of files in metres";
+    EXPECT_EQ(shift_of({}, 1), GlobalShift{});
+}
+
+TEST(GlobalShift, IsOfTheSurfaceNotOfUnusedVertices) {
+    auto mesh = person();
+    mesh.positions.push_back({1e9f, 0, 0});
+    EXPECT_EQ(shift_of(mesh, 1), GlobalShift{});
+}
+
+TEST(CaptureKind, TellsFramesWithoutTheColoursThatOthersHave) {
+    CaptureKind kind;
+    for (int i = 0; i < 3; ++i) kind.add(person(), {}, false);
+    EXPECT_EQ(kind.unlike(person(), false), "");
+    EXPECT_THAT(kind.unlike(person(1, 0, false), false), HasSubstr("no colours"));
+    EXPECT_EQ(kind.unlike(person(1, 0, false), true), "") << "an image gives them";
+    EXPECT_EQ(kind.unlike({}, false), "") << "an empty mesh is of every kind";
+}
+
+TEST(CaptureKind, TellsFramesWithColoursAmongThoseWithout) {
+    CaptureKind kind;
+    for (int i = 0; i < 3; ++i) kind.add(person(1, 0, false), {}, false);
+    EXPECT_THAT(kind.unlike(person(), false), HasSubstr("has colours"));
+}
+
+TEST(CaptureKind, TellsFramesOfAnotherSize) {
+    CaptureKind kind;
+    kind.add(person(), {}, false);
+    EXPECT_EQ(kind.unlike(person(0.4f), false), "") << "somebody crouches";
+    EXPECT_THAT(kind.unlike(person(0.001f), false), HasSubstr("1000 times smaller"));
+    EXPECT_THAT(kind.unlike(person(25), false), HasSubstr("25 times larger"));
+    auto with_stray = person();
+    with_stray.positions.push_back({4e5f, 0, 4e5f});
+    with_stray.colours.push_back({0, 0, 0});
+    EXPECT_EQ(kind.unlike(with_stray, false), "") << "a flying vertex is no other size";
+}
+
+TEST(CaptureKind, AddsUpTheColoursOfFrames) {
+    CaptureKind kind;
+    EXPECT_EQ(kind.colour_range(), std::nullopt) << "types say it";
+    MeshFindings dark, bright;
+    for (int i = 0; i < 10; ++i) dark.colour_levels.count(1);
+    for (int i = 0; i < 1000; ++i) bright.colour_levels.count(130);
+    kind.add(person(), dark, false);
+    EXPECT_EQ(kind.colour_range(), ColourRange::unit);
+    kind.add(person(), bright, false);
+    EXPECT_EQ(kind.colour_range(), ColourRange::bytes);
+}
+
+}  // namespace
+}  // namespace htvm::app

@@ -1,0 +1,92 @@
+#!/usr/bin/env bash
+# What is decided once for a capture, and how htvm check reports on one.
+. "$(dirname "$0")/expect.sh"
+
+"$htvm" synth capture --frames 5 --vertices 600 --quiet
+
+# change FOLDER WHAT: a copy of the capture, of which a line of Python changes each frame's k, vertices v (rows of x y z red
+# green blue) and whether it has colours.
+change() {
+    mkdir "$1"
+    python3 - "$1" "$2" <<'PYTHON'
+import glob, struct, sys
+for k, path in enumerate(sorted(glob.glob("capture/frame_*.ply"))):
+    data = open(path, "rb").read()
+    end = data.index(b"end_header\n") + 11
+    head = data[:end].decode()
+    count = int(head.split("element vertex ")[1].split()[0])
+    assert "uchar red" in head and " nx" not in head
+    v = [list(struct.unpack_from("<3f3B", data, end + 15 * i)) for i in range(count)]
+    number, coloured = "float", True
+    exec(sys.argv[2])
+    lines = ["ply", "format binary_little_endian 1.0", "element vertex %d" % len(v)]
+    lines += ["property %s %s" % (number, c) for c in "xyz"]
+    lines += ["property uchar %s" % c for c in ("red", "green", "blue")] if coloured else []
+    lines += [head[head.index("element face"):].rstrip("\n")]
+    form = "<3" + number[0] + ("3B" if coloured else "")
+    body = b"".join(struct.pack(form, *row[:6 if coloured else 3]) for row in v)
+    open("%s/frame_%05d.ply" % (sys.argv[1], k), "wb").write("\n".join(lines).encode() + b"\n" + body + data[end + 15 * count:])
+PYTHON
+}
+
+# Frames that lack the colours which others have.
+change fading 'coloured = k != 2'
+expect 1 "frame_00002.ply: it has no colours, as the other frames have" "$htvm" encode fading -o x.htvm
+expect 0 "1 bad frame left out" "$htvm" encode fading --on-bad-frame skip -o x.htvm
+change blooming 'coloured = k == 2'
+expect 1 "frame_00002.ply: it has colours, which the other frames have not" "$htvm" encode blooming -o x.htvm
+expect 0 "mesh 2 of standard input: it has no colours" bash -c "cat fading/*.ply | '$htvm' encode - -o x.htvm"
+
+# The second half is in another unit.
+change mixed 'v = [[c / 1000 for c in row[:3]] + row[3:] for row in v] if k > 2 else v'
+expect 1 "frame_00003.ply: it is 1000 times smaller than the first frame: of another capture, or in another unit" \
+    "$htvm" encode mixed -o x.htvm
+
+# Far from the origin, as surveys are: what decode writes is where the capture is, to the lattice's step.
+change survey 'number = "double"; v = [[row[0] / 1000 + 500000, row[1] / 1000 + 80, row[2] / 1000 + 4649776] + row[3:] for row in v]'
+expect 0 "500000, 80, 4.64978e+06 m are taken off, kept in the stream and added again by decode" \
+    "$htvm" encode survey --unit m --profile topology -q 100 -o survey.htvm
+expect 0 "global shift, which decode adds: 500000000, 80000, 4649776000 mm" "$htvm" info survey.htvm --summary
+"$htvm" decode survey.htvm -o surveyed/ --quiet
+"$htvm" decode survey.htvm -o surveyed_obj/ --format obj --quiet
+python3 - <<'PYTHON' || fail "decode does not give the survey's coordinates back"
+import struct
+def read(path, text):
+    if text:
+        return [tuple(map(float, line.split()[1:4])) for line in open(path) if line.startswith("v ")]
+    data = open(path, "rb").read()
+    end = data.index(b"end_header\n") + 11
+    head = data[:end].decode()
+    assert "property double x" in head
+    count = int(head.split("element vertex ")[1].split()[0])
+    return [struct.unpack_from("<3d", data, end + 27 * i) for i in range(count)]
+original = read("survey/frame_00002.ply", False)
+places = {tuple(round(c, 3) for c in p) for p in original}
+for path, text in (("surveyed/00002.ply", False), ("surveyed_obj/00002.obj", True)):
+    decoded = read(path, text)
+    off = max(min(max(abs(a - b) for a, b in zip(p, q)) for q in original) for p in decoded[::40])
+    assert off < 0.0004, off
+PYTHON
+expect 0 "M2" "$htvm" compare survey survey.htvm --unit m --only m2
+expect 0 "M2" "$htvm" compare survey surveyed --unit m --only m2
+
+# A stream under another format's name.
+for name in x.glb x.mp4 x.wav x.PNG x.zip; do
+    expect 1 "give one that ends in .htvm" "$htvm" encode capture -o $name
+    [ ! -e $name ] || fail "$name is written"
+done
+
+# A rate that the capture does not fit into.
+expect 5 "above its --bitrate: give at least that, or fewer vertices" \
+    "$htvm" encode capture --fps 2 --profile topology --bitrate 0.005 --buffer 2 -o x.htvm
+
+# The report.
+expect 0 "nothing to mend was found" "$htvm" check capture
+expect 1 "1 frame cannot be encoded: mend them" "$htvm" check fading
+expect 0 '"bad_frames": 0' "$htvm" check capture --json
+expect 0 "the first 2 frames with the defaults" "$htvm" check capture --trial 2
+mkdir gap && cp capture/frame_0000[0134].ply gap/
+expect 0 "1 frame is missing by the numbers in the names" "$htvm" check gap
+expect 1 "nowhere" "$htvm" check nowhere
+
+done_with "what frames have in common is decided once"
