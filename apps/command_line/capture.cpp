@@ -417,7 +417,7 @@ Result<void> Capture::take_off_shift() {
         return {};
     }
     shift_ = shift;
-    note(fmt::format("the meshes are far from their origin: {:g}, {:g}, {:g} m are taken off, kept in the stream and "
+    note(fmt::format("the meshes are far from their origin: {:.0f}, {:.0f}, {:.0f} m are taken off, kept in the stream and "
                      "added again by decode",
                      static_cast<double>(shift[0]) / 1000, static_cast<double>(shift[1]) / 1000,
                      static_cast<double>(shift[2]) / 1000));

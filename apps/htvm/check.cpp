@@ -317,7 +317,7 @@ void print_report(const Report& report, const Judgement& j, const std::string& i
     fmt::print("  size         {:.0f} mm tall, edges of {:.1f} mm, in units of {:g} mm\n", j.height.middle, j.edge.middle,
                report.millimetres_per_unit);
     if (report.shift != GlobalShift{})
-        fmt::print("  place        {:g}, {:g}, {:g} m from the origin\n", static_cast<double>(report.shift[0]) / 1000,
+        fmt::print("  place        {:.0f}, {:.0f}, {:.0f} m from the origin\n", static_cast<double>(report.shift[0]) / 1000,
                    static_cast<double>(report.shift[1]) / 1000, static_cast<double>(report.shift[2]) / 1000);
     fmt::print("  attributes   {}\n", attributes_of(report, j));
     fmt::print("  pieces       {}, of them specks {}, far away {}\n", text_of(j.pieces), text_of(j.specks),

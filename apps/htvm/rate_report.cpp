@@ -113,7 +113,7 @@ std::string rate_warning(const RateReport& report) {
 
 std::string missed_rate(const RateReport& report, std::uint64_t bytes, double seconds) {
     constexpr double most = 100.0 / 3;
-    if (!report.rate_controlled() || !report.dropped.empty() || seconds <= report.buffer_seconds) return {};
+    if (!report.rate_controlled() || !report.dropped.empty() || report.line_was_slower) return {};
     const double error = error_percent(report, bytes, seconds);
     if (error <= most) return {};
     return fmt::format("takes {:.2f} Mbit/s, {:.0f} % above its --bitrate: give at least that, or fewer vertices",

@@ -78,8 +78,8 @@ struct RateStrain {
 RateStrain rate_strain(const RateReport& report);
 // A sentence with the numbers and what helps; empty if there is no strain.
 std::string rate_warning(const RateReport& report);
-// Why the rate counts as missed: bits are more than a third above it, over longer than the buffer evens out. Empty: it
-// does not.
+// Why the rate counts as missed: all bits are more than a third above it, as of a short capture, whose first frame the
+// buffer takes, or of one that does not get smaller. Empty: it is not missed.
 std::string missed_rate(const RateReport& report, std::uint64_t bytes, double seconds);
 
 // bytes: of the stream; seconds: of the capture, including dropped frames.

@@ -132,6 +132,18 @@ void find_pieces(const Mesh& mesh, const std::vector<Triangle>& triangles, MeshF
     out.high = largest.box.high;
 }
 
+// Weighted by area, as vertices lie closer in some frames than in others.
+double light_of(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+    double sum = 0, all = 0;
+    for (const auto& t : triangles) {
+        const double area = length(area_vector(std::span(mesh.positions), t));
+        for (const auto v : t)
+            for (const auto level : mesh.colours[v]) sum += area * level / 9;
+        all += area;
+    }
+    return all > 0 ? sum / all : 0;
+}
+
 }  // namespace
 
 MeshFacts facts_of(const Mesh& mesh) {
@@ -151,11 +163,7 @@ MeshFacts facts_of(const Mesh& mesh) {
     out.unused_vertices = static_cast<std::size_t>(std::count(used.begin(), used.end(), false));
     count_edges(mesh, triangles, out);
     find_pieces(mesh, triangles, out);
-    if (!mesh.colours.empty()) {
-        double sum = 0;
-        for (const auto& colour : mesh.colours) sum += colour[0] + colour[1] + colour[2];
-        out.light = sum / (3.0 * static_cast<double>(mesh.colours.size()));
-    }
+    if (!mesh.colours.empty()) out.light = light_of(mesh, triangles);
     return out;
 }
 

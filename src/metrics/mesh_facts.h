@@ -23,7 +23,7 @@ struct MeshFacts {
     double area = 0, mean_edge = 0;     // of all triangles
     std::array<double, 3> low{}, high{};  // the largest piece's box
     std::array<double, 3> middle{};       // of its surface
-    double light = -1;                  // mean of the vertices' colours, 0..255; -1: none
+    double light = -1;                  // mean of the surface's colours, 0..255; -1: none
 };
 
 MeshFacts facts_of(const Mesh& mesh);
