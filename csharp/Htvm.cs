@@ -213,8 +213,10 @@ namespace Htvm
         [DllImport(Library)] public static extern void htvm_encoder_options_destroy(IntPtr options);
         [DllImport(Library)] public static extern IntPtr htvm_encoder_options_last_error(IntPtr options);
         [DllImport(Library)] public static extern Status htvm_encoder_options_set(IntPtr options, byte[] name, byte[] value);
+        [DllImport(Library)] public static extern Status htvm_decoder_global_shift(IntPtr decoder, [Out] long[] shift);
         [DllImport(Library)] public static extern Status htvm_encoder_options_add_metadata(IntPtr options, byte[] key, byte[] value);
         [DllImport(Library)] public static extern Status htvm_encoder_options_set_floor(IntPtr options, double floor);
+        [DllImport(Library)] public static extern Status htvm_encoder_options_set_global_shift(IntPtr options, long[] shift);
         [DllImport(Library)] public static extern Status htvm_encoder_options_set_skeleton(IntPtr options, ref Skeleton skeleton);
         [DllImport(Library)] public static extern void htvm_quality_steps(double quality, out double geometry_step, out double colour_step);
         [DllImport(Library)] public static extern Status htvm_encoder_create(IntPtr options, out IntPtr encoder, byte[] text, UIntPtr text_capacity);
@@ -385,6 +387,14 @@ namespace Htvm
             Check(Native.htvm_decoder_bone(handle, bone, out first, out second, out radius));
         }
 
+        // Millimetres that were taken off the capture's coordinates: added to positions, they give these back.
+        public long[] GlobalShift()
+        {
+            var shift = new long[3];
+            Check(Native.htvm_decoder_global_shift(handle, shift));
+            return shift;
+        }
+
         // Title, rights and other texts.
         public Dictionary<string, string> Metadata()
         {
@@ -529,7 +539,7 @@ namespace Htvm
         // culture. quality: 0 to 100; null: 42, as of `htvm encode`.
         public Encoder(Profile profile = Profile.Tracked, double? quality = null, Skeleton skeleton = null,
                        IDictionary<string, string> options = null, IDictionary<string, string> metadata = null,
-                       double? floor = null)
+                       double? floor = null, long[] globalShift = null)
         {
             IntPtr set;
             var status = Native.htvm_encoder_options_create(profile, IntPtr.Zero, out set);
@@ -543,6 +553,11 @@ namespace Htvm
                     foreach (var text in metadata)
                         CheckOptions(set, Native.htvm_encoder_options_add_metadata(set, Native.Utf8(text.Key), Native.Utf8(text.Value)));
                 if (floor.HasValue) CheckOptions(set, Native.htvm_encoder_options_set_floor(set, floor.Value));
+                if (globalShift != null)
+                {
+                    if (globalShift.Length != 3) throw new ArgumentException("a global shift has three numbers");
+                    CheckOptions(set, Native.htvm_encoder_options_set_global_shift(set, globalShift));
+                }
                 if (skeleton != null)
                 {
                     joints = skeleton.JointNames.Length;

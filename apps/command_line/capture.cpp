@@ -11,6 +11,7 @@
 #include "command_line/terminal.h"
 #include "io/skeleton_align.h"
 #include "io/skeleton_file.h"
+#include "io/skeleton_rate.h"
 #include "io/texture_colours.h"
 
 namespace htvm::app {
@@ -22,10 +23,9 @@ bool is_downwards(UpAxis up) { return static_cast<std::size_t>(up) % 2 == 0; }
 
 // From the lowest to the highest vertex, in the mesh's unit; up: as in CaptureOptions.
 double height_of(const Mesh& mesh, UpAxis up) {
+    const auto bounds = surface_bounds(mesh);
     const auto along = [&](std::size_t axis) {
-        const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
-                                                     [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
-        return mesh.positions.empty() ? 0.0 : static_cast<double>((*high)[axis]) - static_cast<double>((*low)[axis]);
+        return bounds ? static_cast<double>(bounds->high[axis]) - static_cast<double>(bounds->low[axis]) : 0.0;
     };
     return up == UpAxis::unknown ? std::max(along(1), along(2)) : along(number_of(up));
 }
@@ -46,6 +46,14 @@ FrameRate rate_of(const std::vector<std::int64_t>& times) {
     return {static_cast<std::uint32_t>(std::lround(per_second * 1000)), 1000};
 }
 
+// Seconds from the first mesh to the end of the last one; 0 of one mesh or an unknown number.
+double duration_of(const std::vector<std::int64_t>& times, std::size_t frames, double fps) {
+    if (times.size() > 1)
+        return static_cast<double>(times.back() - times.front()) / 1e6 * static_cast<double>(times.size()) /
+               static_cast<double>(times.size() - 1);
+    return frames > 1 ? static_cast<double>(frames) / fps : 0;
+}
+
 std::string key_of_rate(const FrameRate& rate) {
     return rate.denominator == 1000 ? fmt::format("{}", rate.per_second())
                                     : fmt::format("{}/{}", rate.numerator, rate.denominator);
@@ -62,6 +70,13 @@ void add_meshes(CLI::App& command, CaptureOptions& options) {
         ->type_name("FILE")
         ->expected(1, -1)
         ->required();
+    command
+        .add_option("--ignore", options.ignored,
+                    "Files, and folders, that are no frames: those whose name matches this glob, such as 'template*',\n"
+                    "are left out; may be given several times")
+        ->type_name("GLOB")
+        ->allow_extra_args(false)
+        ->group(heading::input);
     command.add_option("--frames", options.frames, "Use at most this many frames; 0: all (default: all)")
         ->group(heading::input);
     command.add_option("--first", options.first, "Skip this many frames at the beginning (default: 0)")
@@ -206,23 +221,21 @@ Result<Capture> Capture::open(const CaptureOptions& options) {
     if (!textures) return tl::unexpected(textures.error());
     capture.textures_ = std::move(*textures);
     if (auto found = capture.find_poses(); !found) return tl::unexpected(found.error());
+    if (auto found = capture.find_first(); !found) return tl::unexpected(found.error());
     if (auto found = capture.find_unit(); !found) return tl::unexpected(found.error());
+    if (auto taken = capture.take_off_shift(); !taken) return tl::unexpected(taken.error());
+    capture.find_kind();
+    if (auto read = capture.read_first_again(); !read) return tl::unexpected(read.error());
     capture.tell_of_texture();
     return capture;
 }
 
 Result<void> Capture::find_files() {
-    auto files = find_sequence(options_.inputs);
+    auto files = find_sequence(options_.inputs, {options_.ignored});
     if (!files) return tl::unexpected(files.error());
     files_ = std::move(*files);
-    const auto& paths = files_.paths;
-    const auto back = std::adjacent_find(
-        paths.begin(), paths.end(), [](const auto& a, const auto& b) { return natural_less(b.string(), a.string()); });
-    if (options_.inputs.size() > 1 && back != paths.end())
-        warn(
-            fmt::format("the files are taken in the order given, where {} comes before {}; a folder or a pattern in "
-                        "quotes is taken by number",
-                        back->string(), std::next(back)->string()));
+    for (const auto& remark : files_.remarks)
+        (remark.is_loss ? warn : note)(fmt::format("{}: {}", input_name(options_), remark.text));
     places_ = places_in_time(files_);
     const std::size_t found = files_.paths.size();
     if (options_.first >= found)
@@ -300,14 +313,22 @@ Result<void> Capture::find_poses() {
     }
     if (auto found = find_times(); !found) return found;
     const auto& times = pipe_ ? listed_.microseconds : file_times_;
-    if (options_.fps.numerator > 0) {
-        rate_ = options_.fps;
-    } else if (track && track->fps > 0) {
-        rate_ = {static_cast<std::uint32_t>(std::lround(track->fps * 1000)), 1000};
-    } else if (times.size() > 1) {
-        rate_ = rate_of(times);
+    const bool is_known = options_.fps.numerator > 0 || (times.size() > 1 && (!track || !track->rate_is_known));
+    const std::size_t frames = places_.empty() ? times.size() : static_cast<std::size_t>(places_.back() + 1);
+    if (is_known) {
+        rate_ = options_.fps.numerator > 0 ? options_.fps : rate_of(times);
+    } else if (track && track->rate_is_known) {
+        const auto beside = times.empty() ? mesh_rate_beside(*track, frames) : MeshRate{track->fps, {}, false};
+        rate_ = {static_cast<std::uint32_t>(std::lround(beside.fps * 1000)), 1000};
+        if (!beside.note.empty())
+            (beside.is_doubtful ? warn : note)(fmt::format("{}: {}", options_.skeleton, beside.note));
     } else if (!track) {
         rate_is_told_ = false;
+    }
+    if (track && !track->rate_is_known) take_rate_of_meshes(*track, fps(), frames);
+    if (track && (is_known || !times.empty())) {
+        const auto apart = unlike_durations(*track, duration_of(times, frames, fps()));
+        if (!apart.empty()) warn(fmt::format("{}: {}", options_.skeleton, apart));
     }
     if (!track) return {};
     MeshClock clock;
@@ -342,8 +363,8 @@ Result<std::optional<TexturedMesh>> Capture::read_next_file() {
     return std::optional<TexturedMesh>{std::move(*mesh)};
 }
 
-// Reads the first mesh that can be read and has vertices, and with it the unit of all.
-Result<void> Capture::find_unit() {
+// Reads the first mesh that can be read and has vertices.
+Result<void> Capture::find_first() {
     std::optional<Error> error;
     millimetres_per_unit_ = 1;
     for (std::size_t end = begin_ + frames_;;) {
@@ -357,6 +378,11 @@ Result<void> Capture::find_unit() {
     if (!peeked_ && error) return tl::unexpected(*error);
     if (!peeked_)
         return fail(ErrorKind::bad_input, "there is no mesh in " + (pipe_ ? "standard input" : input_name(options_)));
+    return {};
+}
+
+// From the first mesh, in its file's unit.
+Result<void> Capture::find_unit() {
     const bool guessed = !options_.unit && options_.height == 0 && options_.scale == 1;
     const auto of_format = pipe_ ? std::nullopt : unit_of_format(files_.paths[peeked_at_]);
     const auto unit = options_.unit ? *options_.unit : of_format.value_or(guess_unit(peeked_->mesh));
@@ -378,7 +404,58 @@ Result<void> Capture::find_unit() {
         else if (unit != LengthUnit::millimetre && !of_format)
             note(looks + " (see --unit)");
     }
-    if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) return ok;
+    return {};
+}
+
+// Of meshes far from their origin, which are read anew without it, before their positions become floats.
+Result<void> Capture::take_off_shift() {
+    const auto shift = shift_of(peeked_->mesh, millimetres_per_unit_);
+    if (shift == GlobalShift{}) return {};
+    if (pipe_) {
+        warn("the meshes are so far from their origin that floats lose of their shape; from files, which are read "
+             "twice, a shift is taken off first");
+        return {};
+    }
+    shift_ = shift;
+    note(fmt::format("the meshes are far from their origin: {:g}, {:g}, {:g} m are taken off, kept in the stream and "
+                     "added again by decode",
+                     static_cast<double>(shift[0]) / 1000, static_cast<double>(shift[1]) / 1000,
+                     static_cast<double>(shift[2]) / 1000));
+    return {};
+}
+
+// What the frames have in common, from the first and some others.
+void Capture::find_kind() {
+    Mesh first = peeked_->mesh;
+    if (!scale_positions(first, millimetres_per_unit_)) return;
+    const auto& findings = textures_.findings();
+    kind_.add(first, findings, peeked_->texture != nullptr);
+    const std::size_t samples = findings.colour_levels.any() ? 8 : 4;  // besides the first
+    for (std::size_t k = 1; !pipe_ && k <= samples && frames_ > 1; ++k) {
+        const auto place = begin_ + k * (frames_ - 1) / samples;
+        if (place == peeked_at_ || (k > 1 && place == begin_ + (k - 1) * (frames_ - 1) / samples)) continue;
+        MeshFindings others;
+        const auto mesh = read_mesh(files_.paths[place], mesh_options(), &others);
+        // Whether it has its image is said once it is encoded.
+        if (mesh) kind_.add(*mesh, others, peeked_->texture != nullptr);
+    }
+    colour_range_ = kind_.colour_range();
+    if (colour_range_ && *colour_range_ != ColourRange::unit)
+        note(fmt::format("the numbers of the colours are taken for 0 to {}, as most of them are",
+                         *colour_range_ == ColourRange::bytes ? 255 : 65535));
+}
+
+// The first mesh, as all are read from here on.
+Result<void> Capture::read_first_again() {
+    const bool is_other = shift_ != GlobalShift{} || colour_range_;
+    if (!pipe_ && is_other) {
+        auto again = textures_.read(peeked_at_, texture_use(), mesh_options());
+        if (!again) return tl::unexpected(again.error());
+        peeked_ = std::move(*again);
+    } else if (auto ok = scale_positions(peeked_->mesh, millimetres_per_unit_); !ok) {
+        return ok;
+    }
+    tell(textures_.findings().remarks, pipe_ ? name() : files_.paths[peeked_at_].string());
     has_texture_ = peeked_->texture != nullptr;
     find_floor();
     // From files all is read again but what is kept.
@@ -387,17 +464,22 @@ Result<void> Capture::find_unit() {
     return {};
 }
 
+void Capture::tell(const std::vector<MeshRemark>& remarks, const std::string& name) const {
+    const std::lock_guard lock(told_->mutex);
+    for (const auto& [about, text, is_loss] : remarks) {
+        if (!told_->about.insert(about).second) continue;
+        const auto line = fmt::format("{}: {}; other frames like it are not told", name, text);
+        is_loss ? warn(line) : note(line);
+    }
+}
+
 // Of --up: which axis it is, and where the first mesh ends on it.
 void Capture::find_floor() {
     up_ = options_.up;
     if (up_ == UpAxis::unknown) return;
     const auto axis = number_of(up_);
-    const bool down = is_downwards(up_);
-    bool any = false;
-    for (const auto& p : peeked_->mesh.positions) {
-        const double c = static_cast<double>(p[axis]);
-        if (!std::exchange(any, true) || (down ? c > lowest_ : c < lowest_)) lowest_ = c;
-    }
+    if (const auto bounds = surface_bounds(peeked_->mesh))
+        lowest_ = static_cast<double>(is_downwards(up_) ? bounds->high[axis] : bounds->low[axis]);
 }
 
 // ---- Frames ---------------------------------------------------------------------------------------------------------
@@ -429,10 +511,14 @@ void Capture::tell_of_texture() const {
             note(
                 "the meshes have no texture coordinates, so there is nothing to do for --texture-as or "
                 "--texture-origin");
+    } else if (!wanted().idle_texcoords && (image.empty() || options_.texture.files == "none")) {
+        note(options_.texture.files == "none"
+                 ? std::string("the texture coordinates are left out with their image; --texture-as coordinates keeps them")
+                 : std::string("the meshes have texture coordinates, but no image was found for them, so these are left "
+                               "out; --texture gives its place, --texture-as coordinates keeps them"));
     } else if (options_.texture.files == "none") {
-        note(
-            "the texture coordinates are encoded, without an image, and keep I-frames from being simplified; meshes "
-            "that are written without them take fewer bits");
+        note("the texture coordinates are encoded, without an image; meshes that are written without them take fewer "
+             "bits");
     } else if (image.empty()) {
         note("the meshes have texture coordinates, but no image was found for them; --texture gives its place");
     } else if (options_.texture_as == TextureAs::coordinates) {
@@ -449,8 +535,12 @@ void Capture::tell_of_texture() const {
             "--texture-origin)");
 }
 
-Capture::Encodable Capture::as_encoded(TexturedMesh captured, PicturesOf pictures) {
-    if (!captured.texture) return {std::move(captured.mesh), nullptr};
+Capture::Encodable Capture::as_encoded(TexturedMesh captured, const Wanted& wanted) {
+    const auto pictures = wanted.pictures;
+    if (!captured.texture) {
+        if (!wanted.idle_texcoords) captured.mesh.texcoords.clear();
+        return {std::move(captured.mesh), nullptr};
+    }
     if (pictures == PicturesOf::capture) captured.mesh.colours.clear();
     Encodable out;
     out.textured = std::make_shared<const TexturedMesh>(std::move(captured));
@@ -464,10 +554,16 @@ Capture::Encodable Capture::as_encoded(TexturedMesh captured, PicturesOf picture
 }
 
 Result<Capture::Encodable> Capture::read(TextureFiles& files, std::size_t place, TextureUse use,
-                                         const MeshFileOptions& options, PicturesOf pictures) {
+                                         const MeshFileOptions& options, const Wanted& wanted) {
     auto mesh = files.read(place, use, options);
     if (!mesh) return tl::unexpected(mesh.error());
-    return as_encoded(std::move(*mesh), pictures);
+    auto out = as_encoded(std::move(*mesh), wanted);
+    out.remarks = files.findings().remarks;
+    return out;
+}
+
+Capture::Wanted Capture::wanted() const {
+    return {pictures_of(), options_.keeps_idle_texcoords || options_.texture_as != TextureAs::by_default};
 }
 
 Capture::PicturesOf Capture::pictures_of() const {
@@ -478,6 +574,9 @@ Capture::PicturesOf Capture::pictures_of() const {
 MeshFileOptions Capture::mesh_options() const {
     MeshFileOptions out;
     out.millimetres_per_unit = millimetres_per_unit_;
+    out.reading.colour_range = colour_range_;
+    for (std::size_t c = 0; c < 3; ++c)
+        out.reading.origin[c] = static_cast<double>(shift_[c]) / millimetres_per_unit_;
     return out;
 }
 
@@ -497,9 +596,9 @@ Result<std::optional<Capture::Encodable>> Capture::read_file() {
     if (!next) return std::optional<Encodable>{};
     const std::size_t place = *next;
     const bool begun = ahead_ && ahead_->frame.valid() && ahead_->place == place;
-    auto frame = peeked_ && place == peeked_at_ ? as_encoded(*std::exchange(peeked_, std::nullopt), pictures_of())
+    auto frame = peeked_ && place == peeked_at_ ? as_encoded(*std::exchange(peeked_, std::nullopt), wanted())
                  : begun                        ? ahead_->frame.get()
-                                                : read(textures(), place, texture_use(), mesh_options(), pictures_of());
+                                                : read(textures(), place, texture_use(), mesh_options(), wanted());
     // Who takes a second frame will take a third.
     if (taken_ > 0) begin_to_read_next();
     if (!frame) return tl::unexpected(frame.error());
@@ -513,7 +612,7 @@ void Capture::begin_to_read_next() {
     ahead_->place = next_;
     ahead_->frame = std::async(std::launch::async,
                                [&files = ahead_->files, place = next_, use = texture_use(), options = mesh_options(),
-                                pictures = pictures_of()] { return read(files, place, use, options, pictures); });
+                                kept = wanted()] { return read(files, place, use, options, kept); });
 }
 
 Result<std::optional<TexturedMesh>> Capture::read_pipe() {
@@ -566,7 +665,7 @@ Result<std::optional<Mesh>> Capture::next() {
         auto mesh = read_pipe();
         if (!mesh) return tl::unexpected(mesh.error());
         if (!*mesh) return std::optional<Encodable>{};
-        return std::optional<Encodable>{as_encoded(std::move(**mesh), pictures_of())};
+        return std::optional<Encodable>{as_encoded(std::move(**mesh), wanted())};
     };
     auto frame = pipe_ ? of_pipe() : read_file();
     if (!frame || *frame) ++taken_;
@@ -576,6 +675,12 @@ Result<std::optional<Mesh>> Capture::next() {
         return fail(ErrorKind::bad_input, fmt::format("{}: there is no image for it, as there is for others; --texture "
                                                       "gives its place, --texture-as coordinates does without images",
                                                       name()));
+    tell((*frame)->remarks, name());
+    if (const auto why = kind_.unlike((*frame)->mesh, (*frame)->textured != nullptr); !why.empty()) {
+        if (!pipe_) return fail(ErrorKind::bad_input, fmt::format("{}: {}", name(), why));
+        // What is live goes on: there is no other frame to take.
+        tell({{"unlike", why, true}}, name());
+    }
     textured_ = std::move((*frame)->textured);
     return std::optional<Mesh>{std::move((*frame)->mesh)};
 }
@@ -599,7 +704,7 @@ void Capture::restrict_to(std::size_t first, std::size_t frames) {
 }
 
 Mesh Capture::take_first() {
-    auto frame = as_encoded(*std::exchange(peeked_, std::nullopt), pictures_of());
+    auto frame = as_encoded(*std::exchange(peeked_, std::nullopt), wanted());
     textured_ = std::move(frame.textured);
     return std::move(frame.mesh);
 }

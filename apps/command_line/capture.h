@@ -7,10 +7,13 @@
 #include <cstdint>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "command_line/capture_kind.h"
 #include "command_line/choice.h"
 #include "command_line/mesh_pipe.h"
 #include "htvm/mesh.hpp"
@@ -54,8 +57,9 @@ std::vector<Choice<std::optional<LengthUnit>>> units_or(const char* none);
 struct CaptureOptions {
     // A folder, pattern, glob or file of meshes; several files; or - for PLY after PLY on standard input.
     std::vector<std::string> inputs;
-    std::string skeleton;            // file; empty: none
-    FrameRate fps;                   // of the meshes; not given: the skeleton's, else of their timestamps, else 30
+    std::vector<std::string> ignored;  // globs of files and folders that are no frames, as in SequenceOptions
+    std::string skeleton;              // file; empty: none
+    FrameRate fps;                     // of the meshes; not given: the skeleton's, else of their timestamps, else 30
     std::string timestamps;          // file; empty: as the PLY files say, else by the files' numbers and the frame rate
     std::optional<LengthUnit> unit;  // of the mesh files; not given: by their format, else guessed from the first mesh
     double scale = 1;                // of the mesh files' positions besides
@@ -66,6 +70,7 @@ struct CaptureOptions {
     double skeleton_offset = 0;      // seconds added to the skeleton's clock
     TextureOptions texture;          // where images are
     TextureAs texture_as = TextureAs::by_default;
+    bool keeps_idle_texcoords = true;  // texture coordinates for which no image is used, unless asked for
     WhileBusy while_busy = WhileBusy::wait;  // of standard input: what becomes of frames that come faster than they are
                                              // taken
 };
@@ -93,7 +98,7 @@ public:
     // Opens the input, reads the skeleton and says on the terminal what it found and assumed.
     static Result<Capture> open(const CaptureOptions& options);
     // The next frame's mesh in mm, as it is to be encoded, or nothing at the end. After an error of a file the next
-    // call gives the next file.
+    // call gives the next file. A mesh that is not like the others is such an error.
     Result<std::optional<Mesh>> next();
     // Whether there can be a next frame after an error: of standard input not behind a mesh that did not come whole, as
     // nobody knows where the next one begins, nor behind one whose time is not known.
@@ -131,6 +136,7 @@ public:
     // Where the first frame's lowest vertex lies along the axis that is up, mm; 0 if none is known to be.
     double lowest() const { return lowest_; }
     double millimetres_per_unit() const { return millimetres_per_unit_; }  // scaling included
+    const GlobalShift& global_shift() const { return shift_; }              // mm, taken off the files' positions
 
 private:
     Result<void> find_files();
@@ -138,8 +144,13 @@ private:
     Result<void> find_listed_times();
     void find_times_in_files();
     Result<void> find_poses();
+    Result<void> find_first();
     Result<void> find_unit();
+    Result<void> take_off_shift();
+    void find_kind();
+    Result<void> read_first_again();
     void find_floor();
+    void tell(const std::vector<MeshRemark>& remarks, const std::string& name) const;
     void tell_of_texture() const;
     TextureUse texture_use() const;
     TextureFiles& textures();
@@ -148,14 +159,21 @@ private:
     struct Encodable {
         Mesh mesh;
         std::shared_ptr<const TexturedMesh> textured;
+        std::vector<MeshRemark> remarks = {};
     };
     // Which pictures the stream has: those of the capture, or of its own layout.
     enum class PicturesOf { nothing, capture, stream };
     PicturesOf pictures_of() const;
-    static Encodable as_encoded(TexturedMesh captured, PicturesOf pictures);
+    // What of a captured mesh goes into the stream.
+    struct Wanted {
+        PicturesOf pictures = PicturesOf::nothing;
+        bool idle_texcoords = true;
+    };
+    Wanted wanted() const;
+    static Encodable as_encoded(TexturedMesh captured, const Wanted& wanted);
     // From the files, on whichever thread.
     static Result<Encodable> read(TextureFiles& files, std::size_t place, TextureUse use,
-                                  const MeshFileOptions& options, PicturesOf pictures);
+                                  const MeshFileOptions& options, const Wanted& wanted);
     std::optional<std::size_t> go_to_next_file();  // its place; none behind the last one
     Result<std::optional<TexturedMesh>> read_next_file();
     Result<std::optional<Encodable>> read_file();
@@ -176,6 +194,14 @@ private:
     FrameRate rate_{30000, 1000};
     bool rate_is_told_ = true;         // else the first mesh on standard input may say it
     double millimetres_per_unit_ = 0;  // 0: not known yet
+    GlobalShift shift_{};
+    CaptureKind kind_;
+    std::optional<ColourRange> colour_range_;  // of colours whose type does not say it
+    struct Told {
+        std::mutex mutex;
+        std::set<std::string> about;  // MeshRemark::about
+    };
+    std::shared_ptr<Told> told_ = std::make_shared<Told>();  // copies tell nothing twice
     UpAxis up_ = UpAxis::unknown;
     double lowest_ = 0;
     Skeleton skeleton_;

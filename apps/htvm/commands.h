@@ -6,6 +6,7 @@
 namespace htvm::app {
 
 void add_calibrate(CLI::App& app, Run& run);
+void add_check(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_cut(CLI::App& app, Run& run);
 void add_decode(CLI::App& app, Run& run);

@@ -523,6 +523,14 @@ Result<Sources> open_sources(const Options& options) {
     if (!original) return tl::unexpected(original.error());
     auto decoded = open_meshes({options.decoded}, {options.unit, "", options.limits, {}});
     if (!decoded) return tl::unexpected(decoded.error());
+    // Both sides in the same coordinates.
+    if (!decoded->is_stream && !original->is_stream)
+        if (const auto first = original->mesh_at(*original, 0); !first) return tl::unexpected(first.error());
+    if (!decoded->is_stream || !original->is_stream) {
+        auto &from = decoded->is_stream ? *decoded : *original, &to = decoded->is_stream ? *original : *decoded;
+        to.global_shift = from.global_shift;
+        to.finds_shift = false;
+    }
     // A stream knows what its capture's files are in, however --scale or --height made millimetres of them; but it may
     // have been encoded from others.
     if (decoded->is_stream && original->guesses_unit) {

@@ -106,6 +106,7 @@ public:
             MeshFileOptions file_options;
             file_options.millimetres_per_unit = millimetres_per_unit;
             file_options.timestamp = time_text(info.timestamp_us);
+            file_options.global_shift = sequence.global_shift;
             if (image.bytes && unit_of_format(path))
                 file_options.image = *image.bytes;
             else if (image.bytes)
@@ -117,7 +118,10 @@ public:
         if (image.bytes && !std::exchange(told_of_images_, true))
             note("standard output has no room for the pictures of the texture; -o with a folder or a pattern has");
         if (auto ok = scale_positions(mesh, 1 / millimetres_per_unit); !ok) return tl::unexpected(ok.error());
-        const auto bytes = write_ply(mesh, time_text(info.timestamp_us));
+        std::array<double, 3> origin{};
+        for (std::size_t c = 0; c < 3; ++c)
+            origin[c] = static_cast<double>(sequence.global_shift[c]) / millimetres_per_unit;
+        const auto bytes = write_ply(mesh, time_text(info.timestamp_us), {}, {}, origin);
         if (!bytes) return tl::unexpected(bytes.error());
         if (auto ok = write_standard_output(*bytes); !ok) return tl::unexpected(ok.error());
         return std::string("-");
@@ -154,7 +158,7 @@ private:
         const auto path = output_path(names_, 0);
         const auto in_file = [&](const Error& error) { return fail(error.kind, path.string() + ": " + error.message); };
         if (!animation_) {
-            GltfAnimationOptions options{millimetres_per_unit, sequence.up, path.stem().string(), {}};
+            GltfAnimationOptions options{millimetres_per_unit, sequence.up, path.stem().string(), {}, sequence.global_shift};
             for (const auto& [key, value] : sequence.metadata) {
                 if (key == "title") options.title = value;
                 if (key == "rights") options.rights = value;

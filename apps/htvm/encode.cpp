@@ -192,6 +192,12 @@ Result<void> set_texture(const EncodePlan& plan, const Capture& capture, Encoder
     return {};
 }
 
+// What a shift takes off a coordinate on the axis that is up, mm.
+double shift_along(UpAxis up, const GlobalShift& shift) {
+    if (up == UpAxis::unknown) return 0;
+    return static_cast<double>(shift[(static_cast<std::size_t>(up) - 1) / 2]);
+}
+
 Result<EncoderOptions> settings_for(const EncodePlan& plan, const Capture& capture) {
     auto out = plan.encoder;
     // In its lowest terms, so that 30 frames a second are the library's default, 30 / 1, however they were given.
@@ -202,10 +208,11 @@ Result<EncoderOptions> settings_for(const EncodePlan& plan, const Capture& captu
     out.unit_micrometres =
         static_cast<std::uint32_t>(std::clamp(std::round(capture.millimetres_per_unit() * 1000), 1.0, 4294967295.0));
     out.up = capture.up();
+    out.global_shift = capture.global_shift();
     if (plan.floor.is_lowest)
         out.floor = capture.lowest();
     else if (plan.floor.metres)
-        out.floor = 1000 * *plan.floor.metres;
+        out.floor = 1000 * *plan.floor.metres - shift_along(out.up, capture.global_shift());
     if (auto set = set_skeleton(plan, capture, out); !set) return tl::unexpected(set.error());
     if (auto set = set_texture(plan, capture, out); !set) return tl::unexpected(set.error());
     return out;

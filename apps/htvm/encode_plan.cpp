@@ -258,6 +258,7 @@ Result<EncodePlan> plan_of(const EncodeRequest& request) {
     if (!floor) return tl::unexpected(floor.error());
     EncodePlan plan;
     plan.capture = request.capture;
+    plan.capture.keeps_idle_texcoords = request.encoding.profile != Profile::tracked;
     plan.capture.while_busy = request.drop_late      ? WhileBusy::drop
                               : request.deadline > 0 ? WhileBusy::read_on
                                                      : WhileBusy::wait;

@@ -97,6 +97,9 @@ void print_sequence(const SequenceInfo& s, const std::string& input) {
     if (s.up != UpAxis::unknown)
         fmt::print("up: {}{}\n", axis_name(s.up), s.floor ? fmt::format(", the floor at {:g} mm", *s.floor) : "");
     for (const auto& [key, value] : s.metadata) fmt::print("{}: {}\n", key, value);
+    if (s.global_shift != GlobalShift{})
+        fmt::print("global shift, which decode adds: {}, {}, {} mm\n", s.global_shift[0], s.global_shift[1],
+                   s.global_shift[2]);
     if (!s.has_skeleton) {
         fmt::print("no skeleton: one bone stands in, radius {:.0f} mm\n", s.radii[0]);
         return;
@@ -116,6 +119,7 @@ nlohmann::json sequence_json(const SequenceInfo& s) {
             {"up", axis_name(s.up)},
             {"floor_mm", s.floor ? nlohmann::json(*s.floor) : nlohmann::json()},
             {"metadata", metadata},
+            {"global_shift_mm", s.global_shift},
             {"fps", static_cast<double>(s.fps_numerator) / s.fps_denominator},
             {"lattice_step_mm", s.lattice_step},
             {"unit_mm", s.unit_micrometres / 1000.0},

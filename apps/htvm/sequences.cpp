@@ -10,6 +10,7 @@
 #include <optional>
 #include <utility>
 
+#include "command_line/capture_kind.h"
 #include "htvm/decoder.hpp"
 #include "htvm/frame_numbers.hpp"
 #include "htvm/picture_decoder.hpp"
@@ -61,6 +62,7 @@ Result<void> scan_stream(MeshSource& source, const DecoderOptions& options) {
     source.up = headers.sequence()->up;
     source.rate = {headers.sequence()->fps_numerator, headers.sequence()->fps_denominator};
     source.millimetres_per_unit = headers.sequence()->unit_micrometres / 1000.0;
+    source.global_shift = headers.sequence()->global_shift;
     return {};
 }
 
@@ -166,17 +168,27 @@ Result<MeshSource> open_meshes(const std::vector<std::string>& names, const Mesh
     source.numbers = files->numbers;
     source.millimetres_per_unit = millimetres_per(options.unit.value_or(LengthUnit::millimetre));
     source.guesses_unit = !options.unit;
+    source.finds_shift = true;
     if (auto found = find_times(source, *files, options.timestamps); !found) return tl::unexpected(found.error());
     auto textures = TextureFiles::open(options.texture, *files);
     if (!textures) return tl::unexpected(textures.error());
     source.mesh_at = [paths = files->paths, textures = std::move(*textures)](
                          MeshSource& self, std::size_t position) mutable -> Result<TexturedMesh> {
-        auto textured = textures.read(position, TextureUse::where_colourless);
+        if (self.guesses_unit || self.finds_shift) {
+            const auto mesh = read_mesh(paths[position]);
+            if (!mesh) return tl::unexpected(mesh.error());
+            if (std::exchange(self.guesses_unit, false))
+                self.millimetres_per_unit = millimetres_per(likely_unit(paths[position], *mesh));
+            if (std::exchange(self.finds_shift, false))
+                self.global_shift = shift_of(*mesh, self.millimetres_per_unit);
+        }
+        MeshFileOptions file_options;
+        file_options.millimetres_per_unit = self.millimetres_per_unit;
+        for (std::size_t c = 0; c < 3; ++c)
+            file_options.reading.origin[c] = static_cast<double>(self.global_shift[c]) / self.millimetres_per_unit;
+        auto textured = textures.read(position, TextureUse::where_colourless, file_options);
         if (!textured) return textured;
         auto& [mesh, texture, file] = *textured;
-        if (std::exchange(self.guesses_unit, false))
-            self.millimetres_per_unit = millimetres_per(likely_unit(paths[position], mesh));
-        if (const auto ok = scale_positions(mesh, self.millimetres_per_unit); !ok) return tl::unexpected(ok.error());
         if (texture) mesh.colours = colours_from_texture(mesh, *texture);
         return textured;
     };

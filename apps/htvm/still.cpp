@@ -62,11 +62,13 @@ Result<void> still(const Options& options) {
     if (source->frames == 0) return fail(ErrorKind::bad_input, source->name + " has no frames");
     const auto position = position_of(options, *source);
     if (!position) return tl::unexpected(position.error());
-    const auto textured = source->mesh_at(*source, *position);
+    // Which way is up, where nothing says it, is judged by the first frame, so that every frame's picture is alike.
+    auto first = source->mesh_at(*source, 0);
+    const auto textured = *position == 0 ? first : source->mesh_at(*source, *position);
     if (!textured) return tl::unexpected(textured.error());
     const Mesh* mesh = &textured->mesh;
     if (const auto ok = check_measurable(*mesh, source->name); !ok) return ok;
-    const auto cameras = cameras_round(bounding_box(*mesh), upright_views(options.picture, *source, *mesh));
+    const auto cameras = cameras_round(bounding_box(*mesh), upright_views(options.picture, *source, first ? first->mesh : *mesh));
     if (!cameras) return tl::unexpected(cameras.error());
     const internal::ThreadPool pool(options.picture.threads);
     Canvas canvas;

@@ -64,6 +64,7 @@ struct SequenceInfo {
     UpAxis up = UpAxis::unknown;
     std::optional<double> floor;  // mm, coordinate on the axis that is up; none: not known
     std::vector<MetadataEntry> metadata;
+    GlobalShift global_shift{};  // mm, taken off the capture's coordinates
     StreamTexture texture;
 };
 

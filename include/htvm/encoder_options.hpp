@@ -52,6 +52,13 @@ enum class Denoising : std::uint8_t {
 };
 
 // For Profile::tracked only; with other profiles, anything but the defaults is refused.
+// What becomes of normals that meshes come with.
+enum class CapturedNormals : std::uint8_t {
+    automatic,  // left out with Profile::tracked, whose T-frames could not keep them: who shows a mesh computes them
+    keep,       // coded, with the tracked profile in I-frames alone
+    none,       // left out
+};
+
 struct TrackedOptions {
     int effort = 5;  // how much is searched for a frame, 1 to 9: less is faster; more takes longer and, from 6 on,
                      // fewer bits for the same error, as frames are then coded in groups, for files
@@ -107,6 +114,7 @@ struct EncoderOptions {
                                        // finer. Under rate control it follows from the rate or the error instead
     double geometry_step = 0;    // mm: cell size of the position quantiser, about twice its errors; 0: by the quality
     double colour_step = 0;      // levels of 255, >= 1: cell size of the colour quantiser; 0: by the quality
+    CapturedNormals normals = CapturedNormals::automatic;
     double lambda = 0.12;        // squared error that is worth one bit, in units of step^2; 0: always the nearest
                                  // codeword
     int key_interval = 300;      // largest distance between I-frames, in frames; 1: I-frames only. With EP-frames,
@@ -130,6 +138,7 @@ struct EncoderOptions {
     UpAxis up = UpAxis::unknown;          // the direction of the subject's head
     std::optional<double> floor;          // mm: the floor's coordinate on the axis that is up, which must be known
     std::vector<MetadataEntry> metadata;  // sent with every sequence header: keep it short in live streams
+    GlobalShift global_shift{};  // mm: what the caller took off the capture's coordinates, kept for decoders
     Skeleton skeleton;          // without bones: the capture has no skeleton, and one bone that spans the mesh is used
     std::vector<double> radii;  // mm, one per bone, from calibrate(); empty: calibrated on the first frame
     std::optional<ExternalIntraCoder> intra_coder;  // codes I-frames; none: TFAN

@@ -21,6 +21,12 @@ struct MetadataEntry {
     bool operator==(const MetadataEntry&) const = default;
 };
 
+// What was taken off a capture's coordinates, in whole millimetres, before they became floats: surveys give people
+// coordinates of hundreds of kilometres, which floats do not hold. Added to decoded positions, as doubles, it gives the
+// capture's own back; players do without. Each at most 2^53 - 1 either way.
+using GlobalShift = std::array<std::int64_t, 3>;
+inline constexpr std::int64_t most_global_shift = (std::int64_t{1} << 53) - 1;
+
 // The smallest and the largest x, y, z, mm.
 struct SpaceBounds {
     std::array<float, 3> low, high;

@@ -221,6 +221,7 @@ functions: dict[str, tuple[Any, list[Any]]] = {
     "htvm_decoder_bone": (
         htvm_status, [htvm_decoder, c_uint32, POINTER(c_uint32), POINTER(c_uint32), POINTER(c_double)]),
     "htvm_decoder_metadata": (htvm_status, [htvm_decoder, c_uint32, c_char_p, c_size_t, c_char_p, c_size_t]),
+    "htvm_decoder_global_shift": (htvm_status, [htvm_decoder, POINTER(c_int64)]),
     "htvm_packet_read": (htvm_status, [POINTER(c_uint8), c_size_t, POINTER(htvm_packet_info), c_size_t]),
     "htvm_packet_header_read": (htvm_status, [POINTER(c_uint8), c_size_t, POINTER(htvm_packet_info), c_size_t]),
     "htvm_dependencies_create": (htvm_status, [POINTER(htvm_allocator), POINTER(htvm_dependencies)]),
@@ -239,6 +240,7 @@ functions: dict[str, tuple[Any, list[Any]]] = {
     "htvm_encoder_options_set_skeleton": (htvm_status, [htvm_encoder_options, POINTER(htvm_skeleton)]),
     "htvm_encoder_options_add_metadata": (htvm_status, [htvm_encoder_options, c_char_p, c_char_p]),
     "htvm_encoder_options_set_floor": (htvm_status, [htvm_encoder_options, c_double]),
+    "htvm_encoder_options_set_global_shift": (htvm_status, [htvm_encoder_options, POINTER(c_int64)]),
     "htvm_encoder_option_count": (c_uint32, []),
     "htvm_encoder_option": (htvm_status, [c_uint32, c_uint32, POINTER(htvm_option_info), c_size_t]),
     "htvm_encoder_option_word": (c_char_p, [c_uint32, c_uint32]),

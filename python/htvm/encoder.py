@@ -7,7 +7,7 @@ import os
 import shutil
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, BinaryIO, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Any, BinaryIO, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -143,6 +143,7 @@ class Encoder:
     skeleton: of the poses that come with the meshes; None: one bone stands in
     metadata: "title", "rights", "timecode" and other texts
     floor: millimetres, its coordinate on the axis that the option ``up`` names
+    global_shift: whole millimetres that were taken off the capture's coordinates, which the stream keeps
     options: by their names in docs/options.md, such as ``key_interval=60`` and ``up="y"``; those with a dot in their
         names have _ in its place: ``tracked_node_spacing=50``
 
@@ -159,6 +160,7 @@ class Encoder:
         skeleton: Optional[Skeleton] = None,
         metadata: Optional[Mapping[str, str]] = None,
         floor: Optional[float] = None,
+        global_shift: Optional[Sequence[int]] = None,
         **options: Value,
     ) -> None:
         self._handle = c.htvm_encoder()
@@ -172,7 +174,7 @@ class Encoder:
         if rate <= 0:
             raise BadInput(f"fps must be above 0, not {fps}")
         self._frame_us = Fraction(1000000) / rate
-        all_options = _set_options(profile, quality, rate, skeleton, metadata, floor, options)
+        all_options = _set_options(profile, quality, rate, skeleton, metadata, floor, global_shift, options)
         text = ctypes.create_string_buffer(512)
         status = c.library.htvm_encoder_create(all_options.handle, self._handle, text, len(text))
         if status != c.HTVM_OK:
@@ -370,7 +372,8 @@ class Encoder:
 
 def _set_options(
     profile: str, quality: Optional[float], rate: Fraction, skeleton: Optional[Skeleton],
-    metadata: Optional[Mapping[str, str]], floor: Optional[float], options: Mapping[str, Value],
+    metadata: Optional[Mapping[str, str]], floor: Optional[float], global_shift: Optional[Sequence[int]],
+    options: Mapping[str, Value],
 ) -> _Options:
     out = _Options(profile)
     if quality is not None:
@@ -387,4 +390,7 @@ def _set_options(
         out.check(c.library.htvm_encoder_options_add_metadata(out.handle, key.encode(), text.encode()))
     if floor is not None:
         out.check(c.library.htvm_encoder_options_set_floor(out.handle, floor))
+    if global_shift is not None:
+        x, y, z = global_shift
+        out.check(c.library.htvm_encoder_options_set_global_shift(out.handle, (ctypes.c_int64 * 3)(x, y, z)))
     return out

@@ -61,6 +61,7 @@ class Sequence:
     unit_micrometres: int  # the unit in which the capture was given; meshes are in millimetres in any case
     lattice_step: float  # millimetres: decoded positions are multiples of it, from an origin
     metadata: dict[str, str]  # "title", "rights", "timecode" and others
+    global_shift: Tuple[int, int, int]  # millimetres: added to positions, it gives the capture's own coordinates back
     skeleton: Optional[Skeleton]  # None: the capture had none
     session: int  # of the live publisher; 0: none
     stream_version: int
@@ -309,8 +310,14 @@ class _Decoder:
             fps=Fraction(info.fps_numerator, info.fps_denominator), up=up_axes.get(info.up),
             floor=info.floor if info.floor_known else None, unit_micrometres=info.unit_micrometres,
             lattice_step=info.lattice_step, metadata=dict(self._metadata(n) for n in range(info.metadata)),
+            global_shift=self._global_shift(),
             skeleton=self._skeleton(info) if info.skeleton_tracked else None, session=info.session,
             stream_version=info.stream_version)
+
+    def _global_shift(self) -> Tuple[int, int, int]:
+        shift = (ctypes.c_int64 * 3)()
+        self._check(c.library.htvm_decoder_global_shift(self._handle, shift))
+        return shift[0], shift[1], shift[2]
 
     def _metadata(self, entry: int) -> Tuple[str, str]:
         key, value = ctypes.create_string_buffer(256), ctypes.create_string_buffer(4096)

@@ -357,6 +357,15 @@ htvm_status htvm_decoder_metadata(htvm_decoder* decoder, uint32_t entry, char* k
     return HTVM_OK;
 }
 
+htvm_status htvm_decoder_global_shift(htvm_decoder* decoder, int64_t shift[3]) {
+    if (!decoder) return HTVM_BAD_INPUT;
+    const auto& sequence = decoder->decoder.sequence();
+    if (!sequence) return HTVM_AGAIN;
+    if (!shift) return decoder->error.set(HTVM_BAD_INPUT, "shift is NULL");
+    std::copy_n(sequence->global_shift.begin(), 3, shift);
+    return HTVM_OK;
+}
+
 htvm_status htvm_decoder_bone(htvm_decoder* decoder, uint32_t bone, uint32_t* first, uint32_t* second, double* radius) {
     if (!decoder) return HTVM_BAD_INPUT;
     const auto& sequence = decoder->decoder.sequence();

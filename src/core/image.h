@@ -14,7 +14,7 @@
 
 namespace htvm {
 
-// The largest side of an image that is read as a texture.
+// The largest side of a texture; larger images are made smaller as they are read.
 inline constexpr int largest_image_side = 4096;
 
 struct TexturedMesh {

@@ -32,6 +32,7 @@
 // Draco goes through libdraco: read untrusted files in a process of their own (drc.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <span>
@@ -52,7 +53,8 @@ Result<Mesh> read_gltf(std::span<const std::uint8_t> bytes, const std::filesyste
 // A .glb file. Positions, normals, colours and triangles are read back exactly, texture coordinates to within 1e-7 if
 // they are 0..1. Coloured meshes are unlit (KHR_materials_unlit): captured colours contain the light. Fails (bad_input)
 // if check_mesh does; (limit) if the file would be larger than 4 GiB. image: the bytes of a PNG or JPEG file, which
-// becomes the texture, in the place of colours; empty: none.
-Result<std::vector<std::uint8_t>> write_gltf(const Mesh& mesh, std::span<const std::uint8_t> image = {});
+// becomes the texture, in the place of colours; empty: none. origin: where the mesh's node stands.
+Result<std::vector<std::uint8_t>> write_gltf(const Mesh& mesh, std::span<const std::uint8_t> image = {},
+                                             const std::array<double, 3>& origin = {});
 
 }  // namespace htvm

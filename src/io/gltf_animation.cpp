@@ -123,6 +123,14 @@ Result<void> GltfAnimation::finish(double end_seconds) {
     if (!nodes_.empty()) {
         json all = {{"name", options_.title.empty() ? "capture" : options_.title}, {"rotation", upright(options_.up)}};
         for (std::size_t n = 0; n < nodes_.size(); ++n) all["children"].push_back(n);
+        if (options_.global_shift != GlobalShift{}) {
+            // A node within the one that turns what is up: the shift is of the coordinates before.
+            json shifted = {{"children", all["children"]}};
+            for (const auto c : options_.global_shift)
+                shifted["translation"].push_back(static_cast<double>(c) / options_.millimetres_per_unit);
+            all["children"] = {nodes_.size()};
+            nodes_.push_back(std::move(shifted));
+        }
         nodes_.push_back(std::move(all));
         scene["nodes"].push_back(nodes_.size() - 1);
         root["nodes"] = std::move(nodes_);

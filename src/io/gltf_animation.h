@@ -21,6 +21,7 @@ struct GltfAnimationOptions {
     double millimetres_per_unit = 1000;  // of the file's coordinates; finite, above 0; glTF wants metres
     UpAxis up = UpAxis::unknown;         // of the meshes: turned so that y is up; unknown is y
     std::string title, rights;           // of the file; may be empty
+    GlobalShift global_shift{};          // mm: where the meshes stand
 };
 
 // Frames go to disk as they come: what stays in memory are some hundred bytes for each, and one frame's triangles.

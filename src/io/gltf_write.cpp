@@ -7,7 +7,8 @@ namespace htvm {
 
 using namespace internal;
 
-Result<std::vector<std::uint8_t>> write_gltf(const Mesh& mesh, std::span<const std::uint8_t> image) {
+Result<std::vector<std::uint8_t>> write_gltf(const Mesh& mesh, std::span<const std::uint8_t> image,
+                                             const std::array<double, 3>& origin) {
     if (auto ok = check_mesh(mesh); !ok) return tl::unexpected(ok.error());
     GltfBuffer buffer;
     nlohmann::json root = {{"asset", {{"version", "2.0"}, {"generator", "htvm"}}}, {"scene", 0}};
@@ -17,7 +18,9 @@ Result<std::vector<std::uint8_t>> write_gltf(const Mesh& mesh, std::span<const s
         std::optional<std::size_t> texture;
         if (!image.empty() && !mesh.texcoords.empty()) texture = add_image(buffer, image);
         const auto number = add_mesh(buffer, mesh, topology, texture);
-        root["nodes"].push_back({{"mesh", number}});
+        nlohmann::json node = {{"mesh", number}};
+        if (origin != std::array<double, 3>{}) node["translation"] = origin;
+        root["nodes"].push_back(std::move(node));
         scene["nodes"].push_back(0);
     }
     root["scenes"].push_back(std::move(scene));

@@ -145,9 +145,13 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         if (auto ok = scale_positions(scaled, 1 / options.millimetres_per_unit); !ok) return fail_at(path, ok.error());
         written = &scaled;
     }
+    std::array<double, 3> origin{};
+    for (std::size_t c = 0; c < 3; ++c)
+        origin[c] = static_cast<double>(options.global_shift[c]) / options.millimetres_per_unit;
     if (*format != MeshFormat::obj) {
-        const auto bytes = *format == MeshFormat::ply ? write_ply(*written, options.timestamp, options.texture)
-                                                      : write_gltf(*written, options.image);
+        const auto bytes = *format == MeshFormat::ply
+                               ? write_ply(*written, options.timestamp, options.texture, {}, origin)
+                               : write_gltf(*written, options.image, origin);
         if (!bytes) return fail_at(path, bytes.error());
         return write_file(path, *bytes);
     }
@@ -156,7 +160,8 @@ Result<void> write_mesh(const std::filesystem::path& path, const Mesh& mesh, con
         material.replace_extension(".mtl");
         if (auto ok = write_file(material, write_obj_material(options.texture)); !ok) return ok;
     }
-    const auto text = write_obj(*written, options.texture.empty() ? std::string() : material.filename().string());
+    const auto text = write_obj(*written, options.texture.empty() ? std::string() : material.filename().string(),
+                                origin);
     if (!text) return fail_at(path, text.error());
     return write_file(path, *text);
 }
@@ -170,12 +175,27 @@ Result<LengthUnit> length_unit(std::string_view symbol) {
     return fail(ErrorKind::bad_input, "the unit '" + std::string(symbol) + "' is not one of " + symbols);
 }
 
+std::optional<SpaceBounds> surface_bounds(const Mesh& mesh) {
+    std::optional<SpaceBounds> out;
+    const auto add = [&out](const Vector3f& p) {
+        if (!out) out = SpaceBounds{p, p};
+        for (std::size_t c = 0; c < 3; ++c) {
+            out->low[c] = std::min(out->low[c], p[c]);
+            out->high[c] = std::max(out->high[c], p[c]);
+        }
+    };
+    for (const auto& triangle : mesh.triangles)
+        for (const auto v : triangle) add(mesh.positions[v]);
+    if (mesh.triangles.empty())
+        for (const auto& p : mesh.positions) add(p);
+    return out;
+}
+
 LengthUnit guess_unit(const Mesh& mesh) {
     double squared = 0;
-    for (std::size_t axis = 0; axis < 3 && !mesh.positions.empty(); ++axis) {
-        const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end(),
-                                                     [&](const auto& a, const auto& b) { return a[axis] < b[axis]; });
-        const double extent = static_cast<double>((*high)[axis]) - static_cast<double>((*low)[axis]);
+    const auto bounds = surface_bounds(mesh);
+    for (std::size_t axis = 0; axis < 3 && bounds; ++axis) {
+        const double extent = static_cast<double>(bounds->high[axis]) - static_cast<double>(bounds->low[axis]);
         squared += extent * extent;
     }
     const double diagonal = std::sqrt(squared);

@@ -21,10 +21,34 @@ std::optional<double> parse_number(std::string_view text) {
     return value;
 }
 
-void append_number(std::string& text, float value) {
+std::optional<double> parse_measurement(std::string_view text) {
+    if (const auto number = parse_number(text)) return number;
+    const bool is_negative = text.starts_with('-');
+    const auto magnitude = text.substr(is_negative || text.starts_with('+') ? 1 : 0);
+    if (magnitude.starts_with("1.#")) {
+        const double infinity = std::numeric_limits<double>::infinity();
+        if (!magnitude.substr(3).starts_with("INF")) return std::numeric_limits<double>::quiet_NaN();
+        return is_negative ? -infinity : infinity;
+    }
+    const std::size_t comma = text.find(',');
+    if (comma == text.npos || text.find('.') != text.npos) return std::nullopt;
+    std::string with_point(text);
+    with_point[comma] = '.';
+    return parse_number(with_point);
+}
+
+namespace {
+
+template <class Number>
+void append_shortest(std::string& text, Number value) {
     char digits[32];
     const auto result = std::to_chars(digits, digits + sizeof digits, value);
     text.append(digits, result.ptr);
 }
+
+}  // namespace
+
+void append_number(std::string& text, float value) { append_shortest(text, value); }
+void append_number(std::string& text, double value) { append_shortest(text, value); }
 
 }  // namespace htvm

@@ -39,30 +39,32 @@ std::optional<std::uint64_t> PlySource::remaining() const {
     return buffered();
 }
 
-std::optional<std::string_view> read_line(PlySource& source, std::vector<char>& line, std::size_t most) {
+std::optional<std::string_view> read_line(PlySource& source, char line_end, std::vector<char>& line, std::size_t most) {
     line.clear();
     if (!source.ensure(1)) return std::nullopt;
     while (source.ensure(1)) {
         const char c = static_cast<char>(*source.cursor());
         source.advance(1);
-        if (c == '\n') break;
+        if (c == line_end) break;
         if (line.size() == most) return std::nullopt;
         line.push_back(c);
     }
-    if (!line.empty() && line.back() == '\r') line.pop_back();
     return std::string_view(line.data(), line.size());
 }
 
-bool skip_white_space(PlySource& source) {
+bool skip_to_ply(PlySource& source) {
     while (source.ensure(1)) {
-        if (!is_space(*source.cursor())) return true;
-        source.advance(1);
+        const std::uint8_t c = *source.cursor();
+        const bool is_mark = c == 0xef && source.ensure(3) && source.cursor()[1] == 0xbb && source.cursor()[2] == 0xbf;
+        constexpr std::uint8_t control_z = 26;
+        if (!is_space(c) && c != 0 && c != control_z && !is_mark) return true;
+        source.advance(is_mark ? 3 : 1);
     }
     return false;
 }
 
 std::string_view read_word(PlySource& source, std::span<char, 256> word) {
-    if (!skip_white_space(source)) return {};
+    while (source.ensure(1) && is_space(*source.cursor())) source.advance(1);
     std::size_t length = 0;
     while (source.ensure(1) && !is_space(*source.cursor())) {
         if (length == word.size() - 1) return {};

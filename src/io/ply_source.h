@@ -45,15 +45,16 @@ private:
     std::uint64_t consumed_ = 0;
 };
 
-// Reads bytes up to and including the next '\n' (or up to the end), and returns them without it and without a '\r'
-// before it. Nothing if no byte was left or if the line is longer than `most` bytes.
-std::optional<std::string_view> read_line(PlySource& source, std::vector<char>& line, std::size_t most);
+// Reads bytes up to and including the next `line_end` (or up to the end of the bytes), and returns them without it.
+// Nothing if no byte was left or if the line is longer than `most` bytes.
+std::optional<std::string_view> read_line(PlySource& source, char line_end, std::vector<char>& line, std::size_t most);
 
-// Skips leading white space and reads the word after it (but not the separator that ends it). Empty at the end of the
+// Skips white space and reads the word after it (but not the separator that ends it). Empty at the end of the
 // bytes, and if the word is longer than 255 characters, which no number is.
 std::string_view read_word(PlySource& source, std::span<char, 256> word);
 
-// Skips spaces, tabs and line endings. False if nothing is left after them.
-bool skip_white_space(PlySource& source);
+// Skips what may stand before a PLY and between two: white space, zero bytes (which pad blocks), the control-Z of old
+// systems and byte-order marks. False if nothing is left after them.
+bool skip_to_ply(PlySource& source);
 
 }  // namespace htvm

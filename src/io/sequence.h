@@ -10,40 +10,50 @@
 #include <vector>
 
 #include "htvm/result.hpp"
+#include "io/mesh_reading.h"
+#include "io/sequence_names.h"
 
 namespace htvm {
 
 struct SequenceFiles {
     std::vector<std::filesystem::path> paths;  // one per frame, in order; never empty
-    std::vector<std::uint64_t> numbers;        // each name's number, ascending; empty if the names have none
+    std::vector<std::uint64_t> numbers;        // of the frames, by the names, ascending; empty if the names have none
+    std::vector<MeshRemark> remarks = {};      // what was left out or guessed, clauses behind the sequence's name
+};
+
+struct SequenceOptions {
+    // Globs: files and folders whose name (its last part) matches one are taken as if they were not there. A file that
+    // is named by itself is taken all the same.
+    std::vector<std::string> ignored = {};
 };
 
 // The files that `what` refers to. It may be, tried in this order:
 // - the name of a file: that file;
-// - a folder: its mesh files (as in mesh_file.h, without hidden ones) in natural order;
-// - a name with one %d or %05d in its last part: the existing files of that name with any number (with %05d: of at
-//   least five digits, padded with zeros), by ascending number; the first need not be 0 and numbers may be missing;
-// - a name with * (any characters) or ? (one character) in its last part: the mesh files that match, in natural order.
-// Fails (bad_input) if nothing is found, with what was looked for and what is there instead; also if a folder or a glob
-// contains files of different formats, since then it most likely contains each frame twice.
-Result<SequenceFiles> find_sequence(std::string_view what);
+// - a folder: its mesh files (as in mesh_file.h, without hidden ones), in the order of their frames
+//   (order_of_frames()); or, if it has none, a mesh of each of its folders that have some, which are then the frames
+//   and have the numbers: the only one, or the only one of a name that is in all;
+// - a name with one %d or %05d in its last part: the existing files of that name with any number, however many zeros
+//   are in front, by ascending number; the first need not be 0 and numbers may be missing;
+// - a name with * (any characters) or ? (one character) in its last part: the mesh files that match, as of a folder.
+// Of a folder and a glob copies of other files in it, and files that programs have not finished, are left out, with a
+// remark. Fails (bad_input) if nothing is found, with what was looked for and what is there instead; and, naming the
+// files, if they are more than a sequence of frames: of different formats (whatever the case of their endings), since
+// then each frame is most likely there twice; of several captures; with meshes that do not belong to the frames; with
+// a number twice. Names of which most are not numbered alike are taken in natural order, with a remark.
+Result<SequenceFiles> find_sequence(std::string_view what, const SequenceOptions& options = {});
 
-// The same of several names, as a shell makes them of a pattern: of mesh files of one format, which stay in their
-// order.
-Result<SequenceFiles> find_sequence(std::span<const std::string> names);
+// The same of several names, as a shell makes them of a pattern: of mesh files of one format. They stay in their order
+// unless that is how a shell sorts text: then they are taken by number. A remark says so if they are not by number.
+Result<SequenceFiles> find_sequence(std::span<const std::string> names, const SequenceOptions& options = {});
 
-// The last number in each name, if the names differ only in it and the numbers ascend; else empty.
+// The frame's number in each name (order_of_frames()), if the names differ only in numbers and these ascend; else
+// empty.
 std::vector<std::uint64_t> numbers_in_names(std::span<const std::filesystem::path> paths);
 
-// When each file was captured, in frames since the first: a number that is missing is a frame that is missing. The
-// most frequent step between numbers (1; 10 if every tenth frame was kept) is one frame. 0, 1, 2 and so on if there are
-// no numbers, if not all steps are multiples of that, or if more frames would be missing than there are (numbers that
-// are times of a clock).
+// When each file was captured, in frames since the first: a number that is missing is a frame that is missing, and what
+// numbers step by most often (1; 10 if every tenth frame was kept) is one frame. 0, 1, 2 and so on if there are no
+// numbers or if they do not count frames (frame_step()).
 std::vector<std::uint64_t> places_in_time(const SequenceFiles& files);
-
-// True if a sorts before b: letters by code, runs of digits by their number (2 before 10), equal numbers by fewer
-// leading zeros.
-bool natural_less(std::string_view a, std::string_view b);
 
 // True if the whole of `text` matches `glob`: * stands for any characters or none, ? for one, everything else for
 // itself.

@@ -149,7 +149,9 @@ struct FillCount {
     std::size_t joints = 0;  // number of joints filled in, over all frames
     std::size_t frames = 0;  // number of frames with some
     std::size_t whole = 0;   // number of frames with all
-    std::size_t beyond = 0;  // number of those before the first or after the last pose
+    std::size_t beyond = 0;  // number of those before the first or after the last pose,
+    std::size_t before = 0;  // of which so many are before the first
+    std::size_t last = 0;    // the last frame counted
     std::vector<std::string> never;
 };
 
@@ -212,20 +214,34 @@ Result<FillCount> fill_joints(const SkeletonTrack& track, const std::vector<doub
     if (!count.never.empty()) place_lost_joints(track.skeleton, known, poses);
     for (std::size_t t = first; t < first + count.of; ++t) {
         const auto filled = static_cast<std::size_t>(std::count(poses[t].found.begin(), poses[t].found.end(), false));
-        const bool outside =
-            times[t] < track.timestamps.front() - same_time || times[t] > track.timestamps.back() + same_time;
+        const bool before = times[t] < track.timestamps.front() - same_time;
+        const bool outside = before || times[t] > track.timestamps.back() + same_time;
         count.joints += filled;
         count.frames += filled > 0;
         count.whole += filled == joints;
         count.beyond += outside;
+        count.before += before;
+        count.last = t;
     }
     return count;
+}
+
+// "the first 3" and "frames 40 to 59 (the first is 0)", or one of both.
+std::string frames_beyond(const FillCount& count) {
+    const std::size_t behind = count.beyond - count.before;
+    std::string text = count.before > 0 ? "the first " + std::to_string(count.before) : "";
+    if (behind == 0) return text;
+    const std::string last = std::to_string(count.last);
+    text += text.empty() ? "" : ", ";
+    if (behind == 1) return text + "frame " + last;
+    return text + "frames " + std::to_string(count.last + 1 - behind) + " to " + last + " (the first is 0)";
 }
 
 void say_filled(const FillCount& count, std::vector<std::string>& notes) {
     if (count.beyond > 0)
         notes.push_back("The skeleton does not cover " + counted(count.beyond, "mesh frame") + " of " +
-                        std::to_string(count.of) + " at the ends: its nearest pose is held there.");
+                        std::to_string(count.of) + " at the ends, " + frames_beyond(count) +
+                        ": its nearest pose is held there.");
     if (count.whole > count.beyond)
         notes.push_back("The skeleton is missing in " + counted(count.whole - count.beyond, "mesh frame") + " of " +
                         std::to_string(count.of) + ": interpolated.");

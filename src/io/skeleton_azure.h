@@ -15,10 +15,13 @@ namespace htvm {
 //    "frames": [{"timestamp_usec": n, "frame_id": n, "num_bodies": n,
 //                "bodies": [{"body_id": n, "joint_positions": [[x, y, z] x 32],
 //                            "joint_orientations": [[w, x, y, z] x 32]}]}]}
-// The body seen in most frames is taken (of equals, the one seen first; a note says how many there were); a frame
-// without it is a missing frame. Without joint_names or bone_list: the sensor's own 32 joints and 31 bones. If the
-// names are the sensor's, bones are turned to run away from the pelvis (the sensor's list runs from the chest down).
-// Each bone is oriented like its first joint. Time starts at the first frame; fps is that of the median interval;
+// Names of members and of joints may be written in any case, with or without underscores; points and quaternions may be
+// objects with x, y, z and w. One body is taken (choose_azure_body()); a frame without it, or null, is a missing frame.
+// Without joint_names or bone_list: the sensor's own 32 joints and 31 bones, or the 26 without hands of its first
+// versions. If bodies have fewer joints than are named, the first ones are taken. If the names are the sensor's, bones
+// are turned to run away from the pelvis (the sensor's list runs from the chest down). Each bone is oriented like its
+// first joint. Joints with coordinates that are null or NaN are not tracked. Time starts at the first frame; timestamps
+// that are missing or not after the ones before are interpolated, with a note; fps is that of the median interval;
 // without timestamps, 30 fps. Errors (bad_input, limit) name the frame and the joint.
 Result<SkeletonTrack> parse_skeleton_azure(std::string_view text);
 

@@ -1,5 +1,6 @@
 #include "io/skeleton_file.h"
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -26,12 +27,20 @@ Result<std::string> read_text(const std::string& path, std::size_t max_bytes) {
     return text;
 }
 
+// Without a byte order mark, spaces and lines of comments in front.
+std::string_view start_of(std::string_view text) {
+    if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+    for (;;) {
+        while (!text.empty() && static_cast<unsigned char>(text.front()) <= ' ') text.remove_prefix(1);
+        if (!text.starts_with('#') && !text.starts_with("//")) return text;
+        text.remove_prefix(std::min(text.find_first_of("\r\n"), text.size()));
+    }
+}
+
 }  // namespace
 
 Result<SkeletonTrack> parse_skeleton(std::string_view text, const SkeletonReadOptions& options) {
-    std::string_view start = text;
-    if (start.starts_with("\xEF\xBB\xBF")) start.remove_prefix(3);
-    while (!start.empty() && static_cast<unsigned char>(start.front()) <= ' ') start.remove_prefix(1);
+    const auto start = start_of(text);
     if (start.empty()) return fail(ErrorKind::bad_input, "holds nothing");
     if ((start.front() | 0x20) == 'h') return parse_skeleton_bvh(text, options.bvh);
     if (start.front() != '{')

@@ -113,6 +113,7 @@ Result<void> read_clock(const json& document, SkeletonTrack& track) {
         track.fps = *number;
     }
     if (!timestamps) {
+        track.rate_is_known = fps != nullptr;
         if (!fps) track.notes.push_back("The skeleton file has neither fps nor timestamps: taken as 30 fps.");
         for (std::size_t t = 0; t < count; ++t) track.timestamps.push_back(static_cast<double>(t) / track.fps);
         return {};
@@ -265,13 +266,13 @@ Result<SkeletonTrack> skeleton_from_json(const json& document) {
     for (const char* name : {"joints", "bones", "frames"})
         if (!find_member(document, name))
             return fail(ErrorKind::bad_input, std::string("the skeleton file has no \"") + name + "\"");
-    auto names = joint_names(document["joints"]);
+    auto names = joint_names(*find_member(document, "joints"));
     if (!names) return fail_at("joints", names.error());
     track.skeleton.joint_names = std::move(*names);
-    auto bones = bone_pairs(document["bones"], track.skeleton.joint_names);
+    auto bones = bone_pairs(*find_member(document, "bones"), track.skeleton.joint_names);
     if (!bones) return fail_at("bones", bones.error());
     track.skeleton.bones = std::move(*bones);
-    const json& frames = document["frames"];
+    const json& frames = *find_member(document, "frames");
     if (!frames.is_array()) return fail(ErrorKind::bad_input, "frames must be a list");
     for (std::size_t t = 0; t < frames.size(); ++t) {
         auto pose = pose_from_json(frames[t], t, track.skeleton, *scale);

@@ -1,6 +1,7 @@
 #include "io/skeleton_json_value.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "io/skeleton_track.h"
@@ -27,13 +28,47 @@ Result<std::uint16_t> joint_index(const json& value, const std::vector<std::stri
     return static_cast<std::uint16_t>(index);
 }
 
-}  // namespace
-
-tl::unexpected<Error> fail_at(const std::string& place, const Error& error) {
-    return fail(error.kind, place + ": " + error.message);
+bool same_member(std::string_view a, std::string_view b) {
+    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+    std::size_t i = 0, j = 0;
+    for (;;) {
+        while (i < a.size() && a[i] == '_') ++i;
+        while (j < b.size() && b[j] == '_') ++j;
+        if (i == a.size() || j == b.size()) return i == a.size() && j == b.size();
+        if (lower(a[i++]) != lower(b[j++])) return false;
+    }
 }
 
-Result<json> parse_json(std::string_view text) {
+bool is_word(char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '#' ||
+           c == '+' || c == '-';
+}
+
+// The text with null in place of words for numbers that are none, outside of strings.
+std::string with_nulls(std::string_view text) {
+    std::string out;
+    bool in_string = false;
+    for (std::size_t i = 0; i < text.size();) {
+        if (in_string || !is_word(text[i])) {
+            if (text[i] == '"') in_string = !in_string;
+            if (in_string && text[i] == '\\' && i + 1 < text.size()) out += text[i++];
+            out += text[i++];
+            continue;
+        }
+        std::size_t end = i;
+        while (end < text.size() && is_word(text[end])) ++end;
+        auto word = text.substr(i, end - i);
+        i = end;
+        const auto unsigned_word = word.substr(word.front() == '-' || word.front() == '+' ? 1 : 0);
+        for (const std::string_view begin : {"nan", "infinity", "inf", "1.#", "undefined", "none"})
+            if (unsigned_word.size() >= begin.size() && same_member(unsigned_word.substr(0, begin.size()), begin))
+                word = "null";
+        out += word;
+    }
+    return out;
+}
+
+Result<json> parse_strictly(std::string_view text) {
     // The parser reports errors by exceptions, this library by values.
     try {
         return json::parse(text.begin(), text.end());
@@ -45,9 +80,25 @@ Result<json> parse_json(std::string_view text) {
     }
 }
 
+}  // namespace
+
+tl::unexpected<Error> fail_at(const std::string& place, const Error& error) {
+    return fail(error.kind, place + ": " + error.message);
+}
+
+Result<json> parse_json(std::string_view text) {
+    auto document = parse_strictly(text);
+    if (document) return document;
+    const auto changed = with_nulls(text);
+    auto mended = changed == text ? document : parse_strictly(changed);
+    return mended ? mended : document;
+}
+
 const json* find_member(const json& value, const char* name) {
     if (!value.is_object()) return nullptr;
-    const auto found = value.find(name);
+    auto found = value.find(name);
+    for (auto member = value.begin(); found == value.end() && member != value.end(); ++member)
+        if (same_member(member.key(), name)) found = member;
     return found == value.end() || found->is_null() ? nullptr : &*found;
 }
 
@@ -59,12 +110,15 @@ Result<double> finite_number(const json& value) {
 }
 
 Result<std::optional<Vector3d>> point_or_null(const json& value, double scale) {
+    constexpr std::array names = {"x", "y", "z"};
     if (value.is_null()) return std::optional<Vector3d>();
-    if (!value.is_array() || value.size() != 3)
+    if (!value.is_object() && (!value.is_array() || value.size() != names.size()))
         return fail(ErrorKind::bad_input, "must be [x, y, z], or null where it is not tracked");
     Vector3d point{};
-    for (std::size_t i = 0; i < 3; ++i) {
-        const auto number = finite_number(value[i]);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        const json* coordinate = value.is_object() ? find_member(value, names[i]) : &value[i];
+        if (!coordinate || coordinate->is_null()) return std::optional<Vector3d>();
+        const auto number = finite_number(*coordinate);
         if (!number)
             return fail(ErrorKind::bad_input, "its coordinate " + std::to_string(i) + " " + number.error().message);
         point[i] = *number * scale;

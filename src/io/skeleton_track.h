@@ -24,6 +24,7 @@ struct SkeletonTrack {
     std::vector<Pose> poses;
     std::vector<double> timestamps;  // seconds, one per pose, strictly increasing
     double fps = 30;                 // poses per second, > 0
+    bool rate_is_known = true;       // false: fps is assumed, and timestamps are frame / fps
     std::vector<double> radii;       // mm, one per bone; empty: not calibrated
     std::vector<std::string> notes;  // what was assumed or corrected while reading, one sentence each, for the user
 };

@@ -9,6 +9,7 @@
 
 #include "core/geometry.h"
 #include "core/parallel.h"
+#include "core/srgb.h"
 
 namespace htvm {
 
@@ -93,6 +94,13 @@ Colour mean_of(const ColourSum& sum) {
     return out;
 }
 
+// The same with its mean multiplied by that colour, in light.
+ColourSum multiplied(ColourSum sum, const Colour& by) {
+    const Colour mean = mean_of(sum);
+    for (std::size_t i = 0; i < 3; ++i) sum.colour[i] = sum.area * level_of(light_of(mean[i]) * light_of(by[i]));
+    return sum;
+}
+
 // Where a vertex is and how it is turned: those that agree in both are one.
 struct Place {
     Vector3f position, normal;
@@ -135,9 +143,10 @@ Mesh with_vertex_colours(const TexturedMesh& captured, Threads threads, double s
             if (!mesh.normals.empty()) out.normals.push_back(place.normal);
             merged.emplace_back();
         }
+        const ColourSum own = mesh.colours.empty() ? sums[v] : multiplied(sums[v], mesh.colours[v]);
         ColourSum& sum = merged[at->second];
-        sum.area += sums[v].area;
-        for (std::size_t i = 0; i < 3; ++i) sum.colour[i] += sums[v].colour[i];
+        sum.area += own.area;
+        for (std::size_t i = 0; i < 3; ++i) sum.colour[i] += own.colour[i];
     }
     for (const auto& sum : merged) out.colours.push_back(mean_of(sum));
     for (const Triangle& t : mesh.triangles) {

@@ -15,10 +15,12 @@ namespace htvm {
 // colour at its own coordinates. The mesh must have texture coordinates, and the image pixels.
 std::vector<Colour> colours_from_texture(const Mesh& mesh, const Image& image, internal::Threads threads = {});
 
-// The mesh with these colours in place of the texture and its coordinates. Vertices at one place, of which a seam of
-// the texture needs one for each side, become one if their normals agree, with the mean of their colours by area;
-// triangles that had two corners there are dropped. spacing: of the points, in texels, > 0; 1 is exact, and 2 takes a
-// quarter of the time, for colours that nobody sees: some of what lies a texel beyond the triangles comes in.
+// The mesh with these colours in place of the texture and its coordinates, multiplied, in light, by those that its
+// vertices have, as glTF means both together; where they are not meant so, texture_file.h leaves them out. Vertices at
+// one place, of which a seam of the texture needs one for each side, become one if their normals agree, with the mean
+// of their colours by area; triangles that had two corners there are dropped. spacing: of the points, in texels, > 0; 1
+// is exact, and 2 takes a quarter of the time, for colours that nobody sees: some of what lies a texel beyond the
+// triangles comes in.
 Mesh with_vertex_colours(const TexturedMesh& captured, internal::Threads threads = {}, double spacing = 1);
 
 }  // namespace htvm

@@ -6,8 +6,10 @@
 #include <system_error>
 #include <utility>
 
+#include "core/srgb.h"
 #include "io/image_file.h"
-#include "io/obj.h"
+#include "io/texture_materials.h"
+#include "io/texture_parts.h"
 
 namespace htvm {
 
@@ -18,52 +20,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* other_ways = "; --texture gives its place, or none to go on without";
+constexpr Colour white{255, 255, 255};
 
 tl::unexpected<Error> fail_at(const fs::path& mesh, ErrorKind kind, const std::string& message) {
     return fail(kind, mesh.empty() ? message : mesh.string() + ": " + message);
 }
 
 fs::path folder_of(const fs::path& mesh) { return mesh.has_parent_path() ? mesh.parent_path() : fs::path("."); }
-
-// The file of that name in the folder or below it; the last part of the name alone if it leads elsewhere, as where a
-// program wrote its own folders into it.
-std::optional<fs::path> file_within(const fs::path& folder, const std::string& name) {
-    if (name.empty() || name.find('\0') != name.npos) return std::nullopt;
-    std::error_code error;
-    const auto inside = fs::canonical(folder, error);
-    if (error) return std::nullopt;
-    const auto last_part = name.substr(name.find_last_of("/\\") + 1);
-    for (const auto& tried : {name, last_part}) {
-        if (tried.empty() || !fs::is_regular_file(folder / tried, error)) continue;
-        const auto path = fs::canonical(folder / tried, error);
-        if (error) continue;
-        if (std::mismatch(inside.begin(), inside.end(), path.begin(), path.end()).first == inside.end())
-            return folder / tried;
-    }
-    return std::nullopt;
-}
-
-// The images of an OBJ's materials. A material file that is not there says nothing: many an OBJ names one that was
-// never sent along.
-Result<TextureReference> with_materials(const fs::path& mesh, const TextureReference& said) {
-    TextureReference out = said;
-    if (said.material_files.empty() || said.parts.empty()) return out;
-    std::vector<ObjMaterial> known;
-    for (const auto& name : said.material_files) {
-        const auto path = file_within(folder_of(mesh), name);
-        if (!path) continue;
-        constexpr std::uint64_t most_bytes = std::uint64_t{1} << 26;
-        const auto bytes = read_file(*path, most_bytes);
-        if (!bytes) return tl::unexpected(bytes.error());
-        const auto more = read_obj_materials({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
-        known.insert(known.end(), more.begin(), more.end());
-    }
-    for (auto& part : out.parts) {
-        const auto material = std::ranges::find(known, part.material, &ObjMaterial::name);
-        if (material != known.end() && !material->image.empty()) part.image = add_image(out, material->image);
-    }
-    return out;
-}
 
 std::string lower_case(std::string text) {
     std::transform(text.begin(), text.end(), text.begin(),
@@ -156,6 +119,12 @@ Image turned_over(const Image& image) {
     return out;
 }
 
+Colour product(const Colour& a, const Colour& b) {
+    Colour out;
+    for (std::size_t c = 0; c < 3; ++c) out[c] = level_of(light_of(a[c]) * light_of(b[c]));
+    return out;
+}
+
 void turn_over(Mesh& mesh) {
     for (auto& texcoord : mesh.texcoords) texcoord[1] = 1 - texcoord[1];
 }
@@ -208,50 +177,68 @@ std::vector<std::filesystem::path> TextureFiles::known_images() const {
     return out;
 }
 
-Result<TextureFiles::Found> TextureFiles::find(const fs::path& mesh, std::size_t place,
-                                               const TextureReference& said) const {
-    Found out;
+bool TextureFiles::Kept::is_of(const Found& found) const {
+    if (found.picture || picture) return picture == found.picture;
+    return found.bytes ? bytes == *found.bytes : !path.empty() && path == found.path;
+}
+
+// The parts' images and colours, of an OBJ from its material files.
+void TextureFiles::take_parts(const Mesh& mesh, const fs::path& path) {
+    const bool is_needed =
+        (mesh.colours.empty() || is_one_colour(mesh.colours)) && (path.empty() || !image_beside(path));
+    take_materials(findings_, folder_of(path), worn_parts(mesh, findings_.texture), is_needed, named_);
+}
+
+Result<TextureFiles::Shown> TextureFiles::find(const Mesh& mesh, const fs::path& path, std::size_t place) {
+    Shown out;
     if (options_.files == "none") return out;
     if (video_) {
-        out.name = video_->path().string();
-        out.picture = place < times_.size() ? static_cast<std::size_t>(times_[place]) : place;
+        const auto picture = place < times_.size() ? static_cast<std::size_t>(times_[place]) : place;
+        out.images.push_back({video_->path().string(), {}, nullptr, picture});
         return out;
     }
     if (!images_.empty()) {
-        out.path = images_.size() == 1 ? images_[0] : images_[place];
-        out.name = out.path.string();
+        const auto& own = images_.size() == 1 ? images_[0] : images_[place];
+        out.images.push_back({own.string(), own, nullptr, {}});
         return out;
     }
-    const auto texture = with_materials(mesh, said);
-    if (!texture) return tl::unexpected(texture.error());
-    const bool is_partial =
-        !texture->images.empty() && std::ranges::any_of(texture->parts, [](const auto& part) { return !part.image; });
-    if (texture->images.size() > 1 || is_partial)
-        return fail_at(mesh, ErrorKind::unsupported,
-                       is_partial
-                           ? "a part of the mesh has an image and another has none; one image for all of it is read" +
-                                 std::string(other_ways)
-                           : "its parts have " + std::to_string(texture->images.size()) +
-                                 " images; one image for all of it is read: bake them into one" + other_ways);
-    if (!texture->images.empty()) {
-        out.name = texture->images[0].name;
-        if (!texture->images[0].bytes.empty()) {
-            out.bytes = &said.images[0].bytes;
-            return out;
+    auto of_parts = find_of_parts(worn_parts(mesh, findings_.texture), path);
+    if (!of_parts || !of_parts->images.empty()) return of_parts;
+    if (const auto beside = path.empty() ? std::nullopt : image_beside(path))
+        out.images.push_back({beside->string(), *beside, nullptr, {}});
+    return out;
+}
+
+Result<TextureFiles::Shown> TextureFiles::find_of_parts(const std::vector<bool>& worn, const fs::path& path) {
+    const auto& texture = findings_.texture;
+    Shown out;
+    out.is_of_parts = !texture.parts.empty();
+    for (std::size_t i = 0; i < texture.images.size(); ++i) {
+        bool is_shown = texture.parts.empty() && i == 0;
+        for (std::size_t p = 0; p < worn.size(); ++p) is_shown = is_shown || (worn[p] && texture.parts[p].image == i);
+        if (!is_shown) continue;
+        const auto& image = texture.images[i];
+        if (!image.bytes.empty()) {
+            out.images.push_back({image.name, {}, &image.bytes, {}});
+            continue;
         }
-        const auto path = file_within(folder_of(mesh), out.name);
-        if (!path)
-            return fail_at(mesh, ErrorKind::bad_input,
-                           "its image \"" + out.name.substr(0, 200) + "\" is not in its folder" + other_ways);
-        out.path = *path;
-        out.name = path->string();
-        return out;
-    }
-    if (const auto beside = mesh.empty() ? std::nullopt : image_beside(mesh)) {
-        out.path = *beside;
-        out.name = beside->string();
+        const auto file = named_.find(folder_of(path), image.name);
+        if (!file)
+            return fail(ErrorKind::bad_input,
+                        "its image \"" + image.name.substr(0, 200) + "\" is not in its folder" + other_ways);
+        out.images.push_back({file->string(), *file, nullptr, {}});
     }
     return out;
+}
+
+// With the colours of its parts, if these are all there is.
+TexturedMesh TextureFiles::without_image(Mesh mesh) {
+    if (mesh.colours.empty() && !mesh.positions.empty()) {
+        mesh.colours = colours_of_parts(mesh, findings_.texture);
+        if (!mesh.colours.empty())
+            remark(&findings_, "part-colours", "it has no image; its vertices take the colours of its materials");
+    }
+    return TexturedMesh(std::move(mesh));
 }
 
 Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, std::size_t place, TextureUse use) {
@@ -261,49 +248,175 @@ Result<TexturedMesh> TextureFiles::completed(Mesh mesh, const fs::path& path, st
         turn_over(mesh);
     if (mesh.positions.empty()) return TexturedMesh(std::move(mesh));
     const bool is_named = !images_.empty() || video_;
+    if (!is_named && options_.files != "none") take_parts(mesh, path);
     if (mesh.texcoords.empty()) {
         if (is_named || use == TextureUse::always)
             return fail_at(path, ErrorKind::bad_input,
                            "the mesh has no texture coordinates, which its image needs; leave --texture out, or write "
                            "the mesh with them");
+        return without_image(std::move(mesh));
+    }
+    const bool is_coloured = !mesh.colours.empty() && !is_one_colour(mesh.colours);
+    const bool is_wanted =
+        use == TextureUse::always ||
+        (use == TextureUse::where_colourless && (is_named || !is_coloured || findings_.texture.colours_multiply));
+    const auto shown = find(mesh, path, place);
+    if (!shown) {
+        if (is_wanted && (use == TextureUse::always || mesh.colours.empty()))
+            return fail_at(path, shown.error().kind, shown.error().message);
+        // What vertices have is shown, in place of an image that may be meant instead.
+        remark(&findings_, "no-image", shown.error().message, is_wanted);
         return TexturedMesh(std::move(mesh));
     }
-    const bool is_wanted =
-        use == TextureUse::always || (use == TextureUse::where_colourless && (is_named || mesh.colours.empty()));
-    const auto found = find(path, place, findings_.texture);
-    if (!found) {
-        if (!is_wanted) return TexturedMesh(std::move(mesh));
-        return tl::unexpected(found.error());
+    if (shown->images.empty()) {
+        if (use == TextureUse::always)
+            return fail_at(path, ErrorKind::bad_input, "no image was found for it; --texture gives its place");
+        if (options_.files != "none")
+            remark(&findings_, "no-image", "it has texture coordinates, but no image was found for them");
+        return without_image(std::move(mesh));
     }
-    image_name_ = found->name;
+    image_name_ = shown->images[0].name;
+    if (shown->images.size() > 1) image_name_ += " and " + std::to_string(shown->images.size() - 1) + " more";
     if (!is_wanted) return TexturedMesh(std::move(mesh));
-    if (found->name.empty()) {
-        if (use != TextureUse::always) return TexturedMesh(std::move(mesh));
-        return fail_at(path, ErrorKind::bad_input, "no image was found for it; --texture gives its place");
+    return with_images(std::move(mesh), path, *shown);
+}
+
+// What each part that is worn shows, in the order of the parts.
+std::vector<AtlasPart> TextureFiles::parts_with(const std::vector<ReadImage>& images, const std::vector<bool>& worn,
+                                                const Shown& shown) const {
+    const auto& texture = findings_.texture;
+    std::vector<AtlasPart> out;
+    std::map<std::size_t, std::size_t> read_as;  // of the images that the mesh names, which are shown, in order
+    for (std::size_t p = 0; p < worn.size(); ++p)
+        if (worn[p] && texture.parts[p].image) read_as.emplace(*texture.parts[p].image, 0);
+    std::size_t next = 0;
+    for (auto& [named, read] : read_as) read = next++;
+    for (std::size_t p = 0; p < worn.size(); ++p) {
+        if (!worn[p]) continue;
+        const auto& part = texture.parts[p];
+        AtlasPart& made = out.emplace_back();
+        made.colour = part.colour.value_or(white);
+        made.name = part.material;
+        if (!part.image) continue;
+        const std::size_t read = read_as[*part.image];
+        made.image = images[read].image;
+        made.name += '\0' + shown.images[read].name;
     }
-    auto image = read_image_of(*found, path);
-    if (!image) return tl::unexpected(image.error());
+    return out;
+}
+
+Result<TexturedMesh> TextureFiles::with_images(Mesh mesh, const fs::path& path, const Shown& shown) {
+    const auto& texture = findings_.texture;
+    Colour colour = white;
+    if (texture.colours_multiply && is_one_colour(mesh.colours)) colour = mesh.colours.front();
+    if (!texture.colours_multiply || is_one_colour(mesh.colours)) mesh.colours.clear();
+    const auto worn = shown.is_of_parts ? worn_parts(mesh, texture) : std::vector<bool>();
+    bool is_partial = false, has_colours = false;
+    std::optional<Colour> first;
+    for (std::size_t p = 0; p < worn.size(); ++p) {
+        if (!worn[p]) continue;
+        is_partial = is_partial || !texture.parts[p].image;
+        const Colour own = texture.parts[p].colour.value_or(white);
+        has_colours = has_colours || first.value_or(own) != own;
+        first = own;
+    }
+    const bool is_one = shown.images.size() == 1 && !is_partial && !has_colours;
+    if (!is_one && options_.keep_files)
+        return fail_at(path, ErrorKind::unsupported,
+                       (is_partial    ? "a part of the mesh has an image and another has none"
+                        : has_colours ? std::string("its parts have one image in different colours")
+                                      : "its parts have " + std::to_string(shown.images.size()) + " images") +
+                           "; files are kept where one image is for all of it: bake them into one" + other_ways);
+    auto images = read_images(shown.images, path);
+    if (!images) return tl::unexpected(images.error());
+    for (const auto& image : *images)
+        for (const auto& said : image.remarks) remark(&findings_, said.about.c_str(), said.text, said.is_loss);
+    if (is_one)
+        return with_one_image(std::move(mesh), path, std::move(images->front()),
+                              product(colour, first.value_or(white)));
+    auto parts = parts_with(*images, worn, shown);
+    for (auto& part : parts) part.colour = product(part.colour, colour);
+    std::vector<std::size_t> place_of(worn.size());  // among those that are worn
+    for (std::size_t p = 0, next = 0; p < worn.size(); ++p) {
+        place_of[p] = next;
+        if (worn[p]) ++next;
+    }
+    auto made = with_atlas(std::move(mesh), std::move(parts), place_of);
+    if (!made) return fail_at(path, made.error().kind, made.error().message + other_ways);
+    return made;
+}
+
+Result<TexturedMesh> TextureFiles::with_atlas(Mesh mesh, std::vector<AtlasPart> parts,
+                                              const std::vector<std::size_t>& place_of) {
+    std::vector<std::size_t> part_of(mesh.triangles.size());
+    for (std::size_t t = 0; t < part_of.size(); ++t) part_of[t] = place_of[part_of_triangle(findings_.texture, t)];
+    auto made = put_into_atlas(mesh, parts, part_of, atlas_);
+    if (!made) return tl::unexpected(made.error());
+    atlas_ = std::move(made->atlas);
+    constexpr double nearly_whole = 0.95;
+    if (atlas_.scale < nearly_whole)
+        remark(&findings_, "atlas-scale",
+               "its images are made smaller, to " + std::to_string(std::lround(100 * atlas_.scale)) +
+                   " %, to fit into one of " + std::to_string(largest_image_side) + " x " +
+                   std::to_string(largest_image_side) + " pixels");
+    if (made->is_folded)
+        remark(
+            &findings_, "folded-coordinates",
+            "some of its triangles repeat their image more often than an image for all parts can hold; their colours "
+            "are wrong",
+            true);
+    return TexturedMesh(std::move(mesh), atlas_.image);
+}
+
+TexturedMesh TextureFiles::with_one_image(Mesh mesh, const fs::path& path, ReadImage image, const Colour& colour) {
+    if (colour != white && options_.keep_files) {
+        remark(&findings_, "kept-colour",
+               "its material's colour, which multiplies the image, is left out as that is kept", true);
+    } else if (colour != white) {
+        if (multiplied_.from != image.image || multiplied_.colour != colour)
+            multiplied_ = {image.image, std::make_shared<const Image>(multiplied(*image.image, colour)), colour};
+        image.image = multiplied_.to;
+    }
     if (options_.origin == TextureOrigin::by_format && says_no_origin(path)) {
         if (!from_top_by_seams_)
-            if (const auto difference = difference_at_seams(mesh, *image->image))
+            if (const auto difference = difference_at_seams(mesh, *image.image))
                 from_top_by_seams_ = difference->from_top < difference->from_bottom;
         // The image, as the coordinates are to stay what the file says wherever they are coded or compared; but a file
         // that is kept cannot be turned.
         if (is_from_top_by_seams() && options_.keep_files) {
             turn_over(mesh);
         } else if (is_from_top_by_seams()) {
-            if (!kept_turned_) kept_turned_ = std::make_shared<const Image>(turned_over(*image->image));
-            return TexturedMesh(std::move(mesh), kept_turned_);
+            if (turned_.from != image.image)
+                turned_ = {image.image, std::make_shared<const Image>(turned_over(*image.image)), white};
+            return TexturedMesh(std::move(mesh), turned_.to);
         }
     }
-    TexturedMesh out(std::move(mesh), std::move(image->image));
-    out.texture_file = std::move(image->file);
+    TexturedMesh out(std::move(mesh), std::move(image.image));
+    out.texture_file = std::move(image.file);
+    return out;
+}
+
+Result<std::vector<TextureFiles::ReadImage>> TextureFiles::read_images(const std::vector<Found>& found,
+                                                                       const fs::path& mesh) {
+    std::vector<Kept> read;
+    std::vector<ReadImage> out;
+    for (const auto& one : found) {
+        const auto known = std::ranges::find_if(kept_, [&](const Kept& kept) { return kept.is_of(one); });
+        if (known != kept_.end()) {
+            read.push_back(*known);
+        } else {
+            auto image = read_image_of(one, mesh);
+            if (!image) return tl::unexpected(image.error());
+            read.push_back({one.path, one.bytes ? *one.bytes : std::vector<std::uint8_t>(), one.picture, *image});
+        }
+        out.push_back(read.back().read);
+    }
+    kept_ = std::move(read);
     return out;
 }
 
 Result<TextureFiles::ReadImage> TextureFiles::read_image_of(const Found& found, const fs::path& mesh) {
     if (found.picture) return picture_of_video(*found.picture, mesh);
-    if (!found.bytes && kept_.image && kept_path_ == found.path) return kept_;
     ReadImage out;
     std::vector<std::uint8_t> file;
     if (!found.bytes && options_.keep_files) {
@@ -313,28 +426,36 @@ Result<TextureFiles::ReadImage> TextureFiles::read_image_of(const Found& found, 
     } else if (found.bytes && options_.keep_files) {
         file = *found.bytes;
     }
-    auto image = found.bytes ? read_image(*found.bytes) : read_image_file(found.path);
+    const int most = options_.keep_files ? largest_image_side : largest_image_side_read;
+    std::string damage;
+    auto image = found.bytes ? read_image(*found.bytes, most, &damage) : read_image_file(found.path, most, &damage);
     if (!image && found.bytes) return fail_at(mesh, image.error().kind, found.name + ": " + image.error().message);
     if (!image) return tl::unexpected(with_what_is_taken(image.error(), found.path));
+    if (!damage.empty()) out.remarks.push_back({"image-damage", "its image (" + found.name + ") " + damage, true});
+    const int longest = std::max(image->width, image->height);
+    if (longest > largest_image_side) {
+        const auto smaller = [&](int side) {
+            return std::max(1, static_cast<int>(std::lround(static_cast<double>(side) * largest_image_side / longest)));
+        };
+        const auto size = [](const Image& of) { return std::to_string(of.width) + " x " + std::to_string(of.height); };
+        const auto before = size(*image);
+        *image = resized(*image, smaller(image->width), smaller(image->height));
+        out.remarks.push_back({"image-size", "its image (" + found.name + ") of " + before +
+                                                 " pixels is made smaller, " + size(*image) +
+                                                 ", the most that is taken"});
+    }
     out.image = std::make_shared<const Image>(std::move(*image));
     if (options_.keep_files) out.file = std::make_shared<const std::vector<std::uint8_t>>(std::move(file));
-    kept_turned_.reset();
-    kept_ = out;
-    kept_path_ = found.bytes ? fs::path() : found.path;
     return out;
 }
 
 Result<TextureFiles::ReadImage> TextureFiles::picture_of_video(std::size_t number, const fs::path& mesh) {
-    if (kept_picture_ == number) return kept_;
     auto image = video_->picture(number);
     if (!image)
         return fail_at(mesh, image.error().kind,
                        "there is no picture " + std::to_string(number) +
                            " (of 0, 1, ...) for it in the video: " + image.error().message);
-    kept_turned_.reset();
-    kept_ = {std::make_shared<const Image>(std::move(*image)), nullptr};
-    kept_picture_ = number;
-    return kept_;
+    return ReadImage{std::make_shared<const Image>(std::move(*image)), nullptr, {}};
 }
 
 Result<TexturedMesh> TextureFiles::read(std::size_t place, TextureUse use, const MeshFileOptions& options) {

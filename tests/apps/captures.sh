@@ -79,7 +79,18 @@ expect 1 "there is no file capture/none.ply" "$htvm" encode capture/frame_00000.
 # A shell sorts 10 before 9.
 mkdir unpadded
 for k in 0 1 2; do cp capture/frame_0000$k.ply unpadded/$((k + 8)).ply; done
-expect 0 "in the order given, where unpadded/10.ply comes before unpadded/8.ply" "$htvm" encode unpadded/*.ply -o x.htvm
+"$htvm" encode unpadded -o folder.htvm --quiet
+expect 0 "in which unpadded/10.ply comes before unpadded/8.ply: they are taken by number" \
+    "$htvm" encode unpadded/*.ply -o x.htvm
+cmp -s folder.htvm x.htvm || fail "files as a shell sorts them are not taken by number"
+expect 0 "warning: unpadded: the files are taken in the order given, where unpadded/9.ply comes before unpadded/8.ply" \
+    "$htvm" encode unpadded/9.ply unpadded/8.ply unpadded/10.ply -o x.htvm
+
+# What is no frame is named, and can be left out.
+cp capture/frame_00000.ply unpadded/template.ply
+expect 1 "there is template.ply beside the 3 frames" "$htvm" encode unpadded -o x.htvm
+"$htvm" encode unpadded --ignore 'temp*' -o x.htvm --quiet || fail "--ignore"
+cmp -s folder.htvm x.htvm || fail "--ignore leaves out more"
 rm -r unpadded
 
 # A number that is missing.

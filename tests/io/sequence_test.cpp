@@ -10,8 +10,11 @@ namespace htvm {
 namespace {
 
 using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
+using testing::Field;
 using testing::HasSubstr;
+using testing::IsEmpty;
 
 class Sequence : public testing::Test {
 protected:
@@ -22,7 +25,19 @@ protected:
     }
     void TearDown() override { std::filesystem::remove_all(folder); }
     void touch(std::initializer_list<const char*> names) {
-        for (const char* name : names) std::ofstream(folder / name) << "x";
+        for (const char* name : names) {
+            std::filesystem::create_directories((folder / name).parent_path());
+            std::ofstream(folder / name) << "x";
+        }
+    }
+    // "f_0.ply" and so on, of these numbers.
+    void touch_numbered(const std::string& before, const std::string& after, std::uint64_t from, std::uint64_t to) {
+        for (auto k = from; k <= to; ++k) std::ofstream(folder / (before + std::to_string(k) + after)) << "x";
+    }
+    SequenceFiles files_of(const std::string& last, const SequenceOptions& options = {}) {
+        auto files = find_sequence((folder / last).string(), options);
+        EXPECT_TRUE(files) << files.error().message;
+        return files ? std::move(*files) : SequenceFiles{};
     }
     std::vector<std::string> found(const std::string& last) {
         const auto files = find_sequence((folder / last).string());
@@ -33,48 +48,13 @@ protected:
         }
         return names;
     }
-    std::string error(const std::string& last) {
-        const auto files = find_sequence((folder / last).string());
+    std::string error(const std::string& last, const SequenceOptions& options = {}) {
+        const auto files = find_sequence((folder / last).string(), options);
         EXPECT_FALSE(files);
         return files ? "" : files.error().message;
     }
     std::filesystem::path folder;
 };
-
-TEST(NaturalOrder, ComparesRunsOfDigitsAsNumbers) {
-    EXPECT_TRUE(natural_less("f2.ply", "f10.ply"));
-    EXPECT_FALSE(natural_less("f10.ply", "f2.ply"));
-    EXPECT_TRUE(natural_less("f2a10", "f2a11"));
-    EXPECT_TRUE(natural_less("a9", "b1"));
-    EXPECT_TRUE(natural_less("f", "f0"));
-    EXPECT_TRUE(natural_less("f1", "f01"));
-    EXPECT_TRUE(natural_less("f01b", "f1c"));
-    EXPECT_TRUE(natural_less("f99999999999999999999", "f100000000000000000000"));
-    EXPECT_FALSE(natural_less("f01", "f01"));
-    EXPECT_FALSE(natural_less("", ""));
-}
-
-TEST(NaturalOrder, IsAStrictWeakOrderOverShortNames) {
-    std::vector<std::string> names{""};
-    for (std::size_t from = 0, length = 0; length < 4; ++length) {
-        const std::size_t to = names.size();
-        for (; from < to; ++from) {
-            for (const char c : {'0', '1', 'a'}) names.push_back(names[from] + c);
-        }
-    }
-    for (const auto& a : names) {
-        EXPECT_FALSE(natural_less(a, a));
-        for (const auto& b : names) {
-            if (a != b) {
-                EXPECT_NE(natural_less(a, b), natural_less(b, a)) << a << " " << b;
-            }
-            if (!natural_less(a, b)) continue;
-            for (const auto& c : names) {
-                if (natural_less(b, c) && !natural_less(a, c)) ADD_FAILURE() << a << " " << b << " " << c;
-            }
-        }
-    }
-}
 
 TEST(Glob, StarIsAnyCharactersAndQuestionMarkOne) {
     EXPECT_TRUE(glob_matches("*.ply", "a.ply"));
@@ -118,14 +98,16 @@ TEST(PlacesInTime, AMissingNumberIsAMissingFrame) {
     EXPECT_THAT(places_in_time({std::vector<std::filesystem::path>(3), {}}), ElementsAre(0, 1, 2)) << "no numbers";
 }
 
-TEST_F(Sequence, APatternIsTheFilesWithANumberInItsPlace) {
+TEST_F(Sequence, APatternIsTheFilesWithANumberInItsPlaceHoweverManyZerosItHas) {
     touch({"f00002.drc", "f00010.drc", "f100000.drc", "f0003.drc", "f000004.drc", "fx.drc", "f00005.ply"});
-    EXPECT_THAT(found("f%05d.drc"), ElementsAre("f00002.drc", "f00010.drc", "f100000.drc"));
-    const auto files = find_sequence((folder / "f%05d.drc").string());
-    ASSERT_TRUE(files);
-    EXPECT_THAT(files->numbers, ElementsAre(2u, 10u, 100000u));
+    for (const char* pattern : {"f%05d.drc", "f%d.drc"}) {
+        EXPECT_THAT(found(pattern), ElementsAre("f00002.drc", "f0003.drc", "f000004.drc", "f00010.drc", "f100000.drc"));
+        EXPECT_THAT(files_of(pattern).numbers, ElementsAre(2u, 3u, 4u, 10u, 100000u));
+    }
     touch({"7.obj", "11.obj", "08.obj"});
-    EXPECT_THAT(found("%d.obj"), ElementsAre("7.obj", "11.obj"));
+    EXPECT_THAT(found("%d.obj"), ElementsAre("7.obj", "08.obj", "11.obj"));
+    touch({"007.obj"});
+    EXPECT_THAT(error("%d.obj"), AllOf(HasSubstr("007.obj and 7.obj"), HasSubstr("same number")));
     touch({"50%_1.obj"});
     EXPECT_THAT(found("50%%_%d.obj"), ElementsAre("50%_1.obj"));
 }
@@ -182,6 +164,125 @@ TEST_F(Sequence, WhatWasWrittenUnderOutputNamesIsFoundInOrder) {
     const auto files = find_sequence(pattern);
     ASSERT_TRUE(files);
     EXPECT_THAT(files->numbers, ElementsAre(0u, 9u, 10u, 100u));
+}
+
+TEST_F(Sequence, TheFrameIsTheNumberThatVaries) {
+    touch({"levi_fr0003_qp12_qt13.obj", "levi_fr0004_qp12_qt13.obj", "levi_fr0010_qp12_qt13.obj"});
+    EXPECT_THAT(files_of("").numbers, ElementsAre(3u, 4u, 10u));
+    EXPECT_THAT(files_of("").remarks, IsEmpty());
+}
+
+TEST_F(Sequence, WhereSeveralNumbersVaryTheOneThatCountsIsTheFrame) {
+    touch({"mesh_0001_4096.ply", "mesh_0002_4101.ply", "mesh_0003_4090.ply", "mesh_0005_4444.ply"});
+    EXPECT_THAT(files_of("").numbers, ElementsAre(1u, 2u, 3u, 5u));
+    ASSERT_EQ(files_of("").remarks.size(), 1u);
+    EXPECT_THAT(files_of("").remarks[0].text, HasSubstr("mesh_*_4096.ply"));
+    EXPECT_FALSE(files_of("").remarks[0].is_loss);
+}
+
+TEST_F(Sequence, LettersMakeTwoCaptures) {
+    touch_numbered("a_", ".ply", 1, 12);
+    touch_numbered("b_", ".ply", 1, 10);
+    EXPECT_THAT(error(""), AllOf(HasSubstr("12 \"a_%d.ply\""), HasSubstr("10 \"b_%d.ply\"")));
+    EXPECT_EQ(files_of("a_%d.ply").paths.size(), 12u);
+    EXPECT_EQ(files_of("", {{"b_*"}}).paths.size(), 12u);
+}
+
+TEST_F(Sequence, AMeshThatIsNoFrameIsNamed) {
+    touch_numbered("f_", ".ply", 0, 11);
+    touch({"template.ply"});
+    EXPECT_THAT(error(""),
+                AllOf(HasSubstr("template.ply"), HasSubstr("12 frames \"f_%d.ply\""), HasSubstr("--ignore")));
+    const auto files = files_of("", {{"template*"}});
+    EXPECT_EQ(files.paths.size(), 12u);
+    EXPECT_THAT(files.remarks, IsEmpty());
+    EXPECT_THAT(files_of("f_%d.ply", {{"nothing*"}}).remarks,
+                Contains(Field(&MeshRemark::text, HasSubstr("leaves out nothing"))));
+}
+
+TEST_F(Sequence, CopiesAndUnfinishedFilesAreLeftOutWithAWarning) {
+    touch({"frame_0001.ply", "frame_0002.ply", "frame_0003.ply", "frame_0003 (1).ply", "frame_0003 - Copy.ply",
+           "frame_0003_copy.ply", "frame_0004.tmp.ply", "._frame_0001.ply"});
+    const auto files = files_of("");
+    EXPECT_THAT(files.numbers, ElementsAre(1u, 2u, 3u));
+    ASSERT_EQ(files.remarks.size(), 2u);
+    EXPECT_THAT(files.remarks[0].text, HasSubstr("copies of other files are left out: frame_0003 (1).ply"));
+    EXPECT_TRUE(files.remarks[0].is_loss);
+    EXPECT_THAT(files.remarks[1].text, HasSubstr("frame_0004.tmp.ply"));
+}
+
+TEST_F(Sequence, NumbersInBracketsAreNoCopiesWhereAllHaveThem) {
+    touch({"frame (1).ply", "frame (2).ply", "frame (10).ply", "frame.ply"});
+    EXPECT_THAT(error(""), HasSubstr("frame.ply"));
+    std::filesystem::remove(folder / "frame.ply");
+    EXPECT_THAT(files_of("").numbers, ElementsAre(1u, 2u, 10u));
+}
+
+TEST_F(Sequence, TheSameNumberTwiceIsNamed) {
+    touch({"1.ply", "2.ply", "001.ply"});
+    EXPECT_THAT(error(""), AllOf(HasSubstr("1.ply"), HasSubstr("001.ply"), HasSubstr("same number")));
+}
+
+TEST_F(Sequence, EndingsInAnyCaseAreOneFormat) {
+    touch({"1.ply", "2.PLY", "3.Ply"});
+    EXPECT_THAT(found(""), ElementsAre("1.ply", "2.PLY", "3.Ply"));
+}
+
+TEST_F(Sequence, AFolderForEachFrame) {
+    touch({"frame_0001/mesh.obj", "frame_0002/mesh.obj", "frame_0004/other.obj", "textures/a.png", "frame_0001/a.png"});
+    const auto files = files_of("");
+    EXPECT_THAT(files.numbers, ElementsAre(1u, 2u, 4u));
+    EXPECT_EQ(files.paths[2], folder / "frame_0004" / "other.obj");
+    touch({"frame_0001/collision.obj", "frame_0002/collision.obj"});
+    EXPECT_THAT(error(""), AllOf(HasSubstr("frame_0001 with 2 (collision.obj, mesh.obj)"), HasSubstr("hold one mesh")));
+    std::filesystem::rename(folder / "frame_0004/other.obj", folder / "frame_0004/mesh.obj");
+    const auto common = files_of("");
+    EXPECT_EQ(common.paths[0], folder / "frame_0001" / "mesh.obj");
+    ASSERT_EQ(common.remarks.size(), 1u);
+    EXPECT_THAT(common.remarks[0].text, HasSubstr("mesh.obj is taken"));
+    EXPECT_THAT(files_of("", {{"collision*"}}).remarks, IsEmpty());
+}
+
+TEST_F(Sequence, AFolderAroundACaptureSaysWhichToName) {
+    touch({"meshes/1.ply", "meshes/2.ply", "readme.txt"});
+    EXPECT_THAT(error(""), HasSubstr("name one of them, such as " + (folder / "meshes").string()));
+}
+
+TEST_F(Sequence, NamedFilesAsAShellSortsThemAreTakenByNumber) {
+    touch_numbered("f", ".ply", 0, 11);
+    std::vector<std::string> names;
+    for (const auto& path : files_of("").paths) names.push_back(path.string());
+    std::sort(names.begin(), names.end());
+    const auto sorted = find_sequence(names);
+    ASSERT_TRUE(sorted) << sorted.error().message;
+    EXPECT_EQ(sorted->paths, files_of("").paths);
+    EXPECT_EQ(sorted->numbers.size(), 12u);
+    ASSERT_EQ(sorted->remarks.size(), 1u);
+    EXPECT_FALSE(sorted->remarks[0].is_loss);
+    std::reverse(names.begin(), names.end());
+    const auto given = find_sequence(names);
+    ASSERT_TRUE(given);
+    EXPECT_EQ(given->paths[0].filename(), "f9.ply");
+    ASSERT_EQ(given->remarks.size(), 1u);
+    EXPECT_TRUE(given->remarks[0].is_loss);
+    EXPECT_THAT(given->remarks[0].text, HasSubstr("in the order given"));
+}
+
+TEST_F(Sequence, NamedFilesThatAreCalledAlikeAreNumberedByTheirFolders) {
+    touch({"frame_2/mesh.obj", "frame_10/mesh.obj"});
+    const auto files =
+        find_sequence(std::vector{(folder / "frame_2/mesh.obj").string(), (folder / "frame_10/mesh.obj").string()});
+    ASSERT_TRUE(files);
+    EXPECT_THAT(files->numbers, ElementsAre(2u, 10u));
+}
+
+TEST_F(Sequence, NumbersBelowZeroCountFromTheLowest) {
+    touch({"f-2.ply", "f-1.ply", "f0.ply", "f1.ply"});
+    for (const char* what : {"", "f%d.ply"}) {
+        EXPECT_THAT(found(what), ElementsAre("f-2.ply", "f-1.ply", "f0.ply", "f1.ply"));
+        EXPECT_THAT(files_of(what).numbers, ElementsAre(0u, 1u, 2u, 3u));
+        EXPECT_EQ(files_of(what).remarks.size(), 1u);
+    }
 }
 
 }  // namespace

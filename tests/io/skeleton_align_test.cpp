@@ -116,7 +116,7 @@ TEST(AlignSkeleton, AShorterSkeletonIsHeldAndALongerOneCutAndBothAreSaid) {
     ASSERT_TRUE(held);
     EXPECT_EQ(first_x(held, 4), 20);
     EXPECT_FALSE(held->poses[4].found[0]);
-    EXPECT_THAT(held->notes, Contains(HasSubstr("does not cover 2 mesh frames of 5")));
+    EXPECT_THAT(held->notes, Contains(HasSubstr("does not cover 2 mesh frames of 5 at the ends, frames 3 to 4")));
     AlignOptions first_three;
     first_three.used = 3;
     EXPECT_THAT(align(moving_bone(3, 30), mesh_at(5, 30), first_three)->notes,

@@ -102,10 +102,7 @@ TEST(SkeletonAzure, ErrorsNameTheFrameAndTheJoint) {
     EXPECT_THAT(skeleton_from_azure(bad).error().message,
                 HasSubstr("orientation of joint 2 \"SPINE_CHEST\": is not a unit"));
     bad = good;
-    bad["frames"][1]["timestamp_usec"] = 500000;
-    EXPECT_THAT(skeleton_from_azure(bad).error().message, HasSubstr("frame 1"));
-    bad = good;
-    bad["frames"][1] = nullptr;
+    bad["frames"][1] = 7;
     EXPECT_THAT(skeleton_from_azure(bad).error().message, HasSubstr("frame 1"));
     bad = good;
     bad["frames"][1]["bodies"] = 7;
@@ -141,6 +138,98 @@ TEST(SkeletonAzure, WithoutOrientationsOrTimestampsItStillReads) {
     EXPECT_THAT(track->timestamps, ElementsAre(0, 1 / 30.0));
     EXPECT_TRUE(track->poses[0].orientations.empty());
     EXPECT_THAT(track->notes, Contains(HasSubstr("30 fps")));
+}
+
+TEST(SkeletonAzure, TimestampsThatAreMissingOrOutOfOrderAreInterpolated) {
+    json document = capture({});
+    for (int t = 0; t < 8; ++t) document["frames"].push_back(frame(t, {body(1, t)}));
+    auto& frames = document["frames"];
+    frames[0].erase("timestamp_usec");
+    frames[2]["timestamp_usec"] = frames[1]["timestamp_usec"];
+    frames[3]["timestamp_usec"] = nullptr;
+    frames[5]["timestamp_usec"] = 1000000000000000;
+    frames[7]["timestamp_usec"] = 3;
+    const auto track = skeleton_from_azure(document);
+    ASSERT_TRUE(track) << track.error().message;
+    for (std::size_t t = 0; t < 8; ++t) EXPECT_NEAR(track->timestamps[t], 0.033333 * static_cast<double>(t), 1e-9) << t;
+    EXPECT_TRUE(track->rate_is_known);
+    EXPECT_THAT(track->notes, Contains(HasSubstr("In 5 of 8 frames")));
+    for (auto& f : frames) f["timestamp_usec"] = 7;
+    const auto equal = skeleton_from_azure(document);
+    ASSERT_TRUE(equal);
+    EXPECT_FALSE(equal->rate_is_known);
+    EXPECT_THAT(equal->notes, Contains(HasSubstr("30 fps")));
+}
+
+TEST(SkeletonAzure, AFrameThatIsNullIsMissing) {
+    json document = capture({frame(0, {body(1, 0)}), frame(1, {body(1, 1)}), frame(2, {body(1, 2)})});
+    document["frames"][1] = nullptr;
+    const auto track = skeleton_from_azure(document);
+    ASSERT_TRUE(track) << track.error().message;
+    EXPECT_TRUE(track->poses[1].joints.empty());
+    EXPECT_NEAR(track->timestamps[1], 0.033333, 1e-9);
+}
+
+TEST(SkeletonAzure, ABodyThatTheTrackerTookForANewOneIsTheSame) {
+    const auto track =
+        skeleton_from_azure(capture({frame(0, {body(1, 10)}), frame(1, {body(1, 11)}), frame(2, {}),
+                                     frame(3, {body(2, 13), body(7, 4000)}), frame(4, {body(7, 4001)})}));
+    ASSERT_TRUE(track) << track.error().message;
+    EXPECT_EQ(track->poses[3].joints[0][0], 13);
+    EXPECT_TRUE(track->poses[4].joints.empty()) << "somebody else";
+    EXPECT_THAT(track->notes, Contains(HasSubstr("a tracker that lost it: 2.")));
+}
+
+TEST(SkeletonAzure, MembersAndJointsMayBeWrittenOtherwise) {
+    json document = capture({frame(0, {body(1, 5)}), frame(1, {body(1, 6)})});
+    const auto expected = skeleton_from_azure(document);
+    json other = {{"JointNames", json::array()}, {"Frames", json::array()}};
+    for (const auto& name : expected->skeleton.joint_names) other["JointNames"].push_back("K4ABT_JOINT_" + name);
+    for (const auto& f : document["frames"]) {
+        json positions = json::array();
+        for (const auto& p : f["bodies"][0]["joint_positions"])
+            positions.push_back({{"X", p[0]}, {"Y", p[1]}, {"Z", p[2]}});
+        const json person = {{"bodyId", 1}, {"JointPositions", positions}};
+        other["Frames"].push_back({{"timestampUsec", f["timestamp_usec"]}, {"Bodies", json::array({person})}});
+    }
+    const auto track = parse_skeleton_azure("\xEF\xBB\xBF" + other.dump());
+    ASSERT_TRUE(track) << track.error().message;
+    EXPECT_TRUE(looks_like_azure(other));
+    EXPECT_EQ(track->skeleton.bones.size(), 31u);
+    EXPECT_EQ(track->poses[1].joints, expected->poses[1].joints);
+    EXPECT_EQ(track->timestamps, expected->timestamps);
+}
+
+TEST(SkeletonAzure, BodiesMayHaveFewerJoints) {
+    json document = capture({frame(0, {body(1, 5)})});
+    auto& positions = document["frames"][0]["bodies"][0]["joint_positions"];
+    document["frames"][0]["bodies"][0].erase("joint_orientations");
+    for (int j = 0; j < 6; ++j) positions.erase(positions.size() - 1);
+    const auto early = skeleton_from_azure(document);
+    ASSERT_TRUE(early) << early.error().message;
+    EXPECT_EQ(early->skeleton.joint_names.size(), 26u);
+    EXPECT_EQ(early->skeleton.joint_names[8], "CLAVICLE_RIGHT");
+    EXPECT_EQ(early->skeleton.joint_names[20], "HEAD");
+    EXPECT_EQ(early->skeleton.bones.size(), 25u);
+    document["joint_names"] = {"PELVIS", "SPINE_NAVEL", "SPINE_CHEST", "NECK", "HEAD"};
+    document["bone_list"] = json::array();
+    for (const std::size_t end : {1u, 2u, 4u}) document["bone_list"].push_back(json::array({end - 1, end}));
+    while (positions.size() > 4) positions.erase(positions.size() - 1);
+    const auto named = skeleton_from_azure(document);
+    ASSERT_TRUE(named) << named.error().message;
+    EXPECT_EQ(named->skeleton.joint_names.size(), 4u);
+    EXPECT_EQ(named->skeleton.bones.size(), 2u);
+}
+
+TEST(SkeletonAzure, NaNIsNotTracked) {
+    const auto track =
+        parse_skeleton_azure(R"({"joint_names": ["PELVIS", "SPINE_NAVEL"], "frames": [{"timestamp_usec": 1,
+        "bodies": [{"body_id": 1, "joint_positions": [[NaN, 1, -Infinity], [1, 2, 3]],
+                    "joint_orientations": [[nan, 0, 0, 0], [1, 0, 0, 0]]}]}]})");
+    ASSERT_TRUE(track) << track.error().message;
+    EXPECT_THAT(track->poses[0].found, ElementsAre(false, true));
+    EXPECT_EQ(track->poses[0].orientations[0], unknown_orientation);
+    EXPECT_FALSE(parse_skeleton_azure(R"({"frames": [never]})"));
 }
 
 TEST(SkeletonAzure, ATextThatIsCutAnywhereIsAnError) {

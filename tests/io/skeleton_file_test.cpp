@@ -35,6 +35,9 @@ TEST(SkeletonFile, TheFormatIsToldByTheContent) {
             ASSERT_EQ(track->poses.size(), 1u);
             EXPECT_EQ(track->poses[0].joints[1], (Vector3d{0, 1000, 0}));
         }
+    std::string commented = "# recorded\r\n// today\n";
+    commented += bvh;
+    EXPECT_TRUE(parse_skeleton(commented));
     EXPECT_FALSE(parse_skeleton(""));
     EXPECT_FALSE(parse_skeleton(" \n\t "));
     EXPECT_FALSE(parse_skeleton("\x89PNG"));

@@ -95,6 +95,15 @@ TEST(TextureColours, BothSidesOfASeamBecomeOneVertex) {
     EXPECT_EQ(whole.colours, colours_from_texture(square(), image));
 }
 
+TEST(TextureColours, ColoursOfVerticesMultiplyThoseOfTheTextureInLight) {
+    Mesh mesh = square(true);
+    mesh.colours.assign(6, {255, 255, 255});
+    mesh.colours[1] = {128, 0, 255};
+    const Mesh made = with_vertex_colours({mesh, std::make_shared<const Image>(samples::plain(8, 8, {128, 128, 128}))});
+    EXPECT_EQ(made.colours[0], (Colour{128, 128, 128}));
+    EXPECT_EQ(made.colours[1], (Colour{61, 0, 128}));
+}
+
 TEST(TextureColours, VerticesWithOtherNormalsStayApart) {
     Mesh mesh = square(true);
     mesh.normals.assign(4, {0, 0, 1});

@@ -265,16 +265,190 @@ TEST_F(TextureFile, MistakesAreToldInOneSentence) {
                 HasSubstr("alone.obj: no image was found for it"));
 }
 
-TEST_F(TextureFile, SeveralImagesOfAMeshAreNotReadHalf) {
+// The colour of the mesh's texture, or of its vertices where it has none, at the first corner of each triangle.
+std::vector<Colour> colours_of_triangles(const Result<TexturedMesh>& made) {
+    std::vector<Colour> out;
+    EXPECT_TRUE(made.has_value()) << (made ? "" : made.error().message);
+    if (!made) return out;
+    for (const auto& triangle : made->mesh.triangles) {
+        Colour& colour = out.emplace_back();
+        if (!made->texture) {
+            if (!made->mesh.colours.empty()) colour = made->mesh.colours[triangle[0]];
+            continue;
+        }
+        const auto& at = made->mesh.texcoords[triangle[0]];
+        const auto seen = internal::ImagePyramid(*made->texture).at(at[0], at[1]);
+        for (std::size_t c = 0; c < 3; ++c) colour[c] = static_cast<std::uint8_t>(std::lround(seen[c]));
+    }
+    return out;
+}
+
+std::vector<std::string> abouts(const MeshFindings& findings) {
+    std::vector<std::string> out;
+    for (const auto& said : findings.remarks) out.push_back(said.about + (said.is_loss ? " (loss)" : ""));
+    return out;
+}
+
+TEST_F(TextureFile, SeveralImagesOfAMeshGoIntoOne) {
     image("a.png", red);
     image("b.png", green);
-    mesh("m.mtl", "newmtl one\nmap_Kd a.png\nnewmtl two\nmap_Kd b.png\nnewmtl bare\n");
+    mesh("m.mtl", "newmtl one\nmap_Kd a.png\nnewmtl two\nmap_Kd b.png\nnewmtl bare\nKd 0 0 1\n");
     const std::string begin = "mtllib m.mtl\nusemtl one\n" + std::string(obj);
     mesh("a.obj", begin + "usemtl two\nf 1/1 3/3 2/2\n");
-    EXPECT_THAT(error_of(read("a.obj")), HasSubstr("its parts have 2 images"));
+    EXPECT_EQ(colours_of_triangles(read("a.obj")), (std::vector{red, green}));
+    EXPECT_EQ(name, (folder / "a.png").string() + " and 1 more");
     EXPECT_EQ(colour_of(read("a.obj", 0, {"b.png", {}})), green) << "one that was baked for all";
     mesh("a.obj", begin + "usemtl bare\nf 1/1 3/3 2/2\n");
-    EXPECT_THAT(error_of(read("a.obj")), HasSubstr("a part of the mesh has an image and another has none"));
+    EXPECT_EQ(colours_of_triangles(read("a.obj")), (std::vector{red, Colour{0, 0, 255}}));
+    EXPECT_THAT(error_of(read("a.obj", 0, {"", TextureOrigin::by_format, true})),
+                HasSubstr("a part of the mesh has an image and another has none; files are kept where one image"));
+    mesh("a.obj", begin + "usemtl two\nf 1/1 3/3 2/2\n");
+    EXPECT_THAT(error_of(read("a.obj", 0, {"", TextureOrigin::by_format, true})),
+                HasSubstr("its parts have 2 images;"));
+    fs::remove(folder / "b.png");
+    EXPECT_THAT(error_of(read("a.obj")), HasSubstr("its image \"b.png\" is not in its folder"));
+}
+
+TEST_F(TextureFile, FramesWithTheSameImagesShareTheirAtlas) {
+    image("a.png", red);
+    image("b.png", green);
+    mesh("m.mtl", "newmtl one\nmap_Kd a.png\nnewmtl two\nmap_Kd b.png\n");
+    const std::string vertices = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 0.75\n";
+    mesh("f1.obj", vertices + "usemtl one\nf 1/1 2/2 3/3\nusemtl two\nf 1/1 3/3 2/2\n");
+    mesh("f2.obj", vertices + "usemtl two\nf 1/1 3/3 2/2\nusemtl one\nf 1/1 2/2 3/3\n");
+    auto textures = TextureFiles::open({}, *find_sequence((folder / "f%d.obj").string()));
+    const auto first = textures->read(0, TextureUse::where_colourless);
+    const auto second = textures->read(1, TextureUse::where_colourless);
+    EXPECT_EQ(colours_of_triangles(first), (std::vector{red, green}));
+    EXPECT_EQ(colours_of_triangles(second), (std::vector{green, red})) << "in whichever order the materials come";
+    EXPECT_EQ(first->texture, second->texture);
+}
+
+TEST_F(TextureFile, ColoursOfMaterialsAreThoseOfVertices) {
+    mesh("m.mtl", "newmtl one\nKd 1 0 0\nnewmtl two\nKd 0 0 1\nnewmtl grey\nKd 0.8 0.8 0.8\n");
+    const std::string vertices = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\n";
+    mesh("a.obj", vertices + "usemtl one\nf 1 2 3\nusemtl two\nf 4 5 6\n");
+    EXPECT_EQ(colours_of_triangles(read("a.obj")), (std::vector{Colour{255, 0, 0}, Colour{0, 0, 255}}));
+    mesh("a.obj", vertices + "usemtl grey\nf 1 2 3\nf 4 5 6\n");
+    EXPECT_TRUE(read("a.obj")->mesh.colours.empty()) << "a grey that programs write where none was chosen";
+    mesh("a.obj", "v 0 0 0 0 1 0\nv 1 0 0 0 1 0\nv 0 1 0 1 1 0\nmtllib m.mtl\nusemtl one\nf 1 2 3\n");
+    EXPECT_EQ(colours_of_triangles(read("a.obj")), (std::vector{Colour{0, 255, 0}})) << "vertices' own come first";
+}
+
+TEST_F(TextureFile, MaterialFilesAreFoundAsProgramsNameThem) {
+    image("tex.png", green);
+    mesh("take #3.mtl", "newmtl skin\nmap_Kd TEX.PNG\n");
+    mesh("other.mtl", "newmtl other\nKd 1 0 0\n");
+    fs::create_directories(folder / "materials");
+    image("materials/own.png", blue);
+    mesh("materials/own.mtl", "newmtl skin\nmap_Kd own.png\n");
+    const auto with = [&](const std::string& lines) {
+        mesh("a.obj", lines + "\nusemtl skin\n" + obj);
+        return colour_of(read("a.obj"));
+    };
+    EXPECT_EQ(with("mtllib other.mtl\nmtllib ./TAKE #3.mtl"), green);
+    EXPECT_EQ(with("mtllib other.mtl take #3.mtl"), green);
+    EXPECT_EQ(with("mtllib \"take #3.mtl\""), green);
+    EXPECT_EQ(with("mtllib take%20%233.mtl"), green);
+    EXPECT_EQ(with("mtllib materials/own.mtl"), blue) << "its images lie beside it";
+}
+
+TEST_F(TextureFile, MaterialsThatAreNotThereAreTold) {
+    const auto said_of = [&](const std::string& lines) {
+        mesh("a.obj", lines + "\nusemtl skin\n" + obj);
+        auto textures = TextureFiles::open({}, *find_sequence((folder / "a.obj").string()));
+        EXPECT_TRUE(textures->read(0, TextureUse::where_colourless).has_value());
+        return textures->findings();
+    };
+    mesh("m.mtl", "newmtl hair\n");
+    const auto missing = said_of("mtllib gone.mtl");
+    EXPECT_THAT(abouts(missing), testing::ElementsAre("material-file (loss)", "no-image"));
+    EXPECT_EQ(missing.remarks[0].text, "its material file \"gone.mtl\" is not in its folder (" + folder.string() + ")");
+    const auto unknown = said_of("mtllib m.mtl");
+    EXPECT_THAT(abouts(unknown), testing::ElementsAre("material (loss)", "no-image"));
+    EXPECT_EQ(unknown.remarks[0].text, "its material \"skin\" is in none of its material files");
+    mesh("m.mtl", "newmtl skin\nmap_Ka a.png\n");
+    image("a.png", red);
+    EXPECT_THAT(abouts(said_of("mtllib m.mtl")), testing::ElementsAre("substitute-image"));
+    mesh("m.mtl", "newmtl skin\nmap_Kd -s 2 2 2 a.png\n");
+    EXPECT_THAT(abouts(said_of("mtllib m.mtl")), testing::ElementsAre("placed-image"));
+    EXPECT_THAT(abouts(said_of("mtllib gone.mtl")), testing::ElementsAre("material-file"))
+        << "the image beside it is taken";
+}
+
+TEST_F(TextureFile, OneColourAtAllVerticesIsNoReasonAgainstTheImage) {
+    const std::string rest = "vt 0 0\nvt 1 0\nvt 0 0.75\nf 1/1 2/2 3/3\n";
+    mesh("a.obj", "v 0 0 0 1 1 1\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\n" + rest);
+    EXPECT_EQ(read("a.obj")->mesh.colours, (std::vector<Colour>(3, {255, 255, 255}))) << "without an image it stays";
+    image("a.png", red);
+    EXPECT_EQ(colour_of(read("a.obj")), red);
+    EXPECT_TRUE(read("a.obj")->mesh.colours.empty());
+    mesh("a.obj", "v 0 0 0 1 1 0\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\n" + rest);
+    EXPECT_EQ(colour_of(read("a.obj")), Colour{}) << "different ones come first";
+}
+
+TEST_F(TextureFile, ColoursThatMultiplyTheImageStayWithIt) {
+    image("a.png", {255, 128, 128});
+    const auto read_with = [&](const std::vector<Colour>& colours) {
+        Mesh triangle;
+        triangle.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+        triangle.texcoords = {{0, 0}, {1, 0}, {0, 0.75f}};
+        triangle.triangles = {{0, 1, 2}};
+        triangle.colours = colours;
+        MeshFindings findings;
+        findings.texture.images = {{"a", *read_file(folder / "a.png")}};
+        findings.texture.parts = {{{}, 0, Colour{255, 255, 0}}};
+        findings.texture.colours_multiply = true;
+        auto textures = TextureFiles::open({});
+        return textures->with_image(triangle, 0, findings, TextureUse::where_colourless);
+    };
+    const auto constant = read_with({{128, 255, 255}, {128, 255, 255}, {128, 255, 255}});
+    EXPECT_EQ(colour_of(constant), (Colour{128, 128, 0})) << "one for all is part of the image";
+    EXPECT_TRUE(constant->mesh.colours.empty());
+    const std::vector<Colour> different{{255, 255, 255}, {128, 255, 255}, {0, 255, 255}};
+    const auto kept = read_with(different);
+    EXPECT_EQ(colour_of(kept), (Colour{255, 128, 0}));
+    EXPECT_EQ(kept->mesh.colours, different);
+}
+
+TEST_F(TextureFile, ImagesThatAreTooLargeAreMadeSmaller) {
+    write_bytes(folder / "a.png", *write_png_image(plain(8192, 16, red)));
+    mesh("a.obj", obj);
+    auto textures = TextureFiles::open({}, *find_sequence((folder / "a.obj").string()));
+    const auto made = textures->read(0, TextureUse::where_colourless);
+    EXPECT_EQ(colour_of(made), red);
+    EXPECT_EQ(made->texture->width, 4096);
+    EXPECT_EQ(made->texture->height, 8);
+    EXPECT_THAT(abouts(textures->findings()), testing::ElementsAre("image-size"));
+    EXPECT_THAT(error_of(read("a.obj", 0, {"", TextureOrigin::by_format, true})),
+                HasSubstr("8192 x 16 pixels, more than"));
+}
+
+TEST_F(TextureFile, DamagedImagesAreToldOnceForEachMesh) {
+    Image noise = plain(64, 64, red);
+    for (std::size_t i = 0; i < noise.rgb.size(); ++i)
+        noise.rgb[i] = static_cast<std::uint8_t>(i * i * 2654435761u >> 13);
+    auto jpeg = *write_jpeg_image(noise);
+    jpeg.resize(jpeg.size() * 8 / 10);
+    write_bytes(folder / "a.jpg", jpeg);
+    mesh("a.obj", obj);
+    auto textures = TextureFiles::open({}, *find_sequence((folder / "a.obj").string()));
+    for (int reading = 0; reading < 2; ++reading) {
+        ASSERT_TRUE(textures->read(0, TextureUse::where_colourless).has_value());
+        EXPECT_THAT(abouts(textures->findings()), testing::ElementsAre("image-damage (loss)"));
+        EXPECT_THAT(textures->findings().remarks[0].text, HasSubstr("a.jpg) is cut off: the last "));
+    }
+}
+
+TEST_F(TextureFile, SizesAndKindsMayChangeFromFrameToFrame) {
+    for (const char* file : {"f1.obj", "f2.obj", "f3.obj"}) mesh(file, obj);
+    write_bytes(folder / "f1.png", *write_png_image(plain(8, 4, red)));
+    write_bytes(folder / "f2.jpg", *write_jpeg_image(plain(16, 16, green)));
+    write_bytes(folder / "f3.webp", samples::webp_of(plain(5, 9, blue)));
+    EXPECT_EQ(colour_of(read("f%d.obj", 0)), red);
+    EXPECT_NEAR(colour_of(read("f%d.obj", 1))[1], green[1], 3);
+    EXPECT_EQ(read("f%d.obj", 1)->texture->width, 16);
+    EXPECT_EQ(colour_of(read("f%d.obj", 2)), blue);
 }
 
 }  // namespace

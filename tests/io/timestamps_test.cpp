@@ -42,6 +42,24 @@ TEST(Time, IsSecondsUnlessItSaysOtherwise) {
         EXPECT_FALSE(parse_time(bad, film)) << bad;
 }
 
+TEST(Time, NumbersTooLargeForSecondsAreFinerUnits) {
+    for (const char* text : {"1700000000.125", "1700000000125", "1700000000125000", "1700000000125000000",
+                             "1700000000125000000 ns", "2023-11-14T22:13:20.125Z"})
+        EXPECT_EQ(time_of(text), 1700000000125000) << text;
+}
+
+TEST(Time, DatesCountFrom1970) {
+    EXPECT_EQ(time_of("1970-01-01T00:00:00Z"), 0);
+    EXPECT_EQ(time_of("1970-01-02"), 86400000000);
+    EXPECT_EQ(time_of("1969-12-31T23:59:59.5"), -500000);
+    EXPECT_EQ(time_of("2024-02-29 12:00:00"), 1709208000000000);
+    EXPECT_EQ(time_of("2024-03-01T00:00Z"), 1709251200000000);
+    EXPECT_EQ(time_of("2024-01-31T12:05:01.123+01:00"), time_of("2024-01-31T11:05:01.123Z"));
+    EXPECT_EQ(time_of("20240131T120501.123Z"), time_of("2024-01-31 12:05:01,123"));
+    for (const char* bad : {"2024-13-01", "2024-01-31T25:00:00", "2024-01-31T12:00:00+1", "2024-01-31x", "2024-01-3"})
+        EXPECT_FALSE(parse_time(bad, film)) << bad;
+}
+
 TEST(Time, TimecodeCountsFramesAtTheRate) {
     EXPECT_EQ(time_of("00:00:01:12", film), 1500000);
     EXPECT_EQ(time_of("00:00:01:00", ntsc), 1001000) << "30 frames, which take a little longer than a second";
@@ -101,10 +119,28 @@ TEST_F(FrameTimesFile, NumbersAndNamedColumns) {
     }
 }
 
+TEST_F(FrameTimesFile, AsSpreadsheetsAndLoggersWriteThem) {
+    for (const char* text :
+         {"\xEF\xBB\xBF"
+          "frame,timestamp\r\n7,0\r\n9,0.5\r\n",
+          "Frame;Time [s]\n7;0,0\n9;0,5\n", "sep=;\nFrame;Time\n7;0\n9;0,5\n", "frame\ttime_ms\r7\t0,0\r9\t500,0\r",
+          "\"Frame\",\"Timestamp (us)\"\n\"7\",\"0\"\n\"9\",\"500000\"\n",
+          "FRAME,TIMESTAMP_NS,note\n7,0,\"a, b\"\n9,500000000,\"c\"\n", "7 0.0\n9 0.5\n", "# a\n7, 0\n# b\n9, 0.5",
+          "7;00:00:00:00\n9;00:00:00:12\n",
+          "\xEF\xBB\xBF[{\"Frame\": 7, \"Timestamp_ns\": 0}, {\"Frame\": 9, \"timestampMs\": 500}]"}) {
+        const auto times = read(text);
+        ASSERT_TRUE(times) << text << ": " << times.error().message;
+        EXPECT_THAT(times->microseconds, ElementsAre(0, 500000)) << text;
+        EXPECT_THAT(times->numbers, ElementsAre(7u, 9u)) << text;
+    }
+    EXPECT_THAT(read("00:00:00;00\n00:00:00;12\n").error().message, HasSubstr("drop-frame"));
+}
+
 TEST_F(FrameTimesFile, JsonLists) {
     EXPECT_THAT(read("[0, 0.25, \"00:00:00:12\"]")->microseconds, ElementsAre(0, 250000, 500000));
     EXPECT_THAT(read("{\"timestamps\": [0, 0.25]}")->microseconds, ElementsAre(0, 250000));
     EXPECT_THAT(read("{\"timestamps_us\": [0, 250000]}")->microseconds, ElementsAre(0, 250000));
+    EXPECT_THAT(read("{\"Timestamps_ns\": [0, 250000000]}")->microseconds, ElementsAre(0, 250000));
 }
 
 TEST_F(FrameTimesFile, WhatItsWriterWritesReadsBack) {
@@ -121,7 +157,7 @@ TEST_F(FrameTimesFile, ErrorsNameTheLine) {
     expect_error("1,2,3\n", "must name them");
     expect_error("", "no times");
     expect_error("[0, null]", "entry 1");
-    expect_error("{\"times\": []}", "timestamps");
+    expect_error("{\"moments\": []}", "timestamps");
     expect_error("[0, ", "JSON");
 }
 

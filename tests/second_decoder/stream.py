@@ -84,7 +84,7 @@ def read_sequence_header(payload):
         header.radii.append(radius)
     header.node_spacing = read.field("I") if version > 1 or len(read.data) - read.at >= 4 else 0
     check(header.node_spacing <= L, "the nodes' spacing is out of range")
-    header.session, header.metadata = 0, []
+    header.session, header.metadata, header.global_shift, optional = 0, [], (0, 0, 0), 0
     if version > 1:
         header.session = read.field("Q")
         header.up, optional = read.field("B"), read.field("B")
@@ -101,6 +101,9 @@ def read_sequence_header(payload):
             raise Unsupported("texture layout %d" % header.layout)
         sizes = range(1, 4097) if header.layout > 0 else [0]
         check(all(side in sizes for side in header.picture), "the size of the pictures is out of range")
+    if optional & 4:
+        header.global_shift = tuple(read.field("q") for _ in range(3))
+        check(all(abs(c) < 2**53 for c in header.global_shift), "the global shift is out of range")
     header.bytes = payload
     return header
 

@@ -130,6 +130,7 @@ SequenceInfo describe(const SequenceHeader& header, std::uint32_t ordinal) {
     if (header.floor)
         info.floor = to_millimetres({*header.floor, *header.floor, *header.floor}, header.lattice)[axis_of(header.up)];
     info.metadata = header.metadata;
+    info.global_shift = header.global_shift;
     info.texture = header.texture;
     info.lattice_step = header.lattice.step();
     info.fps_numerator = header.fps_numerator;

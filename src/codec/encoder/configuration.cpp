@@ -78,6 +78,7 @@ Result<PoseTracker> configure(Configuration& configuration, const Mesh& mesh, co
     header.session = options.session;
     header.up = options.up;
     header.metadata = options.metadata;
+    header.global_shift = options.global_shift;
     if (options.floor) {
         const auto origin_up = static_cast<double>(header.lattice.origin[axis_of(options.up)]);
         const double floor = std::round((*options.floor - origin_up) * units);

@@ -22,6 +22,7 @@
 #include "codec/format/sequence.h"
 #include "core/memory_guard.h"
 #include "core/parallel.h"
+#include "surface/triangle_cleaning.h"
 
 namespace htvm {
 
@@ -51,6 +52,7 @@ struct Encoder::State {
     bool configured = false;  // by Encoder::begin(), or a frame that waits
     bool begun = false, finished = false;
     PoseTracker poses;
+    std::optional<bool> cleans;  // captured triangles; nothing: not decided yet
     std::variant<TrackedStrategy, BonesStrategy> strategy;
     QualityControl control;
     int effort = usual_effort;         // for the next frame
@@ -88,10 +90,27 @@ Result<void> configure(State& state, const Mesh& mesh, const Pose* pose) {
     return {};
 }
 
+bool keeps_normals(const EncoderOptions& options) {
+    if (options.normals != CapturedNormals::automatic) return options.normals == CapturedNormals::keep;
+    return options.profile != Profile::tracked;
+}
+
+// Tracking follows a surface, so its triangles count once and face one way. The first mesh says whether a capture's are
+// to be cleaned: most are not, and looking takes time.
+void clean(State& state, LatticeMesh& mesh) {
+    if (state.configuration.options.profile != Profile::tracked || state.cleans == false) return;
+    if (mesh.triangles.empty()) return;
+    auto cleaned = clean_triangles(mesh.positions, mesh.triangles);
+    if (!state.cleans) state.cleans = needs_cleaning(cleaned, mesh.triangles.size());
+    if (*state.cleans) mesh.triangles = std::move(cleaned.triangles);
+}
+
 Result<CapturedFrame> put_on_lattice(State& state, const Mesh& mesh, const Pose* pose) {
     StageClock clock(state.stages);
     auto on_lattice = to_lattice(mesh, state.configuration.header.lattice);
     if (!on_lattice) return tl::unexpected(on_lattice.error());
+    if (!keeps_normals(state.configuration.options)) on_lattice->normals.clear();
+    clean(state, *on_lattice);
     auto coded_pose = state.poses.next(mesh, pose, state.configuration.header.lattice);
     if (!coded_pose) return tl::unexpected(coded_pose.error());
     clock.done("to the lattice");

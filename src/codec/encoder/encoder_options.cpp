@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::array<const char*, 2> tracked_references = {"intra", "previous"};
 constexpr std::array<const char*, 2> denoising = {"off", "auto"};
+constexpr std::array<const char*, 3> captured_normals = {"auto", "keep", "none"};
 constexpr std::array<const char*, 4> frame_choices = {"fixed", "motion", "rd", "cheaper"};
 constexpr std::array<const char*, 7> up_axes = {"unknown", "x", "-x", "y", "-y", "z", "-z"};
 constexpr std::array<const char*, 2> reference_vertices = {"bone", "any"};
@@ -52,6 +53,15 @@ constexpr Option list[] = {
      .get = [](const EncoderOptions& o) -> double { return o.colour_step; },
      .set = [](EncoderOptions& o, double value) { o.colour_step = value; },
      .flag = "--colour-step"},
+    {.name = "normals",
+     .group = OptionGroup::common,
+     .kind = OptionKind::word,
+     .meaning = "normals that meshes come with; auto: left out with the tracked profile, since its frames between "
+                "I-frames could not keep them and players compute them, and kept by the others",
+     .words = captured_normals,
+     .get = [](const EncoderOptions& o) -> double { return static_cast<double>(o.normals); },
+     .set = [](EncoderOptions& o, double value) { o.normals = static_cast<CapturedNormals>(value); },
+     .flag = "--normals"},
     {.name = "lambda",
      .group = OptionGroup::common,
      .kind = OptionKind::number,

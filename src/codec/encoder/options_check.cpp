@@ -55,6 +55,9 @@ Result<void> check_scene(const EncoderOptions& o) {
     if (o.session > largest_session) return bad("session must be at most 2^53 - 1");
     if (o.floor && o.up == UpAxis::unknown) return bad("the floor is known, but not what is up: set up too");
     if (o.floor && !std::isfinite(*o.floor)) return bad("the floor must be a finite number of millimetres");
+    for (const auto c : o.global_shift)
+        if (c < -most_global_shift || c > most_global_shift)
+            return bad("the global shift must be at most 2^53 - 1 mm either way");
     return check_metadata(o.metadata);
 }
 

@@ -17,7 +17,7 @@ constexpr std::size_t max_name = 255;
 constexpr std::size_t max_joints = 1024;
 
 // Bits that say which optional fields follow.
-constexpr std::uint8_t has_floor = 1, has_metadata = 2;
+constexpr std::uint8_t has_floor = 1, has_metadata = 2, has_global_shift = 4;
 
 std::span<const std::uint8_t> bytes_of(const std::string& text) {
     return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
@@ -74,8 +74,8 @@ Result<std::vector<MetadataEntry>> read_metadata(ByteReader& in) {
     return out;
 }
 
-// What version 2 has behind the spacing of the nodes.
-Result<void> read_what_version_2_added(ByteReader& in, SequenceHeader& out) {
+// What version 2 has behind the spacing of the nodes. Returns the bits of the optional fields.
+Result<std::uint8_t> read_what_version_2_added(ByteReader& in, SequenceHeader& out) {
     out.session = in.u64();
     const auto up = in.u8(), has = in.u8();
     if (up > static_cast<std::uint8_t>(UpAxis::minus_z))
@@ -92,6 +92,15 @@ Result<void> read_what_version_2_added(ByteReader& in, SequenceHeader& out) {
         out.metadata = std::move(*metadata);
     }
     if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
+    return has;
+}
+
+// At the end, where decoders that do not know it leave it.
+Result<void> read_global_shift(ByteReader& in, GlobalShift& out) {
+    for (auto& c : out) c = static_cast<std::int64_t>(in.u64());
+    if (!in.ok()) return fail(ErrorKind::corrupt_stream, "sequence header: it ends too early");
+    if (std::any_of(out.begin(), out.end(), [](auto c) { return c < -most_global_shift || c > most_global_shift; }))
+        return fail(ErrorKind::corrupt_stream, "sequence header: the global shift is out of range");
     return {};
 }
 
@@ -155,7 +164,9 @@ std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
     out.u32(static_cast<std::uint32_t>(header.node_spacing));
     out.u64(header.session);
     out.u8(static_cast<std::uint8_t>(header.up));
-    out.u8(static_cast<std::uint8_t>((header.floor ? has_floor : 0) | (header.metadata.empty() ? 0 : has_metadata)));
+    const bool is_shifted = header.global_shift != GlobalShift{};
+    out.u8(static_cast<std::uint8_t>((header.floor ? has_floor : 0) | (header.metadata.empty() ? 0 : has_metadata) |
+                                     (is_shifted ? has_global_shift : 0)));
     if (header.floor) out.u32(static_cast<std::uint32_t>(*header.floor));
     if (!header.metadata.empty()) write_metadata(out, header.metadata);
     if (header.version >= textured_version) {
@@ -163,6 +174,8 @@ std::vector<std::uint8_t> write_sequence_header(const SequenceHeader& header) {
         out.varint(static_cast<std::uint64_t>(header.texture.width));
         out.varint(static_cast<std::uint64_t>(header.texture.height));
     }
+    if (is_shifted)
+        for (const auto c : header.global_shift) out.u64(static_cast<std::uint64_t>(c));
     return out.take();
 }
 
@@ -226,13 +239,19 @@ Result<SequenceHeader> read_sequence_header(std::span<const std::uint8_t> payloa
             return fail(ErrorKind::corrupt_stream, "sequence header: the nodes' spacing is out of range");
         out.node_spacing = static_cast<std::int32_t>(spacing);
     }
-    if (version > 1)
-        if (auto read = read_what_version_2_added(in, out); !read) return tl::unexpected(read.error());
+    std::uint8_t has = 0;
+    if (version > 1) {
+        const auto read = read_what_version_2_added(in, out);
+        if (!read) return tl::unexpected(read.error());
+        has = *read;
+    }
     if (version >= textured_version) {
         const auto texture = read_texture(in);
         if (!texture) return tl::unexpected(texture.error());
         out.texture = *texture;
     }
+    if (has & has_global_shift)
+        if (auto read = read_global_shift(in, out.global_shift); !read) return tl::unexpected(read.error());
     return out;
 }
 

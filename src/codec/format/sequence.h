@@ -61,6 +61,7 @@ struct SequenceHeader {
     std::optional<std::int32_t> floor;  // coordinate of the floor on the axis that is up, lattice units
     std::vector<MetadataEntry> metadata;
     StreamTexture texture;
+    GlobalShift global_shift{};
 };
 
 // Limits of the metadata: bytes of a key (at least 1), of a value, and in total; number of entries.

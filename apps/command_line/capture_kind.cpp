@@ -1,0 +1,85 @@
+#include "command_line/capture_kind.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "io/mesh_file.h"
+
+namespace htvm::app {
+
+GlobalShift shift_of(const Mesh& mesh, double millimetres_per_unit) {
+    constexpr double far = 64;  // sizes: floats then still have a 250,000th of the size
+    const auto bounds = surface_bounds(mesh);
+    if (!bounds) return {};
+    std::array<double, 3> low{}, high{};
+    for (std::size_t c = 0; c < 3; ++c) {
+        low[c] = static_cast<double>(bounds->low[c]);
+        high[c] = static_cast<double>(bounds->high[c]);
+    }
+    const double size = std::hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    GlobalShift out{};
+    bool is_far = false;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double middle = (low[c] + high[c]) / 2;
+        is_far = is_far || std::abs(middle) > far * size;
+        const double metres = std::round(middle * millimetres_per_unit / 1000);
+        if (!(std::abs(metres) * 1000 < static_cast<double>(most_global_shift))) return {};
+        out[c] = static_cast<std::int64_t>(metres) * 1000;
+    }
+    return is_far ? out : GlobalShift{};
+}
+
+double size_of(const Mesh& mesh) {
+    constexpr std::size_t most = 2048;  // vertices looked at
+    const std::size_t step = mesh.positions.size() / most + 1;
+    std::array<std::vector<float>, 3> along;
+    for (std::size_t v = 0; v < mesh.positions.size(); v += step)
+        for (std::size_t c = 0; c < 3; ++c) along[c].push_back(mesh.positions[v][c]);
+    if (along[0].empty()) return 0;
+    const auto middle_of = [](std::vector<float> values) {
+        const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+        std::nth_element(values.begin(), middle, values.end());
+        return *middle;
+    };
+    std::array<float, 3> middle{};
+    for (std::size_t c = 0; c < 3; ++c) middle[c] = middle_of(along[c]);
+    std::vector<float> distances;
+    for (std::size_t v = 0; v < along[0].size(); ++v)
+        distances.push_back(std::hypot(along[0][v] - middle[0], along[1][v] - middle[1], along[2][v] - middle[2]));
+    return static_cast<double>(middle_of(std::move(distances)));
+}
+
+void CaptureKind::add(const Mesh& mesh, const MeshFindings& findings, bool has_texture) {
+    levels_ += findings.colour_levels;
+    if (mesh.positions.empty()) return;
+    if (size_ == 0) size_ = size_of(mesh);
+    ++meshes_;
+    coloured_ += has_texture || !mesh.colours.empty();
+}
+
+std::optional<ColourRange> CaptureKind::colour_range() const {
+    return levels_.any() ? std::optional(colour_range_of(levels_)) : std::nullopt;
+}
+
+std::string CaptureKind::unlike(const Mesh& mesh, bool has_texture) const {
+    if (meshes_ == 0 || mesh.positions.empty()) return {};
+    const bool are_coloured = 2 * coloured_ >= meshes_, is_coloured = has_texture || !mesh.colours.empty();
+    if (are_coloured && !is_coloured) return "it has no colours, as the other frames have";
+    if (!are_coloured && is_coloured) return "it has colours, which the other frames have not";
+    constexpr double most = 10;  // a person who crouches or spreads the arms changes by less than two
+    const double size = size_of(mesh);
+    if (size_ > 0 && size > 0 && std::max(size / size_, size_ / size) > most)
+        return size < size_ ? fmt::format("it is {:.0f} times smaller than the first frame: of another capture, or in "
+                                          "another unit",
+                                          size_ / size)
+                            : fmt::format("it is {:.0f} times larger than the first frame: of another capture, or in "
+                                          "another unit",
+                                          size / size_);
+    return {};
+}
+
+}  // namespace htvm::app
